@@ -1,0 +1,34 @@
+"""Arrays in, images out. Knows no HTTP, no JSON, no scene document; all names not listed here are private."""
+
+from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays
+from gpu.errors import (
+    CompileError,
+    ContextError,
+    GpuError,
+    NothingRendered,
+    OutOfMemory,
+    SceneTooLarge,
+    WrongThread,
+)
+from gpu.renderer import Renderer
+from gpu.settings import AOVS, ESTIMATORS, FILTERS, SAMPLERS, TONE_MAPS, RenderSettings
+
+__all__ = [
+    "AOVS",
+    "ESTIMATORS",
+    "FILTERS",
+    "SAMPLERS",
+    "TONE_MAPS",
+    "CameraArrays",
+    "CompileError",
+    "ContextError",
+    "EnvironmentArrays",
+    "GpuError",
+    "NothingRendered",
+    "OutOfMemory",
+    "RenderSettings",
+    "Renderer",
+    "SceneArrays",
+    "SceneTooLarge",
+    "WrongThread",
+]

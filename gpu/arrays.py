@@ -1,0 +1,70 @@
+"""A scene as finished arrays: what the renderer takes in. Made by the service, uploaded as it is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from gpu import layout
+from gpu.layout import ShapeKind
+
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class CameraArrays:
+    """A thin-lens camera in the scene's (rebased) coordinates; right, up and forward are orthonormal."""
+
+    position: Vec3
+    right: Vec3
+    up: Vec3
+    forward: Vec3
+    tan_half_vfov: float
+    aperture_radius: float
+    focus_distance: float
+
+
+@dataclass(frozen=True)
+class EnvironmentArrays:
+    """Light from infinity: (h, w, 3) float32 radiance, row 0 at the top (v = 0), latitude-longitude.
+
+    A constant environment is one texel. `probability` (h, w) float32 is the density per steradian with which
+    `alias` (h * w records of `layout.EnvironmentAlias`) picks a direction in that texel, at rotation 0.
+    """
+
+    texels: np.ndarray
+    probability: np.ndarray
+    alias: np.ndarray
+    rotation: float  # radians about +Y
+    scale: float
+    background: bool
+
+
+def _empty(record: type[layout.Record]) -> np.ndarray:
+    return np.zeros(0, record.dtype)
+
+
+@dataclass
+class SceneArrays:
+    """Everything the renderer needs. Shapes of a kind in `bvh_kinds` are met through `nodes`, all others in a loop.
+
+    Positions are relative to `origin` (float64, world): what was subtracted before rounding to float32.
+    """
+
+    camera: CameraArrays
+    materials: np.ndarray  # layout.Material
+    spheres: np.ndarray = field(default_factory=lambda: _empty(layout.Sphere))
+    quads: np.ndarray = field(default_factory=lambda: _empty(layout.Quad))
+    boxes: np.ndarray = field(default_factory=lambda: _empty(layout.Solid))
+    ellipsoids: np.ndarray = field(default_factory=lambda: _empty(layout.Solid))
+    triangles: np.ndarray = field(default_factory=lambda: _empty(layout.Triangle))
+    triangle_normals: np.ndarray = field(default_factory=lambda: _empty(layout.TriangleNormals))  # none: all flat
+    lights: np.ndarray = field(default_factory=lambda: _empty(layout.Light))
+    nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # 8 octants' orders, one after the other
+    node_origin: Vec3 = (0.0, 0.0, 0.0)
+    node_scale: Vec3 = (0.0, 0.0, 0.0)
+    bvh_kinds: frozenset[ShapeKind] = frozenset()
+    environment: EnvironmentArrays | None = None
+    radiance_scale: float = 1.0  # about the largest radiance a picture of it will hold; a power of two
+    origin: Vec3 = (0.0, 0.0, 0.0)

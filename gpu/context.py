@@ -1,0 +1,49 @@
+"""A headless OpenGL context through EGL, or an error that names what is missing."""
+
+from __future__ import annotations
+
+import ctypes.util
+import logging
+from typing import Any
+
+from gpu.errors import ContextError
+
+log = logging.getLogger(__name__)
+
+REQUIRED = 430  # compute shaders and storage buffers
+_SOFTWARE = ("llvmpipe", "softpipe", "swrast")
+
+
+def create(device: int | None = None) -> Any:
+    """A moderngl context of OpenGL 4.3 or later that belongs to the calling thread.
+
+    `device` counts EGL's devices from 0; None takes the default. Raises ContextError naming the package, driver or
+    version that is missing.
+    """
+    import moderngl
+
+    if ctypes.util.find_library("EGL") is None:
+        raise ContextError("libEGL is not installed: on Debian `apt-get install libegl1 libgl1-mesa-dri`")
+    options: dict[str, Any] = {"backend": "egl"} | ({} if device is None else {"device_index": device})
+    try:
+        context = moderngl.create_context(REQUIRED, standalone=True, **options)
+    except Exception as error:  # glcontext raises bare Exception, moderngl several others
+        where = "the default EGL device" if device is None else f"EGL device {device}"
+        raise ContextError(
+            f"no OpenGL {REQUIRED / 100:.1f} context on {where} ({error}): needs a GPU driver with EGL, "
+            "or Mesa's software renderer (on Debian `apt-get install libegl1 libgl1-mesa-dri`)"
+        ) from error
+    log.info("created context renderer=%s version=%s", context.info["GL_RENDERER"], context.info["GL_VERSION"])
+    return context
+
+
+def describe(context: Any) -> dict[str, Any]:
+    """Renderer, version and vendor as the driver says them; `software`: it runs on the CPU."""
+    info = context.info
+    renderer = str(info["GL_RENDERER"])
+    return {
+        "renderer": renderer,
+        "version": str(info["GL_VERSION"]),
+        "vendor": str(info["GL_VENDOR"]),
+        "software": any(s in renderer.lower() for s in _SOFTWARE),
+    }

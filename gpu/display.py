@@ -1,0 +1,49 @@
+"""Pictures for the eye of what is not colour, and which pixels the noise meter looks at. Runs without GL."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def srgb(linear: np.ndarray) -> np.ndarray:
+    """sRGB encoding of 0..1 [IEC 61966-2-1]; clips."""
+    x = np.clip(linear, 0, 1)
+    out: np.ndarray = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 1e-12) ** (1 / 2.4) - 0.055)
+    return out
+
+
+def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
+    """(h, w, c) of an AOV as (h, w, 4) display values, opaque: albedo sRGB, normal .5 + .5 n, depth and variance
+    divided by their maximum."""
+    if aov == "albedo":
+        shown = srgb(values)
+    elif aov == "normal":
+        shown = 0.5 + 0.5 * values
+    else:
+        top = float(values.max(initial=0))
+        shown = values / top if top > 0 else values
+    if shown.shape[2] == 1:
+        shown = np.repeat(shown, 3, axis=2)
+    out = np.ones((*values.shape[:2], 4), np.float32)
+    out[..., :3] = np.clip(shown, 0, 1)
+    return out if dtype == "f4" else np.round(out * 255).astype(np.uint8)
+
+
+def _hash(x: np.ndarray) -> np.ndarray:
+    """`sobol_hash` of shaders/sobol.glsl."""
+    low = np.uint64(0xFFFFFFFF)
+    s = (x * np.uint64(747796405) + np.uint64(2891336453)) & low
+    w = (((s >> ((s >> np.uint64(28)) + np.uint64(4))) ^ s) * np.uint64(277803737)) & low
+    out: np.ndarray = (w >> np.uint64(22)) ^ w
+    return out
+
+
+def meter_pixels(cells: tuple[int, int], stride: int, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+    """x and y of the pixel that stands for each cell, row by row: `camera_pixel` of shaders/camera.glsl."""
+    y, x = (a.astype(np.uint64) for a in np.divmod(np.arange(cells[0] * cells[1]), cells[0]))
+    h = _hash(x ^ _hash(y)) if stride > 1 else np.zeros(len(x), np.uint64)
+    px = np.minimum(x * np.uint64(stride) + h % np.uint64(stride), np.uint64(size[0] - 1)).astype(np.int64)
+    py = np.minimum(y * np.uint64(stride) + (h >> np.uint64(8)) % np.uint64(stride), np.uint64(size[1] - 1)).astype(
+        np.int64
+    )
+    return px, py

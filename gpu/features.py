@@ -1,0 +1,94 @@
+"""Which code a scene needs: a table, flag -> question about the arrays.
+
+A flag only removes code that the scene cannot reach; choices that change pixels are settings (`defines`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from gpu import layout
+from gpu.arrays import SceneArrays
+from gpu.layout import LightKind, Model, ShapeKind
+from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
+
+FILTER_TABLE_SIZE = 512
+
+
+def _linear(kind: ShapeKind, records: str) -> Callable[[SceneArrays], bool]:
+    return lambda s: len(getattr(s, records)) > 0 and kind not in s.bvh_kinds
+
+
+def _tree(kind: ShapeKind) -> Callable[[SceneArrays], bool]:
+    return lambda s: kind in s.bvh_kinds
+
+
+def _light(kind: LightKind) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((s.lights["kind"] == kind).any())
+
+
+def _model(model: Model) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((s.materials["model"] == model).any())
+
+
+def _disney(member: str) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool(((s.materials["model"] == Model.DISNEY) & (s.materials[member] > 0)).any())
+
+
+FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
+    "HAS_SPHERES": _linear(ShapeKind.SPHERE, "spheres"),
+    "HAS_QUADS": _linear(ShapeKind.QUAD, "quads"),
+    "HAS_BOXES": _linear(ShapeKind.BOX, "boxes"),
+    "HAS_ELLIPSOIDS": _linear(ShapeKind.ELLIPSOID, "ellipsoids"),
+    "HAS_TRIANGLES": _linear(ShapeKind.TRIANGLE, "triangles"),
+    "HAS_BVH": lambda s: bool(s.bvh_kinds),
+    "HAS_BVH_SPHERES": _tree(ShapeKind.SPHERE),
+    "HAS_BVH_QUADS": _tree(ShapeKind.QUAD),
+    "HAS_BVH_BOXES": _tree(ShapeKind.BOX),
+    "HAS_BVH_ELLIPSOIDS": _tree(ShapeKind.ELLIPSOID),
+    "HAS_BVH_TRIANGLES": _tree(ShapeKind.TRIANGLE),
+    "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
+    "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
+    "HAS_MANY_MATERIALS": lambda s: len(s.materials) > 1,
+    "HAS_EMISSION": lambda s: bool((s.materials["emission"] > 0).any()),
+    "HAS_LIGHTS": lambda s: len(s.lights) > 0,
+    "HAS_MANY_LIGHTS": lambda s: len(s.lights) > 1,
+    "HAS_POINT_LIGHTS": _light(LightKind.POINT),
+    "HAS_SPHERE_LIGHTS": _light(LightKind.SPHERE),
+    "HAS_QUAD_LIGHTS": _light(LightKind.QUAD),
+    "HAS_TRIANGLE_LIGHTS": _light(LightKind.TRIANGLE),
+    "HAS_ELLIPSOID_LIGHTS": _light(LightKind.ELLIPSOID),
+    "HAS_ENVIRONMENT": lambda s: s.environment is not None,
+    "HAS_ENVIRONMENT_IMAGE": lambda s: s.environment is not None and s.environment.texels.size > 3,
+    "HAS_APERTURE": lambda s: s.camera.aperture_radius > 0,
+    "HAS_DISNEY": _model(Model.DISNEY),
+    "HAS_SUBSURFACE": _disney("subsurface"),
+    "HAS_SHEEN": _disney("sheen"),
+    "HAS_ANISOTROPIC": _disney("anisotropic"),
+    "HAS_CLEARCOAT": _disney("clearcoat"),
+}
+
+# What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
+# ever waits for a compiler.
+EDITED = {"HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")}
+
+
+def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
+    """The flags that `scene` raises; with `editing`, also those that an edit of its materials could."""
+    raised = {name for name, asks in FLAGS.items() if asks(scene)}
+    if editing:
+        raised |= {more for name in raised & set(EDITED) for more in EDITED[name]}
+    return frozenset(raised)
+
+
+def defines(raised: frozenset[str], settings: RenderSettings | None = None) -> dict[str, int]:
+    """Every flag as 0 or 1, and the settings that are compiled in."""
+    out = {name: int(name in raised) for name in FLAGS}
+    out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
+    out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
+    out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)
+    out["ESTIMATOR"] = ESTIMATORS.index(settings.estimator) if settings else 0
+    out["SAMPLER"] = SAMPLERS.index(settings.sampler) if settings else 0
+    return out

@@ -1,0 +1,33 @@
+"""Pixel filters as inverse distributions: where in the pixel's neighbourhood a sample falls."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+RADIUS = {"box": 0.5, "tent": 1.0, "gaussian": 2.0, "blackman_harris": 1.5}  # pixels
+_GAUSSIAN_SIGMA = 0.5
+
+
+def profile(name: str, x: np.ndarray) -> np.ndarray:
+    """The filter's weight, not normalised, at distances x (pixels) along one axis; 0 beyond its radius."""
+    t = np.abs(x) / RADIUS[name]
+    if name == "box":
+        w = np.ones_like(t)
+    elif name == "tent":
+        w = 1 - t
+    elif name == "gaussian":
+        w = np.exp(-0.5 * (x / _GAUSSIAN_SIGMA) ** 2)
+    else:  # 4-term Blackman-Harris window [Harris 1978, table 1], its middle at t = 0
+        w = 0.35875 + 0.48829 * np.cos(np.pi * t) + 0.14128 * np.cos(2 * np.pi * t) + 0.01168 * np.cos(3 * np.pi * t)
+    return np.where(t <= 1, w, 0.0)
+
+
+@cache
+def inverse(name: str, size: int) -> np.ndarray:
+    """Distances (pixels) at which the half profile's distribution reaches k / size, k = 0 .. size: float32."""
+    x = np.linspace(0, RADIUS[name], 1 << 16)
+    w = profile(name, x)
+    cdf = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]))])
+    return np.interp(np.linspace(0, 1, size + 1), cdf / cdf[-1], x).astype(np.float32)

@@ -1,0 +1,347 @@
+"""The bytes that the host and the shaders share, declared once.
+
+Each record yields a numpy dtype and GLSL: a struct, a buffer and a loader. Shaders get all of it through
+`#include "layout.glsl"`, which exists only in memory. Buffers are arrays of 32-bit words in groups of four (or
+two): llvmpipe fetches a uvec4 for the price of one float, so a record is read with as few fetches as it has groups.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+from typing import ClassVar
+
+import numpy as np
+
+NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
+SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
+
+
+class LayoutError(TypeError):
+    """A declaration that would leave a hole between members, or name an unknown type."""
+
+
+class Kind:
+    """A member's type: its GLSL name, its size in 32-bit words, and numpy's element."""
+
+    glsl: ClassVar[str]
+    words: ClassVar[int]
+    base: ClassVar[type[np.generic]] = np.float32
+
+
+class f32(Kind):
+    glsl, words = "float", 1
+
+
+class u32(Kind):
+    glsl, words, base = "uint", 1, np.uint32
+
+
+class vec2(Kind):
+    glsl, words = "vec2", 2
+
+
+class uvec2(Kind):
+    glsl, words, base = "uvec2", 2, np.uint32
+
+
+class vec3(Kind):
+    glsl, words = "vec3", 3
+
+
+class vec4(Kind):
+    glsl, words = "vec4", 4
+
+
+_KINDS: dict[str, type[Kind]] = {k.__name__: k for k in (f32, u32, vec2, uvec2, vec3, vec4)}
+
+
+class ShapeKind(IntEnum):
+    SPHERE = 0
+    QUAD = 1
+    BOX = 2
+    ELLIPSOID = 3
+    TRIANGLE = 4
+
+
+class LightKind(IntEnum):
+    POINT = 0
+    ENVIRONMENT = 1
+    SPHERE = 2
+    QUAD = 3
+    TRIANGLE = 4
+    ELLIPSOID = 5
+
+
+class Model(IntEnum):
+    DIFFUSE = 0
+    DISNEY = 1
+
+
+class Slot(IntEnum):
+    """Binding points of the storage buffers."""
+
+    MATERIALS = 0
+    SPHERES = 1
+    QUADS = 2
+    BOXES = 3
+    ELLIPSOIDS = 4
+    TRIANGLES = 5
+    TRIANGLE_NORMALS = 6
+    NODES = 7
+    LIGHTS = 8
+    ENVIRONMENT_ALIAS = 9
+    SUM = 10
+    COMPENSATION = 11
+    MOMENTS = 12
+    ALBEDO = 13
+    NORMAL = 14
+    OUTPUT = 15
+
+
+FRAME_BLOCK = 0  # uniform blocks
+FILTER_BLOCK = 1
+ENVIRONMENT_TEXTURE = 0  # texture unit
+
+
+class Record:
+    """Base of all records: members in order, a vec3 followed by a scalar, no hole between members."""
+
+    dtype: ClassVar[np.dtype[np.void]]
+    members: ClassVar[dict[str, type[Kind]]]
+    offsets: ClassVar[dict[str, int]]  # in words
+    words: ClassVar[int]
+    slot: ClassVar[Slot | None] = None
+
+    def __init_subclass__(cls) -> None:
+        cls.members = {}
+        for name, kind in cls.__annotations__.items():
+            if kind not in _KINDS:
+                raise LayoutError(f"{cls.__name__}.{name}: unknown type {kind!r}; have {sorted(_KINDS)}")
+            cls.members[name] = _KINDS[kind]
+        cls.offsets, end = {}, 0
+        for name, kind_ in cls.members.items():
+            align = {1: 1, 2: 2, 3: 4, 4: 4}[kind_.words]
+            if end % align:
+                raise LayoutError(f"{cls.__name__}.{name}: a hole of {align - end % align} words before it")
+            cls.offsets[name] = end
+            end += kind_.words
+        group = 4 if end > 2 else 2
+        cls.words = -(-end // group) * group
+        cls.dtype = np.dtype(
+            {
+                "names": list(cls.members),
+                "formats": [(k.base, (k.words,)) if k.words > 1 else k.base for k in cls.members.values()],
+                "offsets": [4 * o for o in cls.offsets.values()],
+                "itemsize": 4 * cls.words,
+            }
+        )
+
+
+class Material(Record):
+    slot = Slot.MATERIALS
+    base_color: vec3  # linear Rec.709 reflectance, each channel in [0, 1]; diffuse's albedo
+    roughness: f32  # perceptual, [0, 1]
+    emission: vec3  # radiance, W / (m^2 sr) per channel
+    metallic: f32
+    model: u32  # Model
+    subsurface: f32
+    specular: f32
+    specular_tint: f32
+    anisotropic: f32
+    sheen: f32
+    sheen_tint: f32
+    clearcoat: f32
+    clearcoat_gloss: f32
+
+
+class Sphere(Record):
+    slot = Slot.SPHERES
+    center: vec3
+    radius: f32
+    rotation: vec4  # quaternion (x, y, z, w), world from object: where the poles and the meridian are
+    material: u32
+    light: u32  # its place among the lights, or NONE
+    shape: u32  # index in the scene document
+
+
+class Quad(Record):
+    slot = Slot.QUADS
+    origin: vec3
+    material: u32
+    u: vec3
+    light: u32
+    v: vec3
+    shape: u32
+    normal: vec3  # unit, along cross(u, v)
+    area: f32
+    dual_u: vec3  # dot(p - origin, dual_u) is p's coordinate along u, 0..1 inside
+    u_length: f32
+    dual_v: vec3
+    v_length: f32
+
+
+class Solid(Record):
+    """A unit sphere (ellipsoid) or the cube [-1, 1]^3 (box) under an affine map: object = rows (world - center)."""
+
+    center: vec3
+    material: u32
+    row_x: vec3  # rows of object_from_world
+    light: u32
+    row_y: vec3
+    shape: u32
+    row_z: vec3
+    handedness: f32  # -1 where the map mirrors, else 1
+
+
+class Triangle(Record):
+    slot = Slot.TRIANGLES
+    v0: vec3
+    material: u32
+    v1: vec3
+    light: u32
+    v2: vec3
+    shape: u32  # index in the scene document, with SINGLE_SIDED
+
+
+class TriangleNormals(Record):
+    slot = Slot.TRIANGLE_NORMALS
+    n0: u32  # octahedral, 2 x 16 bits snorm (packSnorm2x16)
+    n1: u32
+    n2: u32
+    smoothed: u32  # 1: interpolate these; 0: the triangle is flat
+
+
+class Node(Record):
+    """One box of the threaded tree, quantised to 16 bits a side, rounded outwards."""
+
+    slot = Slot.NODES
+    x: u32  # low half: lower bound; high half: upper bound, in units of the grid
+    y: u32
+    z: u32
+    link: u32  # inner: index to go on at when the box is missed. Leaf: see LEAF_*
+
+
+class Light(Record):
+    slot = Slot.LIGHTS
+    position: vec3  # point lights
+    kind: u32  # LightKind
+    intensity: vec3  # W/sr, point lights; shapes emit by their material
+    index: u32  # into the array of the shape's kind
+    probability: f32  # of being picked
+    threshold: f32  # alias table: keep this light where u < threshold
+    alias: u32  # else take that one
+    material: u32
+
+
+class EnvironmentAlias(Record):
+    slot = Slot.ENVIRONMENT_ALIAS
+    threshold: f32
+    alias: u32
+
+
+class Frame(Record):
+    """Uniforms of one dispatch."""
+
+    camera_position: vec3
+    aperture_radius: f32
+    camera_right: vec3
+    focus_distance: f32
+    camera_up: vec3
+    tan_half_vfov: f32
+    camera_forward: vec3
+    environment_scale: f32
+    environment_turn: vec2  # cosine, sine of the rotation
+    resolution: uvec2  # of the whole picture
+    tile_origin: uvec2
+    tile_size: uvec2
+    sample_first: u32
+    sample_count: u32
+    max_bounces: u32
+    roulette_depth: u32
+    node_origin: vec3  # world position of grid coordinate 0
+    seed: u32
+    node_scale: vec3  # world size of one grid step
+    node_count: u32  # of one octant's order
+    sphere_count: u32
+    quad_count: u32
+    box_count: u32
+    ellipsoid_count: u32
+    triangle_count: u32
+    light_count: u32
+    replicate: u32  # which independent scramble of the sampler
+    clamp_radiance: f32  # of indirect light; 0: off
+    environment_probability: f32  # of picking the environment among the lights
+    moment_scale: f32  # second moments are of radiance times this
+    environment_background: u32
+    pixel_stride: u32  # 1: every pixel; n: one pixel of each n x n block, for the noise meter
+
+
+# A leaf's link: bit 31 set, kind << 28, (count - 1) << 24, first: index into the array of that kind
+LEAF_BIT = 0x80000000
+LEAF_KIND_SHIFT = 28
+LEAF_COUNT_SHIFT = 24
+LEAF_FIRST_MASK = 0x00FFFFFF
+LEAF_MAX_COUNT = 16
+
+_BUFFERS: dict[str, tuple[type[Record], Slot]] = {
+    "material": (Material, Slot.MATERIALS),
+    "sphere": (Sphere, Slot.SPHERES),
+    "quad": (Quad, Slot.QUADS),
+    "box": (Solid, Slot.BOXES),
+    "ellipsoid": (Solid, Slot.ELLIPSOIDS),
+    "triangle": (Triangle, Slot.TRIANGLES),
+    "triangle_normals": (TriangleNormals, Slot.TRIANGLE_NORMALS),
+    "light": (Light, Slot.LIGHTS),
+    "environment_alias": (EnvironmentAlias, Slot.ENVIRONMENT_ALIAS),
+}
+
+
+def _struct(record: type[Record]) -> str:
+    body = " ".join(f"{k.glsl} {name};" for name, k in record.members.items())
+    return f"struct {record.__name__} {{ {body} }};"
+
+
+def _loader(name: str, record: type[Record], slot: Slot) -> str:
+    group = 4 if record.words % 4 == 0 else 2
+    lines = [
+        f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_words[]; }};"
+    ]
+    lines.append(f"{record.__name__} {name}_load(uint i) {{")
+    for k in range(record.words // group):
+        lines.append(f"    uvec{group} w{k} = {name}_words[i * {record.words // group}u + {k}u];")
+    values = []
+    for member, kind in record.members.items():
+        at = record.offsets[member]
+        swizzle = "xyzw"[at % group : at % group + kind.words]
+        word = f"w{at // group}.{swizzle}"
+        values.append(word if kind.base is np.uint32 else f"uintBitsToFloat({word})")
+    lines.append(f"    return {record.__name__}({', '.join(values)});\n}}")
+    return "\n".join(lines)
+
+
+def _constants() -> str:
+    out = []
+    for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", Model)):
+        out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum]
+    out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
+    out += [f"#define FRAME_BLOCK {FRAME_BLOCK}", f"#define FILTER_BLOCK {FILTER_BLOCK}"]
+    for name in (
+        "NONE",
+        "SINGLE_SIDED",
+        "LEAF_BIT",
+        "LEAF_KIND_SHIFT",
+        "LEAF_COUNT_SHIFT",
+        "LEAF_FIRST_MASK",
+    ):
+        out.append(f"const uint {name} = {globals()[name]}u;")
+    return "\n".join(out)
+
+
+def glsl() -> str:
+    """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `frame`."""
+    structs = [_struct(r) for r in dict.fromkeys(r for r, _ in _BUFFERS.values())]
+    loaders = [_loader(name, r, slot) for name, (r, slot) in _BUFFERS.items()]
+    nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
+    body = " ".join(f"{k.glsl} {name};" for name, k in Frame.members.items())
+    frame = f"layout(std140, binding = {FRAME_BLOCK}) uniform frame_block {{ {body} }} frame;"
+    return "\n".join([_constants(), *structs, *loaders, nodes, frame]) + "\n"

@@ -1,0 +1,276 @@
+"""One picture in the making: samples added slice by slice, read whenever somebody looks.
+
+The cut into tiles and slices follows measured cost and never shows: every pixel adds its samples one by one.
+"""
+
+from __future__ import annotations
+
+import math
+import time
+from typing import Any
+
+import numpy as np
+
+from gpu import display, features, filters, layout
+from gpu.errors import NothingRendered, OutOfMemory
+from gpu.layout import Slot
+from gpu.program import Kernels
+from gpu.scene import Scene
+from gpu.settings import RenderSettings
+
+_SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
+_PASS_S = 0.08  # samples per pass aim at this, once there are some
+_MAX_SAMPLES_A_PASS = 32
+_GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
+_METER_PIXELS = 4096  # the noise meter looks at about so many pixels
+
+
+class Picture:
+    """Accumulators and schedule of one scene at one size. Made by `Renderer.picture`."""
+
+    def __init__(self, context: Any, kernels: Kernels, frame: Any, scene: Scene, settings: RenderSettings) -> None:
+        self._context, self._kernels, self._frame_buffer = context, kernels, frame
+        self.scene, self.settings = scene, settings
+        self._cost_s = 0.0  # seconds per sample of one pixel, measured; 0: unknown
+        self.compile_ms = 0.0
+        pixels = settings.width * settings.height
+        self._stride = max(1, min(8, math.isqrt(max(1, pixels // _METER_PIXELS))))
+        self._cells = (-(-settings.width // self._stride), -(-settings.height // self._stride))
+        self._main = self._allocate(pixels)
+        self._meter = self._allocate(self._cells[0] * self._cells[1])
+        self._guides: dict[Slot, Any] = {}
+        self._ended = context.buffer(reserve=16)
+        self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
+        self._kernel: Any = None
+        self.reset()
+
+    def _allocate(self, pixels: int) -> dict[Slot, Any]:
+        out: dict[Slot, Any] = {}
+        try:
+            for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
+                out[slot] = self._context.buffer(reserve=16 * pixels)
+        except Exception as error:
+            for buffer in out.values():
+                buffer.release()
+            raise OutOfMemory(f"the device has no {48 * pixels / 2**20:.0f} MiB left for this picture") from error
+        return out
+
+    def configure(self, settings: RenderSettings) -> None:
+        """Other settings at the same size; starts again."""
+        if (settings.width, settings.height) != (self.settings.width, self.settings.height):
+            raise ValueError("a picture keeps its size: make another")
+        self.settings = settings
+        self.reset()
+
+    def reset(self) -> None:
+        """Start again at zero samples, with the scene as it is now."""
+        kernel = self._kernels.get("pathtrace.comp", features.defines(self.scene.flags, self.settings))
+        self.compile_ms += self._kernels.last_compile_ms
+        if kernel is not self._kernel:
+            self._kernel, self._cost_s = kernel, 0.0
+        for buffer in (*self._main.values(), *self._meter.values(), *self._guides.values(), self._ended):
+            buffer.clear()
+        table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
+        table[:, 0] = filters.inverse(self.settings.filter, features.FILTER_TABLE_SIZE)
+        self._filter.write(table)
+        self.samples = 0
+        self._guide_samples = 0
+        self._pass_samples = 0  # samples of the pass under way; 0: none is
+        self._row, self._column = 0, 0  # where its next tile begins
+
+    @property
+    def any_samples(self) -> bool:
+        return self.samples > 0
+
+    @property
+    def cost_s(self) -> float:
+        """Seconds per sample of one pixel, as measured so far; 0 before the first slice."""
+        return self._cost_s
+
+    @property
+    def warnings(self) -> list[str]:
+        ended = int(np.frombuffer(self._ended.read(4), np.uint32)[0])
+        return [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
+
+    def trace(self, budget_s: float, max_samples: int) -> float:
+        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
+        start = time.perf_counter()
+        self._bind()
+        while self.samples < max_samples:
+            if self._pass_samples == 0:
+                self._pass_samples = min(self._choose_pass(), max_samples - self.samples)
+            self._slice()
+            if time.perf_counter() - start >= budget_s:
+                break
+        return time.perf_counter() - start
+
+    def _choose_pass(self) -> int:
+        if self.samples == 0 or self._cost_s == 0:
+            return 1
+        whole_s = self._cost_s * self.settings.width * self.settings.height
+        return max(1, min(int(_PASS_S / whole_s), self.samples, _MAX_SAMPLES_A_PASS))
+
+    def _tile(self) -> tuple[int, int, int, int]:
+        """x, y, width, height of the next tile: full rows where they fit, else part of one band of 16 rows."""
+        width, height = self.settings.width, self.settings.height
+        rate = (self._cost_s or 2e-7) * self._pass_samples
+        pixels = max(256.0, _SLICE_S / rate)
+        if self._column == 0 and pixels >= 16 * width:
+            rows = min(int(pixels // width) // 8 * 8, height - self._row)
+            return 0, self._row, width, max(rows, 1)
+        columns = max(16, int(pixels / 16) // 8 * 8)
+        return self._column, self._row, min(columns, width - self._column), min(16, height - self._row)
+
+    def _slice(self) -> None:
+        x, y, width, height = self._tile()
+        start = time.perf_counter()
+        self._dispatch(self._main, (x, y), (width, height))
+        self._context.finish()
+        cost = (time.perf_counter() - start) / (width * height * self._pass_samples)
+        self._cost_s = cost if self._cost_s == 0 else 0.7 * self._cost_s + 0.3 * cost
+        self._column = x + width
+        if self._column >= self.settings.width:
+            self._column, self._row = 0, y + height
+        if self._row >= self.settings.height:
+            self._row = 0
+            self._dispatch(self._meter, (0, 0), self._cells, stride=self._stride, replicate=1)
+            self.samples += self._pass_samples
+            self._pass_samples = 0
+
+    def _frame(self, tile: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:
+        s = self.settings
+        frame: np.ndarray = np.zeros((), layout.Frame.dtype)
+        self.scene.write_frame(frame)
+        frame["resolution"] = (s.width, s.height)
+        frame["tile_origin"], frame["tile_size"] = tile, size
+        frame["sample_first"], frame["sample_count"] = first, count
+        frame["max_bounces"], frame["roulette_depth"], frame["seed"] = s.max_bounces, s.roulette_depth, s.seed
+        frame["clamp_radiance"] = s.clamp or 0.0
+        frame["pixel_stride"] = 1
+        return frame
+
+    def _bind(self) -> None:
+        self.scene.bind()
+        self._ended.bind_to_storage_buffer(int(Slot.ALBEDO))
+        self._frame_buffer.bind_to_uniform_block(layout.FRAME_BLOCK)
+        self._filter.bind_to_uniform_block(layout.FILTER_BLOCK)
+
+    def _dispatch(
+        self,
+        buffers: dict[Slot, Any],
+        tile: tuple[int, int],
+        size: tuple[int, int],
+        stride: int = 1,
+        replicate: int = 0,
+    ) -> None:
+        frame = self._frame(tile, size, self.samples, self._pass_samples)
+        frame["pixel_stride"], frame["replicate"] = stride, replicate
+        self._frame_buffer.write(frame.tobytes())
+        for slot, buffer in buffers.items():
+            buffer.bind_to_storage_buffer(int(slot))
+        self._kernel.run(-(-size[0] // 8), -(-size[1] // 8))
+
+    def _need_samples(self) -> None:
+        if self.samples == 0:
+            raise NothingRendered("no sample is complete yet")
+
+    def _vectors(self, buffer: Any) -> np.ndarray:
+        flat = np.frombuffer(buffer.read(), np.float32)
+        shaped: np.ndarray = flat.reshape(self.settings.height, self.settings.width, 4)
+        return shaped
+
+    def read(self, aov: str = "color") -> np.ndarray:
+        """Linear (height, width, channels) float32, row 0 at the top: color 4 (premultiplied), albedo 3, normal 3,
+        depth 1 (0 where nothing is hit), variance 3 (of the pixel's mean).
+
+        Waits for the GPU. Raises NothingRendered before a sample is complete.
+        """
+        self._need_samples()
+        if aov in ("albedo", "normal", "depth"):
+            return self._read_guide(aov)
+        moments = self._vectors(self._main[Slot.MOMENTS])
+        n = np.maximum(moments[..., 3:], 1)
+        if aov == "variance":
+            scale = np.float32(self.scene.arrays.radiance_scale)
+            spread = np.where(n > 1, moments[..., :3] / np.maximum(n - 1, 1) / n, 0)
+            return np.minimum(spread.astype(np.float64) * float(scale) ** 2, 3e38).astype(np.float32)
+        mean: np.ndarray = self._vectors(self._main[Slot.SUM]) / n
+        return mean
+
+    def _read_guide(self, aov: str) -> np.ndarray:
+        self._trace_guides()
+        albedo, normal = (self._vectors(self._guides[s]) for s in (Slot.ALBEDO, Slot.NORMAL))
+        n = np.float32(self._guide_samples)
+        if aov == "albedo":
+            return albedo[..., :3] / n
+        if aov == "normal":
+            return normal[..., :3] / n
+        hits = albedo[..., 3:]
+        return np.where(hits > 0, normal[..., 3:] / np.maximum(hits, 1), 0).astype(np.float32)
+
+    def _trace_guides(self) -> None:
+        want = min(self.samples, _GUIDE_SAMPLES)
+        size = (self.settings.width, self.settings.height)
+        if not self._guides:
+            for slot in (Slot.ALBEDO, Slot.NORMAL):
+                self._guides[slot] = self._context.buffer(reserve=16 * size[0] * size[1])
+                self._guides[slot].clear()
+        kernel = self._kernels.get("guides.comp", features.defines(self.scene.flags, self.settings))
+        self._bind()
+        for slot, buffer in self._guides.items():
+            buffer.bind_to_storage_buffer(int(slot))
+        while self._guide_samples < want:
+            count = min(8, want - self._guide_samples)
+            self._frame_buffer.write(self._frame((0, 0), size, self._guide_samples, count).tobytes())
+            kernel.run(-(-size[0] // 8), -(-size[1] // 8))
+            self._guide_samples += count
+
+    def noise(self) -> float | None:
+        """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black.
+
+        From a second, independent scramble of the sampler on a share of the pixels: half the mean squared
+        difference of two estimates of a pixel is its variance, whatever the sampler gains.
+        """
+        if self.samples < 2:
+            return None
+        weights = np.array([0.2126, 0.7152, 0.0722])
+        mean = self.read()[..., :3] @ weights
+        at = display.meter_pixels(self._cells, self._stride, (self.settings.width, self.settings.height))
+        sums = np.frombuffer(self._meter[Slot.SUM].read(), np.float32).reshape(-1, 4)[:, :3]
+        other = sums / self.samples @ weights
+        average = float(mean.mean())
+        if average == 0:
+            return 0.0
+        difference = (mean[at[1], at[0]] - other) / average
+        return float(np.sqrt(0.5 * np.mean(difference**2)))
+
+    def display(
+        self, aov: str = "color", exposure: float = 0.0, tone_map: str = "pbr_neutral", dtype: str = "u1"
+    ) -> np.ndarray:
+        """Display-encoded (height, width, 4), straight alpha: uint8, or float32 in 0..1 with dtype "f4".
+
+        Colour: exposed (stops), tone-mapped, sRGB. Other AOVs: see `display.encode`.
+        """
+        self._need_samples()
+        if aov != "color":
+            return display.encode(aov, self.read(aov), dtype)
+        width, height = self.settings.width, self.settings.height
+        floats = dtype == "f4"
+        defines = {"TONE_MAP": f"{tone_map}_curve", "OUTPUT_FLOAT": int(floats)}
+        kernel = self._kernels.get("resolve.comp", defines)
+        output = self._context.buffer(reserve=(16 if floats else 4) * width * height)
+        kernel["size"].value = (width, height)
+        kernel["exposure"].value = 2.0**exposure
+        self._main[Slot.SUM].bind_to_storage_buffer(int(Slot.SUM))
+        self._main[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.MOMENTS))
+        output.bind_to_storage_buffer(int(Slot.OUTPUT))
+        kernel.run(-(-width // 8), -(-height // 8))
+        pixels = np.frombuffer(output.read(), np.float32 if floats else np.uint8).reshape(height, width, 4)
+        output.release()
+        return pixels
+
+    def release(self) -> None:
+        for buffer in (*self._main.values(), *self._meter.values(), *self._guides.values()):
+            buffer.release()
+        self._ended.release()
+        self._filter.release()

@@ -1,0 +1,63 @@
+"""The one way in: load a scene, take a picture of it. All calls belong to the thread that made the Renderer."""
+
+from __future__ import annotations
+
+import threading
+from typing import Any
+
+from gpu import context as contexts
+from gpu import layout
+from gpu.arrays import SceneArrays
+from gpu.errors import SceneTooLarge, WrongThread
+from gpu.picture import Picture
+from gpu.program import Kernels
+from gpu.scene import Scene
+from gpu.settings import RenderSettings
+
+
+class Renderer:
+    """A device with its context and compiled kernels. Raises ContextError where there is none to be had."""
+
+    def __init__(self, device: int | None = None) -> None:
+        self._thread = threading.get_ident()
+        self._context = contexts.create(device)
+        self._kernels = Kernels(self._context)
+        self._frame = self._context.buffer(reserve=layout.Frame.dtype.itemsize)
+        self.info: dict[str, Any] = contexts.describe(self._context)
+
+    def _own(self) -> None:
+        if threading.get_ident() != self._thread:
+            raise WrongThread("a Renderer belongs to the thread that made it")
+
+    def load(self, arrays: SceneArrays, editing: bool = False) -> Scene:
+        """Upload a scene. `editing` keeps compiled what its materials' sliders could raise.
+
+        Raises SceneTooLarge, OutOfMemory.
+        """
+        self._own()
+        for name in ("spheres", "quads", "boxes", "ellipsoids", "triangles"):
+            count = len(getattr(arrays, name))
+            if count > layout.LEAF_FIRST_MASK:
+                raise SceneTooLarge(f"{count} {name}: at most {layout.LEAF_FIRST_MASK} of a kind")
+        return Scene(self._context, arrays, editing)
+
+    def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
+        """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.
+
+        Raises CompileError, OutOfMemory.
+        """
+        self._own()
+        return Picture(self._context, self._kernels, self._frame, scene, settings)
+
+    def close(self) -> None:
+        """Release the context with all that was made from it."""
+        self._own()
+        self._kernels.release()
+        self._frame.release()
+        self._context.release()
+
+    def __enter__(self) -> Renderer:
+        return self
+
+    def __exit__(self, *_: object) -> None:
+        self.close()

@@ -1,0 +1,141 @@
+"""A scene on the device: its buffers, its flags, and the numbers that change without an upload."""
+
+from __future__ import annotations
+
+import logging
+import math
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gpu import features, layout
+from gpu.arrays import CameraArrays, SceneArrays
+from gpu.errors import OutOfMemory
+from gpu.layout import LightKind, Slot
+
+log = logging.getLogger(__name__)
+
+_BUFFERS = {
+    Slot.MATERIALS: "materials",
+    Slot.SPHERES: "spheres",
+    Slot.QUADS: "quads",
+    Slot.BOXES: "boxes",
+    Slot.ELLIPSOIDS: "ellipsoids",
+    Slot.TRIANGLES: "triangles",
+    Slot.TRIANGLE_NORMALS: "triangle_normals",
+    Slot.NODES: "nodes",
+    Slot.LIGHTS: "lights",
+}
+
+
+class Scene:
+    """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
+
+    def __init__(self, context: Any, arrays: SceneArrays, editing: bool) -> None:
+        self._context = context
+        self._editing = editing
+        self._raised: frozenset[str] = frozenset()
+        self.arrays = arrays
+        self._raise_flags()
+        self._buffers = {slot: self._upload(getattr(arrays, name)) for slot, name in _BUFFERS.items()}
+        self._texels, alias = self._upload_environment()
+        self._buffers[Slot.ENVIRONMENT_ALIAS] = self._upload(alias)
+        count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
+        log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
+
+    def _raise_flags(self) -> None:
+        raised = features.flags(self.arrays, self._editing)
+        self._raised = self._raised | raised if self._editing else raised
+
+    def _upload(self, array: np.ndarray) -> Any:
+        # An empty binding still needs a buffer: llvmpipe reads it, masked, on the way past.
+        data = np.ascontiguousarray(array).view(np.uint8).reshape(-1) if array.size else np.zeros(96, np.uint8)
+        try:
+            return self._context.buffer(data)
+        except Exception as error:
+            raise OutOfMemory(f"the device has no {data.nbytes / 2**20:.0f} MiB left for this scene") from error
+
+    def _upload_environment(self) -> tuple[Any, np.ndarray]:
+        e = self.arrays.environment
+        texels = np.zeros((1, 1, 4), np.float32)
+        alias = np.zeros(0, layout.EnvironmentAlias.dtype)
+        if e is not None:
+            texels = np.dstack([e.texels, e.probability]).astype(np.float32)
+            alias = e.alias
+        height, width = texels.shape[:2]
+        texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        return texture, alias
+
+    @property
+    def flags(self) -> frozenset[str]:
+        return self._raised
+
+    def edit(
+        self,
+        camera: CameraArrays | None = None,
+        materials: np.ndarray | None = None,
+        environment: tuple[float, float] | None = None,
+    ) -> None:
+        """Replace the camera, the materials' bytes (as many as before), the environment's (rotation, scale).
+
+        Uploads nothing else. Pictures of this scene must be reset by the caller.
+        """
+        changes: dict[str, Any] = {}
+        if camera is not None:
+            changes["camera"] = camera
+        if materials is not None:
+            if len(materials) != len(self.arrays.materials):
+                raise ValueError(f"{len(materials)} materials for a scene of {len(self.arrays.materials)}")
+            changes["materials"] = materials
+            self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(materials).view(np.uint8))
+        if environment is not None and self.arrays.environment is not None:
+            rotation, scale = environment
+            changes["environment"] = replace(self.arrays.environment, rotation=rotation, scale=scale)
+        self.arrays = replace(self.arrays, **changes)
+        self._raise_flags()
+
+    def bind(self) -> None:
+        """Bind every buffer of the scene to its slot."""
+        for slot, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(int(slot))
+        self._texels.use(layout.ENVIRONMENT_TEXTURE)
+
+    def write_frame(self, frame: np.ndarray) -> None:
+        """Fill the scene's part of a `layout.Frame` record."""
+        a, c = self.arrays, self.arrays.camera
+        frame["camera_position"] = c.position
+        frame["camera_right"] = c.right
+        frame["camera_up"] = c.up
+        frame["camera_forward"] = c.forward
+        frame["tan_half_vfov"] = c.tan_half_vfov
+        frame["aperture_radius"] = c.aperture_radius
+        frame["focus_distance"] = c.focus_distance
+        frame["node_origin"] = a.node_origin
+        frame["node_scale"] = a.node_scale
+        frame["node_count"] = len(a.nodes) // 8
+        for kind, records in (
+            ("sphere", a.spheres),
+            ("quad", a.quads),
+            ("box", a.boxes),
+            ("light", a.lights),
+        ):
+            frame[f"{kind}_count"] = len(records)
+        frame["ellipsoid_count"] = len(a.ellipsoids)
+        frame["triangle_count"] = len(a.triangles)
+        frame["moment_scale"] = 1.0 / a.radiance_scale
+        frame["environment_turn"] = (1.0, 0.0)
+        if a.environment is not None:
+            e = a.environment
+            frame["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
+            frame["environment_scale"] = e.scale
+            frame["environment_background"] = e.background
+            frame["environment_probability"] = a.lights["probability"][
+                a.lights["kind"] == LightKind.ENVIRONMENT
+            ].sum()
+
+    def release(self) -> None:
+        for buffer in self._buffers.values():
+            buffer.release()
+        self._texels.release()

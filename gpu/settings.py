@@ -1,0 +1,26 @@
+"""How to render: the choices that change pixels, in the renderer's own words."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+ESTIMATORS = ("mis", "bsdf", "light", "uniform")
+SAMPLERS = ("sobol", "independent")
+FILTERS = ("box", "tent", "gaussian", "blackman_harris")
+TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
+AOVS = ("color", "albedo", "normal", "depth", "variance")
+
+
+@dataclass(frozen=True)
+class RenderSettings:
+    """Size in pixels; `clamp` bounds the radiance of indirect light (None: unbiased)."""
+
+    width: int
+    height: int
+    max_bounces: int = 8
+    estimator: str = "mis"
+    sampler: str = "sobol"
+    filter: str = "blackman_harris"
+    roulette_depth: int = 3
+    seed: int = 0
+    clamp: float | None = None

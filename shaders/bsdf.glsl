@@ -1,0 +1,97 @@
+// The models: which lobes, with what weights. Directions in the shading frame; f includes |cos theta_i|.
+#include "fresnel.glsl"
+#include "microfacet.glsl"
+#include "lobes/diffuse.glsl"
+#include "lobes/sheen.glsl"
+#include "lobes/specular.glsl"
+#include "lobes/clearcoat.glsl"
+
+struct Scatter {
+    vec3 f;    // BSDF times |cos theta_i|
+    float pdf; // of bsdf_sample for this wi, per solid angle
+};
+
+struct LobeWeights {
+    float diffuse;
+    float specular;
+    float clearcoat;
+};
+
+// Chances of picking each lobe, summing to one.
+LobeWeights bsdf_weights(Surface s, vec3 wo) {
+    LobeWeights w = LobeWeights(1.0, 0.0, 0.0);
+#if HAS_DISNEY
+    if (s.model == MODEL_DISNEY) {
+        w = LobeWeights(diffuse_weight(s), specular_weight(s, wo), 0.0);
+#if HAS_CLEARCOAT
+        w.clearcoat = clearcoat_weight(s, wo);
+#endif
+        float inv = 1.0 / (w.diffuse + w.specular + w.clearcoat);
+        w = LobeWeights(w.diffuse * inv, w.specular * inv, w.clearcoat * inv);
+    }
+#endif
+    return w;
+}
+
+// The specular lobe's own frame, its x along the tangent.
+vec3 bsdf_turn(Surface s, vec3 w) {
+    return vec3(dot(s.tangent, w.xy), s.tangent.x * w.y - s.tangent.y * w.x, w.z);
+}
+
+vec3 bsdf_turn_back(Surface s, vec3 w) {
+    return vec3(s.tangent.x * w.x - s.tangent.y * w.y, s.tangent.y * w.x + s.tangent.x * w.y, w.z);
+}
+
+Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
+    if (wo.z <= 0.0 || wi.z <= 0.0) return Scatter(vec3(0.0), 0.0);
+    Scatter r = Scatter(diffuse_lambert(s), diffuse_pdf(wi));
+#if HAS_DISNEY
+    if (s.model == MODEL_DISNEY) {
+        LobeWeights w = bsdf_weights(s, wo);
+        vec3 wm = normalize(wo + wi);
+        float cos_d = dot(wi, wm);
+        r.f = diffuse_disney(s, wo, wi, cos_d);
+        r.pdf = w.diffuse * diffuse_pdf(wi);
+#if HAS_SHEEN
+        r.f += sheen_eval(s, cos_d);
+#endif
+        vec3 wm_t = wm, wo_t = wo;
+#if HAS_ANISOTROPIC
+        wm_t = bsdf_turn(s, wm);
+        wo_t = bsdf_turn(s, wo);
+#endif
+        r.f += specular_eval(s, wo, wi, wm_t, cos_d);
+        r.pdf += w.specular * specular_pdf(s, wo_t, wm_t);
+#if HAS_CLEARCOAT
+        r.f += clearcoat_eval(s, wo, wi, wm, cos_d);
+        r.pdf += w.clearcoat * clearcoat_pdf(s, wm, cos_d);
+#endif
+    }
+#endif
+    r.f *= wi.z;
+    return r;
+}
+
+// Direction for light to come from; may lie below the surface, where bsdf_eval gives pdf 0.
+vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    vec3 wi = diffuse_sample(u);
+#if HAS_DISNEY
+    if (s.model == MODEL_DISNEY) {
+        LobeWeights w = bsdf_weights(s, wo);
+        vec3 wo_t = wo;
+#if HAS_ANISOTROPIC
+        wo_t = bsdf_turn(s, wo);
+#endif
+        vec3 mirrored = specular_sample(s, wo_t, u);
+#if HAS_ANISOTROPIC
+        mirrored = bsdf_turn_back(s, mirrored);
+#endif
+        if (u_lobe >= w.diffuse) wi = mirrored;
+#if HAS_CLEARCOAT
+        vec3 coat = clearcoat_sample(s, wo, u);
+        if (u_lobe >= w.diffuse + w.specular) wi = coat;
+#endif
+    }
+#endif
+    return wi;
+}

@@ -1,0 +1,29 @@
+// Thin-lens camera. Row 0 is the top of the picture, its right is to the right.
+void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
+    vec2 at = vec2(pixel) + 0.5 + sampling_filter(sobol_pair(rng, PAIR_PIXEL));
+    vec2 half_size = 0.5 * vec2(frame.resolution);
+    vec2 xy = (at - half_size) * (frame.tan_half_vfov / half_size.y);
+    vec3 through = xy.x * frame.camera_right - xy.y * frame.camera_up + frame.camera_forward;
+    o = frame.camera_position;
+#if HAS_APERTURE
+    vec2 lens = frame.aperture_radius * sampling_disk(sobol_pair(rng, PAIR_LENS));
+    vec3 offset = lens.x * frame.camera_right + lens.y * frame.camera_up;
+    o += offset;
+    through = through * frame.focus_distance - offset;
+#endif
+    d = normalize(through);
+}
+
+// The pixel of this invocation, and whether there is one. With a stride, one pixel of each block, at a place that
+// is fixed by hash, stands for the block.
+bool camera_pixel(out uvec2 pixel, out uint slot) {
+    uvec2 g = gl_GlobalInvocationID.xy;
+    uvec2 cell = frame.tile_origin + g;
+    uint stride = frame.pixel_stride;
+    uvec2 cells = (frame.resolution + stride - 1u) / stride;
+    bool there = g.x < frame.tile_size.x && g.y < frame.tile_size.y && cell.x < cells.x && cell.y < cells.y;
+    uint h = stride > 1u ? sobol_hash(cell.x ^ sobol_hash(cell.y)) : 0u;
+    pixel = min(cell * stride + uvec2(h % stride, (h >> 8u) % stride), frame.resolution - 1u);
+    slot = cell.y * cells.x + cell.x;
+    return there;
+}

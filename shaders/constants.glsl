@@ -1,0 +1,12 @@
+const float PI = 3.14159265358979;
+const float TWO_PI = 6.28318530717959;
+const float INV_PI = 0.318309886183791;
+const float INFINITY_T = 3.0e38; // farther than any hit: coordinates end at 1e9
+const float ULP = 5.9604645e-8;  // 2^-24, the largest relative rounding error of one float operation
+
+// n ulps, bounding n successive roundings [Higham 2002, lemma 3.1].
+float gamma_error(float n) { return n * ULP / (1.0 - n * ULP); }
+
+float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+float max_component(vec3 c) { return max(c.x, max(c.y, c.z)); }
+float sqr(float x) { return x * x; }

@@ -1,0 +1,31 @@
+// Entry: albedo, normal and depth of the first hit, over the same camera rays as the picture's first samples.
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "layout.glsl"
+layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit
+layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
+#include "constants.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "shapes.glsl"
+#include "camera.glsl"
+
+void main() {
+    uvec2 pixel;
+    uint slot;
+    if (!camera_pixel(pixel, slot)) return;
+    vec4 albedo = albedos[slot], normal = normals[slot];
+    uint i = 0u;
+    do {
+        Sampler rng = sobol_begin(pixel, frame.sample_first + i);
+        vec3 o, d;
+        camera_ray(pixel, rng, o, d);
+        Nearest n = shapes_nearest(o, d, NONE);
+        Point at = shapes_point(n, o, d);
+        if (n.id != NONE) {
+            albedo += vec4(material_load(at.material).base_color, 1.0);
+            normal += vec4(dot(at.ng, d) > 0.0 ? -at.ns : at.ns, n.t);
+        }
+    } while (++i < frame.sample_count);
+    albedos[slot] = albedo;
+    normals[slot] = normal;
+}

@@ -1,0 +1,82 @@
+// Pick a light and a direction towards it; and the density with which that would have happened.
+struct LightSample {
+    vec3 wi;       // world, towards the light, from the point given
+    float t;       // how far; INFINITY_T for the environment
+    vec3 radiance; // arriving, not yet divided by pdf; for a point light divided by d^2
+    float pdf;     // per solid angle, picking included; 0: nothing comes
+    bool extended; // false: only direct sampling finds this light
+};
+
+#include "lights/point.glsl"
+#include "lights/environment.glsl"
+#include "lights/sphere.glsl"
+#include "lights/quad.glsl"
+#include "lights/triangle.glsl"
+#include "lights/ellipsoid.glsl"
+
+LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true); }
+
+Light lights_pick(float u) {
+#if HAS_MANY_LIGHTS
+    float x = u * float(frame.light_count);
+    uint i = min(uint(x), frame.light_count - 1u);
+    Light l = light_load(i);
+    if (x - float(i) >= l.threshold) l = light_load(l.alias);
+    return l;
+#else
+    return light_load(0u);
+#endif
+}
+
+// p: the shaded point; u_pick chooses the light, the bits of two more numbers the direction.
+LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
+    LightSample s = lights_none();
+    vec2 u = sobol_units(bits);
+    Light l = lights_pick(u_pick);
+#if HAS_POINT_LIGHTS
+    if (l.kind == LIGHT_POINT) s = point_light_sample(l, p);
+#endif
+#if HAS_ENVIRONMENT
+    if (l.kind == LIGHT_ENVIRONMENT) s = environment_light_sample(bits);
+#endif
+#if HAS_SPHERE_LIGHTS
+    if (l.kind == LIGHT_SPHERE) s = sphere_light_sample(sphere_load(l.index), p, u);
+#endif
+#if HAS_QUAD_LIGHTS
+    if (l.kind == LIGHT_QUAD) s = quad_light_sample(quad_load(l.index), p, u);
+#endif
+#if HAS_TRIANGLE_LIGHTS
+    if (l.kind == LIGHT_TRIANGLE) s = triangle_light_sample(triangle_load(l.index), p, u);
+#endif
+#if HAS_ELLIPSOID_LIGHTS
+    if (l.kind == LIGHT_ELLIPSOID) s = ellipsoid_light_sample(ellipsoid_load(l.index), p, u);
+#endif
+#if HAS_EMISSION
+    if (l.kind >= LIGHT_SPHERE) s.radiance = material_load(l.material).emission;
+#endif
+    s.pdf *= l.probability;
+    return s;
+}
+
+// Density of lights_sample at p for the direction wi that met the emitting shape n.id at distance n.t.
+float lights_pdf(uint light, Nearest n, Point at, vec3 p, vec3 wi) {
+#if HAS_EMISSION
+    Light l = light_load(light);
+    float pdf = 0.0;
+#if HAS_SPHERE_LIGHTS
+    if (l.kind == LIGHT_SPHERE) pdf = sphere_light_pdf(sphere_load(l.index), p);
+#endif
+#if HAS_QUAD_LIGHTS
+    if (l.kind == LIGHT_QUAD) pdf = quad_light_pdf(quad_load(l.index), n.t, at.ng, wi);
+#endif
+#if HAS_TRIANGLE_LIGHTS
+    if (l.kind == LIGHT_TRIANGLE) pdf = triangle_light_pdf(triangle_load(l.index), n.t, at.ng, wi);
+#endif
+#if HAS_ELLIPSOID_LIGHTS
+    if (l.kind == LIGHT_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_load(l.index), n.t, at, wi);
+#endif
+    return pdf * l.probability;
+#else
+    return 0.0;
+#endif
+}

@@ -1,0 +1,68 @@
+// Light from infinity. An image is latitude-longitude, picked texel by texel from an alias table; inside a texel
+// the direction is uniform in longitude and in the cosine of its colatitude, so its density is constant there.
+uniform sampler2D environment_texels; // rgb radiance; a: density per steradian of picking a direction here
+
+vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
+    vec2 cs = frame.environment_turn;
+    return vec3(cs.x * d.x - cs.y * d.z, d.y, cs.y * d.x + cs.x * d.z);
+}
+
+vec3 environment_turn_back(vec3 d) {
+    vec2 cs = frame.environment_turn;
+    return vec3(cs.x * d.x + cs.y * d.z, d.y, -cs.y * d.x + cs.x * d.z);
+}
+
+// Radiance from world direction w, and the density of environment_light_sample there.
+vec4 environment_radiance(vec3 w) {
+#if HAS_ENVIRONMENT_IMAGE
+    vec3 d = environment_turn(w);
+    ivec2 size = textureSize(environment_texels, 0);
+    float azimuth = d.x == 0.0 && d.z == 0.0 ? 0.0 : atan(d.x, -d.z);
+    float polar = atan(length(d.xz), d.y); // exact near the poles, where acos(y) is not
+    vec2 xy = vec2(0.5 + azimuth * (0.5 * INV_PI), polar * INV_PI) * vec2(size);
+    ivec2 at = min(ivec2(xy), size - 1);
+    vec2 c = floor(xy - 0.5);
+    vec2 f = xy - 0.5 - c;
+    int x0 = int(c.x) < 0 ? size.x - 1 : int(c.x);
+    int x1 = x0 + 1 == size.x ? 0 : x0 + 1;
+    int y0 = max(int(c.y), 0), y1 = min(int(c.y) + 1, size.y - 1);
+    vec4 a = texelFetch(environment_texels, ivec2(x0, y0), 0), b = texelFetch(environment_texels, ivec2(x1, y0), 0);
+    vec4 e = texelFetch(environment_texels, ivec2(x0, y1), 0), g = texelFetch(environment_texels, ivec2(x1, y1), 0);
+    vec3 radiance = mix(mix(a.rgb, b.rgb, f.x), mix(e.rgb, g.rgb, f.x), f.y);
+    float left = at.y == y0 ? (at.x == x0 ? a.a : b.a) : (at.x == x0 ? e.a : g.a);
+    return vec4(radiance * frame.environment_scale, left);
+#elif HAS_ENVIRONMENT
+    vec4 t = texelFetch(environment_texels, ivec2(0), 0);
+    return vec4(t.rgb * frame.environment_scale, t.a);
+#else
+    return vec4(0.0);
+#endif
+}
+
+LightSample environment_light_sample(uvec2 bits) {
+    vec2 u = sobol_units(bits);
+#if HAS_ENVIRONMENT_IMAGE
+    uvec2 size = uvec2(textureSize(environment_texels, 0));
+    // All 32 bits: a float's 24 would leave a large map three for the place inside the texel.
+    uint i, low;
+    umulExtended(bits.x, size.x * size.y, i, low);
+    float rest = sobol_unit(low);
+    EnvironmentAlias e = environment_alias_load(i);
+    bool keep = rest < e.threshold;
+    i = keep ? i : e.alias;
+    // What is left of the first number after both choices is uniform again: it places the direction inside the texel.
+    float v = keep ? rest / e.threshold : (rest - e.threshold) / (1.0 - e.threshold);
+    uvec2 at = uvec2(i % size.x, i / size.x);
+    float phi = (float(at.x) + u.y) / float(size.x) * TWO_PI - PI;
+    // The row's band between two colatitudes, uniform in cosine; near a pole by sines, without cancelling.
+    float top = float(at.y) / float(size.y) * PI, bottom = float(at.y + 1u) / float(size.y) * PI;
+    float s0 = sqr(sin(0.5 * top)), s1 = sqr(sin(0.5 * bottom));
+    float h = mix(s0, s1, clamp(v, 0.0, 1.0)); // sin^2 of half the colatitude
+    float y = 1.0 - 2.0 * h, r = 2.0 * sqrt(max(0.0, h * (1.0 - h)));
+    vec3 wi = environment_turn_back(vec3(r * sin(phi), y, -r * cos(phi)));
+#else
+    vec3 wi = sampling_sphere(u);
+#endif
+    vec4 l = environment_radiance(wi);
+    return LightSample(wi, INFINITY_T, l.rgb, l.a, true);
+}

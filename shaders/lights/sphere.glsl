@@ -1,0 +1,30 @@
+// A sphere seen from outside: uniform over the cone it fills [Pharr, Jakob, Humphreys 2023, section 6.2.4].
+
+// 1 - cos of the cone's half angle, without cancelling for small or far spheres; 2 from inside.
+float sphere_light_cap(Sphere s, vec3 p) {
+    vec3 to = s.center - p;
+    float sin2 = s.radius * s.radius / dot(to, to);
+    return sin2 < 1.0 ? sin2 / (1.0 + sqrt(1.0 - sin2)) : 2.0;
+}
+
+float sphere_light_pdf(Sphere s, vec3 p) { return 1.0 / (TWO_PI * sphere_light_cap(s, p)); }
+
+LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u) {
+    float cap = sphere_light_cap(s, p);
+    if (cap == 2.0) return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true); // it shines outwards only
+    vec3 to = s.center - p;
+    float d2 = dot(to, to);
+    float h = u.x * cap; // 1 - cos theta
+    float sin2 = h * (2.0 - h), cos_t = 1.0 - h;
+    float phi = TWO_PI * u.y, r = sqrt(max(sin2, 0.0));
+    Basis b = frame_basis(to * inversesqrt(d2));
+    vec3 wi = frame_to_world(b, vec3(r * cos(phi), r * sin(phi), cos_t));
+    // Where the ray meets the sphere, from the triangle of p, the centre and that point.
+    float reach = sqrt(max(0.0, s.radius * s.radius - d2 * sin2));
+    Point at;
+    at.ng = normalize(wi * (sqrt(d2) * cos_t - reach) - to);
+    at.p = s.center + s.radius * at.ng;
+    at.error = gamma_error(6.0) * (abs(s.center) + s.radius);
+    vec3 target = shapes_leave(at, -wi);
+    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(0.0), 1.0 / (TWO_PI * cap), true);
+}

@@ -1,0 +1,158 @@
+// The estimator: light carried back along one camera path. The only place, with frame.glsl, that changes space.
+#include "surface.glsl"
+#include "bsdf.glsl"
+#include "lights.glsl"
+
+struct Radiance {
+    vec3 color;
+    float alpha; // 1: met a surface, or a background that is shown
+};
+
+// Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
+float path_weight(float a, float b) {
+    float r = b / a;
+    return 1.0 / (1.0 + r * r);
+}
+
+vec3 path_clamp(vec3 c, bool indirect) {
+#if HAS_CLAMP
+    float m = max_component(c);
+    if (indirect && m > frame.clamp_radiance) c *= frame.clamp_radiance / m;
+#endif
+    return c;
+}
+
+Material path_material(uint index) {
+#if HAS_MANY_MATERIALS
+    return material_load(index);
+#else
+    return material_load(0u);
+#endif
+}
+
+// Emission towards the side the ray came from: a shape shines from its outward side.
+vec3 path_emission(Point at, vec3 d) {
+#if HAS_EMISSION
+    if (at.light != NONE && dot(d, at.ng) < 0.0) return path_material(at.material).emission;
+#endif
+    return vec3(0.0);
+}
+
+// A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation can turn it away at a
+// silhouette; it is then bent back until it is just in view, which loses no light to black rims.
+vec3 path_normal(Point at, vec3 wo_w) {
+    vec3 n = dot(at.ng, wo_w) < 0.0 ? -at.ns : at.ns;
+#if HAS_SMOOTH_NORMALS
+    float c = dot(n, wo_w);
+    if (c < 0.01) n = normalize(n + (0.01 - c) * wo_w);
+#endif
+    return n;
+}
+
+Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
+    Radiance result = Radiance(vec3(0.0), 0.0);
+    Nearest n = shapes_nearest(o, d, NONE);
+    Point at = shapes_point(n, o, d);
+    bool alive = n.id != NONE;
+    if (alive) {
+        result = Radiance(path_emission(at, d), 1.0);
+    }
+#if HAS_ENVIRONMENT
+    else if (frame.environment_background != 0u) {
+        result = Radiance(environment_radiance(d).rgb, 1.0);
+    }
+#endif
+    alive = alive && frame.max_bounces > 0u;
+    vec3 throughput = vec3(1.0);
+    uint bounce = 0u;
+    if (alive) {
+        do {
+            vec3 wo_w = -d;
+            vec3 front = dot(at.ng, wo_w) < 0.0 ? -at.ng : at.ng;
+            Basis basis = frame_basis(path_normal(at, wo_w));
+            vec2 tangent = vec2(1.0, 0.0);
+#if HAS_ANISOTROPIC
+            vec2 along = vec2(dot(at.tangent, basis.x), dot(at.tangent, basis.y));
+            float along2 = dot(along, along);
+            if (along2 > 0.0) tangent = along * inversesqrt(along2);
+#endif
+            Surface s = surface_make(path_material(at.material), tangent);
+            vec3 wo = frame_to_local(basis, wo_w);
+            uint pair = PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE;
+            vec2 choice = sobol_pair(rng, pair + PAIR_CHOICE);
+            uint flat_id = at.flat_id;
+#if HAS_LIGHTS
+            LightSample light = lights_sample(at.p, choice.x, sobol_bits(rng, pair + PAIR_LIGHT));
+#if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
+            bool wanted = light.pdf > 0.0 && !light.extended;
+#else
+            bool wanted = light.pdf > 0.0;
+#endif
+            vec3 wi = frame_to_local(basis, light.wi);
+            Scatter f = bsdf_eval(s, wo, wi);
+            wanted = wanted && dot(light.wi, front) > 0.0 && max_component(f.f * light.radiance) > 0.0;
+            float weight = 1.0;
+#if ESTIMATOR == ESTIMATOR_MIS
+            if (light.extended) weight = path_weight(light.pdf, f.pdf);
+#endif
+            if (wanted) {
+                bool hidden = shapes_occluded(shapes_leave(at, light.wi), light.wi, light.t, flat_id);
+                vec3 c = throughput * (f.f * light.radiance * (weight / light.pdf));
+                if (!hidden) result.color += path_clamp(c, bounce > 0u);
+            }
+#endif
+#if ESTIMATOR == ESTIMATOR_UNIFORM
+            vec3 wi_next = sampling_hemisphere(sobol_pair(rng, pair + PAIR_BSDF));
+            Scatter next = bsdf_eval(s, wo, wi_next);
+            next.pdf = 0.5 * INV_PI;
+#else
+            vec3 wi_next = bsdf_sample(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
+            Scatter next = bsdf_eval(s, wo, wi_next);
+#endif
+            d = frame_to_world(basis, wi_next);
+            alive = next.pdf > 0.0 && dot(d, front) > 0.0;
+            throughput *= next.f / (alive ? next.pdf : 1.0);
+            float reach = max_component(throughput);
+            alive = alive && reach > 0.0;
+            if (alive && !(reach < 1e6)) {
+                atomicAdd(path_ended, 1u);
+                alive = false;
+            }
+            bounce++;
+            if (bounce >= frame.roulette_depth && bounce < frame.max_bounces) {
+                float survive = min(1.0, reach);
+                if (sobol_pair(rng, pair + PAIR_ROULETTE).x >= survive) alive = false;
+                throughput /= survive > 0.0 ? survive : 1.0;
+            }
+            vec3 from = at.p;
+            o = shapes_leave(at, d);
+            n.id = NONE;
+            if (alive) n = shapes_nearest(o, d, flat_id);
+            bool met = n.id != NONE;
+            at = shapes_point(n, o, d);
+#if ESTIMATOR != ESTIMATOR_LIGHT
+            vec3 arriving = vec3(0.0);
+            float pdf_light = 0.0;
+#if HAS_EMISSION
+            if (met && at.light != NONE) {
+                arriving = path_emission(at, d);
+                pdf_light = lights_pdf(at.light, n, at, from, d);
+            }
+#endif
+#if HAS_ENVIRONMENT
+            if (!met) {
+                vec4 l = environment_radiance(d);
+                arriving = l.rgb;
+                pdf_light = l.a * frame.environment_probability;
+            }
+#endif
+#if ESTIMATOR == ESTIMATOR_MIS
+            arriving *= path_weight(next.pdf, pdf_light);
+#endif
+            if (alive) result.color += path_clamp(throughput * arriving, bounce > 1u);
+#endif
+            alive = alive && met;
+        } while (alive && bounce < frame.max_bounces);
+    }
+    return result;
+}

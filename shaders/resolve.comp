@@ -1,0 +1,40 @@
+// Entry: accumulator -> exposed, tone-mapped, sRGB-encoded picture, straight alpha.
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "layout.glsl"
+#include "constants.glsl"
+#include "tonemap/linear.glsl"
+#include "tonemap/exponential.glsl"
+#include "tonemap/reinhard.glsl"
+#include "tonemap/aces.glsl"
+#include "tonemap/agx.glsl"
+#include "tonemap/pbr_neutral.glsl"
+layout(std430, binding = SLOT_SUM) readonly buffer sum_buffer { vec4 sums[]; };
+layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
+#if OUTPUT_FLOAT
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 pixels[]; };
+#else
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
+#endif
+uniform uvec2 size;
+uniform float exposure; // factor
+
+vec3 resolve_srgb(vec3 c) { // IEC 61966-2-1
+    return mix(1.055 * pow(max(c, vec3(1e-12)), vec3(1.0 / 2.4)) - 0.055, 12.92 * c, lessThanEqual(c, vec3(0.0031308)));
+}
+
+void main() {
+    uvec2 g = gl_GlobalInvocationID.xy;
+    if (g.x >= size.x || g.y >= size.y) return;
+    uint slot = g.y * size.x + g.x;
+    vec4 sum = sums[slot];
+    float n = moments[slot].w;
+    vec4 mean = n > 0.0 ? sum / n : vec4(0.0);
+    vec3 c = mean.a > 0.0 ? mean.rgb / mean.a : vec3(0.0);
+    c = min(c * exposure, vec3(1e37)); // a picture of 1e20 lifted by 60 stops stays finite
+    c = resolve_srgb(clamp(TONE_MAP(c), 0.0, 1.0));
+#if OUTPUT_FLOAT
+    pixels[slot] = vec4(c, mean.a);
+#else
+    pixels[slot] = packUnorm4x8(vec4(c, mean.a));
+#endif
+}

@@ -1,0 +1,53 @@
+// Maps from the unit square to the shapes that are sampled.
+
+// Unit disk, areas kept, squares to circles [Shirley & Chiu 1997].
+vec2 sampling_disk(vec2 u) {
+    vec2 s = 2.0 * u - 1.0;
+    bool wide = abs(s.x) > abs(s.y);
+    float r = wide ? s.x : s.y;
+    float ratio = r == 0.0 ? 0.0 : (wide ? s.y : s.x) / r;
+    float angle = ratio * (PI / 4.0);
+    float major = cos(angle), minor = sin(angle);
+    return r * (wide ? vec2(major, minor) : vec2(minor, major));
+}
+
+// Hemisphere about +z, density cos(theta) / pi [Malley].
+vec3 sampling_cosine(vec2 u) {
+    vec2 d = sampling_disk(u);
+    return vec3(d, sqrt(max(0.0, 1.0 - dot(d, d))));
+}
+
+// Hemisphere about +z, density 1 / (2 pi).
+vec3 sampling_hemisphere(vec2 u) {
+    float r = sqrt(max(0.0, 1.0 - u.x * u.x));
+    float phi = TWO_PI * u.y;
+    return vec3(r * cos(phi), r * sin(phi), u.x);
+}
+
+// Sphere, density 1 / (4 pi).
+vec3 sampling_sphere(vec2 u) {
+    float z = 1.0 - 2.0 * u.x;
+    float r = sqrt(max(0.0, 4.0 * u.x * (1.0 - u.x))); // 1 - z^2 without cancelling
+    float phi = TWO_PI * u.y;
+    return vec3(r * cos(phi), r * sin(phi), z);
+}
+
+// Triangle, uniform: barycentric weights of its second and third vertex [Heitz 2019, low distortion].
+vec2 sampling_triangle(vec2 u) {
+    vec2 b = u * 0.5;
+    float d = u.y - u.x;
+    return d > 0.0 ? vec2(b.x, b.y + d * 0.5) .xy : vec2(b.x - d * 0.5, b.y);
+}
+
+// Offset in the pixel, importance-sampled from the reconstruction filter, so that every sample weighs one
+// [Ernst, Stamminger, Greiner 2006]. The table holds the inverse of the half profile's distribution, in pixels.
+layout(std140, binding = FILTER_BLOCK) uniform filter_block { vec4 filter_table[FILTER_TABLE_SIZE + 1]; };
+
+float sampling_filter_axis(float u) {
+    float s = abs(2.0 * u - 1.0) * float(FILTER_TABLE_SIZE);
+    uint k = min(uint(s), uint(FILTER_TABLE_SIZE - 1));
+    float r = mix(filter_table[k].x, filter_table[k + 1u].x, s - float(k));
+    return u < 0.5 ? -r : r;
+}
+
+vec2 sampling_filter(vec2 u) { return vec2(sampling_filter_axis(u.x), sampling_filter_axis(u.y)); }

@@ -1,0 +1,121 @@
+// Nearest hit and any hit. Shapes of a kind that is few stand in a loop, for which llvmpipe pays next to nothing
+// (uniform loads); kinds that are many go through the tree.
+struct Point {
+    vec3 p;
+    vec3 error;   // bound on p's distance from the surface, per axis
+    vec3 ng;      // geometric normal, unit, outward
+    vec3 ns;      // shading normal, unit, outward
+    vec3 tangent; // any length
+    uint material;
+    uint light;   // or NONE
+    uint flat_id; // the shape, where a ray that leaves it cannot meet it again, else NONE
+};
+
+#include "frame.glsl"
+#include "shapes/sphere.glsl"
+#include "shapes/quad.glsl"
+#include "shapes/solid.glsl"
+#include "shapes/triangle.glsl"
+#include "traverse.glsl"
+
+void shapes_intersect(vec3 o, vec3 d, uint skip, bool any, inout Nearest n) {
+    Shear shear = triangle_shear(o, d);
+    uint i = 0u;
+#if HAS_SPHERES
+    do {
+        float t = sphere_hit(sphere_load(i), o, d, n.t);
+        if (t < n.t) n = Nearest(t, (SHAPE_SPHERE << LEAF_KIND_SHIFT) | i, n.uv);
+    } while (++i < frame.sphere_count);
+#endif
+#if HAS_QUADS
+    i = 0u;
+    do {
+        uint id = (SHAPE_QUAD << LEAF_KIND_SHIFT) | i;
+        float t = quad_hit(quad_load(i), o, d, n.t);
+        if (t < n.t && id != skip) n = Nearest(t, id, n.uv);
+    } while (++i < frame.quad_count);
+#endif
+#if HAS_BOXES
+    i = 0u;
+    do {
+        float t = box_hit(box_load(i), o, d, n.t);
+        if (t < n.t) n = Nearest(t, (SHAPE_BOX << LEAF_KIND_SHIFT) | i, n.uv);
+    } while (++i < frame.box_count);
+#endif
+#if HAS_ELLIPSOIDS
+    i = 0u;
+    do {
+        float t = ellipsoid_hit(ellipsoid_load(i), o, d, n.t);
+        if (t < n.t) n = Nearest(t, (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | i, n.uv);
+    } while (++i < frame.ellipsoid_count);
+#endif
+#if HAS_TRIANGLES
+    i = 0u;
+    do {
+        uint id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | i;
+        vec2 uv = n.uv;
+        float t = triangle_hit(triangle_load(i), shear, d, n.t, uv);
+        if (t < n.t && id != skip) n = Nearest(t, id, uv);
+    } while (++i < frame.triangle_count);
+#endif
+#if HAS_BVH
+    traverse_tree(o, d, shear, skip, any, n);
+#endif
+}
+
+// Nearest hit along o + t d, t in (0, infinity); n.id is NONE where nothing is met. `skip` is the flat shape that
+// the ray leaves.
+Nearest shapes_nearest(vec3 o, vec3 d, uint skip) {
+    Nearest n = Nearest(INFINITY_T, NONE, vec2(0.0));
+    shapes_intersect(o, d, skip, false, n);
+    return n;
+}
+
+// Whether anything stands in (0, t_max).
+bool shapes_occluded(vec3 o, vec3 d, float t_max, uint skip) {
+    Nearest n = Nearest(t_max, NONE, vec2(0.0));
+    shapes_intersect(o, d, skip, true, n);
+    return n.id != NONE;
+}
+
+Point shapes_point(Nearest n, vec3 o, vec3 d) {
+    uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK;
+    vec3 p = o + n.t * d;
+    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE);
+    // llvmpipe reads all kinds, whichever was met: an index of another kind's array may be out of range, which
+    // robust buffer access turns into 0.
+#if HAS_SPHERES || HAS_BVH_SPHERES
+    if (kind == SHAPE_SPHERE) r = sphere_point(sphere_load(index), p);
+#endif
+#if HAS_QUADS || HAS_BVH_QUADS
+    if (kind == SHAPE_QUAD) r = quad_point(quad_load(index), p, n.id);
+#endif
+#if HAS_BOXES || HAS_BVH_BOXES
+    if (kind == SHAPE_BOX) r = box_point(box_load(index), p);
+#endif
+#if HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS
+    if (kind == SHAPE_ELLIPSOID) r = ellipsoid_point(ellipsoid_load(index), p);
+#endif
+#if HAS_TRIANGLES || HAS_BVH_TRIANGLES
+    if (kind == SHAPE_TRIANGLE) r = triangle_point(triangle_load(index), n.uv, index, n.id);
+#endif
+    return r;
+}
+
+float shapes_next(float x, bool up) { // the float after x
+    if (x == 0.0) return up ? 1.4e-45 : -1.4e-45;
+    int i = floatBitsToInt(x);
+    return intBitsToFloat((x > 0.0) == up ? i + 1 : i - 1);
+}
+
+// Where a ray leaves p towards w: beyond the error of p along the geometric normal, rounded away from the
+// surface [Pharr, Jakob, Humphreys 2023, section 6.8].
+vec3 shapes_leave(Point s, vec3 w) {
+    float d = dot(abs(s.ng), s.error);
+    vec3 by = dot(w, s.ng) < 0.0 ? -d * s.ng : d * s.ng;
+    vec3 o = s.p + by;
+    o.x = by.x == 0.0 ? o.x : shapes_next(o.x, by.x > 0.0);
+    o.y = by.y == 0.0 ? o.y : shapes_next(o.y, by.y > 0.0);
+    o.z = by.z == 0.0 ? o.z : shapes_next(o.z, by.z > 0.0);
+    return o;
+}

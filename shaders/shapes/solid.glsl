@@ -1,0 +1,73 @@
+// Affine images of the unit sphere (ellipsoid) and of the cube [-1, 1]^3 (box), met in their own space, where the
+// ray's direction is not of unit length, so that t is the same in both.
+
+vec3 solid_rows(Solid s, vec3 v) { return vec3(dot(s.row_x, v), dot(s.row_y, v), dot(s.row_z, v)); }
+
+// Columns of world_from_object, from the rows of its inverse.
+mat3 solid_axes(Solid s) {
+    vec3 x = cross(s.row_y, s.row_z), y = cross(s.row_z, s.row_x), z = cross(s.row_x, s.row_y);
+    return mat3(x, y, z) / dot(s.row_x, x);
+}
+
+Point solid_point(Solid s, vec3 q, vec3 n) {
+    Point r;
+    mat3 axes = solid_axes(s);
+    r.p = s.center + axes * q;
+    vec3 reach = abs(axes[0]) + abs(axes[1]) + abs(axes[2]);
+    r.error = gamma_error(16.0) * (abs(s.center) + reach);
+    r.ng = normalize(n.x * s.row_x + n.y * s.row_y + n.z * s.row_z); // inverse transpose
+    r.ns = r.ng;
+    r.material = s.material;
+    r.light = s.light;
+    r.flat_id = NONE;
+    r.tangent = axes[0];
+    return r;
+}
+
+float ellipsoid_hit(Solid s, vec3 o, vec3 d, float t_max) {
+    vec3 f = solid_rows(s, o - s.center), g = solid_rows(s, d);
+    float a = dot(g, g);
+    float b = -dot(f, g);
+    vec3 l = f + (b / a) * g;
+    float disc = 1.0 - dot(l, l);
+    float q = b + (b < 0.0 ? -1.0 : 1.0) * sqrt(max(disc, 0.0) * a);
+    float ta = (dot(f, f) - 1.0) / q, tb = q / a;
+    float near = min(ta, tb), far = max(ta, tb);
+    float t = near > 0.0 ? near : far;
+    return disc >= 0.0 && t > 0.0 && t < t_max ? t : t_max;
+}
+
+Point ellipsoid_point(Solid s, vec3 p) {
+    vec3 q = normalize(solid_rows(s, p - s.center));
+    Point r = solid_point(s, q, q);
+#if HAS_ANISOTROPIC
+    vec3 t = dot(q.xz, q.xz) > 0.0 ? vec3(q.z, 0.0, -q.x) : vec3(1.0, 0.0, 0.0);
+    r.tangent = solid_axes(s) * t;
+#endif
+    return r;
+}
+
+float box_hit(Solid s, vec3 o, vec3 d, float t_max) {
+    vec3 f = solid_rows(s, o - s.center), g = solid_rows(s, d);
+    vec3 inv = 1.0 / mix(g, vec3(1e-30), equal(g, vec3(0.0)));
+    vec3 ta = (-1.0 - f) * inv, tb = (1.0 - f) * inv;
+    vec3 lo = min(ta, tb), hi = max(ta, tb);
+    float near = max(lo.x, max(lo.y, lo.z)), far = min(hi.x, min(hi.y, hi.z));
+    float t = near > 0.0 ? near : far;
+    return near <= far && t > 0.0 && t < t_max ? t : t_max;
+}
+
+Point box_point(Solid s, vec3 p) {
+    vec3 q = solid_rows(s, p - s.center);
+    vec3 a = abs(q);
+    float m = max(a.x, max(a.y, a.z));
+    vec3 n = a.x == m ? vec3(sign(q.x), 0.0, 0.0) : a.y == m ? vec3(0.0, sign(q.y), 0.0) : vec3(0.0, 0.0, sign(q.z));
+    q = mix(q, n, notEqual(n, vec3(0.0))); // exactly on the face
+    Point r = solid_point(s, q, n);
+#if HAS_ANISOTROPIC
+    // u to the right seen from outside: faces of x along -z or +z, of y along +x, of z along +x or -x.
+    vec3 t = n.x != 0.0 ? vec3(0.0, 0.0, -n.x) : n.y != 0.0 ? vec3(1.0, 0.0, 0.0) : vec3(n.z, 0.0, 0.0);
+    r.tangent = solid_axes(s) * t;
+#endif
+    return r;
+}

@@ -1,0 +1,34 @@
+// Nearest root of |o + t d - c| = r in (0, t_max), or t_max [Haines et al. 2019, "Precision improvements for
+// ray/sphere intersection"]: the discriminant from the closest approach, the roots without cancelling.
+float sphere_hit(Sphere s, vec3 o, vec3 d, float t_max) {
+    vec3 f = o - s.center;
+    float b = -dot(f, d);
+    vec3 l = f + b * d;
+    float disc = s.radius * s.radius - dot(l, l);
+    float q = b + (b < 0.0 ? -1.0 : 1.0) * sqrt(max(disc, 0.0));
+    float c = dot(f, f) - s.radius * s.radius;
+    float ta = c / q, tb = q;
+    float near = min(ta, tb), far = max(ta, tb);
+    float t = near > 0.0 ? near : far;
+    return disc >= 0.0 && t > 0.0 && t < t_max ? t : t_max;
+}
+
+Point sphere_point(Sphere s, vec3 p) {
+    Point r;
+    r.ng = normalize(p - s.center);
+    r.p = s.center + s.radius * r.ng;
+    r.error = gamma_error(6.0) * (abs(s.center) + s.radius);
+    r.ns = r.ng;
+    r.material = s.material;
+    r.light = s.light;
+    r.flat_id = NONE;
+#if HAS_ANISOTROPIC
+    // Along growing u = 1/2 + atan2(x, z) / 2 pi; at a pole any direction serves.
+    vec3 n = frame_rotate(vec4(-s.rotation.xyz, s.rotation.w), r.ng);
+    vec3 t = dot(n.xz, n.xz) > 0.0 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0);
+    r.tangent = frame_rotate(s.rotation, t);
+#else
+    r.tangent = vec3(1.0, 0.0, 0.0);
+#endif
+    return r;
+}

@@ -1,0 +1,1 @@
+vec3 exponential_curve(vec3 c) { return 1.0 - exp(-c); }

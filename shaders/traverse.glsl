@@ -1,0 +1,72 @@
+// The tree, threaded: one depth-first order for each octant of ray directions, nearer children first, so that a
+// walk needs no stack: a missed box names where to go on, a met one goes on at the next node. Boxes are 16-bit
+// coordinates on the scene's grid, rounded outwards.
+//
+// Two loops, one to find a leaf and one to test it: llvmpipe runs both sides of every `if`, but ends loops early.
+
+// Far distances grow by this against rounding in the slab test [Ize 2013]: 1 + 2 gamma(3), rounded up.
+const float TRAVERSE_SLACK = 1.0000007;
+
+struct Nearest {
+    float t;
+    uint id; // kind << 28 | index
+    vec2 uv; // barycentric, triangles only
+};
+
+void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uint skip, inout Nearest n) {
+    uint id = (kind << LEAF_KIND_SHIFT) | index;
+    float t = n.t;
+    vec2 uv = n.uv;
+#if HAS_BVH_SPHERES
+    if (kind == SHAPE_SPHERE) t = sphere_hit(sphere_load(index), o, d, n.t);
+#endif
+#if HAS_BVH_QUADS
+    if (kind == SHAPE_QUAD && id != skip) t = quad_hit(quad_load(index), o, d, n.t);
+#endif
+#if HAS_BVH_BOXES
+    if (kind == SHAPE_BOX) t = box_hit(box_load(index), o, d, n.t);
+#endif
+#if HAS_BVH_ELLIPSOIDS
+    if (kind == SHAPE_ELLIPSOID) t = ellipsoid_hit(ellipsoid_load(index), o, d, n.t);
+#endif
+#if HAS_BVH_TRIANGLES
+    if (kind == SHAPE_TRIANGLE && id != skip) t = triangle_hit(triangle_load(index), shear, d, n.t, uv);
+#endif
+    if (t < n.t) n = Nearest(t, id, uv);
+}
+
+// Nearest hit, or with `any` just some hit, before n.t.
+void traverse_tree(vec3 o, vec3 d, Shear shear, uint skip, bool any, inout Nearest n) {
+    vec3 safe = mix(d, vec3(1e-20), lessThan(abs(d), vec3(1e-20)));
+    vec3 inv = 1.0 / safe;
+    vec3 scale = frame.node_scale * inv, bias = (frame.node_origin - o) * inv;
+    uvec3 swap = 16u * uvec3(lessThan(safe, vec3(0.0))); // which half is the nearer side
+    uvec3 swap_far = 16u - swap;
+    uint octant = (safe.x < 0.0 ? 1u : 0u) | (safe.y < 0.0 ? 2u : 0u) | (safe.z < 0.0 ? 4u : 0u);
+    uint i = octant * frame.node_count;
+    uint end = i + frame.node_count;
+    float start = n.t;
+    do {
+        uint leaf = 0u;
+        do {
+            uvec4 w = node_words[i];
+            vec3 lo = vec3((w.xyz >> swap) & 0xffffu) * scale + bias;
+            vec3 hi = vec3((w.xyz >> swap_far) & 0xffffu) * scale + bias;
+            float near = max(max(lo.x, lo.y), max(lo.z, 0.0));
+            float far = min(min(hi.x, hi.y), min(hi.z, n.t)) * TRAVERSE_SLACK;
+            bool met = near <= far;
+            bool is_leaf = (w.w & LEAF_BIT) != 0u;
+            if (met && is_leaf) leaf = w.w;
+            i = met || is_leaf ? i + 1u : w.w;
+        } while (leaf == 0u && i < end);
+        uint kind = (leaf >> LEAF_KIND_SHIFT) & 7u;
+        uint index = leaf & LEAF_FIRST_MASK;
+        uint stop = index + ((leaf >> LEAF_COUNT_SHIFT) & 15u) + 1u;
+        if (leaf != 0u) {
+            do {
+                traverse_test(kind, index, o, d, shear, skip, n);
+                index++;
+            } while (index < stop && !(any && n.t < start));
+        }
+    } while (i < end && !(any && n.t < start));
+}

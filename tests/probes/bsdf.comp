@@ -1,0 +1,28 @@
+// Evaluates or samples the BSDF of material 0 for one wo: asks[i] is wi, or (u_lobe, u, u) with MODE 1.
+layout(local_size_x = 64) in;
+#include "layout.glsl"
+#include "constants.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "surface.glsl"
+#include "bsdf.glsl"
+layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
+layout(std430, binding = SLOT_MOMENTS) writeonly buffer answer_buffer { vec4 answers[]; };
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer direction_buffer { vec4 directions[]; };
+uniform vec3 wo;
+uniform uint count;
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    Surface s = surface_make(material_load(0u), normalize(vec2(0.8, 0.6)));
+    vec4 ask = asks[i];
+#if SAMPLE
+    vec3 wi = bsdf_sample(s, wo, ask.x, ask.yz);
+#else
+    vec3 wi = ask.xyz;
+#endif
+    Scatter f = bsdf_eval(s, wo, wi);
+    answers[i] = vec4(f.f, f.pdf);
+    directions[i] = vec4(wi, 0.0);
+}

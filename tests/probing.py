@@ -1,0 +1,64 @@
+"""Runs the kernels of tests/probes, which expose one shader function each."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from gpu import Renderer, features, filters, layout
+from gpu.layout import Slot
+from gpu.program import SHADERS, Kernels
+
+PROBES = Path(__file__).parent / "probes"
+
+
+def materials(**members: Any) -> np.ndarray:
+    """One `layout.Material` with the contract's defaults of `disney`, but for what is given."""
+    out = np.zeros(1, layout.Material.dtype)
+    defaults = {"base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0}
+    for name, value in {**defaults, **members}.items():
+        out[name] = value
+    return out
+
+
+class Prober:
+    """Kernels, buffers and uniforms for probes on the context of a Renderer."""
+
+    def __init__(self, renderer: Renderer) -> None:
+        self.context = renderer._context
+        self._kernels = Kernels(self.context, (PROBES, SHADERS))
+
+    def run(
+        self,
+        entry: str,
+        count: int,
+        inputs: Mapping[Slot, np.ndarray] | None = None,
+        outputs: tuple[Slot, ...] = (Slot.OUTPUT,),
+        defines: Mapping[str, object] | None = None,
+        raised: frozenset[str] = frozenset(),
+        frame: np.ndarray | None = None,
+        filter_name: str = "box",
+        **uniforms: Any,
+    ) -> list[np.ndarray]:
+        """(count, 4) float32 of each output slot after one run over `count` invocations."""
+        kernel = self._kernels.get(entry, {**features.defines(raised), **(defines or {})})
+        made = {slot: self.context.buffer(np.ascontiguousarray(a).tobytes()) for slot, a in (inputs or {}).items()}
+        made |= {slot: self.context.buffer(reserve=16 * count) for slot in outputs}
+        for slot, buffer in made.items():
+            buffer.bind_to_storage_buffer(int(slot))
+        table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
+        table[:, 0] = filters.inverse(filter_name, features.FILTER_TABLE_SIZE)
+        blocks = [self.context.buffer(table.tobytes())]
+        blocks.append(self.context.buffer((np.zeros((), layout.Frame.dtype) if frame is None else frame).tobytes()))
+        blocks[0].bind_to_uniform_block(layout.FILTER_BLOCK)
+        blocks[1].bind_to_uniform_block(layout.FRAME_BLOCK)
+        for name, value in {**uniforms, "count": count}.items():
+            kernel[name].value = value
+        kernel.run(-(-count // 64))
+        results = [np.frombuffer(made[slot].read(), np.float32).reshape(count, 4) for slot in outputs]
+        for buffer in (*made.values(), *blocks):
+            buffer.release()
+        return results

@@ -1,0 +1,164 @@
+"""Every material model: exact against float64, reciprocal, sampled with the density it claims. A lobe is a row."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+import pytest
+
+from gpu import Renderer
+from gpu.features import EDITED
+from gpu.layout import Model, Slot
+from tests import disney, stats
+from tests.probing import Prober, materials
+
+D = Model.DISNEY
+ROWS = {
+    "diffuse": materials(model=Model.DIFFUSE, base_color=(0.8, 0.5, 0.1)),
+    "disney default": materials(model=D),
+    "retro-reflective": materials(model=D, roughness=1, specular=0, base_color=(0.9, 0.2, 0.4)),
+    "subsurface": materials(model=D, subsurface=1, roughness=0.8),
+    "sheen": materials(model=D, sheen=1, sheen_tint=1, base_color=(0.1, 0.1, 0.6)),
+    "rough metal": materials(model=D, metallic=1, roughness=0.7, base_color=(1, 0.78, 0.34)),
+    "smooth metal": materials(model=D, metallic=1, roughness=0.1),
+    "mirror": materials(model=D, metallic=1, roughness=0, base_color=0.9),
+    "brushed": materials(model=D, metallic=1, roughness=0.4, anisotropic=0.9),
+    "tinted": materials(model=D, specular=1, specular_tint=1, base_color=(0.1, 0.7, 0.2), roughness=0.3),
+    "clear coat": materials(model=D, clearcoat=1, clearcoat_gloss=1, base_color=(0.4, 0, 0)),
+    "hazy coat": materials(model=D, clearcoat=1, clearcoat_gloss=0, metallic=0.5, roughness=0.9),
+    "everything": materials(
+        model=D, base_color=(0.6, 0.3, 0.2), metallic=0.3, subsurface=0.4, specular=0.8, roughness=0.35,
+        specular_tint=0.5, anisotropic=0.6, sheen=0.7, sheen_tint=0.3, clearcoat=0.8, clearcoat_gloss=0.7,
+    ),
+}  # fmt: skip
+ANGLES = (0.0, 35.0, 70.0, 87.0)
+FLAGS = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"]})
+TANGENT = np.array([0.8, 0.6])
+CASES = [(name, angle) for name in ROWS for angle in ANGLES]
+
+
+@pytest.fixture(scope="module")
+def prober(gpu: Renderer) -> Prober:
+    return Prober(gpu)
+
+
+def _wo(angle: float) -> np.ndarray:
+    t = math.radians(angle)
+    return np.array([math.sin(t) * 0.6, math.sin(t) * -0.8, math.cos(t)])
+
+
+def _eval(prober: Prober, row: str, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    asks = np.zeros((len(wi), 4), np.float32)
+    asks[:, :3] = wi
+    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}
+    outputs = (Slot.MOMENTS, Slot.OUTPUT)
+    return prober.run("bsdf.comp", len(wi), inputs, outputs, {"SAMPLE": 0}, FLAGS, wo=tuple(wo))[0].astype(float)
+
+
+def _sample(prober: Prober, row: str, wo: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    asks = np.zeros((len(u), 4), np.float32)
+    asks[:, :3] = u
+    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}
+    outputs = (Slot.MOMENTS, Slot.OUTPUT)
+    f, wi = prober.run("bsdf.comp", len(u), inputs, outputs, {"SAMPLE": 1}, FLAGS, wo=tuple(wo))
+    return f.astype(float), wi[:, :3].astype(float)
+
+
+def _hemisphere(rng: np.random.Generator, n: int) -> np.ndarray:
+    z, phi = rng.uniform(0.01, 1, n), rng.uniform(0, 2 * np.pi, n)
+    r = np.sqrt(1 - z * z)
+    return np.stack([r * np.cos(phi), r * np.sin(phi), z], 1)
+
+
+class Grid:
+    """Cells over half vectors, in the logarithm of their slope and in azimuth: any lobe is smooth there."""
+
+    SLOPES = np.linspace(math.log(1e-6), math.log(2e3), 81)
+    AZIMUTHS = 16
+    FINE = 20
+
+    def __init__(self, wo: np.ndarray) -> None:
+        self.wo = wo
+        n = (len(self.SLOPES) - 1) * self.FINE
+        x = self.SLOPES[0] + (np.arange(n) + 0.5) * (self.SLOPES[-1] - self.SLOPES[0]) / n
+        phi = (np.arange(self.AZIMUTHS * self.FINE) + 0.5) * 2 * np.pi / (self.AZIMUTHS * self.FINE)
+        x, phi = (a.ravel() for a in np.meshgrid(x, phi, indexing="ij"))
+        cos = 1 / np.sqrt(1 + np.exp(2 * x))
+        sin = cos * np.exp(x)
+        wm = np.stack([sin * np.cos(phi), sin * np.sin(phi), cos], 1)
+        cos_d = wm @ wo
+        self.wi = 2 * cos_d[:, None] * wm - wo
+        step = (self.SLOPES[1] - self.SLOPES[0]) / self.FINE * 2 * np.pi / (self.AZIMUTHS * self.FINE)
+        # d omega_m = sin dtheta dphi with dtheta = sin cos dx; d omega_i = 4 cos_d d omega_m
+        self.solid_angle = np.where((cos_d > 0) & (self.wi[:, 2] > 0), 4 * cos_d * sin * sin * cos * step, 0)
+
+    def sums(self, density: np.ndarray) -> np.ndarray:
+        cells = (density * self.solid_angle).reshape(len(self.SLOPES) - 1, self.FINE, self.AZIMUTHS, self.FINE)
+        return cells.sum((1, 3))
+
+    def counts(self, wi: np.ndarray) -> np.ndarray:
+        wm = wi + self.wo
+        wm /= np.linalg.norm(wm, axis=1, keepdims=True)
+        x = np.log(np.maximum(np.hypot(wm[:, 0], wm[:, 1]), 1e-12) / wm[:, 2])
+        phi = np.arctan2(wm[:, 1], wm[:, 0]) % (2 * np.pi)
+        return np.histogram2d(x, phi, [self.SLOPES, np.linspace(0, 2 * np.pi, self.AZIMUTHS + 1)])[0]
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_value_is_the_formula(prober: Prober, row: str) -> None:
+    rng = np.random.default_rng(1)
+    for angle in ANGLES:
+        wo, wi = _wo(angle).astype(np.float32).astype(float), _hemisphere(rng, 4000).astype(np.float32).astype(float)
+        mirrored = wo * [-1, -1, 1] + 1e-3 * rng.normal(size=(400, 3))  # where narrow lobes are
+        wi = np.concatenate([wi, mirrored / np.linalg.norm(mirrored, axis=1, keepdims=True)])
+        wi = wi[wi[:, 2] > 0.005].astype(np.float32).astype(float)
+        expected = disney.bsdf(ROWS[row][0], wo, wi, TANGENT) * wi[:, 2:]
+        # Directions are rounded to 2^-24 and a lobe of alpha .001 moves 1000 times as fast.
+        np.testing.assert_allclose(_eval(prober, row, wo, wi)[:, :3], expected, rtol=2e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_reciprocal(prober: Prober, row: str) -> None:
+    rng = np.random.default_rng(2)
+    for wo in _hemisphere(rng, 6):
+        wi = _hemisphere(rng, 64)
+        there = _eval(prober, row, wo, wi)[:, :3] / wi[:, 2:]
+        back = np.concatenate([_eval(prober, row, w, wo[None])[:, :3] / wo[2] for w in wi])
+        np.testing.assert_allclose(there, back, rtol=2e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize(("row", "angle"), CASES)
+def test_samples_follow_their_pdf_and_carry_the_albedo(prober: Prober, row: str, angle: float) -> None:
+    rng = np.random.default_rng(3)
+    n = 60_000
+    wo = _wo(angle)
+    grid = Grid(wo)
+    on_grid = _eval(prober, row, wo, np.where(grid.solid_angle[:, None] > 0, grid.wi, [0, 0, 1]))
+    f, wi = _sample(prober, row, wo, rng.random((n, 3)))
+    alive = f[:, 3] > 0
+    observed = grid.counts(wi[alive])
+    expected = grid.sums(on_grid[:, 3]) * n
+    # Samples below the horizon are lost; quadrature knows their share to about a percent at grazing angles.
+    assert observed.sum() == pytest.approx(expected.sum(), abs=0.012 * n)
+    p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()))
+    assert p > stats.sidak(1e-3, len(CASES)), f"chi-square p = {p:.2g}"
+    weights = np.where(alive[:, None], f[:, :3] / np.where(alive, f[:, 3], 1)[:, None], 0)
+    albedo = np.array([grid.sums(on_grid[:, c]).sum() for c in range(3)])
+    error = weights.std(0) / math.sqrt(n)
+    assert (np.abs(weights.mean(0) - albedo) < 4.5 * error + 2e-3 * albedo + 1e-6).all()
+
+
+def test_a_wrong_pdf_is_seen(prober: Prober) -> None:
+    """The chi-square test above fails when alpha^2 is off by 10 %: samples of one roughness, density of another."""
+    wo = _wo(35)
+    grid, n = Grid(wo), 240_000
+    ROWS["off"] = materials(model=D, metallic=1, roughness=0.7 * 1.1**0.25, base_color=(1, 0.78, 0.34))
+    try:
+        on_grid = _eval(prober, "off", wo, np.where(grid.solid_angle[:, None] > 0, grid.wi, [0, 0, 1]))
+    finally:
+        del ROWS["off"]
+    f, wi = _sample(prober, "rough metal", wo, np.random.default_rng(3).random((n, 3)))
+    observed, expected = grid.counts(wi[f[:, 3] > 0]), grid.sums(on_grid[:, 3]) * n
+    p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()))
+    assert p < 1e-6
