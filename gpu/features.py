@@ -5,7 +5,7 @@ A flag only removes code that the scene cannot reach; choices that change pixels
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 
@@ -51,7 +51,6 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_BVH_TRIANGLES": _tree(ShapeKind.TRIANGLE),
     "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
     "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
-    "HAS_MANY_MATERIALS": lambda s: len(s.materials) > 1,
     "HAS_EMISSION": lambda s: bool((s.materials["emission"] > 0).any()),
     "HAS_LIGHTS": lambda s: len(s.lights) > 0,
     "HAS_MANY_LIGHTS": lambda s: len(s.lights) > 1,
@@ -83,9 +82,33 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
     return frozenset(raised)
 
 
-def defines(raised: frozenset[str], settings: RenderSettings | None = None) -> dict[str, int]:
-    """Every flag as 0 or 1, and the settings that are compiled in."""
-    out = {name: int(name in raised) for name in FLAGS}
+# Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
+# varying index. 0: too many to be worth it, or met through the tree.
+COUNTS = {
+    "SPHERE_COUNT": "spheres",
+    "QUAD_COUNT": "quads",
+    "BOX_COUNT": "boxes",
+    "ELLIPSOID_COUNT": "ellipsoids",
+    "TRIANGLE_COUNT": "triangles",
+}
+FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
+_FEW_MAX = 2
+
+
+def counts(scene: SceneArrays) -> dict[str, int]:
+    """How many shapes of each kind stand in the kernel's loops, and how many materials and lights, where few."""
+    kinds = zip(COUNTS.items(), ShapeKind, strict=True)
+    out = {name: 0 if kind in scene.bvh_kinds else len(getattr(scene, records)) for (name, records), kind in kinds}
+    few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
+    return out | {name: n if n <= _FEW_MAX else 0 for name, n in few.items()}
+
+
+def defines(
+    raised: frozenset[str], settings: RenderSettings | None = None, shapes: Mapping[str, int] | None = None
+) -> dict[str, object]:
+    """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
+    out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
+    out |= {name: 0 for name in (*COUNTS, *FEW)} | dict(shapes or {})
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
     out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)

@@ -168,16 +168,16 @@ class Quad(Record):
     slot = Slot.QUADS
     origin: vec3
     material: u32
-    u: vec3
-    light: u32
-    v: vec3
-    shape: u32
     normal: vec3  # unit, along cross(u, v)
-    area: f32
+    light: u32
     dual_u: vec3  # dot(p - origin, dual_u) is p's coordinate along u, 0..1 inside
     u_length: f32
     dual_v: vec3
     v_length: f32
+    u: vec3
+    area: f32
+    v: vec3
+    shape: u32
 
 
 class Solid(Record):
@@ -262,11 +262,6 @@ class Frame(Record):
     seed: u32
     node_scale: vec3  # world size of one grid step
     node_count: u32  # of one octant's order
-    sphere_count: u32
-    quad_count: u32
-    box_count: u32
-    ellipsoid_count: u32
-    triangle_count: u32
     light_count: u32
     replicate: u32  # which independent scramble of the sampler
     clamp_radiance: f32  # of indirect light; 0: off
@@ -296,6 +291,10 @@ _BUFFERS: dict[str, tuple[type[Record], Slot]] = {
 }
 
 
+# Buffers with a COUNT that kernels are compiled for
+PICKED = ("material", "sphere", "quad", "box", "ellipsoid", "triangle", "light")
+
+
 def _struct(record: type[Record]) -> str:
     body = " ".join(f"{k.glsl} {name};" for name, k in record.members.items())
     return f"struct {record.__name__} {{ {body} }};"
@@ -317,6 +316,24 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
         values.append(word if kind.base is np.uint32 else f"uintBitsToFloat({word})")
     lines.append(f"    return {record.__name__}({', '.join(values)});\n}}")
     return "\n".join(lines)
+
+
+def _picker(name: str, record: type[Record]) -> str:
+    """Loads record i as `_load` does, but where a kernel knows that there are one or two, by choosing among loads at
+    constant places: on llvmpipe those cost a tenth of a load at a place that varies from lane to lane."""
+    count = f"{name.upper()}_COUNT"
+    return f"""
+{record.__name__} {name}_pick(uint i) {{
+#if {count} == 0 || {count} > 2
+    return {name}_load(i);
+#else
+    {record.__name__} r = {name}_load(0u);
+    for (uint k = 1u; k < uint({count}); k++) {{
+        if (i == k) r = {name}_load(k);
+    }}
+    return r;
+#endif
+}}"""
 
 
 def _constants() -> str:
@@ -341,6 +358,7 @@ def glsl() -> str:
     """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `frame`."""
     structs = [_struct(r) for r in dict.fromkeys(r for r, _ in _BUFFERS.values())]
     loaders = [_loader(name, r, slot) for name, (r, slot) in _BUFFERS.items()]
+    loaders += [_picker(name, _BUFFERS[name][0]) for name in PICKED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     body = " ".join(f"{k.glsl} {name};" for name, k in Frame.members.items())
     frame = f"layout(std140, binding = {FRAME_BLOCK}) uniform frame_block {{ {body} }} frame;"

@@ -64,7 +64,7 @@ class Picture:
 
     def reset(self) -> None:
         """Start again at zero samples, with the scene as it is now."""
-        kernel = self._kernels.get("pathtrace.comp", features.defines(self.scene.flags, self.settings))
+        kernel = self._kernels.get("pathtrace.comp", self.scene.defines(self.settings))
         self.compile_ms += self._kernels.last_compile_ms
         if kernel is not self._kernel:
             self._kernel, self._cost_s = kernel, 0.0
@@ -215,7 +215,7 @@ class Picture:
             for slot in (Slot.ALBEDO, Slot.NORMAL):
                 self._guides[slot] = self._context.buffer(reserve=16 * size[0] * size[1])
                 self._guides[slot].clear()
-        kernel = self._kernels.get("guides.comp", features.defines(self.scene.flags, self.settings))
+        kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
         self._bind()
         for slot, buffer in self._guides.items():
             buffer.bind_to_storage_buffer(int(slot))
@@ -256,7 +256,7 @@ class Picture:
             return display.encode(aov, self.read(aov), dtype)
         width, height = self.settings.width, self.settings.height
         floats = dtype == "f4"
-        defines = {"TONE_MAP": f"{tone_map}_curve", "OUTPUT_FLOAT": int(floats)}
+        defines = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve", "OUTPUT_FLOAT": int(floats)}
         kernel = self._kernels.get("resolve.comp", defines)
         output = self._context.buffer(reserve=(16 if floats else 4) * width * height)
         kernel["size"].value = (width, height)

@@ -13,6 +13,7 @@ from gpu import features, layout
 from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
 from gpu.layout import LightKind, Slot
+from gpu.settings import RenderSettings
 
 log = logging.getLogger(__name__)
 
@@ -68,6 +69,10 @@ class Scene:
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
         return texture, alias
 
+    def defines(self, settings: RenderSettings) -> dict[str, object]:
+        """What its kernels are compiled with."""
+        return features.defines(self._raised, settings, features.counts(self.arrays))
+
     @property
     def flags(self) -> frozenset[str]:
         return self._raised
@@ -115,15 +120,7 @@ class Scene:
         frame["node_origin"] = a.node_origin
         frame["node_scale"] = a.node_scale
         frame["node_count"] = len(a.nodes) // 8
-        for kind, records in (
-            ("sphere", a.spheres),
-            ("quad", a.quads),
-            ("box", a.boxes),
-            ("light", a.lights),
-        ):
-            frame[f"{kind}_count"] = len(records)
-        frame["ellipsoid_count"] = len(a.ellipsoids)
-        frame["triangle_count"] = len(a.triangles)
+        frame["light_count"] = len(a.lights)
         frame["moment_scale"] = 1.0 / a.radiance_scale
         frame["environment_turn"] = (1.0, 0.0)
         if a.environment is not None:

@@ -20,8 +20,8 @@ Light lights_pick(float u) {
 #if HAS_MANY_LIGHTS
     float x = u * float(frame.light_count);
     uint i = min(uint(x), frame.light_count - 1u);
-    Light l = light_load(i);
-    if (x - float(i) >= l.threshold) l = light_load(l.alias);
+    Light l = light_pick(i);
+    if (x - float(i) >= l.threshold) l = light_pick(l.alias);
     return l;
 #else
     return light_load(0u);
@@ -40,19 +40,19 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
     if (l.kind == LIGHT_ENVIRONMENT) s = environment_light_sample(bits);
 #endif
 #if HAS_SPHERE_LIGHTS
-    if (l.kind == LIGHT_SPHERE) s = sphere_light_sample(sphere_load(l.index), p, u);
+    if (l.kind == LIGHT_SPHERE) s = sphere_light_sample(sphere_pick(l.index), p, u);
 #endif
 #if HAS_QUAD_LIGHTS
-    if (l.kind == LIGHT_QUAD) s = quad_light_sample(quad_load(l.index), p, u);
+    if (l.kind == LIGHT_QUAD) s = quad_light_sample(quad_pick(l.index), p, u);
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (l.kind == LIGHT_TRIANGLE) s = triangle_light_sample(triangle_load(l.index), p, u);
+    if (l.kind == LIGHT_TRIANGLE) s = triangle_light_sample(triangle_pick(l.index), p, u);
 #endif
 #if HAS_ELLIPSOID_LIGHTS
-    if (l.kind == LIGHT_ELLIPSOID) s = ellipsoid_light_sample(ellipsoid_load(l.index), p, u);
+    if (l.kind == LIGHT_ELLIPSOID) s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u);
 #endif
 #if HAS_EMISSION
-    if (l.kind >= LIGHT_SPHERE) s.radiance = material_load(l.material).emission;
+    if (l.kind >= LIGHT_SPHERE) s.radiance = material_pick(l.material).emission;
 #endif
     s.pdf *= l.probability;
     return s;
@@ -61,19 +61,19 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
 // Density of lights_sample at p for the direction wi that met the emitting shape n.id at distance n.t.
 float lights_pdf(uint light, Nearest n, Point at, vec3 p, vec3 wi) {
 #if HAS_EMISSION
-    Light l = light_load(light);
+    Light l = light_pick(light);
     float pdf = 0.0;
 #if HAS_SPHERE_LIGHTS
-    if (l.kind == LIGHT_SPHERE) pdf = sphere_light_pdf(sphere_load(l.index), p);
+    if (l.kind == LIGHT_SPHERE) pdf = sphere_light_pdf(sphere_pick(l.index), p);
 #endif
 #if HAS_QUAD_LIGHTS
-    if (l.kind == LIGHT_QUAD) pdf = quad_light_pdf(quad_load(l.index), n.t, at.ng, wi);
+    if (l.kind == LIGHT_QUAD) pdf = quad_light_pdf(quad_pick(l.index), n.t, at.ng, wi);
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (l.kind == LIGHT_TRIANGLE) pdf = triangle_light_pdf(triangle_load(l.index), n.t, at.ng, wi);
+    if (l.kind == LIGHT_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(l.index), n.t, at.ng, wi);
 #endif
 #if HAS_ELLIPSOID_LIGHTS
-    if (l.kind == LIGHT_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_load(l.index), n.t, at, wi);
+    if (l.kind == LIGHT_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(l.index), n.t, at, wi);
 #endif
     return pdf * l.probability;
 #else

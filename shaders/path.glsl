@@ -22,18 +22,10 @@ vec3 path_clamp(vec3 c, bool indirect) {
     return c;
 }
 
-Material path_material(uint index) {
-#if HAS_MANY_MATERIALS
-    return material_load(index);
-#else
-    return material_load(0u);
-#endif
-}
-
 // Emission towards the side the ray came from: a shape shines from its outward side.
 vec3 path_emission(Point at, vec3 d) {
 #if HAS_EMISSION
-    if (at.light != NONE && dot(d, at.ng) < 0.0) return path_material(at.material).emission;
+    if (at.light != NONE && dot(d, at.ng) < 0.0) return material_pick(at.material).emission;
 #endif
     return vec3(0.0);
 }
@@ -76,7 +68,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             float along2 = dot(along, along);
             if (along2 > 0.0) tangent = along * inversesqrt(along2);
 #endif
-            Surface s = surface_make(path_material(at.material), tangent);
+            Surface s = surface_make(material_pick(at.material), tangent);
             vec3 wo = frame_to_local(basis, wo_w);
             uint pair = PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE;
             vec2 choice = sobol_pair(rng, pair + PAIR_CHOICE);

@@ -52,10 +52,13 @@ LightSample environment_light_sample(uvec2 bits) {
     i = keep ? i : e.alias;
     // What is left of the first number after both choices is uniform again: it places the direction inside the texel.
     float v = keep ? rest / e.threshold : (rest - e.threshold) / (1.0 - e.threshold);
-    uvec2 at = uvec2(i % size.x, i / size.x);
+    // Row and column by float division, mended by one where it rounded: llvmpipe divides integers lane by lane.
+    int row = int(float(i) / float(size.x)), column = int(i) - row * int(size.x);
+    int carry = column < 0 ? -1 : column >= int(size.x) ? 1 : 0;
+    ivec2 at = ivec2(column - carry * int(size.x), row + carry);
     float phi = (float(at.x) + u.y) / float(size.x) * TWO_PI - PI;
     // The row's band between two colatitudes, uniform in cosine; near a pole by sines, without cancelling.
-    float top = float(at.y) / float(size.y) * PI, bottom = float(at.y + 1u) / float(size.y) * PI;
+    float top = float(at.y) / float(size.y) * PI, bottom = float(at.y + 1) / float(size.y) * PI;
     float s0 = sqr(sin(0.5 * top)), s1 = sqr(sin(0.5 * bottom));
     float h = mix(s0, s1, clamp(v, 0.0, 1.0)); // sin^2 of half the colatitude
     float y = 1.0 - 2.0 * h, r = 2.0 * sqrt(max(0.0, h * (1.0 - h)));

@@ -11,8 +11,8 @@ float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
 Point quad_point(Quad q, vec3 p, uint id) {
     Point r;
     vec3 w = p - q.origin;
-    r.p = q.origin + dot(w, q.dual_u) * q.u + dot(w, q.dual_v) * q.v;
-    r.error = gamma_error(6.0) * (abs(q.origin) + abs(q.u) + abs(q.v));
+    r.p = p - dot(w, q.normal) * q.normal; // onto the plane: what is left is the rounding of this line
+    r.error = gamma_error(8.0) * (abs(q.origin) + abs(w) + abs(p));
     r.ng = q.normal;
     r.ns = q.normal;
     r.tangent = q.u;

@@ -1,0 +1,135 @@
+"""Boxes -> a bounding volume hierarchy as `layout.Node` records. Runs without GL, off the render loop.
+
+Importing this loads numba (half a second), so import it where a tree is needed.
+"""
+
+from __future__ import annotations
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpu.bvh_grow import WORDS, grow, measure
+from gpu.bvh_threads import thread_octant
+from gpu.errors import SceneTooLarge
+from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, Node
+
+LEAF_SIZE = 4  # at most so many primitives in a leaf; the surface area heuristic splits most of them further
+LEAF_SIZE_LARGE = 8  # exactly that many wherever counts allow, for scenes whose eight orders would pass 2 GiB
+LARGE = 6_000_000
+MAX_PRIMITIVES = LEAF_FIRST_MASK + 1
+OCTANTS = 8
+WORTH_THREADS = 32_768  # boxes; below it starting threads costs more than they save
+
+Vec3 = tuple[float, float, float]
+
+
+@dataclass(frozen=True)
+class Tree:
+    """A hierarchy whose boxes are on a grid: coordinate q of an axis stands for origin + q * scale."""
+
+    order: np.ndarray  # (n,) uint32: the primitives in leaf order
+    ranks: np.ndarray  # (n,) uint32: in the same order, each one's place in the array of its kind
+    rows: np.ndarray  # (slots, WORDS) uint32, see bvh_grow
+    regions: np.ndarray  # (k, 2): the slots [from, to) in use, parents before their children
+    origin: Vec3
+    scale: Vec3
+
+    @property
+    def count(self) -> int:
+        return int(np.diff(self.regions).sum())
+
+
+def _grid(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
+    """(2, 3) float64, exact in float32: origin and step of the grid of 65536 planes per axis.
+
+    Steps are never finer than a few roundings of the coordinates, nor than 1/64 of the longest axis' step:
+    growing a box by one of them must cover the rounding in the shader, in flat scenes as well.
+    """
+    low, high = lower.min(axis=0).astype(np.float64), upper.max(axis=0).astype(np.float64)
+    extent = high - low
+    extent = np.maximum(extent, extent.max() / 64)
+    step = np.maximum(extent / 65530, np.maximum(abs(low), abs(high)).max() * 2.0**-21)
+    step = np.maximum(step, 1e-30).astype(np.float32).astype(np.float64)  # a point at 0: not denormal, either
+    return np.stack([(low - 2 * step).astype(np.float32).astype(np.float64), step])
+
+
+def build(lower: np.ndarray, upper: np.ndarray, kinds: np.ndarray, leaf_size: int | None = None) -> Tree:
+    """The tree over n boxes: `lower`, `upper` (n, 3) float32, finite; `kinds` (n,) `layout.ShapeKind`.
+
+    A leaf holds one kind only. The tree does not depend on the number of threads. Raises SceneTooLarge.
+    """
+    n = len(kinds)
+    if not 0 < n <= MAX_PRIMITIVES:
+        raise SceneTooLarge(f"{n} primitives; a tree holds 1 to {MAX_PRIMITIVES}")
+    leaf_max = min(leaf_size or (LEAF_SIZE if n <= LARGE else LEAF_SIZE_LARGE), LEAF_MAX_COUNT)
+    leaf_min = leaf_max if n > LARGE else 1
+    boxes = np.concatenate([lower, upper], axis=1, dtype=np.float32)
+    kinds = np.ascontiguousarray(kinds, np.uint8)
+    order = np.arange(n, dtype=np.uint32)
+    mixed = bool((kinds != kinds[0]).any())
+    grid = _grid(lower, upper)
+
+    workers = os.cpu_count() or 1
+    whole = max(8192, n // (8 * workers)) if n > WORTH_THREADS and workers > 1 else 0
+    tasks = np.empty((n if whole else 1, 3), np.int64)
+    # A subtree over [a, b) has its own 2 (b - a) rows; those never written cost address space, not memory.
+    reserved = 2 * n if whole else 0
+    rows = np.empty((reserved + 2 * n, WORDS), np.uint32)
+
+    def subtree(slot: int, free: int, first: int, last: int, whole: int) -> tuple[int, int]:
+        used, task_count = grow(
+            rows, slot, free, boxes, order, kinds, mixed, grid, first, last, leaf_min, leaf_max, whole, tasks
+        )
+        if task_count == 0:
+            measure(rows, free, used, slot)
+        return used, task_count
+
+    top, task_count = subtree(0, 1, 0, n, whole)
+    regions = [(0, top)]
+    if task_count:
+        ranges = sorted((int(a), int(b), int(slot)) for slot, a, b in tasks[:task_count])
+        with ThreadPoolExecutor(workers) as pool:
+            ends = pool.map(lambda r: subtree(r[2], reserved + 2 * r[0], r[0], r[1], 0)[0], ranges)
+            regions += [(reserved + 2 * a, end) for (a, _, _), end in zip(ranges, ends, strict=True)]
+        measure(rows, 1, top, 0)
+    return Tree(order, _ranks(kinds[order], mixed), rows, np.array(regions, np.int64), *_as_tuples(grid))
+
+
+def _as_tuples(grid: np.ndarray) -> tuple[Vec3, Vec3]:
+    (ox, oy, oz), (sx, sy, sz) = grid.tolist()
+    return (ox, oy, oz), (sx, sy, sz)
+
+
+def _ranks(kinds: np.ndarray, mixed: bool) -> np.ndarray:
+    ranks = np.arange(len(kinds), dtype=np.uint32)
+    if mixed:
+        for kind in np.unique(kinds):
+            places = np.flatnonzero(kinds == kind)
+            ranks[places] = np.arange(len(places), dtype=np.uint32)
+    return ranks
+
+
+def thread(tree: Tree) -> np.ndarray:
+    """(8 * count,) `layout.Node`: octant o's order at [o * count, (o + 1) * count).
+
+    Bit i of the octant is set where the ray's direction is negative on axis i. An order is depth first, the
+    child nearer along the split axis first. An inner node's link is the place in the whole array to go on at
+    when its box is missed, the octant's end being (o + 1) * count. After a hit or a leaf, it is i + 1.
+    """
+    count = tree.count
+    nodes = np.empty((OCTANTS, count, 4), np.uint32)
+
+    def octant(o: int) -> None:
+        thread_octant(tree.rows, tree.regions, tree.ranks, o, o * count, nodes[o])
+
+    workers = min(OCTANTS, os.cpu_count() or 1)
+    if count > WORTH_THREADS and workers > 1:
+        with ThreadPoolExecutor(workers) as pool:
+            list(pool.map(octant, range(OCTANTS)))
+    else:
+        for o in range(OCTANTS):
+            octant(o)
+    return nodes.reshape(-1).view(Node.dtype)

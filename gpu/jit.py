@@ -1,0 +1,43 @@
+"""Machine code for the few loops that numpy cannot express, kept in the user's cache between runs."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable
+from hashlib import sha256
+from pathlib import Path
+from typing import Any, TypeVar, cast
+
+
+def _cache() -> Path:
+    """A folder of the user's (the package's own may be read-only), another one whenever the code changes.
+
+    numba alone would miss a change in a function or constant that came from another file.
+    """
+    folder = Path(__file__).parent
+    sources = [*sorted(folder.glob("bvh*.py")), folder / "layout.py"]
+    digest = sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
+    home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return home / "sunbox" / "numba" / digest[:16]
+
+
+os.environ.setdefault("NUMBA_CACHE_DIR", str(_cache()))
+
+import numba  # noqa: E402
+
+log = logging.getLogger(__name__)
+
+F = TypeVar("F", bound=Callable[..., Any])
+
+
+def jit(function: F) -> F:
+    """`function`, compiled at its first call and run without the GIL.
+
+    Where no cache can be written, each process compiles it anew.
+    """
+    try:
+        return cast(F, numba.njit(cache=True, nogil=True)(function))
+    except RuntimeError:
+        log.warning("compiled without a cache function=%s", function.__name__)
+        return cast(F, numba.njit(nogil=True)(function))
