@@ -92,7 +92,8 @@ COUNTS = {
     "TRIANGLE_COUNT": "triangles",
 }
 FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
-_FEW_MAX = 2
+_FEW_MAX = 64  # 5 KiB of materials, well inside the 16 KiB that every driver gives a uniform block
+PICK_MAX = 2
 
 
 def counts(scene: SceneArrays) -> dict[str, int]:
@@ -109,6 +110,7 @@ def defines(
     """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
     out |= {name: 0 for name in (*COUNTS, *FEW)} | dict(shapes or {})
+    out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
     out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)

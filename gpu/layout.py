@@ -100,6 +100,8 @@ class Slot(IntEnum):
 
 FRAME_BLOCK = 0  # uniform blocks
 FILTER_BLOCK = 1
+# Buffers with a NAME_COUNT that kernels are compiled for: uniform blocks where it is above 0. Binding points
+COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}
 ENVIRONMENT_TEXTURE = 0  # texture unit
 
 
@@ -278,7 +280,7 @@ LEAF_COUNT_SHIFT = 24
 LEAF_FIRST_MASK = 0x00FFFFFF
 LEAF_MAX_COUNT = 16
 
-_BUFFERS: dict[str, tuple[type[Record], Slot]] = {
+BUFFERS: dict[str, tuple[type[Record], Slot]] = {
     "material": (Material, Slot.MATERIALS),
     "sphere": (Sphere, Slot.SPHERES),
     "quad": (Quad, Slot.QUADS),
@@ -291,23 +293,36 @@ _BUFFERS: dict[str, tuple[type[Record], Slot]] = {
 }
 
 
-# Buffers with a COUNT that kernels are compiled for
-PICKED = ("material", "sphere", "quad", "box", "ellipsoid", "triangle", "light")
-
-
 def _struct(record: type[Record]) -> str:
     body = " ".join(f"{k.glsl} {name};" for name, k in record.members.items())
     return f"struct {record.__name__} {{ {body} }};"
 
 
 def _loader(name: str, record: type[Record], slot: Slot) -> str:
+    """The buffer of a record and its `NAME_load(i)`.
+
+    A buffer of which kernels know the count is a uniform block: llvmpipe loads those once for all lanes where the
+    index is constant, as in unrolled loops, and storage buffers lane by lane wherever control flow has diverged.
+    """
     group = 4 if record.words % 4 == 0 else 2
-    lines = [
+    groups = record.words // group
+    storage = (
         f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_words[]; }};"
-    ]
+    )
+    lines = [storage]
+    if name in COUNTED:
+        count = f"{name.upper()}_COUNT"
+        block = f"layout(std140, binding = {COUNTED[name]}) uniform {name}_block"
+        lines = [
+            f"#if {count} > 0",
+            f"{block} {{ uvec4 {name}_words[{count} * {groups}]; }};",
+            "#else",
+            storage,
+            "#endif",
+        ]
     lines.append(f"{record.__name__} {name}_load(uint i) {{")
-    for k in range(record.words // group):
-        lines.append(f"    uvec{group} w{k} = {name}_words[i * {record.words // group}u + {k}u];")
+    for k in range(groups):
+        lines.append(f"    uvec{group} w{k} = {name}_words[i * {groups}u + {k}u];")
     values = []
     for member, kind in record.members.items():
         at = record.offsets[member]
@@ -319,17 +334,17 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
 
 
 def _picker(name: str, record: type[Record]) -> str:
-    """Loads record i as `_load` does, but where a kernel knows that there are one or two, by choosing among loads at
-    constant places: on llvmpipe those cost a tenth of a load at a place that varies from lane to lane."""
+    """`NAME_pick(i)`: as `_load`, but where there are very few, chosen among loads at constant places."""
     count = f"{name.upper()}_COUNT"
     return f"""
 {record.__name__} {name}_pick(uint i) {{
-#if {count} == 0 || {count} > 2
+#if {count} == 0 || {count} > PICK_MAX
     return {name}_load(i);
 #else
     {record.__name__} r = {name}_load(0u);
     for (uint k = 1u; k < uint({count}); k++) {{
-        if (i == k) r = {name}_load(k);
+        {record.__name__} other = {name}_load(k);
+        if (i == k) r = other;
     }}
     return r;
 #endif
@@ -356,9 +371,9 @@ def _constants() -> str:
 
 def glsl() -> str:
     """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `frame`."""
-    structs = [_struct(r) for r in dict.fromkeys(r for r, _ in _BUFFERS.values())]
-    loaders = [_loader(name, r, slot) for name, (r, slot) in _BUFFERS.items()]
-    loaders += [_picker(name, _BUFFERS[name][0]) for name in PICKED]
+    structs = [_struct(r) for r in dict.fromkeys(r for r, _ in BUFFERS.values())]
+    loaders = [_loader(name, r, slot) for name, (r, slot) in BUFFERS.items()]
+    loaders += [_picker(name, BUFFERS[name][0]) for name in COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     body = " ".join(f"{k.glsl} {name};" for name, k in Frame.members.items())
     frame = f"layout(std140, binding = {FRAME_BLOCK}) uniform frame_block {{ {body} }} frame;"

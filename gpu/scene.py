@@ -30,6 +30,9 @@ _BUFFERS = {
 }
 
 
+_BLOCKS = {layout.BUFFERS[name][1]: block for name, block in layout.COUNTED.items()}
+
+
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
@@ -105,6 +108,8 @@ class Scene:
         """Bind every buffer of the scene to its slot."""
         for slot, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(int(slot))
+            if slot in _BLOCKS:
+                buffer.bind_to_uniform_block(_BLOCKS[slot])
         self._texels.use(layout.ENVIRONMENT_TEXTURE)
 
     def write_frame(self, frame: np.ndarray) -> None:
