@@ -26,8 +26,8 @@ def profile(name: str, x: np.ndarray) -> np.ndarray:
 
 @cache
 def inverse(name: str, size: int) -> np.ndarray:
-    """Distances (pixels) at which the half profile's distribution reaches k / size, k = 0 .. size: float32."""
-    x = np.linspace(0, RADIUS[name], 1 << 16)
+    """Distances (pixels) at which the half profile's distribution reaches 1 - (1 - k / size)^4, k = 0 .. size: float32."""
+    x = np.linspace(0, RADIUS[name], 1 << 17)
     w = profile(name, x)
     cdf = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]))])
-    return np.interp(np.linspace(0, 1, size + 1), cdf / cdf[-1], x).astype(np.float32)
+    return np.interp(1 - (1 - np.linspace(0, 1, size + 1)) ** 4, cdf / cdf[-1], x).astype(np.float32)

@@ -40,11 +40,13 @@ vec2 sampling_triangle(vec2 u) {
 }
 
 // Offset in the pixel, importance-sampled from the reconstruction filter, so that every sample weighs one
-// [Ernst, Stamminger, Greiner 2006]. The table holds the inverse of the half profile's distribution, in pixels.
+// [Ernst, Stamminger, Greiner 2006]. The table holds the inverse of the half profile's distribution, in pixels, at
+// 1 - (1 - k / n)^4: dense in the tail, where the inverse is steep.
 layout(std140, binding = FILTER_BLOCK) uniform filter_block { vec4 filter_table[FILTER_TABLE_SIZE + 1]; };
 
 float sampling_filter_axis(float u) {
-    float s = abs(2.0 * u - 1.0) * float(FILTER_TABLE_SIZE);
+    float tail = sqrt(sqrt(1.0 - abs(2.0 * u - 1.0)));
+    float s = (1.0 - tail) * float(FILTER_TABLE_SIZE);
     uint k = min(uint(s), uint(FILTER_TABLE_SIZE - 1));
     float r = mix(filter_table[k].x, filter_table[k + 1u].x, s - float(k));
     return u < 0.5 ? -r : r;

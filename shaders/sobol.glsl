@@ -38,13 +38,14 @@ uint sobol_scramble(uint x, uint seed) {
     return x;
 }
 
-// Pascal's triangle mod 2 times the digits of v: the second Sobol' dimension, mirrored [Ahmed 2024].
+// The second Sobol' dimension, mirrored: digit r is the sum of C(j, r) v_j mod 2, Pascal's triangle, in five steps
+// [Ahmed 2024, "An implementation algorithm of 2D Sobol sequence fast, elegant, and compact"].
 uint sobol_pascal(uint v) {
-    v ^= v << 16u;
-    v ^= (v & 0x00ff00ffu) << 8u;
-    v ^= (v & 0x0f0f0f0fu) << 4u;
-    v ^= (v & 0x33333333u) << 2u;
-    v ^= (v & 0x55555555u) << 1u;
+    v ^= v >> 16u;
+    v ^= (v & 0xff00ff00u) >> 8u;
+    v ^= (v & 0xf0f0f0f0u) >> 4u;
+    v ^= (v & 0xccccccccu) >> 2u;
+    v ^= (v & 0xaaaaaaaau) >> 1u;
     return v;
 }
 

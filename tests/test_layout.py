@@ -1,0 +1,91 @@
+"""Bytes shared with the shaders: every member of every record is echoed from the GPU, bit for bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, layout
+from gpu.features import COUNTS, FEW, FLAGS, defines
+from gpu.layout import BUFFERS, COUNTED, LayoutError, Record, f32, vec3
+
+
+@pytest.mark.parametrize("name", BUFFERS)
+@pytest.mark.parametrize("block", [False, True])
+def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
+    record, slot = BUFFERS[name]
+    if block and name not in COUNTED:
+        pytest.skip("this buffer is always a storage buffer")
+    count = 3
+    rng = np.random.default_rng(5)
+    # Any bits but those of a NaN's or denormal's exponent, which some GPUs do not keep in float registers.
+    words = rng.integers(0x00800000, 0x7F000000, (count, record.words), np.uint32)
+    values = words.view(record.dtype)[:, 0]
+    out_words = sum(kind.words for kind in record.members.values())
+    lines, at = [], 0
+    for member, kind in record.members.items():
+        for axis in "xyzw"[: kind.words]:
+            value = f"r.{member}" + (f".{axis}" if kind.words > 1 else "")
+            bits = value if kind.base is np.uint32 else f"floatBitsToUint({value})"
+            lines.append(f"    echo[i * {out_words}u + {at}u] = {bits};")
+            at += 1
+    known = defines(frozenset()) | ({f"{name.upper()}_COUNT": count} if block else {})
+    head = "\n".join(f"#define {k} {v}" for k, v in known.items())
+    kernel = gpu._context.compute_shader(
+        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout.glsl()}\n"
+        "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
+        f"void main() {{\n    uint i = gl_GlobalInvocationID.x;\n    if (i >= {count}u) return;\n"
+        f"    {record.__name__} r = {name}_load(i);\n" + "\n".join(lines) + "\n}\n"
+    )
+    data = gpu._context.buffer(words.tobytes())
+    echo = gpu._context.buffer(reserve=4 * count * out_words)
+    if block:
+        data.bind_to_uniform_block(COUNTED[name])
+    else:
+        data.bind_to_storage_buffer(int(slot))
+    echo.bind_to_storage_buffer(15)
+    kernel.run(1)
+    got = np.frombuffer(echo.read(), np.uint32).reshape(count, out_words)
+    members = [np.ascontiguousarray(values[m]).view(np.uint32).reshape(count, -1) for m in record.members]
+    assert (got == np.concatenate(members, axis=1)).all()
+    for thing in (kernel, data, echo):
+        thing.release()
+
+
+def test_frame_block_arrives(gpu: Renderer) -> None:
+    record = layout.Frame
+    words = np.random.default_rng(6).integers(0x00800000, 0x7F000000, record.words, np.uint32)
+    lines, expected = [], []
+    for member, kind in record.members.items():
+        for k, axis in enumerate("xyzw"[: kind.words]):
+            value = f"frame.{member}" + (f".{axis}" if kind.words > 1 else "")
+            bits = value if kind.base is np.uint32 else f"floatBitsToUint({value})"
+            lines.append(f"    echo[{len(expected)}] = {bits};")
+            expected.append(words[record.offsets[member] + k])
+    head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset()).items())
+    kernel = gpu._context.compute_shader(
+        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout.glsl()}\n"
+        "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
+        "void main() {\n    if (gl_GlobalInvocationID.x > 0u) return;\n" + "\n".join(lines) + "\n}\n"
+    )
+    data, echo = gpu._context.buffer(words.tobytes()), gpu._context.buffer(reserve=4 * len(expected))
+    data.bind_to_uniform_block(layout.FRAME_BLOCK)
+    echo.bind_to_storage_buffer(15)
+    kernel.run(1)
+    assert np.frombuffer(echo.read(), np.uint32).tolist() == [int(x) for x in expected]
+    for thing in (kernel, data, echo):
+        thing.release()
+
+
+def test_a_hole_is_refused() -> None:
+    with pytest.raises(LayoutError, match="hole"):
+        type("Holed", (Record,), {"__annotations__": {"a": "f32", "b": "vec3"}})
+    with pytest.raises(LayoutError, match="unknown type"):
+        type("Odd", (Record,), {"__annotations__": {"a": "f64"}})
+    assert (f32.words, vec3.words) == (1, 3)
+
+
+def test_every_flag_and_count_is_defined() -> None:
+    known = defines(frozenset())
+    assert set(FLAGS) <= set(known)
+    assert {*COUNTS, *FEW} == {f"{name.upper()}_COUNT" for name in COUNTED}

@@ -1,0 +1,60 @@
+"""Shader text: includes once, flags checked, the driver's errors with file and line."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+from gpu import CompileError, Renderer, features
+from gpu.program import SHADERS, Kernels, Source
+
+
+def _folder(tmp_path: Path, **files: str) -> tuple[Path, ...]:
+    for name, text in files.items():
+        (tmp_path / name.replace("_glsl", ".glsl").replace("_comp", ".comp")).write_text(text)
+    return (tmp_path, SHADERS)
+
+
+def test_includes_happen_once(tmp_path: Path) -> None:
+    folders = _folder(
+        tmp_path, a_comp='#include "b.glsl"\n#include "c.glsl"\n', b_glsl='#include "c.glsl"\nB\n', c_glsl="C\n"
+    )
+    lines = Source("a.comp", {}, folders).text.splitlines()
+    assert [line for line in lines if not line.startswith("#")] == ["C", "B"]
+
+
+def test_an_unknown_flag_is_refused(tmp_path: Path) -> None:
+    folders = _folder(tmp_path, a_comp="#if HAS_NOTHING\n#endif\n")
+    with pytest.raises(CompileError, match=r"a\.comp:1: #if asks for HAS_NOTHING"):
+        Source("a.comp", {"HAS_THING": 1}, folders)
+
+
+def test_an_include_inside_a_condition_is_refused(tmp_path: Path) -> None:
+    folders = _folder(tmp_path, a_comp='#if HAS_A\n#include "c.glsl"\n#endif\n', c_glsl="C\n")
+    with pytest.raises(CompileError, match=r"a\.comp:2"):
+        Source("a.comp", {"HAS_A": 0}, folders)
+
+
+def test_a_missing_file_is_named(tmp_path: Path) -> None:
+    with pytest.raises(CompileError, match=r"gone\.glsl"):
+        Source("a.comp", {}, _folder(tmp_path, a_comp='#include "gone.glsl"\n'))
+
+
+def test_the_drivers_errors_name_file_and_line(gpu: Renderer, tmp_path: Path) -> None:
+    folders = _folder(
+        tmp_path,
+        a_comp='layout(local_size_x = 8) in;\n#include "b.glsl"\nvoid main() {}\n',
+        b_glsl="float f() {\n    return undefined_name;\n}\n",
+    )
+    with pytest.raises(CompileError, match=r"b\.glsl:2"):
+        Kernels(gpu._context, folders).get("a.comp", {})
+
+
+def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
+    text = "\n".join(p.read_text() for p in SHADERS.rglob("*") if p.suffix in (".glsl", ".comp"))
+    assert [flag for flag in features.FLAGS if flag not in text] == []
+    everything = features.defines(frozenset(features.FLAGS))
+    for entry in ("pathtrace.comp", "guides.comp"):
+        Source(entry, everything)  # raises where a name in #if is not defined
+    Source("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0})
