@@ -10,7 +10,9 @@ from gpu.errors import (
     SceneTooLarge,
     WrongThread,
 )
+from gpu.picture import Picture
 from gpu.renderer import Renderer
+from gpu.scene import Scene
 from gpu.settings import AOVS, ESTIMATORS, FILTERS, SAMPLERS, TONE_MAPS, RenderSettings
 
 __all__ = [
@@ -26,8 +28,10 @@ __all__ = [
     "GpuError",
     "NothingRendered",
     "OutOfMemory",
+    "Picture",
     "RenderSettings",
     "Renderer",
+    "Scene",
     "SceneArrays",
     "SceneTooLarge",
     "WrongThread",

@@ -170,7 +170,7 @@ class Quad(Record):
     slot = Slot.QUADS
     origin: vec3
     material: u32
-    normal: vec3  # unit, along cross(u, v)
+    normal: vec3  # unit, outward: along cross(u, v), against it where a transform mirrors
     light: u32
     dual_u: vec3  # dot(p - origin, dual_u) is p's coordinate along u, 0..1 inside
     u_length: f32

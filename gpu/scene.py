@@ -33,6 +33,9 @@ _BUFFERS = {
 _BLOCKS = {layout.BUFFERS[name][1]: block for name, block in layout.COUNTED.items()}
 
 
+RADIANCE_MAX = 1e20  # what a texel times the environment's scale may reach
+
+
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
@@ -63,10 +66,12 @@ class Scene:
     def _upload_environment(self) -> tuple[Any, np.ndarray]:
         e = self.arrays.environment
         texels = np.zeros((1, 1, 4), np.float32)
+        self._scale_max = RADIANCE_MAX
         alias = np.zeros(0, layout.EnvironmentAlias.dtype)
         if e is not None:
             texels = np.dstack([e.texels, e.probability]).astype(np.float32)
             alias = e.alias
+            self._scale_max = RADIANCE_MAX / max(float(e.texels.max()), 1.0)
         height, width = texels.shape[:2]
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
@@ -131,7 +136,7 @@ class Scene:
         if a.environment is not None:
             e = a.environment
             frame["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
-            frame["environment_scale"] = e.scale
+            frame["environment_scale"] = min(e.scale, self._scale_max)
             frame["environment_background"] = e.background
             frame["environment_probability"] = a.lights["probability"][
                 a.lights["kind"] == LightKind.ENVIRONMENT

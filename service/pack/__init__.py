@@ -1,0 +1,16 @@
+"""Scene -> gpu.SceneArrays: the only room fluent in both vocabularies.
+
+values      camera, materials, the environment's turn: an edit of one of them needs nothing else from here
+placing     document -> `placed` (analytic shapes) and `meshes` with their `normals`, in the world, float64
+records     placed shapes -> records, relative to an origin; `tree` orders those that are many
+geometry    all of that together, with the shapes that shine
+sky         environment -> texels and the tables that draw from them
+lights      how often each light is picked
+scene       the whole; `cache` keeps geometries and skies between edits
+"""
+
+from service.pack.cache import PackCache
+from service.pack.scene import Packed, pack
+from service.pack.values import pack_camera, pack_materials, pack_turn
+
+__all__ = ["PackCache", "Packed", "pack", "pack_camera", "pack_materials", "pack_turn"]

@@ -1,0 +1,72 @@
+"""Packed parts kept by what they were made from, so that an edit costs only what it changes."""
+
+from __future__ import annotations
+
+import hashlib
+import threading
+from collections import OrderedDict
+from collections.abc import Callable, Hashable
+from typing import Any, TypeVar
+
+import numpy as np
+
+from service.scene.shape import MeshShape, Shape
+
+T = TypeVar("T")
+
+
+class PackCache:
+    """The few last used geometries and skies, within `max_bytes` (the newest is kept in any case). Any thread."""
+
+    def __init__(self, entries: int = 4, max_bytes: int = 1 << 30) -> None:
+        self._entries = entries
+        self._max_bytes = max_bytes
+        self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
+        self._lock = threading.Lock()
+
+    def get(self, key: Hashable, make: Callable[[], T]) -> T:
+        """What was made for an equal key, or else `make()`, which runs outside the lock."""
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                value: T = self._kept[key][0]
+                return value
+        value = make()
+        with self._lock:
+            self._kept[key] = value, _freeze(value)
+            self._kept.move_to_end(key)
+            while len(self._kept) > 1 and (
+                len(self._kept) > self._entries or sum(size for _, size in self._kept.values()) > self._max_bytes
+            ):
+                self._kept.popitem(last=False)
+        return value
+
+
+def _freeze(value: object) -> int:
+    """Makes the arrays in a dataclass read-only, as they are shared from now on; returns their bytes."""
+    size = 0
+    for member in vars(value).values():
+        for array in member.values() if isinstance(member, dict) else [member]:
+            if isinstance(array, np.ndarray):
+                array.flags.writeable = False
+                size += array.nbytes
+    return size
+
+
+def content(shape: Shape) -> Hashable:
+    """A key that is equal for equal shapes, arrays by their bytes."""
+    if not isinstance(shape, MeshShape):
+        return shape
+    return tuple(_digest(getattr(shape, name)) for name in MeshShape.model_fields)
+
+
+def _digest(value: Any) -> Hashable:
+    if not isinstance(value, np.ndarray):
+        return value  # type: ignore[no-any-return]
+    data = np.ascontiguousarray(value).data
+    return value.shape, value.dtype.str, hashlib.blake2b(data, digest_size=16).digest()
+
+
+def lasting(reference: str | None) -> bool:
+    """Whether an asset's reference will always name the same bytes; a path may not."""
+    return reference is None or reference.startswith("sha256:")

@@ -1,0 +1,64 @@
+"""Vertex normals: computed where a mesh has none, and as 32 bits."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def encode(normals: np.ndarray) -> np.ndarray:
+    """(n,) uint32 of (n, 3) directions of any length: octahedral, as GLSL's packSnorm2x16 [Cigolle et al. 2014].
+
+    Decoded: e = unpackSnorm2x16(code); n = (e.x, e.y, 1 - |e.x| - |e.y|); where n.z < 0, n.x and n.y move towards
+    zero by -n.z; normalise. Off by at most 0.004 degrees. A zero normal becomes +z.
+    """
+    n = np.asarray(normals, np.float64)
+    size = np.abs(n).sum(axis=1)
+    n = n / np.where(size > 0, size, 1.0)[:, None]
+    sign = np.where(n[:, :2] >= 0, 1.0, -1.0)
+    folded = (1.0 - np.abs(n[:, 1::-1])) * sign
+    e = np.where((n[:, 2] < 0)[:, None], folded, n[:, :2])
+    bits = np.rint(e * 32767).astype(np.int16).astype(np.uint16).astype(np.uint32)
+    return np.asarray(bits[:, 0] | bits[:, 1] << np.uint32(16))
+
+
+def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(normals (k, 3) of the distinct positions, faces (m, 3) counting in them).
+
+    A position's normal is the mean of its faces', weighted by their angles there [Thuermer and Wuethrich 1998], so
+    that it depends on neither the tessellation nor on vertices that a file repeats along its seams. Zero where the
+    faces cancel.
+    """
+    place = _positions(vertices)
+    faces = place[faces]
+    count = int(place.max(initial=-1)) + 1
+    points = np.zeros((count, 3))
+    points[place] = vertices
+    p = points[faces]
+    edges = p[:, [1, 2, 0]] - p  # edge k leads from corner k to the next
+    cross = np.cross(edges[:, 0], edges[:, 1])
+    twice_area = np.linalg.norm(cross, axis=1)
+    with np.errstate(divide="ignore", invalid="ignore"):
+        unit = np.where(twice_area[:, None] > 0, cross / twice_area[:, None], 0.0)
+    normals = np.zeros((count, 3))
+    for k in range(3):
+        angle = np.arctan2(twice_area, -np.einsum("ij,ij->i", edges[:, k], edges[:, k - 1]))
+        for axis in range(3):
+            normals[:, axis] += np.bincount(faces[:, k], angle * unit[:, axis], count)
+    length = np.linalg.norm(normals, axis=1)
+    cancelled = length < 1e-9  # of faces back to back there is nothing left but rounding
+    return np.where(cancelled[:, None], 0.0, normals / np.where(cancelled, 1.0, length)[:, None]), faces
+
+
+def _positions(vertices: np.ndarray) -> np.ndarray:
+    """(n,) the number of each vertex's position, equal for equal positions."""
+    bits = np.ascontiguousarray(vertices + 0.0, np.float64).view(np.uint64)  # + 0.0: -0 becomes 0
+    # Sorting one mixed number per row is ten times as fast as sorting rows.
+    mixed = np.zeros(len(bits), np.uint64)
+    for axis in range(3):
+        mixed = (mixed ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
+        mixed ^= mixed >> np.uint64(29)
+    _, first, place = np.unique(mixed, return_index=True, return_inverse=True)
+    if np.array_equal(bits[first][place], bits):
+        return place
+    _, place = np.unique(bits, axis=0, return_inverse=True)  # two positions gave one number
+    return np.asarray(place).reshape(-1)

@@ -1,0 +1,136 @@
+"""Shapes in the world, in float64, before any rounding: where a transform has put each of them."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from service.problems import FieldError, InvalidDocument
+from service.scene.numbers import LARGEST
+
+Vec3 = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]  # x, y, z, w
+
+SAME_SCALE = 1e-6  # a matrix typed with seven digits still turns a sphere into a sphere
+SLACK = 2.0  # of a box or an edge from one end of the range to the other
+LEAST = 1e-12  # m; the cube of a shorter length, or of its inverse, leaves float32
+
+# Corner and edges of the faces of the cube [-1, 1]^3: seen from outside u is right and v up, with +Y up;
+# on the top v is -Z, on the bottom +Z.
+CUBE_FACES = (
+    ((-1, -1, 1), (2, 0, 0), (0, 2, 0)),
+    ((1, -1, -1), (-2, 0, 0), (0, 2, 0)),
+    ((1, -1, 1), (0, 0, -2), (0, 2, 0)),
+    ((-1, -1, -1), (0, 0, 2), (0, 2, 0)),
+    ((-1, 1, 1), (2, 0, 0), (0, 0, -2)),
+    ((-1, -1, -1), (2, 0, 0), (0, 0, 2)),
+)
+
+
+@dataclass
+class Solids:
+    """Affine images of the unit sphere or of the cube [-1, 1]^3."""
+
+    centers: list[Vec3] = field(default_factory=list)
+    axes: list[np.ndarray] = field(default_factory=list)  # (3, 3) world from object
+    used: list[tuple[int, int]] = field(default_factory=list)  # material, shape
+
+    def add(self, center: np.ndarray, axes: np.ndarray, used: tuple[int, int]) -> None:
+        self.centers.append(tuple(center))
+        self.axes.append(axes)
+        self.used.append(used)
+
+
+@dataclass
+class Placed:
+    """The analytic shapes of a scene, by kind, in the document's order. `used` holds (material, shape) indices."""
+
+    spheres: list[tuple[Vec3, float, Quaternion]] = field(default_factory=list)
+    spheres_used: list[tuple[int, int]] = field(default_factory=list)
+    quads: list[tuple[Vec3, Vec3, Vec3, bool]] = field(default_factory=list)  # origin, u, v, mirrored
+    quads_used: list[tuple[int, int]] = field(default_factory=list)
+    boxes: Solids = field(default_factory=Solids)
+    ellipsoids: Solids = field(default_factory=Solids)
+    vanished: list[int] = field(default_factory=list)  # shapes too small to be traced
+
+    def sphere(self, center: Vec3, radius: float, matrix: np.ndarray | None, used: tuple[int, int]) -> None:
+        if matrix is None:
+            if self._fits(used, center, radius):
+                self._add_sphere(center, radius, (0.0, 0.0, 0.0, 1.0), used)
+            return
+        axes = matrix[:3, :3]
+        middle = axes @ center + matrix[:3, 3]
+        scale = math.cbrt(np.linalg.det(axes))
+        turn = axes / scale
+        if not self._fits(used, middle, *np.linalg.norm(axes, axis=0) * radius):
+            return
+        if scale > 0 and np.abs(turn.T @ turn - np.eye(3)).max() < SAME_SCALE:
+            self._add_sphere(tuple(middle), scale * radius, quaternion(turn), used)
+        else:
+            self.ellipsoids.add(middle, axes * radius, used)
+
+    def _add_sphere(self, center: Vec3, radius: float, rotation: Quaternion, used: tuple[int, int]) -> None:
+        self.spheres.append((center, radius, rotation))
+        self.spheres_used.append(used)
+
+    def quad(self, origin: Vec3, u: Vec3, v: Vec3, matrix: np.ndarray | None, used: tuple[int, int]) -> None:
+        mirrored = False
+        if matrix is not None:
+            axes = matrix[:3, :3]
+            mirrored = bool(np.linalg.det(axes) < 0)
+            origin, u, v = tuple(axes @ origin + matrix[:3, 3]), tuple(axes @ u), tuple(axes @ v)
+        if self._fits(used, origin, math.hypot(*u), math.hypot(*v)):
+            self.quads.append((origin, u, v, mirrored))
+            self.quads_used.append(used)
+
+    def box(self, low: Vec3, high: Vec3, matrix: np.ndarray | None, used: tuple[int, int], emissive: bool) -> None:
+        """A box that shines is six quads: lights are sampled face by face."""
+        center = np.add(low, high) / 2
+        axes = np.diag(np.subtract(high, low) / 2)
+        if matrix is not None:
+            center, axes = matrix[:3, :3] @ center + matrix[:3, 3], matrix[:3, :3] @ axes
+        if not self._fits(used, center, *np.linalg.norm(axes, axis=0)):
+            return
+        if not emissive:
+            self.boxes.add(center, axes, used)
+            return
+        placed = np.eye(4)
+        placed[:3, :3], placed[:3, 3] = axes, center
+        for origin, u, v in CUBE_FACES:
+            self.quad(origin, u, v, placed, used)
+
+    def _fits(self, used: tuple[int, int], position: Vec3 | np.ndarray, *lengths: float) -> bool:
+        """False, and noted, for a shape too small for float32; refuses one that its transform puts out of range."""
+        check_reach(used[1], max(*map(abs, position), *lengths))
+        if min(lengths) < LEAST:
+            self.vanished.append(used[1])
+            return False
+        return True
+
+
+def check_reach(shape: int, reach: float) -> None:
+    """Refuses a shape that its transform moves or stretches further than a document's own numbers may go."""
+    if not reach <= SLACK * LARGEST:
+        detail = f"takes the shape {reach:.3g} m far; at most {LARGEST:g}"
+        raise InvalidDocument([FieldError(f"/shapes/{shape}/transform", detail)])
+
+
+def quaternion(m: np.ndarray) -> Quaternion:
+    """(x, y, z, w) of a rotation matrix, by its greatest component, so that nothing cancels [Shepperd 1978]."""
+    squares = np.array([
+        1 + m[0, 0] - m[1, 1] - m[2, 2],
+        1 - m[0, 0] + m[1, 1] - m[2, 2],
+        1 - m[0, 0] - m[1, 1] + m[2, 2],
+        1 + m[0, 0] + m[1, 1] + m[2, 2],
+    ])  # fmt: skip
+    rows = np.array([
+        [squares[0], m[0, 1] + m[1, 0], m[0, 2] + m[2, 0], m[2, 1] - m[1, 2]],
+        [m[0, 1] + m[1, 0], squares[1], m[1, 2] + m[2, 1], m[0, 2] - m[2, 0]],
+        [m[0, 2] + m[2, 0], m[1, 2] + m[2, 1], squares[2], m[1, 0] - m[0, 1]],
+        [m[2, 1] - m[1, 2], m[0, 2] - m[2, 0], m[1, 0] - m[0, 1], squares[3]],
+    ])  # fmt: skip
+    x, y, z, w = rows[int(np.argmax(squares))]
+    length = math.sqrt(x * x + y * y + z * z + w * w)
+    return float(x / length), float(y / length), float(z / length), float(w / length)

@@ -1,0 +1,77 @@
+"""Placed shapes -> the renderer's records and their bounds, relative to an origin."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gpu import layout
+from service.pack.placed import Placed, Solids
+
+Bounds = tuple[np.ndarray, np.ndarray]  # (n, 3) each, float64
+
+
+def spheres(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+    records = _records(layout.Sphere, placed.spheres_used)
+    if not len(records):
+        return records, _no_bounds()
+    centers, radii, rotations = zip(*placed.spheres, strict=True)
+    center, radius = np.array(centers) - origin, np.array(radii)
+    records["center"], records["radius"], records["rotation"] = center, radius, rotations
+    return records, (center - radius[:, None], center + radius[:, None])
+
+
+def quads(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+    records = _records(layout.Quad, placed.quads_used)
+    if not len(records):
+        return records, _no_bounds()
+    corners, us, vs, mirrored = zip(*placed.quads, strict=True)
+    corner, u, v = np.array(corners) - origin, np.array(us), np.array(vs)
+    cross = np.cross(u, v)
+    area = np.linalg.norm(cross, axis=1)
+    normal = cross / area[:, None]
+    records["origin"], records["u"], records["v"] = corner, u, v
+    # A mirroring transform keeps the front in front, and texture coordinates along u and v.
+    records["normal"] = np.where(np.array(mirrored)[:, None], -normal, normal)
+    records["area"] = area
+    records["dual_u"] = np.cross(v, normal) / area[:, None]
+    records["dual_v"] = np.cross(normal, u) / area[:, None]
+    records["u_length"], records["v_length"] = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+    corners4 = np.stack([corner, corner + u, corner + v, corner + u + v])
+    return records, (corners4.min(axis=0), corners4.max(axis=0))
+
+
+def boxes(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+    return _solids(placed.boxes, origin, np.ones(3))
+
+
+def ellipsoids(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+    return _solids(placed.ellipsoids, origin, None)
+
+
+def _solids(solids: Solids, origin: np.ndarray, cube: np.ndarray | None) -> tuple[np.ndarray, Bounds]:
+    records = _records(layout.Solid, solids.used)
+    if not len(records):
+        return records, _no_bounds()
+    center, axes = np.array(solids.centers) - origin, np.array(solids.axes)
+    rows = np.linalg.inv(axes)
+    records["center"] = center
+    records["row_x"], records["row_y"], records["row_z"] = rows[:, 0], rows[:, 1], rows[:, 2]
+    records["handedness"] = np.sign(np.linalg.det(axes))
+    # How far the shape reaches along a world axis: the sum of the object axes' parts for the cube, their length
+    # for the ball.
+    reach = np.linalg.norm(axes, axis=2) if cube is None else np.abs(axes) @ cube
+    return records, (center - reach, center + reach)
+
+
+def _records(record: type[layout.Record], used: Sequence[tuple[int, int]]) -> np.ndarray:
+    records = np.zeros(len(used), record.dtype)
+    if used:
+        records["material"], records["shape"] = np.array(used, np.uint32).T
+        records["light"] = layout.NONE
+    return records
+
+
+def _no_bounds() -> Bounds:
+    return np.zeros((0, 3)), np.zeros((0, 3))

@@ -1,0 +1,112 @@
+"""The whole scene, from its parts."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+
+from gpu import EnvironmentArrays, SceneArrays
+from gpu.layout import LEAF_FIRST_MASK, ShapeKind
+from service.assets import Assets
+from service.pack import lights
+from service.pack.cache import PackCache, content, lasting
+from service.pack.geometry import Geometry, geometry
+from service.pack.sky import Sky, make_sky
+from service.pack.values import pack_camera, pack_materials, pack_turn
+from service.scene import Scene
+from service.scene.environment import Environment, ImageEnvironment
+from service.scene.numbers import BRIGHTEST
+
+MAX_TRIANGLES = LEAF_FIRST_MASK + 1
+
+
+class Limits(Protocol):
+    @property
+    def max_triangles(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class Packed:
+    """Arrays that share memory with the cache's: not to be written to."""
+
+    arrays: SceneArrays
+    warnings: list[str]
+
+
+def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: Limits | None = None) -> Packed:
+    """The renderer's arrays for `scene`.
+
+    Raises InvalidDocument, its pointers from the scene's root. Slow where there is geometry: not for an event loop.
+    """
+    materials = pack_materials(scene)
+    emissive = np.any(materials["emission"] > 0, axis=1)
+    built = _geometry(scene, emissive, assets, cache, limits)
+    warnings = list(built.warnings)
+    environment, sky_power, peak = None, 0.0, 0.0
+    if scene.environment is not None:
+        sky = _sky(scene.environment, assets, cache)
+        rotation, scale = pack_turn(scene.environment)
+        warnings += sky.warnings
+        if scale * sky.peak > BRIGHTEST:
+            scale = BRIGHTEST / sky.peak
+            warnings.append(f"/environment/scale: lowered to {scale:.3g}, as radiance ends at {BRIGHTEST:g}")
+        environment = EnvironmentArrays(
+            sky.texels, sky.probability, sky.alias, rotation, scale, scene.environment.background
+        )
+        if scale > 0:  # what it sends through a disk around the scene
+            sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
+    points = lights.points(scene.lights, built.origin)
+    emission = materials["emission"][built.lights["material"]]
+    area_power = np.pi * built.areas * lights.luminance(emission)
+    point_power = 4 * np.pi * lights.luminance(points["intensity"])
+    peak = max(
+        peak,
+        float(emission.max(initial=0.0)),
+        float(points["intensity"].max(initial=0.0)) / (math.pi * built.radius**2),
+    )
+    arrays = SceneArrays(
+        camera=pack_camera(scene.camera, built.origin),
+        materials=materials,
+        spheres=built.shapes[ShapeKind.SPHERE],
+        quads=built.shapes[ShapeKind.QUAD],
+        boxes=built.shapes[ShapeKind.BOX],
+        ellipsoids=built.shapes[ShapeKind.ELLIPSOID],
+        triangles=built.shapes[ShapeKind.TRIANGLE],
+        triangle_normals=built.triangle_normals,
+        lights=lights.weigh(
+            np.concatenate([built.lights, points]), np.concatenate([area_power, point_power]), sky_power
+        ),
+        nodes=built.nodes,
+        node_origin=built.node_origin,
+        node_scale=built.node_scale,
+        bvh_kinds=built.bvh_kinds,
+        environment=environment,
+        radiance_scale=lights.radiance_scale(peak),
+        origin=built.origin,
+    )
+    return Packed(arrays, warnings)
+
+
+def _geometry(
+    scene: Scene, emissive: np.ndarray, assets: Assets, cache: PackCache | None, limits: Limits | None
+) -> Geometry:
+    names = list(scene.materials)
+    used = {shape.material for shape in scene.shapes}
+    shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
+    room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
+
+    def make() -> Geometry:
+        return geometry(scene.shapes, names, shining, assets, room)
+
+    if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
+        return make()
+    return cache.get(("geometry", tuple(map(content, scene.shapes)), tuple(names), shining, room), make)
+
+
+def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> Sky:
+    if isinstance(environment, ImageEnvironment) and cache is not None and lasting(environment.asset):
+        return cache.get(("sky", environment.asset), lambda: make_sky(environment, assets))
+    return make_sky(environment, assets)

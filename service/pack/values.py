@@ -1,0 +1,57 @@
+"""The camera, the materials and the environment's turn: what an edit changes without touching anything else."""
+
+from __future__ import annotations
+
+import math
+
+import numpy as np
+
+from gpu import CameraArrays, layout
+from service.scene import Scene
+from service.scene.camera import Camera
+from service.scene.environment import Environment
+from service.scene.numbers import Vec3
+
+# What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
+RENAMED = {"albedo": "base_color"}
+
+
+def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> CameraArrays:
+    """The camera relative to `SceneArrays.origin`."""
+    position, target = np.array(camera.position, np.float64), np.array(camera.target, np.float64)
+    view = target - position
+    distance = math.hypot(*view)
+    forward = view / distance
+    right = np.cross(forward, np.array(camera.up, np.float64) / math.hypot(*camera.up))
+    right /= math.hypot(*right)
+    return CameraArrays(
+        position=vec3(position - origin),
+        right=vec3(right),
+        up=vec3(np.cross(right, forward)),
+        forward=vec3(forward),
+        tan_half_vfov=math.tan(math.radians(camera.vfov) / 2),
+        aperture_radius=camera.aperture_radius,
+        focus_distance=distance if camera.focus_distance is None else camera.focus_distance,
+    )
+
+
+def pack_materials(scene: Scene) -> np.ndarray:
+    """`layout.Material` records in the order of the document's names, unused ones included."""
+    records = np.zeros(len(scene.materials), layout.Material.dtype)
+    for record, material in zip(records, scene.materials.values(), strict=True):
+        record["model"] = layout.Model[material.type.upper()]
+        for name in type(material).model_fields:
+            member = RENAMED.get(name, name)
+            if member in layout.Material.members:
+                record[member] = getattr(material, name)
+    return records
+
+
+def pack_turn(environment: Environment) -> tuple[float, float]:
+    """(rotation in radians, factor on the radiance), as `Scene.edit` takes them."""
+    return math.radians(math.fmod(environment.rotation, 360.0)), environment.scale
+
+
+def vec3(v: np.ndarray) -> Vec3:
+    x, y, z = v.tolist()
+    return x, y, z

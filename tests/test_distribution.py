@@ -1,0 +1,111 @@
+"""Alias tables: exact about themselves, close to what was asked, and never drawing what has no weight."""
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+from gpu import distribution
+
+RNG = np.random.default_rng(11)
+
+WEIGHTS = {
+    "one": np.array([3.0]),
+    "equal": np.full(7, 0.1),
+    "thirds": np.full(3, 1 / 3),
+    "one heavy": np.array([1e-12, 1.0, 0.0, 1e-12]),
+    "heavy at the ends": np.array([5.0, 0.0, 0.0, 1.0, 0.0, 7.0]),
+    "zeros": np.where(RNG.random(500) < 0.5, 0.0, RNG.random(500)),
+    "steep": RNG.random(5000) ** 20,
+    "tiny": np.array([5e-324, 1e-323, 0.0]),
+    "large": np.array([1e300, 3e299, 1e298]),
+}
+
+
+def drawn(threshold, alias):
+    """Probabilities of a table by the loop that a shader stands for."""
+    n = len(threshold)
+    probability = np.zeros(n)
+    for i in range(n):
+        probability[i] += float(threshold[i]) / n
+        probability[alias[i]] += (1.0 - float(threshold[i])) / n
+    return probability
+
+
+@pytest.mark.parametrize("name", WEIGHTS)
+def test_table_draws_what_it_says_and_what_was_asked(name):
+    weights = WEIGHTS[name]
+    threshold, alias, probability = distribution.alias_table(weights)
+    assert threshold.dtype == np.float32 and alias.dtype == np.uint32
+    assert np.all((threshold >= 0) & (threshold <= 1)) and alias.max() < len(weights)
+    np.testing.assert_allclose(probability, drawn(threshold, alias), rtol=1e-12, atol=1e-15)
+    assert probability.sum() == pytest.approx(1.0, abs=1e-12)
+    asked = weights / weights.max()
+    asked /= asked.sum()
+    np.testing.assert_allclose(probability, asked, rtol=1e-6, atol=3e-7 / len(weights))
+    assert np.all(probability[weights == 0] == 0)
+
+
+def interpolate(texels, u, v):
+    """The bilinear lookup of the contract: texel centres at (i + .5) / n, repeating in u, clamping in v."""
+    height, width = texels.shape[:2]
+    x, y = u * width - 0.5, np.clip(v * height - 0.5, 0, height - 1)
+    column, row = np.floor(x).astype(int), np.floor(y).astype(int)
+    fx, fy = (x - column)[:, None], (y - row)[:, None]
+    lower = np.minimum(row + 1, height - 1)
+    above = texels[row, column % width] * (1 - fx) + texels[row, (column + 1) % width] * fx
+    below = texels[lower, column % width] * (1 - fx) + texels[lower, (column + 1) % width] * fx
+    return above * (1 - fy) + below * fy
+
+
+def test_footprint_is_the_integral_of_the_interpolation():
+    texels = RNG.random((4, 5, 1))
+    fine = 64
+    v, u = np.meshgrid(
+        (np.arange(4 * fine) + 0.5) / (4 * fine), (np.arange(5 * fine) + 0.5) / (5 * fine), indexing="ij"
+    )
+    values = interpolate(texels, u.ravel(), v.ravel()).reshape(4, fine, 5, fine)
+    np.testing.assert_allclose(distribution._footprint(texels[..., 0]), values.mean(axis=(1, 3)), rtol=1e-3)
+
+
+def test_solid_angles_fill_the_sphere():
+    for height, width in ((1, 1), (2, 3), (512, 1024)):
+        assert distribution.solid_angles(height, width).sum() * width == pytest.approx(4 * np.pi)
+    edges = np.linspace(0, np.pi, 65)
+    expected = 2 * np.pi / 128 * (np.cos(edges[:-1]) - np.cos(edges[1:]))
+    np.testing.assert_allclose(distribution.solid_angles(64, 128), expected, rtol=1e-12)
+
+
+def test_environment_probability_is_a_density_over_directions():
+    texels = (RNG.random((16, 32, 3)) ** 6).astype(np.float32)
+    probability, table = distribution.environment_tables(texels)
+    solid = distribution.solid_angles(16, 32)[:, None]
+    assert (probability * solid).sum() == pytest.approx(1.0, abs=1e-6)
+    asked = drawn(table["threshold"], table["alias"]).reshape(16, 32)
+    np.testing.assert_allclose(probability * solid, asked, rtol=1e-6)
+    # An estimate of the irradiance has little variance left: radiance / probability is nearly constant.
+    luminance = distribution._footprint((texels @ distribution.LUMINANCE).astype(np.float64))
+    np.testing.assert_allclose(luminance / probability, (luminance * solid).sum(), rtol=1e-5)
+
+
+@pytest.mark.parametrize("channel", range(3))
+def test_every_lit_texel_can_be_drawn_and_so_can_its_neighbours(channel):
+    texels = np.zeros((6, 8, 3), np.float32)
+    texels[2, 0, channel] = 1e-3
+    probability, _ = distribution.environment_tables(texels)
+    lit = np.zeros((6, 8), bool)
+    lit[1:4][:, [7, 0, 1]] = True  # bilinear interpolation reaches across the seam
+    assert np.array_equal(probability > 0, lit)
+
+
+def test_constant_and_black_environments_are_uniform():
+    for texels in (np.ones((1, 1, 3)), np.zeros((4, 8, 3))):
+        probability, _ = distribution.environment_tables(texels.astype(np.float32))
+        np.testing.assert_allclose(probability, distribution.UNIFORM_SPHERE, rtol=1e-6)
+
+
+def test_needs_neither_numba_nor_gl():
+    code = "import sys, gpu.distribution; print({'numba', 'moderngl', 'scipy', 'pydantic'} & set(sys.modules))"
+    result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert result.stdout.strip() == "set()"

@@ -1,0 +1,184 @@
+"""What shines, how often it is picked, and where the tree keeps what is many."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpu import layout
+from gpu.layout import LightKind, ShapeKind
+from tests.documents import Shelf, box, mesh, packed, picture, quad, sphere
+
+MANY = {
+    ShapeKind.SPHERE: ("spheres", 8, lambda i: sphere(center=[3 * i, 0, 0])),
+    ShapeKind.QUAD: ("quads", 24, lambda i: quad(origin=[3 * i, 0, 0])),
+    ShapeKind.BOX: ("boxes", 8, lambda i: box(transform={"translate": [9 * i, 0, 0]})),
+    ShapeKind.ELLIPSOID: ("ellipsoids", 6, lambda i: sphere(center=[3 * i, 0, 0], transform={"scale": [1, 2, 1]})),
+}
+
+
+@pytest.mark.parametrize("kind", MANY)
+def test_many_of_a_kind_go_through_the_tree(kind):
+    name, few, make = MANY[kind]
+    arrays = packed(*map(make, range(few))).arrays
+    assert not arrays.bvh_kinds and not len(arrays.nodes)
+    arrays = packed(sphere(radius=5), *map(make, range(few + 1)), quad(origin=[0, -9, 0])).arrays
+    assert arrays.bvh_kinds == {kind}
+    assert len(arrays.nodes) % 8 == 0 and len(arrays.nodes)
+    assert set(range(1, few + 2)) <= set(getattr(arrays, name)["shape"].tolist())
+
+
+def test_leaves_point_at_what_their_boxes_hold():
+    rng = np.random.default_rng(5)
+    shapes = [sphere(center=c, radius=0.1) for c in rng.random((40, 3)).tolist()]
+    shapes += [quad(origin=c, u=[0.1, 0, 0], v=[0, 0.1, 0]) for c in rng.random((40, 3)).tolist()]
+    shapes += [mesh(transform={"translate": c, "scale": 0.1}) for c in rng.random((10, 3)).tolist()]
+    arrays = packed(*shapes).arrays
+    assert arrays.bvh_kinds == {ShapeKind.SPHERE, ShapeKind.QUAD, ShapeKind.TRIANGLE}
+    reach = {
+        ShapeKind.SPHERE: (arrays.spheres["center"], arrays.spheres["radius"][:, None]),
+        ShapeKind.QUAD: (arrays.quads["origin"] + (arrays.quads["u"] + arrays.quads["v"]) / 2, np.float32(0.0)),
+        ShapeKind.TRIANGLE: (arrays.triangles["v1"], np.float32(0.0)),
+    }
+    found = {kind: set() for kind in arrays.bvh_kinds}
+    for node in arrays.nodes[: len(arrays.nodes) // 8]:
+        link = int(node["link"])
+        if not link & layout.LEAF_BIT:
+            continue
+        kind = ShapeKind((link >> layout.LEAF_KIND_SHIFT) & 7)
+        first, count = link & layout.LEAF_FIRST_MASK, ((link >> layout.LEAF_COUNT_SHIFT) & 15) + 1
+        words = np.array([int(node[axis]) for axis in "xyz"])
+        lower = np.array(arrays.node_origin) + (words & 0xFFFF) * np.array(arrays.node_scale)
+        upper = np.array(arrays.node_origin) + (words >> 16) * np.array(arrays.node_scale)
+        middle, radius = reach[kind]
+        radius = np.broadcast_to(radius, (len(middle), 1))
+        for i in range(first, first + count):
+            assert np.all(lower <= middle[i] - radius[i]) and np.all(middle[i] + radius[i] <= upper)
+            found[kind].add(i)
+    assert {kind: len(indices) for kind, indices in found.items()} == {
+        ShapeKind.SPHERE: 40, ShapeKind.QUAD: 40, ShapeKind.TRIANGLE: 120,
+    }  # fmt: skip
+
+
+KINDS = {
+    LightKind.SPHERE: "spheres",
+    LightKind.QUAD: "quads",
+    LightKind.ELLIPSOID: "ellipsoids",
+    LightKind.TRIANGLE: "triangles",
+}
+SHINING = [
+    sphere(material="lamp"),
+    *[quad(origin=[3 * i, 0, 0], material=("lamp", "grey")[i % 2]) for i in range(30)],
+    sphere(material="lamp", transform={"scale": [1, 2, 1]}),
+    *[mesh(transform={"translate": [0, 0, 3 * i]}, material=("grey", "lamp")[i % 2]) for i in range(4)],
+    sphere(),
+]
+
+
+def test_lights_and_shapes_name_each_other():
+    point = {"type": "point", "position": [1, 2, 3], "intensity": [1, 2, 3]}
+    dark = {"type": "point", "position": [0, 0, 0], "intensity": 0}
+    arrays = packed(*SHINING, lights=[dark, point], environment={"type": "constant", "radiance": 1}).arrays
+    assert arrays.bvh_kinds == {ShapeKind.QUAD, ShapeKind.TRIANGLE}
+    counts = {kind: int((arrays.lights["kind"] == kind).sum()) for kind in LightKind}
+    assert counts == {
+        LightKind.SPHERE: 1, LightKind.QUAD: 15, LightKind.ELLIPSOID: 1, LightKind.TRIANGLE: 24,
+        LightKind.POINT: 1, LightKind.ENVIRONMENT: 1,
+    }  # fmt: skip
+    for i, light in enumerate(arrays.lights):
+        if name := KINDS.get(LightKind(int(light["kind"]))):
+            shape = getattr(arrays, name)[light["index"]]
+            assert shape["light"] == i and shape["material"] == light["material"] == 1
+    for name in KINDS.values():
+        shapes = getattr(arrays, name)
+        assert np.array_equal(shapes["light"] != layout.NONE, shapes["material"] == 1)
+    lamp = arrays.lights[arrays.lights["kind"] == LightKind.POINT][0]
+    assert lamp["position"].tolist() == [1, 2, 3] and lamp["intensity"].tolist() == [1, 2, 3]
+
+
+def test_lights_are_picked_as_their_records_say():
+    lights = packed(*SHINING, environment={"type": "constant", "radiance": 1}).arrays.lights
+    drawn = lights["threshold"].astype(float)
+    np.add.at(drawn, lights["alias"], 1 - lights["threshold"].astype(float))
+    np.testing.assert_allclose(lights["probability"], drawn / len(lights), rtol=1e-6)
+    assert lights["probability"].min() > 0
+
+
+def pick(*shapes, **fields):
+    return packed(*shapes, **fields).arrays.lights["probability"].astype(float)
+
+
+def test_stronger_lights_are_picked_more_often():
+    quads = [quad(material="lamp"), quad(material="lamp", u=[2, 0, 0], v=[0, 3, 0])]
+    one, six = pick(*quads)
+    assert (one - 0.025) * 6 == pytest.approx(six - 0.025, rel=1e-5)  # 5 % go to all alike
+    # A ball of radius 1 and radiance L sends out pi L 4 pi; a point of pi L in all directions just as much.
+    point = {"type": "point", "position": [0, 3, 0], "intensity": [4 * np.pi, 2 * np.pi, np.pi]}
+    assert pick(sphere(material="lamp"), lights=[point]) == pytest.approx([0.5, 0.5])
+    solid = sphere(material="lamp", transform={"scale": [1, 1, 1.00001]})
+    assert pick(sphere(material="lamp"), solid) == pytest.approx([0.5, 0.5], abs=1e-4)
+    tetra = packed(mesh(material="lamp", transform={"scale": [1, 1, 2]}))
+    areas = np.linalg.norm(np.cross(tetra.arrays.triangles["v1"] - tetra.arrays.triangles["v0"],
+                                    tetra.arrays.triangles["v2"] - tetra.arrays.triangles["v0"]), axis=1)  # fmt: skip
+    shares = tetra.arrays.lights["probability"][tetra.arrays.triangles["light"]]
+    np.testing.assert_allclose(shares, 0.95 * areas / areas.sum() + 0.05 / 12, rtol=1e-5)
+
+
+def test_neither_the_sky_nor_the_lamps_starve():
+    for radiance in (1e-20, 1e20):
+        probability = pick(sphere(material="lamp"), environment={"type": "constant", "radiance": radiance})
+        assert probability.min() >= 0.19
+    assert pick(environment={"type": "constant", "radiance": 1}).tolist() == [1]
+
+
+def test_brightness_of_the_sky_edits_no_table():
+    tables = [
+        packed(*SHINING, environment={"type": "constant", "radiance": 1, "scale": s}).arrays.lights for s in (1, 50)
+    ]
+    assert np.array_equal(*tables)
+
+
+@pytest.mark.parametrize(
+    "environment", [{"type": "constant", "radiance": 0}, {"type": "constant", "radiance": 1, "scale": 0}]
+)
+def test_black_sky_is_seen_but_no_light(environment):
+    arrays = packed(sphere(), environment=environment).arrays
+    assert arrays.environment is not None and not len(arrays.lights)
+
+
+def test_radiance_scale_is_a_power_of_two_near_the_peak():
+    assert packed(sphere()).arrays.radiance_scale == 1
+    assert packed(sphere(material="lamp")).arrays.radiance_scale == 4
+    assert packed(environment={"type": "constant", "radiance": 1e20}).arrays.radiance_scale == 2.0**66
+
+
+def sky_of(pixels, is_8bit=False, **fields):
+    environment = {"type": "image", "asset": "sha256:sky", **fields}
+    return packed(assets=Shelf(sky=picture(pixels, is_8bit)), environment=environment)
+
+
+def test_image_environment_is_taken_as_it_is():
+    pixels = np.random.default_rng(1).random((4, 8, 4), dtype=np.float32)
+    environment = sky_of(pixels, rotation=450, scale=2, background=False).arrays.environment
+    assert np.array_equal(environment.texels, pixels[..., :3])
+    assert environment.rotation == pytest.approx(np.pi / 2) and environment.scale == 2 and not environment.background
+    assert environment.alias.shape == (32,) and environment.probability.shape == (4, 8)
+    assert np.array_equal(sky_of(pixels[..., :1]).arrays.environment.texels, np.repeat(pixels[..., :1], 3, axis=2))
+
+
+def test_eight_bits_are_decoded_from_srgb():
+    texels = sky_of(np.full((1, 2, 3), [0.0, 0.02, 0.5]), is_8bit=True).arrays.environment.texels
+    np.testing.assert_allclose(texels[0, 0], [0, 0.02 / 12.92, 0.21404114], rtol=1e-5)
+
+
+def test_texels_out_of_range_are_clamped_with_a_warning():
+    result = sky_of([[[-1, 0.5, 2], [1e30, 0, 0], [1, 1, 1]]])
+    assert result.arrays.environment.texels.min() == 0
+    assert result.arrays.environment.texels.max() == np.float32(1e20)
+    assert result.warnings == [
+        "/environment/asset: 1 negative texels raised to 0",
+        "/environment/asset: 1 texels beyond 1e+20 lowered to it",
+    ]
+    bright = sky_of([[[1e18, 0, 0]]], scale=1e6)
+    assert bright.arrays.environment.scale * 1e18 == pytest.approx(1e20)
+    assert bright.warnings[0].startswith("/environment/scale: ")
