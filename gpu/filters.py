@@ -26,7 +26,7 @@ def profile(name: str, x: np.ndarray) -> np.ndarray:
 
 @cache
 def inverse(name: str, size: int) -> np.ndarray:
-    """Distances (pixels) at which the half profile's distribution reaches 1 - (1 - k / size)^4, k = 0 .. size: float32."""
+    """Distances (pixels) where the half profile has 1 - (1 - k / size)^4 of its weight, k = 0 .. size: float32."""
     x = np.linspace(0, RADIUS[name], 1 << 17)
     w = profile(name, x)
     cdf = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]))])

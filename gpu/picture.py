@@ -20,7 +20,7 @@ from gpu.settings import RenderSettings
 
 _SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
 _PASS_S = 0.2  # samples per pass aim at this, once there are some
-_MAX_SAMPLES_A_PASS = 32
+_MAX_SAMPLES_A_PASS = 256
 _GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
 _METER_PIXELS = 4096  # the noise meter looks at about so many pixels
 

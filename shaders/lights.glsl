@@ -5,7 +5,10 @@ struct LightSample {
     vec3 radiance; // arriving, not yet divided by pdf; for a point light divided by d^2
     float pdf;     // per solid angle, picking included; 0: nothing comes
     bool extended; // false: only direct sampling finds this light
+    uint id;       // the shape that shines, or NONE
 };
+
+LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true, NONE); }
 
 #include "lights/point.glsl"
 #include "lights/environment.glsl"
@@ -14,7 +17,7 @@ struct LightSample {
 #include "lights/triangle.glsl"
 #include "lights/ellipsoid.glsl"
 
-LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true); }
+
 
 Light lights_pick(float u) {
 #if HAS_MANY_LIGHTS
@@ -40,16 +43,28 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
     if (l.kind == LIGHT_ENVIRONMENT) s = environment_light_sample(bits);
 #endif
 #if HAS_SPHERE_LIGHTS
-    if (l.kind == LIGHT_SPHERE) s = sphere_light_sample(sphere_pick(l.index), p, u);
+    if (l.kind == LIGHT_SPHERE) {
+        s = sphere_light_sample(sphere_pick(l.index), p, u);
+        s.id = (SHAPE_SPHERE << LEAF_KIND_SHIFT) | l.index;
+    }
 #endif
 #if HAS_QUAD_LIGHTS
-    if (l.kind == LIGHT_QUAD) s = quad_light_sample(quad_pick(l.index), p, u);
+    if (l.kind == LIGHT_QUAD) {
+        s = quad_light_sample(quad_pick(l.index), p, u);
+        s.id = (SHAPE_QUAD << LEAF_KIND_SHIFT) | l.index;
+    }
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (l.kind == LIGHT_TRIANGLE) s = triangle_light_sample(triangle_pick(l.index), p, u);
+    if (l.kind == LIGHT_TRIANGLE) {
+        s = triangle_light_sample(triangle_pick(l.index), p, u);
+        s.id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | l.index;
+    }
 #endif
 #if HAS_ELLIPSOID_LIGHTS
-    if (l.kind == LIGHT_ELLIPSOID) s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u);
+    if (l.kind == LIGHT_ELLIPSOID) {
+        s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u);
+        s.id = (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | l.index;
+    }
 #endif
 #if HAS_EMISSION
     if (l.kind >= LIGHT_SPHERE) s.radiance = material_pick(l.material).emission;

@@ -88,7 +88,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             if (light.extended) weight = path_weight(light.pdf, f.pdf);
 #endif
             if (wanted) {
-                bool hidden = shapes_occluded(shapes_leave(at, light.wi), light.wi, light.t, flat_id);
+                bool hidden = shapes_occluded(shapes_leave(at, light.wi), light.wi, light.t, uvec2(flat_id, light.id));
                 vec3 c = throughput * (f.f * light.radiance * (weight / light.pdf));
                 if (!hidden) result.color += path_clamp(c, bounce > 0u);
             }

@@ -19,39 +19,38 @@ struct Point {
 #include "shapes/triangle.glsl"
 #include "traverse.glsl"
 
-void shapes_intersect(vec3 o, vec3 d, uint skip, bool any, inout Nearest n) {
+void shapes_take(uint kind, uint index, float t, vec2 uv, uvec2 skip, inout Nearest n) {
+    uint id = (kind << LEAF_KIND_SHIFT) | index;
+    if (t < n.t && id != skip.x && id != skip.y) n = Nearest(t, id, uv);
+}
+
+void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Nearest n) {
     Shear shear = triangle_shear(o, d);
 #if HAS_SPHERES
     for (uint i = 0u; i < uint(SPHERE_COUNT); i++) {
-        float t = sphere_hit(sphere_load(i), o, d, n.t);
-        if (t < n.t) n = Nearest(t, (SHAPE_SPHERE << LEAF_KIND_SHIFT) | i, n.uv);
+        shapes_take(SHAPE_SPHERE, i, sphere_hit(sphere_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_QUADS
     for (uint i = 0u; i < uint(QUAD_COUNT); i++) {
-        uint id = (SHAPE_QUAD << LEAF_KIND_SHIFT) | i;
-        float t = quad_hit(quad_load(i), o, d, n.t);
-        if (t < n.t && id != skip) n = Nearest(t, id, n.uv);
+        shapes_take(SHAPE_QUAD, i, quad_hit(quad_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_BOXES
     for (uint i = 0u; i < uint(BOX_COUNT); i++) {
-        float t = box_hit(box_load(i), o, d, n.t);
-        if (t < n.t) n = Nearest(t, (SHAPE_BOX << LEAF_KIND_SHIFT) | i, n.uv);
+        shapes_take(SHAPE_BOX, i, box_hit(box_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_ELLIPSOIDS
     for (uint i = 0u; i < uint(ELLIPSOID_COUNT); i++) {
-        float t = ellipsoid_hit(ellipsoid_load(i), o, d, n.t);
-        if (t < n.t) n = Nearest(t, (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | i, n.uv);
+        shapes_take(SHAPE_ELLIPSOID, i, ellipsoid_hit(ellipsoid_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_TRIANGLES
     for (uint i = 0u; i < uint(TRIANGLE_COUNT); i++) {
-        uint id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | i;
         vec2 uv = n.uv;
         float t = triangle_hit(triangle_load(i), shear, d, n.t, uv);
-        if (t < n.t && id != skip) n = Nearest(t, id, uv);
+        shapes_take(SHAPE_TRIANGLE, i, t, uv, skip, n);
     }
 #endif
 #if HAS_BVH
@@ -63,12 +62,14 @@ void shapes_intersect(vec3 o, vec3 d, uint skip, bool any, inout Nearest n) {
 // the ray leaves.
 Nearest shapes_nearest(vec3 o, vec3 d, uint skip) {
     Nearest n = Nearest(INFINITY_T, NONE, vec2(0.0));
-    shapes_intersect(o, d, skip, false, n);
+    shapes_intersect(o, d, uvec2(skip, NONE), false, n);
     return n;
 }
 
-// Whether anything stands in (0, t_max).
-bool shapes_occluded(vec3 o, vec3 d, float t_max, uint skip) {
+// Whether anything stands in (0, t_max). `skip`: the flat shape that the ray leaves, and the lamp that it goes to. A
+// lamp is convex and was picked where it is seen, so it never hides that place; but near a sphere's rim the
+// distance to it is known to no better than the square root of a rounding.
+bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
     Nearest n = Nearest(t_max, NONE, vec2(0.0));
     shapes_intersect(o, d, skip, true, n);
     return n.id != NONE;

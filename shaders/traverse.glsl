@@ -13,7 +13,7 @@ struct Nearest {
     vec2 uv; // barycentric, triangles only
 };
 
-void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uint skip, inout Nearest n) {
+void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 skip, inout Nearest n) {
     uint id = (kind << LEAF_KIND_SHIFT) | index;
     float t = n.t;
     vec2 uv = n.uv;
@@ -21,7 +21,7 @@ void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uint skip
     if (kind == SHAPE_SPHERE) t = sphere_hit(sphere_load(index), o, d, n.t);
 #endif
 #if HAS_BVH_QUADS
-    if (kind == SHAPE_QUAD && id != skip) t = quad_hit(quad_load(index), o, d, n.t);
+    if (kind == SHAPE_QUAD) t = quad_hit(quad_load(index), o, d, n.t);
 #endif
 #if HAS_BVH_BOXES
     if (kind == SHAPE_BOX) t = box_hit(box_load(index), o, d, n.t);
@@ -30,13 +30,13 @@ void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uint skip
     if (kind == SHAPE_ELLIPSOID) t = ellipsoid_hit(ellipsoid_load(index), o, d, n.t);
 #endif
 #if HAS_BVH_TRIANGLES
-    if (kind == SHAPE_TRIANGLE && id != skip) t = triangle_hit(triangle_load(index), shear, d, n.t, uv);
+    if (kind == SHAPE_TRIANGLE) t = triangle_hit(triangle_load(index), shear, d, n.t, uv);
 #endif
-    if (t < n.t) n = Nearest(t, id, uv);
+    if (t < n.t && id != skip.x && id != skip.y) n = Nearest(t, id, uv);
 }
 
 // Nearest hit, or with `any` just some hit, before n.t.
-void traverse_tree(vec3 o, vec3 d, Shear shear, uint skip, bool any, inout Nearest n) {
+void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Nearest n) {
     vec3 safe = mix(d, vec3(1e-20), lessThan(abs(d), vec3(1e-20)));
     vec3 inv = 1.0 / safe;
     vec3 scale = frame.node_scale * inv, bias = (frame.node_origin - o) * inv;

@@ -17,5 +17,5 @@ LightSample ellipsoid_light_sample(Solid s, vec3 p, vec2 u) {
     vec3 to = shapes_leave(at, at.ng) - p;
     float t = length(to);
     vec3 wi = t > 0.0 ? to / t : at.ng;
-    return LightSample(wi, t, vec3(0.0), ellipsoid_light_pdf(s, t, at, wi), true);
+    return LightSample(wi, t, vec3(0.0), ellipsoid_light_pdf(s, t, at, wi), true, NONE);
 }

@@ -61,11 +61,11 @@ LightSample environment_light_sample(uvec2 bits) {
     float top = float(at.y) / float(size.y) * PI, bottom = float(at.y + 1) / float(size.y) * PI;
     float s0 = sqr(sin(0.5 * top)), s1 = sqr(sin(0.5 * bottom));
     float h = mix(s0, s1, clamp(v, 0.0, 1.0)); // sin^2 of half the colatitude
+#else
+    float phi = TWO_PI * u.y - PI, h = u.x; // as an image of one texel
+#endif
     float y = 1.0 - 2.0 * h, r = 2.0 * sqrt(max(0.0, h * (1.0 - h)));
     vec3 wi = environment_turn_back(vec3(r * sin(phi), y, -r * cos(phi)));
-#else
-    vec3 wi = sampling_sphere(u);
-#endif
     vec4 l = environment_radiance(wi);
-    return LightSample(wi, INFINITY_T, l.rgb, l.a, true);
+    return LightSample(wi, INFINITY_T, l.rgb, l.a, true, NONE);
 }

@@ -3,6 +3,6 @@ LightSample point_light_sample(Light l, vec3 p) {
     vec3 to = l.position - p;
     float d2 = dot(to, to);
     float d = sqrt(d2);
-    if (d == 0.0) return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false);
-    return LightSample(to / d, d, l.intensity / d2, 1.0, false);
+    if (d == 0.0) return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false, NONE);
+    return LightSample(to / d, d, l.intensity / d2, 1.0, false, NONE);
 }

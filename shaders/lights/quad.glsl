@@ -12,5 +12,5 @@ LightSample quad_light_sample(Quad q, vec3 p, vec2 u) {
     vec3 to = shapes_leave(at, q.normal) - p; // it is seen from its front only
     float t = length(to);
     vec3 wi = t > 0.0 ? to / t : q.normal;
-    return LightSample(wi, t, vec3(0.0), quad_light_pdf(q, t, q.normal, wi), true);
+    return LightSample(wi, t, vec3(0.0), quad_light_pdf(q, t, q.normal, wi), true, NONE);
 }

@@ -11,7 +11,7 @@ float sphere_light_pdf(Sphere s, vec3 p) { return 1.0 / (TWO_PI * sphere_light_c
 
 LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u) {
     float cap = sphere_light_cap(s, p);
-    if (cap == 2.0) return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true); // it shines outwards only
+    if (cap == 2.0) return lights_none(); // it shines outwards only
     vec3 to = s.center - p;
     float d2 = dot(to, to);
     float h = u.x * cap; // 1 - cos theta
@@ -26,5 +26,5 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u) {
     at.p = s.center + s.radius * at.ng;
     at.error = gamma_error(6.0) * (abs(s.center) + s.radius);
     vec3 target = shapes_leave(at, -wi);
-    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(0.0), 1.0 / (TWO_PI * cap), true);
+    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(0.0), 1.0 / (TWO_PI * cap), true, NONE);
 }

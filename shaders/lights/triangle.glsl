@@ -11,5 +11,5 @@ LightSample triangle_light_sample(Triangle tri, vec3 p, vec2 u) {
     vec3 to = shapes_leave(at, at.ng) - p;
     float t = length(to);
     vec3 wi = t > 0.0 ? to / t : at.ng;
-    return LightSample(wi, t, vec3(0.0), triangle_light_pdf(tri, t, at.ng, wi), true);
+    return LightSample(wi, t, vec3(0.0), triangle_light_pdf(tri, t, at.ng, wi), true, NONE);
 }

@@ -1,0 +1,57 @@
+"""Documents to pictures, in one call, for tests about light."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gpu import Picture, Renderer, RenderSettings
+from service.assets import ImageData
+from service.pack import pack
+from service.scene import parse_scene
+
+
+class Images:
+    """Assets made of arrays, by name."""
+
+    def __init__(self, **images: np.ndarray) -> None:
+        self._images = images
+
+    def image(self, ref: str) -> ImageData:
+        return ImageData(pixels=self._images[ref], is_8bit=False)
+
+    def mesh(self, ref: str) -> Any:
+        raise KeyError(ref)
+
+
+def document(shapes: list[dict[str, Any]], materials: dict[str, Any] | None = None, **more: Any) -> dict[str, Any]:
+    """A scene seen from +Z towards the origin, unless told otherwise."""
+    return {
+        "version": 1,
+        "camera": {"position": [0, 0, 4], "target": [0, 0, 0]},
+        "materials": materials or {"m": {"type": "diffuse", "albedo": 0.5}},
+        "shapes": shapes,
+        **more,
+    }
+
+
+def picture(
+    gpu: Renderer, scene: dict[str, Any], samples: int = 64, assets: Images | None = None, editing: bool = False,
+    **settings: Any,
+) -> Picture:  # fmt: skip
+    """A picture of `scene` with that many samples; 32 x 32, box filter, one bounce unless told otherwise."""
+    loaded = gpu.load(pack(parse_scene(scene), assets or Images()).arrays, editing)
+    defaults = {"width": 32, "height": 32, "max_bounces": 1, "filter": "box"}
+    out = gpu.picture(loaded, RenderSettings(**{**defaults, **settings}))
+    out.trace(600.0, samples)
+    return out
+
+
+def render(gpu: Renderer, scene: dict[str, Any], samples: int = 64, aov: str = "color", **more: Any) -> np.ndarray:
+    """(h, w, c) float64 of `picture(...)`."""
+    made = picture(gpu, scene, samples, **more)
+    values = made.read(aov).astype(float)
+    made.release()
+    made.scene.release()
+    return values
