@@ -1,0 +1,161 @@
+"""Every shape against a float64 answer; and rays that leave a surface do not meet it again, at any scale."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings, Scene, layout
+from gpu.layout import Slot
+from service.pack import pack
+from service.scene import parse_scene
+from tests.probing import Prober
+from tests.rendering import Images, document
+
+TURNED = {"translate": [0.3, -0.2, 0.1], "rotate": [20, -35, 50], "scale": [0.5, 1.3, -0.8]}
+ROWS: dict[str, dict[str, Any]] = {
+    "sphere": {"type": "sphere", "center": [0.2, -0.1, 0.3], "radius": 0.9},
+    "turned sphere": {
+        "type": "sphere", "center": [0, 0, 0], "radius": 1, "transform": {"rotate": [30, 40, 50], "scale": 0.7},
+    },
+    "ellipsoid": {"type": "sphere", "center": [0, 0, 0], "radius": 1, "transform": TURNED},
+    "quad": {"type": "quad", "origin": [-1, -0.5, 0.2], "u": [2, 0.3, 0], "v": [0.2, 1, 0.5]},
+    "turned quad": {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "transform": TURNED},
+    "box": {"type": "box", "min": [-0.7, -0.4, -0.9], "max": [0.5, 0.8, 0.3]},
+    "turned box": {"type": "box", "min": [-1, -1, -1], "max": [1, 1, 1], "transform": TURNED},
+}  # fmt: skip
+N = 20_000
+
+
+def _matrix(shape: dict[str, Any]) -> np.ndarray:
+    t = shape.get("transform", {})
+    rx, ry, rz = (np.radians(a) for a in t.get("rotate", (0, 0, 0)))
+    x = np.array([[1, 0, 0], [0, np.cos(rx), -np.sin(rx)], [0, np.sin(rx), np.cos(rx)]])
+    y = np.array([[np.cos(ry), 0, np.sin(ry)], [0, 1, 0], [-np.sin(ry), 0, np.cos(ry)]])
+    z = np.array([[np.cos(rz), -np.sin(rz), 0], [np.sin(rz), np.cos(rz), 0], [0, 0, 1]])
+    out = np.eye(4)
+    out[:3, :3] = z @ y @ x @ np.diag(np.broadcast_to(np.asarray(t.get("scale", 1), float), 3))
+    out[:3, 3] = t.get("translate", (0, 0, 0))
+    return out
+
+
+def expected(shape: dict[str, Any], o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Distance (nan: none) and outward unit normal, in float64, by way of the shape's own space."""
+    m = _matrix(shape)
+    inverse = np.linalg.inv(m[:3, :3])
+    o, d = (o - m[:3, 3]) @ inverse.T, d @ inverse.T
+    with np.errstate(all="ignore"):
+        if shape["type"] == "sphere":
+            f = o - np.array(shape["center"])
+            a, b, c = (d * d).sum(1), (f * d).sum(1), (f * f).sum(1) - shape["radius"] ** 2
+            root = np.sqrt(b * b - a * c)
+            near, far = (-b - root) / a, (-b + root) / a
+            t = np.where(near > 0, near, np.where(far > 0, far, np.nan))
+            n = f + t[:, None] * d
+        elif shape["type"] == "quad":
+            u, v = np.array(shape["u"], float), np.array(shape["v"], float)
+            n = np.broadcast_to(np.cross(u, v), o.shape)
+            t = ((np.array(shape["origin"]) - o) * n).sum(1) / (d * n).sum(1)
+            p = o + t[:, None] * d - shape["origin"]
+            s = p @ np.linalg.pinv(np.stack([u, v], 1)).T
+            t = np.where((s >= 0).all(1) & (s <= 1).all(1) & (t > 0), t, np.nan)
+        else:
+            lo, hi = np.array(shape["min"]), np.array(shape["max"])
+            ta, tb = (lo - o) / d, (hi - o) / d
+            near, far = np.minimum(ta, tb).max(1), np.maximum(ta, tb).min(1)
+            t = np.where(near <= far, np.where(near > 0, near, np.where(far > 0, far, np.nan)), np.nan)
+            q = (o + t[:, None] * d - (lo + hi) / 2) / ((hi - lo) / 2)
+            n = np.where(np.abs(q) == np.abs(q).max(1, keepdims=True), np.sign(q), 0)
+        n = n @ inverse
+        return t, n / np.linalg.norm(n, axis=1, keepdims=True)
+
+
+def _trace(gpu: Renderer, scene: Scene, o: np.ndarray, d: np.ndarray, away: np.ndarray) -> list[np.ndarray]:
+    def wide(a: np.ndarray) -> np.ndarray:
+        return np.concatenate([a, np.zeros((len(a), 1))], 1).astype(np.float32)
+
+    scene.bind()
+    frame = np.zeros((), layout.Frame.dtype)
+    scene.write_frame(frame)
+    inputs = {Slot.SUM: wide(o), Slot.COMPENSATION: wide(d), Slot.MOMENTS: wide(away)}
+    outputs = (Slot.OUTPUT, Slot.ALBEDO, Slot.NORMAL)
+    known = scene.defines(RenderSettings(8, 8)) | {"HAS_ANISOTROPIC": 1}
+    return Prober(gpu).run("rays.comp", len(o), inputs, outputs, known, frame=frame)
+
+
+def _rays(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
+    o = rng.normal(size=(n, 3))
+    o *= rng.choice([0.1, 3.0], (n, 1)) / np.linalg.norm(o, axis=1, keepdims=True)  # from inside and outside
+    d = rng.uniform(-0.8, 0.8, (n, 3)) - o
+    d[: n // 10] = np.eye(3)[rng.integers(0, 3, n // 10)] * rng.choice([-1, 1], (n // 10, 1))  # along the axes
+    o = o.astype(np.float32).astype(float)
+    d = (d / np.linalg.norm(d, axis=1, keepdims=True)).astype(np.float32).astype(float)
+    return o, d
+
+
+@pytest.mark.parametrize("row", ROWS)
+def test_hits_are_where_float64_says(gpu: Renderer, row: str) -> None:
+    shape = {**ROWS[row], "material": "m"}
+    rng = np.random.default_rng(7)
+    o, d = _rays(rng, N)
+    scene = gpu.load(pack(parse_scene(document([shape])), Images()).arrays)
+    hits, _, _ = _trace(gpu, scene, o, d, rng.normal(size=(N, 3)))
+    t, n = expected(shape, o, d)
+    met = hits[:, 3] >= 0
+    edge = np.isnan(t) != ~met
+    assert edge.mean() < 5e-4  # rays along an edge may go either way
+    both = met & ~np.isnan(t)
+    assert both.sum() > N / 10
+    grazing = np.abs((n * d).sum(1)) < 0.02  # where a rounding of the ray moves the hit far
+    np.testing.assert_allclose(hits[both & ~grazing, 3], t[both & ~grazing], rtol=3e-5, atol=3e-6)
+    agree = (hits[both, :3] * n[both]).sum(1)
+    assert (agree > 0.9999).mean() > 0.999
+
+
+CLOSED = {
+    "sphere": {"type": "sphere", "center": [0, 0, 0], "radius": 1},
+    "ellipsoid": {"type": "sphere", "center": [0, 0, 0], "radius": 1, "transform": {"scale": [1, 0.3, 0.5]}},
+    "box": {"type": "box", "min": [-0.6, -0.5, -0.4], "max": [0.5, 0.6, 0.7]},
+    "quad": {"type": "quad", "origin": [-0.6, -0.5, 0], "u": [1.2, 0, 0], "v": [0, 1.1, 0]},
+}
+
+
+def _icosphere(divisions: int) -> dict[str, Any]:
+    import trimesh
+
+    mesh = trimesh.creation.icosphere(divisions)
+    return {"type": "mesh", "vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist(), "smooth": False}
+
+
+@pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
+@pytest.mark.parametrize("offset", [0.0, 7.3])
+@pytest.mark.parametrize("row", [*CLOSED, "mesh"])
+def test_rays_that_leave_do_not_come_back(gpu: Renderer, row: str, scale: float, offset: float) -> None:
+    """From outside, off a convex shape, towards any outward direction, grazing ones too: nothing may be met."""
+    shape = CLOSED[row] if row != "mesh" else _icosphere(3)
+    inner = _matrix(shape)
+    inner = np.diag([scale, scale, scale, 1.0]) @ inner
+    inner[:3, 3] += np.array([offset, -2 * offset, offset]) * scale
+    placed = {**shape, "material": "m", "transform": {"matrix": inner.ravel().tolist()}}
+    rng = np.random.default_rng(8)
+    o = rng.normal(size=(N, 3))
+    o *= 4 / np.linalg.norm(o, axis=1, keepdims=True)
+    d = rng.uniform(-0.5, 0.5, (N, 3)) - o
+    d /= np.linalg.norm(d, axis=1, keepdims=True)
+    packed = pack(parse_scene(document([placed])), Images()).arrays
+    shift = np.array([offset, -2 * offset, offset]) * scale - np.array(packed.origin)
+    scene = gpu.load(packed)
+    world = o * scale + shift
+    first, _, _ = _trace(gpu, scene, world, d, np.ones((N, 3)))
+    normal = first[:, :3].astype(float)
+    away = rng.normal(size=(N, 3))
+    graze = away - (away * normal).sum(1, keepdims=True) * normal
+    graze /= np.linalg.norm(graze, axis=1, keepdims=True)
+    towards = graze + normal * rng.choice([1e-4, 1e-2, 1.0], (N, 1))
+    hits, places, leaves = _trace(gpu, scene, world, d, towards)
+    met = hits[:, 3] >= 0
+    assert met.mean() > 0.2
+    assert np.isfinite(places[met]).all()
+    assert leaves[met, 0].sum() == 0
