@@ -1,0 +1,65 @@
+"""Built-in scenes, materials and environments: JSON documents, and the assets that our own code makes for them.
+
+A file's `title` is for menus and no part of its document; `"builtin:NAME"` in it stands for an asset of `generated`.
+"""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Callable
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from service.presets.field import sphere_field
+from service.presets.generated import ASSETS, asset, asset_id
+from service.problems import NotFound
+
+KINDS = ("scenes", "materials", "environments")
+DEFAULT_SCENE = "sphere-on-floor"
+
+# Documents that would be long files of numbers.
+COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {("scenes", "sphere-field"): sphere_field}
+
+
+def names(kind: str) -> list[dict[str, str]]:
+    """`[{name, title}]` in the order of the titles. Raises NotFound."""
+    titled = [{"name": name, "title": _titled(kind, name)["title"]} for name in _known(kind)]
+    return sorted(titled, key=lambda entry: entry["title"])
+
+
+def get(kind: str, name: str) -> dict[str, Any]:
+    """A document of the caller's own, ready to be rendered or edited. Raises NotFound."""
+    if name not in _known(kind):
+        raise NotFound(f"there is no preset {name[:80]!r} among the {kind}; there are {', '.join(_known(kind))}")
+    document: dict[str, Any] = json.loads(_text(kind, name))
+    return document
+
+
+@cache
+def builtin_assets() -> dict[str, bytes]:
+    """Bytes by id, `sha256:` and 64 hexadecimal digits: the same on every call and machine."""
+    return {asset_id(name): asset(name) for name in ASSETS}
+
+
+@cache
+def _known(kind: str) -> tuple[str, ...]:
+    if kind not in KINDS:
+        raise NotFound(f"there are no presets of {kind[:80]!r}; there are {', '.join(KINDS)}")
+    stored = [entry.name.removesuffix(".json") for entry in files(__name__).joinpath(kind).iterdir()]
+    return tuple(sorted(stored + [name for computed, name in COMPUTED if computed == kind]))
+
+
+@cache
+def _titled(kind: str, name: str) -> dict[str, Any]:
+    if (kind, name) in COMPUTED:
+        return COMPUTED[kind, name]()
+    document: dict[str, Any] = json.loads(files(__name__).joinpath(kind, f"{name}.json").read_text("utf-8"))
+    return document
+
+
+@cache
+def _text(kind: str, name: str) -> str:
+    document = {key: value for key, value in _titled(kind, name).items() if key != "title"}
+    return re.sub(r'"builtin:([a-z-]+)"', lambda match: f'"{asset_id(match[1])}"', json.dumps(document))

@@ -1,0 +1,45 @@
+"""A photographer's studio: three softboxes in a dark grey room, for a subject seen from +Z."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from service.presets import exr
+from service.presets.latlong import directions, smoothstep, toward
+
+EDGE = 0.03  # half the width of a softbox's edge: below a texel it would alias into steps
+
+
+def studio() -> bytes:
+    """The classic three lights: a warm key from the left, a cool rim from behind on the right, a wide one above."""
+    d = directions()
+    # The room brightens from the floor up and never ends in a line: there is no corner in a studio's backdrop.
+    room = 0.04 + 0.16 * smoothstep(-0.9, 0.9, d[:, :, 1])
+    picture = room[:, :, None] * np.array([0.96, 0.98, 1.0])
+    _hang(picture, d, toward(-128, 40), (0.55, 0.42), (5.6, 5.2, 4.7))
+    _hang(picture, d, toward(62, 24), (0.13, 0.50), (5.2, 5.7, 6.3))
+    _hang(picture, d, toward(180, 84), (0.70, 0.34), (1.5, 1.5, 1.55))
+    return exr.encode(picture)
+
+
+def _hang(
+    picture: np.ndarray,
+    d: np.ndarray,
+    center: np.ndarray,
+    half_size: tuple[float, float],
+    radiance: tuple[float, float, float],
+) -> None:
+    """Paints a rectangle that faces the middle from unit distance; `half_size` to the right and up."""
+    right = np.cross(center, [0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    up = np.cross(right, center)
+    ahead = d @ center
+    with np.errstate(divide="ignore", invalid="ignore"):
+        x, y = np.abs(d @ right) / ahead, np.abs(d @ up) / ahead
+    inside = (1 - smoothstep(half_size[0] - EDGE, half_size[0] + EDGE, x)) * (
+        1 - smoothstep(half_size[1] - EDGE, half_size[1] + EDGE, y)
+    )
+    # A diffuser is brightest before its lamp: half a stop down to the corners.
+    falloff = 1 / (1 + 0.4 * ((x / half_size[0]) ** 2 + (y / half_size[1]) ** 2) / 2)
+    light = np.where(ahead > 0, inside * falloff, 0.0)[:, :, None]
+    picture += light * (np.array(radiance) - picture)

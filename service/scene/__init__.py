@@ -1,0 +1,45 @@
+"""The document as a person writes it: models with ranges, defaults, units and hints, and what is made from them."""
+
+from __future__ import annotations
+
+from service.scene.camera import Camera
+from service.scene.color import Color
+from service.scene.document import Scene, parse_scene
+from service.scene.environment import ConstantEnvironment, Environment, ImageEnvironment
+from service.scene.light import PointLight
+from service.scene.material import DiffuseMaterial, DisneyMaterial, Material
+from service.scene.numbers import Vec3
+from service.scene.patch import merge_patch
+from service.scene.schema import schema
+from service.scene.settings import Limits, Settings, parse_settings
+from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
+from service.scene.text import load_json
+from service.scene.transform import MatrixTransform, Transform
+
+__all__ = [
+    "BoxShape",
+    "Camera",
+    "Color",
+    "ConstantEnvironment",
+    "DiffuseMaterial",
+    "DisneyMaterial",
+    "Environment",
+    "ImageEnvironment",
+    "Limits",
+    "Material",
+    "MatrixTransform",
+    "MeshShape",
+    "PointLight",
+    "QuadShape",
+    "Scene",
+    "Settings",
+    "Shape",
+    "SphereShape",
+    "Transform",
+    "Vec3",
+    "load_json",
+    "merge_patch",
+    "parse_scene",
+    "parse_settings",
+    "schema",
+]

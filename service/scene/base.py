@@ -1,0 +1,64 @@
+"""What every model of the document shares: strictness, and the way a validator says what is wrong."""
+
+from __future__ import annotations
+
+from types import NoneType
+from typing import Any, get_args
+
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetPydanticSchema
+from pydantic_core import CoreSchema, PydanticCustomError
+
+REFUSAL = "refusal"  # the type of our own errors among pydantic's
+
+
+class Model(BaseModel):
+    # strict: "1" and true are no numbers; frozen: a scene is shared between threads and never edited in place.
+    model_config = ConfigDict(
+        strict=True, extra="forbid", allow_inf_nan=False, frozen=True, arbitrary_types_allowed=True
+    )
+
+
+def refusal(detail: str, at: str = "") -> PydanticCustomError:
+    """The error for a validator to raise; `at` is a JSON pointer from the value that it looks at."""
+    return PydanticCustomError(REFUSAL, "{detail}", {"detail": detail, "at": at})
+
+
+def hint(
+    title: str,
+    description: str,
+    *,
+    unit: str | None = None,
+    widget: str | None = None,
+    soft: tuple[float, float] | float | None = None,
+    default: float | None = None,
+) -> Any:
+    """What the editor says about a field, as metadata for Annotated.
+
+    `soft` is where a slider ends whose range goes on, or both its ends; `default` is told where the model's is None.
+    """
+    extra: dict[str, Any] = {}
+    if unit is not None:
+        extra["x-unit"] = unit
+    if widget is not None:
+        extra["x-widget"] = widget
+    if isinstance(soft, tuple):
+        extra["x-soft-minimum"], soft = soft
+    if soft is not None:
+        extra["x-soft-maximum"] = soft
+    if default is not None:
+        extra["default"] = default
+    return Field(title=title, description=description, json_schema_extra=extra)
+
+
+def field_names(model: type[BaseModel]) -> list[str]:
+    """A model's own fields before those that it shares with its siblings: the order of a form."""
+    return sorted(model.model_fields, key=lambda name: name not in model.__annotations__)
+
+
+def _without_null(source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
+    (kind,) = (argument for argument in get_args(source) if argument is not NoneType)
+    return handler(kind)
+
+
+# On `T | None = None`: the field may be left out, but null is no value for it (a merge patch leaves out by null).
+OMITTABLE = GetPydanticSchema(_without_null)

@@ -1,0 +1,90 @@
+"""How surfaces scatter and glow."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from pydantic import Field
+
+from service.scene.base import Model, hint
+from service.scene.color import Radiometric, Reflectance
+from service.scene.numbers import Fraction
+
+
+class _Surface(Model):
+    emission: Annotated[
+        Radiometric,
+        hint("Emission", "Radiance that leaves the front side: above 0 the shape is an area light.",
+             unit="W/(m^2 sr)", widget="color", soft=20),
+    ] = (0.0, 0.0, 0.0)
+
+
+class DiffuseMaterial(_Surface):
+    """Scatters equally in all directions: f = albedo / pi."""
+
+    type: Literal["diffuse"]
+    albedo: Annotated[
+        Reflectance,
+        hint("Albedo", "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
+             unit="", widget="color"),
+    ]
+
+
+class DisneyMaterial(_Surface):
+    """The "principled" BRDF of Burley's 2012 course notes."""
+
+    type: Literal["disney"]
+    base_color: Annotated[
+        Reflectance,
+        hint("Base colour", "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+             unit="", widget="color"),
+    ] = (0.5, 0.5, 0.5)
+    subsurface: Annotated[
+        Fraction,
+        hint("Subsurface", "Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger).",
+             unit="", widget="slider"),
+    ] = 0.0
+    metallic: Annotated[
+        Fraction,
+        hint("Metallic", "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+             unit="", widget="slider"),
+    ] = 0.0
+    specular: Annotated[
+        Fraction,
+        hint("Specular", "Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5.",
+             unit="", widget="slider"),
+    ] = 0.5
+    specular_tint: Annotated[
+        Fraction,
+        hint("Specular tint", "Tints the dielectric's reflection head-on to the base colour; grazing stays white.",
+             unit="", widget="slider"),
+    ] = 0.0
+    roughness: Annotated[
+        Fraction,
+        hint("Roughness", "0 is polished, 1 is matte; its square is the width of the highlight.",
+             unit="", widget="slider"),
+    ] = 0.5
+    anisotropic: Annotated[
+        Fraction,
+        hint("Anisotropic", "Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1.",
+             unit="", widget="slider"),
+    ] = 0.0
+    sheen: Annotated[
+        Fraction,
+        hint("Sheen", "Extra light at grazing angles, for cloth.", unit="", widget="slider"),
+    ] = 0.0
+    sheen_tint: Annotated[
+        Fraction,
+        hint("Sheen tint", "Tints the sheen from white to the base colour.", unit="", widget="slider"),
+    ] = 0.5
+    clearcoat: Annotated[
+        Fraction,
+        hint("Clearcoat", "A second, thin layer of lacquer with an index of 1.5.", unit="", widget="slider"),
+    ] = 0.0
+    clearcoat_gloss: Annotated[
+        Fraction,
+        hint("Clearcoat gloss", "1 is a gloss lacquer, 0 a satin one.", unit="", widget="slider"),
+    ] = 1.0
+
+
+Material = Annotated[DiffuseMaterial | DisneyMaterial, Field(discriminator="type")]

@@ -1,0 +1,107 @@
+"""Pydantic's errors in plain words, each with the JSON pointer of the place a person would correct."""
+
+from __future__ import annotations
+
+import difflib
+from collections.abc import Callable, Iterable
+from itertools import islice
+from typing import Any, TypeVar
+
+from pydantic import BaseModel, TypeAdapter, ValidationError
+
+from service.problems import FieldError, InvalidDocument
+from service.scene.base import REFUSAL, field_names
+from service.scene.numbers import described
+from service.scene.places import Place, locate
+
+T = TypeVar("T")
+
+MOST = 100  # mistakes told at once: a list of ten thousand wrong spheres would only repeat itself
+
+_WRONG_KIND = ("union_tag_invalid", "union_tag_not_found", "literal_error", "missing")
+
+
+def validated(adapter: TypeAdapter[T], document: Any, pointer: str) -> T:
+    """The document as `adapter` makes it. Raises InvalidDocument with its mistakes, seen from `pointer` up."""
+    try:
+        return adapter.validate_python(document)
+    except ValidationError as error:
+        # The adapter's type has no public name; the error alone does not tell tags from fields.
+        raise InvalidDocument(mistakes(error, adapter._type)).under(pointer) from None
+
+
+def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
+    """Where and what, in the order of the document; `kind` is the type that was validated."""
+    found: dict[str, str] = {}
+    kinds: set[str] = set()
+    for entry in error.errors(include_url=False):
+        place = locate(kind, entry["loc"])
+        pointer = "".join("/" + escaped(step) for step in place.steps)
+        if entry["type"] in ("union_tag_invalid", "union_tag_not_found"):
+            pointer += "/type"
+        if pointer.endswith("/type") and entry["type"] in _WRONG_KIND:
+            kinds.add(pointer)
+        found.setdefault(pointer + entry.get("ctx", {}).get("at", ""), _detail(entry, place))
+    # What kind of thing it is comes first: under a wrong type every other field may look wrong.
+    hidden = tuple(pointer.removesuffix("type") for pointer in kinds)
+    kept = [pointer for pointer in found if pointer in kinds or not pointer.startswith(hidden)]
+    return [FieldError(pointer, found[pointer]) for pointer in kept[:MOST]]
+
+
+def among(names: Iterable[str]) -> str:
+    """The names as a list for an error message, cut off where nobody would read on."""
+    known = [repr(name[:40]) for name in islice(names, 21)]
+    return ", ".join(known[:20]) + (", ..." if len(known) > 20 else "") if known else "none"
+
+
+def escaped(step: object) -> str:
+    """One step of a JSON pointer (RFC 6901)."""
+    return str(step).replace("~", "~0").replace("/", "~1")
+
+
+def _detail(entry: Any, place: Place) -> str:
+    kind, value, context = entry["type"], entry["input"], entry.get("ctx", {})
+    if kind == REFUSAL:
+        return str(context["detail"])
+    if kind == "extra_forbidden" and place.holder is not None:
+        return _unknown_field(str(place.steps[-1]), place.holder)
+    if kind == "union_tag_invalid":
+        return f"is not known: {described(value.get('type'))}; known are {context['expected_tags']}"
+    if kind == "literal_error":
+        return f"must be {context['expected']}, not {described(value)}"
+    words = _WORDS.get(kind)
+    return words(context, value) if words else str(entry["msg"])
+
+
+def _unknown_field(name: str, model: type[BaseModel]) -> str:
+    names = field_names(model)
+    near = difflib.get_close_matches(name[:40], names, n=1)  # its time grows with the square
+    return f"is not known here{f' (did you mean {near[0]!r}?)' if near else ''}; known are {', '.join(names)}"
+
+
+def _not(what: str) -> Callable[[dict[str, Any], Any], str]:
+    return lambda context, value: f"must be {what}, not {described(value)}"
+
+
+def _bound(word: str, key: str) -> Callable[[dict[str, Any], Any], str]:
+    return lambda context, value: f"must be {word} {context[key]:.10g}, not {described(value)}"
+
+
+_WORDS: dict[str, Callable[[dict[str, Any], Any], str]] = {
+    "missing": lambda context, value: "is required",
+    "union_tag_not_found": lambda context, value: "is required: it says what kind of thing this is",
+    "finite_number": _not("a finite number"),
+    "float_type": _not("a number"),
+    "int_type": _not("a whole number"),
+    "bool_type": _not("true or false"),
+    "string_type": _not("a text"),
+    "string_too_short": lambda context, value: "must not be empty",
+    "list_type": _not("an array"),
+    "dict_type": _not("an object"),
+    "model_type": _not("an object"),
+    "model_attributes_type": _not("an object"),
+    "greater_than": _bound("above", "gt"),
+    "greater_than_equal": _bound("at least", "ge"),
+    "less_than": _bound("below", "lt"),
+    "less_than_equal": _bound("at most", "le"),
+}

@@ -1,0 +1,104 @@
+"""Long arrays of rows of three numbers, checked by numpy: 100 000 of them take tens of milliseconds."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import chain
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import PlainSerializer, PlainValidator, WithJsonSchema
+
+from service.scene.base import refusal
+from service.scene.numbers import LARGEST, described, is_number, vector_schema
+
+LARGEST_INDEX = 2**31 - 1
+
+
+def _rows(value: Any, low: float, high: float, example: str) -> np.ndarray:
+    """(n, 3) float64, read-only. Refuses with the pointer of the first bad row."""
+    bounds = f"between {low:.10g} and {high:.10g}"
+    if not isinstance(value, list | tuple | np.ndarray):
+        raise refusal(f"must be an array of rows like {example}, not {described(value)}")
+    if len(value) == 0:
+        raise refusal(f"must not be empty: it holds rows like {example}")
+    if not isinstance(value, np.ndarray):
+        _check_kinds(value, example)
+    try:
+        array = np.array(value, np.float64)
+    except (OverflowError, ValueError):  # a whole number beyond float64
+        i = next(i for i, row in enumerate(value) if any(abs(x) > high for x in row))
+        raise refusal(f"must be {bounds}", at=f"/{i}") from None
+    good = (array >= low) & (array <= high)  # NaN is neither
+    if not good.all():
+        i, j = np.argwhere(~good)[0].tolist()
+        raise refusal(f"must be {bounds}, not {described(value[i][j])}", at=f"/{i}")
+    array.flags.writeable = False
+    return array
+
+
+def _check_kinds(rows: Any, example: str) -> None:
+    # Sets of types: one pass in C each, and a fault is searched for only where there is one.
+    good = (
+        set(map(type, rows)) <= {list, tuple}
+        and set(map(len, rows)) == {3}
+        and set(map(type, chain.from_iterable(rows))) <= {int, float}
+    )
+    if not good:
+        i, row = next((i, row) for i, row in enumerate(rows) if not _is_row(row))
+        raise refusal(f"must be three numbers like {example}, not {_row_described(row)}", at=f"/{i}")
+
+
+def _is_row(row: object) -> bool:
+    return isinstance(row, list | tuple) and len(row) == 3 and all(map(is_number, row))
+
+
+def _row_described(row: object) -> str:
+    if not isinstance(row, list | tuple):
+        return described(row)
+    if len(row) != 3:
+        return str(len(row))
+    return f"with {described(next(x for x in row if not is_number(x)))}"
+
+
+def _points(value: Any) -> np.ndarray:
+    return _rows(value, -LARGEST, LARGEST, "[0.5, 1, 0]")
+
+
+def _directions(value: Any) -> np.ndarray:
+    array = _rows(value, -LARGEST, LARGEST, "[0, 1, 0]")
+    lengths = np.abs(array).max(axis=1).astype(np.float32)
+    if not lengths.all():
+        raise refusal("must not be zero: a direction has a length", at=f"/{int(np.argmin(lengths))}")
+    return array
+
+
+def _indices(value: Any) -> np.ndarray:
+    array = _rows(value, 0, LARGEST_INDEX, "[0, 1, 2]")
+    whole = array == np.floor(array)
+    if not whole.all():
+        i, j = np.argwhere(~whole)[0].tolist()
+        raise refusal(f"an index is a whole number, not {described(float(array[i, j]))}", at=f"/{i}")
+    indices = array.astype(np.int32)
+    indices.flags.writeable = False
+    return indices
+
+
+def first_beyond(indices: np.ndarray, count: int) -> int | None:
+    """The first row with an index that is not below `count`."""
+    bad = (indices >= count).any(axis=1)
+    return int(np.argmax(bad)) if bad.any() else None
+
+
+def _type(validate: Callable[[Any], np.ndarray], row: dict[str, Any]) -> Any:
+    schema = {"type": "array", "items": row, "minItems": 1}
+    return Annotated[
+        np.ndarray, PlainValidator(validate), PlainSerializer(lambda array: array.tolist()), WithJsonSchema(schema)
+    ]
+
+
+_INDEX_ROW = {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 3, "maxItems": 3}
+
+Points = _type(_points, vector_schema())
+Directions = _type(_directions, vector_schema())
+Triangles = _type(_indices, _INDEX_ROW)

@@ -1,0 +1,127 @@
+"""How a scene is to be rendered: size, limits, and the choices of method."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal, Protocol
+
+from pydantic import BeforeValidator, Field, TypeAdapter
+
+from service.config import MAX_PIXELS
+from service.problems import FieldError, InvalidDocument
+from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.mistakes import validated
+from service.scene.numbers import BRIGHTEST, LARGEST, described
+
+# The knobs of quality "balanced", which are the defaults; service.quality has the other presets.
+BALANCED: dict[str, Any] = {"max_samples": 256, "max_bounces": 8, "roulette_depth": 3, "resolution_scale": 1.0}
+
+Size = Annotated[int, Field(ge=1)]
+Amount = Annotated[float, Field(gt=0, le=LARGEST)]
+
+
+class Limits(Protocol):
+    """What of the service's configuration bounds the settings."""
+
+    @property
+    def max_pixels(self) -> int: ...
+
+
+def _only_false(value: Any) -> Any:
+    if value is True:
+        raise refusal("is not built yet: leave it out, or say false")
+    if value is not False:
+        raise refusal(f"must be false, not {described(value)}")
+    return value
+
+
+NotYet = Annotated[Literal[False], BeforeValidator(_only_false)]
+
+
+class Settings(Model):
+    """How to render. What is left out comes from the quality."""
+
+    width: Annotated[Size, hint("Width", "Of the picture.", unit="pixels", widget="number", soft=1920)] = 512
+    height: Annotated[Size, hint("Height", "Of the picture.", unit="pixels", widget="number", soft=1920)] = 512
+    max_samples: Annotated[
+        int | None,
+        OMITTABLE,
+        Field(ge=1, le=2**24),
+        hint("Samples", "Paths per pixel at which to stop; four times as many halve the noise.",
+             unit="", widget="number", soft=4096, default=BALANCED["max_samples"]),
+    ] = None
+    max_bounces: Annotated[
+        int | None,
+        OMITTABLE,
+        Field(ge=0, le=1024),
+        hint("Bounces", "Scattering events on a path: 0 shows emission only, 1 direct light, more the light between.",
+             unit="", widget="slider", soft=32, default=BALANCED["max_bounces"]),
+    ] = None
+    time_limit: Annotated[
+        Amount | None,
+        OMITTABLE,
+        hint("Time limit", "Stops after so long; with it and no samples given, nothing else stops it.",
+             unit="s", widget="number", soft=60),
+    ] = None
+    target_noise: Annotated[
+        Amount | None,
+        OMITTABLE,
+        hint("Target noise", "Stops when the estimated error is this share of the mean brightness; 0.01 looks clean.",
+             unit="", widget="number", soft=0.1),
+    ] = None
+    seed: Annotated[
+        int,
+        Field(ge=0, le=2**32 - 1),
+        hint("Seed", "Another one gives another noise of the same size.", unit="", widget="number", soft=100),
+    ] = 0
+    quality: Annotated[
+        Literal["draft", "preview", "balanced", "high", "reference"],
+        hint("Quality", "Fills in samples, bounces and roulette where they are not given."),
+    ] = "balanced"
+    estimator: Annotated[
+        Literal["mis", "bsdf", "light", "uniform"],
+        hint("Estimator", "How light is looked for; mis weighs both ways (Veach), the others are for comparison."),
+    ] = "mis"
+    sampler: Annotated[
+        Literal["sobol", "independent"],
+        hint("Sampler", "sobol spreads its points evenly, and so needs fewer of them."),
+    ] = "sobol"
+    filter: Annotated[
+        Literal["box", "tent", "gaussian", "blackman_harris"],
+        hint("Pixel filter", "How far around a pixel is averaged: box .5 pixels, tent 1, gaussian 2, the last 1.5."),
+    ] = "blackman_harris"
+    roulette_depth: Annotated[
+        int | None,
+        OMITTABLE,
+        Field(ge=0, le=1024),
+        hint("Roulette from", "Bounces before dim paths may end at random: changes noise and speed, not the mean.",
+             unit="", widget="slider", soft=32, default=BALANCED["roulette_depth"]),
+    ] = None
+    resolution_scale: Annotated[
+        float | None,
+        OMITTABLE,
+        Field(gt=0, le=1),
+        hint("Resolution", "Factor on width and height.",
+             unit="", widget="slider", default=BALANCED["resolution_scale"]),
+    ] = None
+    adaptive: Annotated[NotYet, hint("Adaptive", "More samples where there is more noise: not built yet.")] = False
+    clamp: Annotated[
+        Annotated[float, Field(gt=0, le=BRIGHTEST)] | None,
+        OMITTABLE,
+        hint("Clamp", "Bounds the radiance of indirect light: removes fireflies, and some light with them.",
+             unit="W/(m^2 sr)", widget="number", soft=100),
+    ] = None
+    denoise: Annotated[NotYet, hint("Denoise", "Filters the finished picture: not built yet.")] = False
+
+
+_SETTINGS = TypeAdapter(Settings)
+
+
+def parse_settings(document: Any, pointer: str = "", limits: Limits | None = None) -> Settings:
+    """The settings that a document gives. Raises InvalidDocument with every mistake, seen from `pointer` up."""
+    settings = validated(_SETTINGS, document, pointer)
+    most = limits.max_pixels if limits else MAX_PIXELS
+    if settings.width * settings.height > most:
+        larger = "width" if settings.width >= settings.height else "height"
+        detail = f"{settings.width} x {settings.height} are more than the {most} pixels allowed (SUNBOX_MAX_PIXELS)"
+        raise InvalidDocument([FieldError(f"{pointer}/{larger}", detail)])
+    return settings

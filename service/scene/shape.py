@@ -1,0 +1,142 @@
+"""The shapes: sphere, quad, box and mesh."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Any, Literal, Self
+
+import numpy as np
+from pydantic import ConfigDict, Field, model_validator
+
+from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.numbers import Point, PositiveLength
+from service.scene.rows import Directions, Points, Triangles, first_beyond
+from service.scene.transform import AnyTransform
+
+# The sine between a quad's edges below which its float32 normal is noise: the spacing of float32 near 1.
+LEAST_SINE = float(np.finfo(np.float32).eps)
+
+
+class _Placed(Model):
+    material: Annotated[str, hint("Material", "The name of one of the scene's materials.")]
+    transform: Annotated[
+        AnyTransform | None, OMITTABLE, hint("Transform", "Where the shape stands; without it, as written.")
+    ] = None
+
+
+class SphereShape(_Placed):
+    """An exact sphere, not a mesh."""
+
+    type: Literal["sphere"]
+    center: Annotated[Point, hint("Centre", "The middle of the sphere.", unit="m", widget="number")]
+    radius: Annotated[
+        PositiveLength, hint("Radius", "From the centre to the surface.", unit="m", widget="slider", soft=5)
+    ]
+
+
+class QuadShape(_Placed):
+    """A parallelogram; its front is where u, v and the normal are right-handed."""
+
+    type: Literal["quad"]
+    origin: Annotated[Point, hint("Corner", "The corner that both edges start from.", unit="m", widget="number")]
+    u: Annotated[Point, hint("Edge u", "From the corner along the first edge.", unit="m", widget="number")]
+    v: Annotated[
+        Point, hint("Edge v", "Along the second edge; the front faces cross(u, v).", unit="m", widget="number")
+    ]
+
+    @model_validator(mode="after")
+    def _has_area(self) -> Self:
+        edges = math.hypot(*self.u) * math.hypot(*self.v)
+        area = math.hypot(*np.cross(self.u, self.v).tolist())
+        if area <= LEAST_SINE * edges or np.float32(area) == 0.0:
+            raise refusal("has no area: u and v must not be zero nor parallel")
+        return self
+
+
+class BoxShape(_Placed):
+    """A box along the axes; a transform turns it."""
+
+    type: Literal["box"]
+    min: Annotated[Point, hint("Lower corner", "The least x, y and z.", unit="m", widget="number")]
+    max: Annotated[
+        Point, hint("Upper corner", "The greatest x, y and z: each above the lower's.", unit="m", widget="number")
+    ]
+
+    @model_validator(mode="after")
+    def _has_volume(self) -> Self:
+        for axis, low, high in zip("xyz", self.min, self.max, strict=True):
+            # As float32, which is what is traced: a box may also be too thin for its distance from the origin.
+            if not np.float32(low) < np.float32(high):
+                raise refusal(f"max must be above min on every axis; on {axis} they are {high!r} and {low!r}")
+        return self
+
+
+class MeshShape(_Placed):
+    """Triangles, from a file (`asset`) or written out (`vertices` and `faces`)."""
+
+    model_config = ConfigDict(
+        json_schema_extra={"oneOf": [{"required": ["asset"]}, {"required": ["vertices", "faces"]}]}
+    )
+
+    type: Literal["mesh"]
+    asset: Annotated[
+        str | None, Field(min_length=1), OMITTABLE, hint("File", "A mesh file: OBJ, PLY, STL or GLB.")
+    ] = None
+    vertices: Annotated[
+        Points | None, OMITTABLE, hint("Vertices", "Rows of x, y, z.", unit="m", widget="number")
+    ] = None
+    faces: Annotated[
+        Triangles | None,
+        OMITTABLE,
+        hint("Faces", "Rows of three vertex numbers, from 0, counter-clockwise seen from outside.",
+             unit="", widget="number"),
+    ] = None
+    normals: Annotated[
+        Directions | None, OMITTABLE, hint("Normals", "One row per vertex.", unit="", widget="number")
+    ] = None
+    smooth: Annotated[
+        bool, hint("Smooth", "Interpolates vertex normals; off shows the facets.")
+    ] = True
+    double_sided: Annotated[
+        bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")
+    ] = True
+
+    @model_validator(mode="after")
+    def _is_whole(self) -> Self:
+        if self.asset is not None:
+            for name in ("vertices", "faces", "normals"):
+                if getattr(self, name) is not None:
+                    raise refusal(f"a mesh has an asset or {name}, not both", at=f"/{name}")
+            return self
+        if self.vertices is None and self.faces is None:
+            raise refusal("is required: a mesh has an asset, or vertices and faces", at="/asset")
+        if self.vertices is None or self.faces is None:
+            missing = "vertices" if self.vertices is None else "faces"
+            raise refusal("is required: a mesh without asset has vertices and faces", at=f"/{missing}")
+        _check_numbers(self.vertices, self.faces, self.normals)
+        return self
+
+    def __eq__(self, other: Any) -> bool:
+        """Arrays by value: pydantic's own comparison has no answer for them."""
+        if not isinstance(other, MeshShape):
+            return NotImplemented
+        return all(_equal(getattr(self, name), getattr(other, name)) for name in MeshShape.model_fields)
+
+
+def _check_numbers(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None) -> None:
+    count = len(vertices)
+    beyond = first_beyond(faces, count)
+    if beyond is not None:
+        row = faces[beyond].tolist()
+        raise refusal(f"{row} names a vertex that is not there: the last is {count - 1}", at=f"/faces/{beyond}")
+    if normals is not None and len(normals) != count:
+        raise refusal(f"has {len(normals)} rows for {count} vertices: must be one per vertex", at="/normals")
+
+
+def _equal(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return np.array_equal(a, b)
+    return type(a) is type(b) and bool(a == b)
+
+
+Shape = Annotated[SphereShape | QuadShape | BoxShape | MeshShape, Field(discriminator="type")]
