@@ -1,0 +1,122 @@
+"""The process that parses strangers' files: `python -m service.assets.child FD`, FD being a socket to the parent.
+
+One request after the other: a format and a file come in, arrays in sealed memory go out. It ends when the parent
+does, and is killed where a file takes too much time; memory that a file must not take is refused to it.
+"""
+
+import contextlib
+import ctypes
+import fcntl
+import importlib
+import mmap
+import os
+import resource
+import signal
+import socket
+import sys
+from dataclasses import asdict
+from typing import Any
+
+from service.assets.data import AssetLimits, ImageData, MeshData
+from service.assets.errors import ParseError
+from service.assets.wire import Array, publish, receive, send
+
+CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
+LIBRARIES = ("numpy", "PIL.Image", "OpenImageIO", "DracoPy", "trimesh.exchange.stl")
+
+
+def main() -> None:
+    link = socket.socket(fileno=int(sys.argv[1]))
+    _confine()
+    while True:
+        try:
+            request, source = receive(link)
+        except (EOFError, OSError):
+            return
+        if source < 0:
+            for name in LIBRARIES:
+                importlib.import_module(name)
+            continue
+        reply, result = _answer(request, source, link)
+        os.close(source)
+        try:
+            send(link, reply, result)
+        except OSError:
+            return
+        if result >= 0:
+            os.close(result)
+
+
+def _confine() -> None:
+    """Never a core file, no network where the kernel lets us drop it, and the first to go when memory runs out."""
+    _limit(resource.RLIMIT_CORE, 0)
+    libc = ctypes.CDLL(None, use_errno=True)
+    if libc.unshare(CLONE_NEWNET) != 0:
+        libc.unshare(CLONE_NEWUSER | CLONE_NEWNET)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle; it closes the socket
+    os.nice(5)
+    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
+        score.write("1000")
+
+
+def _limit(which: int, value: int) -> None:
+    """The soft limit, as far as the hard one that we were given lets us; it can be lifted again for the next file."""
+    hard = resource.getrlimit(which)[1]
+    resource.setrlimit(which, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
+
+
+def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[dict[str, Any], int]:
+    limits = AssetLimits(**request["limits"])
+    try:
+        _bound(limits, request["memory"])
+        # A signal when the parent hangs up, whose default is to end: also in the middle of a library's loop.
+        fcntl.fcntl(link, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
+        parsed = _parse(request["format"], source, limits)
+        arrays, facts = _arrays(parsed)
+        fd, table = publish(arrays)
+        return {"arrays": table, **facts}, fd
+    except ParseError as error:
+        return {"error": str(error)[:2000]}, -1
+    except MemoryError:
+        return {"error": f"reading it takes more than the {request['memory'] >> 20} MiB allowed"}, -1
+    except Exception as error:
+        # Libraries raise anything at all on nonsense; none of it may end the child.
+        plain = isinstance(error, OSError | ValueError) and str(error)
+        said = str(error) if plain else f"{type(error).__name__}: {error}"
+        return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
+    finally:
+        fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) & ~os.O_ASYNC)
+        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
+        resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
+
+
+def _bound(limits: AssetLimits, memory: int) -> None:
+    """Memory beyond what the libraries have taken already, and processor time beyond what earlier files took."""
+    with open("/proc/self/statm") as sizes:
+        taken = int(sizes.read().split()[0]) * mmap.PAGESIZE
+    _limit(resource.RLIMIT_AS, taken + memory)
+    used = resource.getrusage(resource.RUSAGE_SELF)
+    _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime + limits.seconds) + 1)
+
+
+def _parse(format: str, source: int, limits: AssetLimits) -> MeshData | ImageData:
+    from service.assets.image import SIGNATURES, parse_image
+    from service.assets.mesh import parse_mesh
+
+    data = os.pread(source, os.fstat(source).st_size, 0)
+    if not data:
+        raise ParseError("the file is empty")
+    if format in SIGNATURES:
+        return parse_image(format, data, f"/proc/self/fd/{source}", limits)
+    return parse_mesh(format, data, limits)
+
+
+def _arrays(parsed: MeshData | ImageData) -> tuple[dict[str, Array], dict[str, Any]]:
+    if isinstance(parsed, ImageData):
+        return {"pixels": parsed.pixels}, {"is_8bit": parsed.is_8bit}
+    return {name: array for name, array in asdict(parsed).items() if array is not None}, {}
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,64 @@
+"""What the asset room hands out, and its limits. Imports nothing of the service."""
+
+from dataclasses import dataclass
+from typing import Literal, Protocol
+
+import numpy as np
+import numpy.typing as npt
+
+Floats = npt.NDArray[np.float32]
+Doubles = npt.NDArray[np.float64]
+Indices = npt.NDArray[np.int32]
+Kind = Literal["mesh", "image"]
+
+
+@dataclass(frozen=True)
+class MeshData:
+    """Triangles as the file has them: neither merged nor reordered, polygons triangulated. Arrays are read-only."""
+
+    vertices: Doubles  # (n, 3), finite
+    faces: Indices  # (m, 3), in range, counter-clockwise from outside
+    normals: Floats | None  # (n, 3), unit length; None where the file has none
+
+
+@dataclass(frozen=True)
+class ImageData:
+    """Texels as stored, row 0 at the top of the image; nothing is decoded from sRGB. The array is read-only."""
+
+    pixels: Floats  # (height, width, 1 | 3 | 4), finite; 8- and 16-bit integers became 0..1
+    is_8bit: bool
+
+
+@dataclass(frozen=True)
+class AssetInfo:
+    """What an upload is answered with; a mesh has no width and an image no triangles: those are None."""
+
+    id: str
+    kind: Kind
+    format: str
+    bytes: int
+    width: int | None = None
+    height: int | None = None
+    channels: int | None = None
+    vertices: int | None = None
+    triangles: int | None = None
+
+
+@dataclass(frozen=True)
+class AssetLimits:
+    """Bounds on one file, on the process that parses it, and on what is kept in memory."""
+
+    max_triangles: int = 16_000_000
+    max_texels: int = 1 << 26  # 8192 x 8192: as float32 RGBA 1 GiB
+    max_file: int = 1 << 30
+    seconds: float = 20.0  # wall and processor time for one file
+    cache_bytes: int = 512 << 20
+    children: int = 2
+
+
+class Assets(Protocol):
+    """Where a scene's asset references lead. Both methods raise AssetError, and may be called on any thread."""
+
+    def mesh(self, ref: str) -> MeshData: ...
+
+    def image(self, ref: str) -> ImageData: ...

@@ -1,0 +1,113 @@
+"""Assets of a scene on disk: paths relative to its file, for the command line only."""
+
+import errno
+import os
+import stat
+from pathlib import Path
+from types import TracebackType
+
+from service.assets.data import AssetLimits, ImageData, MeshData
+from service.assets.errors import ParseError
+from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
+from service.assets.sniff import sniff
+from service.assets.store import AssetStore
+from service.problems import AssetError
+
+
+class FileAssets:
+    """Files inside `folder` or one of `roots`, links followed first; a `sha256:` id leads to `fallback`.
+
+    A path is taken from `folder`, and where nothing is there from each of the roots.
+    """
+
+    def __init__(self, folder: Path, roots: list[Path], fallback: AssetStore | None = None) -> None:
+        self._bases = [Path(os.path.realpath(base)) for base in (folder, *roots)]
+        self._fallback = fallback
+        self._loader = fallback.loader if fallback else Loader(AssetLimits())
+
+    def mesh(self, ref: str) -> MeshData:
+        """Raises AssetError."""
+        if ref.startswith("sha256:"):
+            return self._store(ref).mesh(ref)
+        return as_mesh(self._load(ref), repr(ref))
+
+    def image(self, ref: str) -> ImageData:
+        """Raises AssetError."""
+        if ref.startswith("sha256:"):
+            return self._store(ref).image(ref)
+        return as_image(self._load(ref), repr(ref))
+
+    def close(self) -> None:
+        """Ends the parser, unless it is the fallback's."""
+        if self._fallback is None:
+            self._loader.close()
+
+    def __enter__(self) -> "FileAssets":
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def _store(self, ref: str) -> AssetStore:
+        if self._fallback is None:
+            raise AssetError(f"there is no asset {ref[:100]!r} here")
+        return self._fallback
+
+    def _load(self, ref: str) -> Parsed:
+        fd = _open(self._find(ref), ref)
+        try:
+            found = os.fstat(fd)
+            key = f"{found.st_dev}:{found.st_ino}:{found.st_size}:{found.st_mtime_ns}"
+            return self._loader.load(key, lambda: self._parse(fd, ref, found.st_size))
+        finally:
+            os.close(fd)
+
+    def _parse(self, fd: int, ref: str, size: int) -> Parsed:
+        limits = self._loader.sandbox.limits
+        if size > limits.max_file:
+            raise AssetError(f"{ref!r} has {size} bytes; {limits.max_file} are allowed")
+        with open(fd, "rb", closefd=False) as file:
+            data = file.read()
+        format = sniff(data, filename=ref)
+        if format is None:
+            what = "is empty" if not data else "is no mesh or image of a known format"
+            raise AssetError(f"{ref!r} {what}")
+        try:
+            return self._loader.sandbox.parse(format, data)
+        except ParseError as error:
+            raise refused(repr(ref), error) from None
+
+    def _find(self, ref: str) -> Path:
+        """The file itself, no link on the way to it. It may be gone when it is opened."""
+        if not ref or "\0" in ref:
+            raise AssetError(f"{ref[:100]!r} is no file name")
+        if os.path.isabs(ref):
+            raise AssetError(f"{ref[:100]!r} is an absolute path; write it relative to the scene's file")
+        candidates = [Path(os.path.realpath(base / ref)) for base in self._bases]
+        allowed = [path for path in candidates if any(path.is_relative_to(base) for base in self._bases)]
+        if not allowed:
+            raise AssetError(f"{ref[:100]!r} leaves the scene's folder; --asset-root DIR allows another one")
+        return next((path for path in allowed if _exists(path)), allowed[0])
+
+
+def _exists(path: Path) -> bool:
+    try:
+        return path.exists()
+    except OSError:  # a name too long
+        return False
+
+
+def _open(path: Path, ref: str) -> int:
+    try:
+        # Neither a link put there meanwhile nor a pipe that nobody writes to.
+        fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
+    except OSError as error:
+        what = "there is no such file" if error.errno == errno.ENOENT else os.strerror(error.errno or 0).lower()
+        raise AssetError(f"{ref[:100]!r}: {what}") from None
+    mode = os.fstat(fd).st_mode
+    if not stat.S_ISREG(mode):
+        os.close(fd)
+        raise AssetError(f"{ref[:100]!r} is {'a folder' if stat.S_ISDIR(mode) else 'no ordinary file'}")
+    return fd

@@ -1,0 +1,168 @@
+"""Image files -> float32 texels. Runs in the parsing child."""
+
+import io
+import re
+import struct
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from service.assets.data import AssetLimits, Floats, ImageData
+from service.assets.errors import ParseError
+from service.images.metadata import exr_attributes
+
+PILLOW = {"png": "PNG", "jpeg": "JPEG", "webp": "WEBP"}
+OIIO = {"exr": "openexr", "hdr": "hdr"}
+SIGNATURES: dict[str, tuple[bytes, ...]] = {
+    "png": (b"\x89PNG\r\n\x1a\n",),
+    "jpeg": (b"\xff\xd8\xff",),
+    "webp": (b"RIFF",),
+    "exr": (b"\x76\x2f\x31\x01",),
+    "hdr": (b"#?",),
+}
+PNG_END = b"IEND\xaeB`\x82"
+HDR_SIZE = re.compile(rb"\n([-+])([XY]) +(\d{1,9}) +([-+])(?!\2)[XY] +(\d{1,9})\n")
+COLOUR = ("R", "G", "B")
+
+
+def parse_image(format: str, data: bytes, path: str, limits: AssetLimits) -> ImageData:
+    """`path` leads to the same bytes, for the library that reads only files.
+
+    Raises ParseError, or what the libraries raise.
+    """
+    if not data.startswith(SIGNATURES[format]):
+        raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
+    is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
+    pixels = _pillow(format, data, limits) if is_8bit else _openimageio(format, data, path, limits)
+    if not is_8bit and not np.isfinite(pixels).all():
+        y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
+        raise ParseError(f"the texel at x={x}, y={y} is not finite: {pixels[y, x].tolist()}")
+    return ImageData(np.ascontiguousarray(pixels, np.float32), is_8bit)
+
+
+def check_size(width: int, height: int, limits: AssetLimits) -> None:
+    if width < 1 or height < 1 or width * height > limits.max_texels:
+        raise ParseError(f"{width} x {height} texels; 1 to {limits.max_texels} are allowed")
+
+
+def _pillow(format: str, data: bytes, limits: AssetLimits) -> Floats:
+    from PIL import Image, UnidentifiedImageError
+
+    Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
+    try:
+        image = Image.open(io.BytesIO(data), formats=[PILLOW[format]])
+    except UnidentifiedImageError:
+        raise ParseError(f"it begins as {format.upper()} does, but can't be read") from None
+    check_size(*image.size, limits)
+    if format == "png" and PNG_END not in data:
+        raise ParseError("the file is cut off: it has no IEND chunk")
+    image.load()
+    grey = image.mode in ("1", "L")
+    transparent = image.mode in ("LA", "PA", "La", "RGBa", "RGBA") or "transparency" in image.info
+    converted = image.convert("RGBA" if transparent else "L" if grey else "RGB")
+    texels = np.asarray(converted).reshape(converted.height, converted.width, -1)
+    scaled: Floats = np.divide(texels, 255, dtype=np.float32)
+    return scaled
+
+
+def _openimageio(format: str, data: bytes, path: str, limits: AssetLimits) -> Floats:
+    """EXR and Radiance as stored; a PNG of 16 bits with straight alpha, which Pillow would round to 8."""
+    import OpenImageIO as oiio
+
+    _check_header(format, data, limits)
+    config = oiio.ImageSpec()
+    config.attribute("oiio:UnassociatedAlpha", 1)
+    file = oiio.ImageInput.open(path, config)
+    if file is None or file.format_name() != OIIO.get(format, format):
+        oiio.geterror()  # says only that no reader took it
+        raise ParseError(f"it begins as {format.upper()} does, but its header can't be read or is cut off")
+    try:
+        part, names = _part(file)
+        spec = file.spec()
+        check_size(spec.width, spec.height, limits)
+        check_size(spec.full_width, spec.full_height, limits)
+        first, last = min(names), max(names) + 1
+        pixels = file.read_image(part, 0, first, last, "float")
+        if pixels is None:
+            raise ParseError(_said(file.geterror(), path))
+        picked = np.asarray(pixels).reshape(spec.height, spec.width, -1)[:, :, [k - first for k in names]]
+        return _upright(_framed(picked, spec), data) if format == "hdr" else _framed(picked, spec)
+    finally:
+        file.close()
+
+
+def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
+    """The size that the file claims, before a library sees it: that one only says that it can't read it."""
+    if format == "hdr":
+        header = HDR_SIZE.search(data[:65536])
+        if header is None:
+            raise ParseError("the header is cut off: it gives no size such as `-Y 512 +X 1024`")
+        if b"xyze" in data[: header.start()]:
+            raise ParseError("its texels are XYZ (32-bit_rle_xyze); 32-bit_rle_rgbe is read")
+        check_size(int(header[5]), int(header[3]), limits)
+    elif format == "exr":
+        attributes = exr_attributes(data)
+        for window in (attributes.get("dataWindow", b""), attributes.get("displayWindow", b"")):
+            if len(window) == 16:
+                left, top, right, bottom = struct.unpack("<iiii", window)
+                check_size(right - left + 1, bottom - top + 1, limits)
+
+
+def _part(file: Any) -> tuple[int, list[int]]:
+    """The first part with a colour image, and the places of its channels: RGB, RGBA or a single one."""
+    seen: list[str] = []
+    part = 0
+    while file.seek_subimage(part, 0):
+        spec = file.spec()
+        names = list(spec.channelnames)
+        layers = dict.fromkeys(["", *(name.rpartition(".")[0] + "." for name in names if "." in name)])
+        for layer in layers:
+            if all(layer + c in names for c in COLOUR):
+                alpha = [layer + "A"] if layer + "A" in names else []
+                return _plain(spec, part, [names.index(n) for n in [*(layer + c for c in COLOUR), *alpha]])
+        if len(names) == 1:
+            return _plain(spec, part, [0])
+        if names == ["Y", "A"]:
+            return _plain(spec, part, [0, 0, 0, 1])
+        seen += names
+        part += 1
+    raise ParseError(f"it has no channels R, G and B; it has {', '.join(seen[:20])}")
+
+
+def _plain(spec: Any, part: int, channels: list[int]) -> tuple[int, list[int]]:
+    if spec.deep:
+        raise ParseError("deep images are not read")
+    if spec.depth > 1:
+        raise ParseError("images with depth are not read")
+    return part, channels
+
+
+def _framed(pixels: npt.NDArray[Any], spec: Any) -> Floats:
+    """The data window put into the display window, black around it."""
+    left, top = spec.x - spec.full_x, spec.y - spec.full_y
+    if (left, top, spec.width, spec.height) == (0, 0, spec.full_width, spec.full_height):
+        return pixels
+    framed = np.zeros((spec.full_height, spec.full_width, pixels.shape[2]), np.float32)
+    x, y = max(left, 0), max(top, 0)
+    inside = pixels[y - top : spec.full_height - top, x - left : spec.full_width - left]
+    framed[y : y + inside.shape[0], x : x + inside.shape[1]] = inside
+    return framed
+
+
+def _upright(pixels: Floats, data: bytes) -> Floats:
+    """A Radiance file with its rows from the top and its columns from the left.
+
+    Y grows upwards and X to the right; the axis named first goes from one scan line to the next.
+    """
+    header = HDR_SIZE.search(data[:65536])
+    if header is None:
+        return pixels
+    rows, columns = header[1], header[4]
+    if header[2] == b"X":
+        pixels, rows, columns = pixels.transpose(1, 0, 2), columns, rows
+    return pixels[:: 1 if rows == b"-" else -1, :: 1 if columns == b"+" else -1]
+
+
+def _said(message: str, path: str) -> str:
+    return message.replace(f'"{path}"', "the file").replace(path, "the file").strip()[:300] or "it can't be read"

@@ -1,0 +1,79 @@
+"""Parsed assets, kept while there is room; a file that many ask for at once is parsed once."""
+
+import threading
+from collections import OrderedDict
+from collections.abc import Callable
+from concurrent.futures import Future
+
+from service.assets.data import AssetLimits, ImageData, MeshData
+from service.assets.errors import ParseError
+from service.assets.sandbox import Sandbox
+from service.problems import AssetError
+
+Parsed = MeshData | ImageData
+
+
+class Loader:
+    """For any number of threads."""
+
+    def __init__(self, limits: AssetLimits) -> None:
+        self.sandbox = Sandbox(limits)
+        self._lock = threading.Lock()
+        self._kept: OrderedDict[str, Parsed] = OrderedDict()
+        self._pending: dict[str, Future[Parsed]] = {}
+
+    def load(self, key: str, parse: Callable[[], Parsed]) -> Parsed:
+        """What `parse` gave for this key, now or before. Raises what it raises; failures are not kept."""
+        with self._lock:
+            if key in self._kept:
+                self._kept.move_to_end(key)
+                return self._kept[key]
+            future = self._pending.get(key)
+            if future is None:
+                mine = self._pending[key] = Future()
+        if future is not None:
+            return future.result()
+        try:
+            parsed = parse()
+        except BaseException as error:
+            with self._lock:
+                del self._pending[key]
+            mine.set_exception(error)
+            raise
+        with self._lock:
+            self._keep(key, parsed)
+            del self._pending[key]
+        mine.set_result(parsed)
+        return parsed
+
+    def _keep(self, key: str, parsed: Parsed) -> None:
+        self._kept[key] = parsed
+        room = self.sandbox.limits.cache_bytes - sum(map(_bytes, self._kept.values()))
+        while room < 0:
+            room += _bytes(self._kept.popitem(last=False)[1])
+
+    def close(self) -> None:
+        self.sandbox.close()
+
+
+def as_mesh(parsed: Parsed, name: str) -> MeshData:
+    if not isinstance(parsed, MeshData):
+        raise AssetError(f"{name} is an image; a mesh is wanted here")
+    return parsed
+
+
+def as_image(parsed: Parsed, name: str) -> ImageData:
+    if not isinstance(parsed, ImageData):
+        raise AssetError(f"{name} is a mesh; an image is wanted here")
+    return parsed
+
+
+def refused(name: str, error: ParseError) -> AssetError:
+    return AssetError(f"{name}: {error}")
+
+
+def _bytes(parsed: Parsed) -> int:
+    if isinstance(parsed, ImageData):
+        return parsed.pixels.nbytes
+    normals = 0 if parsed.normals is None else parsed.normals.nbytes
+    return parsed.vertices.nbytes + parsed.faces.nbytes + normals

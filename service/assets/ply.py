@@ -1,0 +1,215 @@
+"""PLY, text or binary -> triangles. Runs in the parsing child.
+
+Our own, and not trimesh's: that one cannot read a binary file whose faces differ in length, and gives what a header
+promises its memory before looking at the file.
+"""
+
+import warnings
+from dataclasses import dataclass, field
+from struct import Struct
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from service.assets.data import Doubles
+from service.assets.errors import ParseError
+from service.assets.polygons import Longs, triangulate
+
+TYPES = {
+    **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
+    **{"int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4"},
+    **{"float": "f4", "float32": "f4", "double": "f8", "float64": "f8"},
+}
+HEADER_BYTES = 1 << 20
+CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
+FACE_LISTS = ("vertex_indices", "vertex_index")
+
+
+@dataclass
+class Property:
+    name: str
+    dtype: str
+    count: str | None = None  # the type of a list's length
+
+
+@dataclass
+class Element:
+    name: str
+    length: int
+    properties: list[Property] = field(default_factory=list)
+
+    def lists(self) -> list[Property]:
+        return [p for p in self.properties if p.count is not None]
+
+    def row(self, lengths: dict[str, int]) -> np.dtype[np.void]:
+        """A row's layout, where each list has the given length."""
+        fields: list[tuple[str, str] | tuple[str, str, tuple[int]]] = []
+        for p in self.properties:
+            if p.count is None:
+                fields.append((p.name, p.dtype))
+            else:
+                fields += [(_count_of(p), p.count), (p.name, p.dtype, (lengths[p.name],))]
+        return np.dtype(fields)
+
+
+def _count_of(p: Property) -> str:
+    return f"count of {p.name}"
+
+
+def read_ply(data: bytes) -> tuple[Doubles, Longs, Doubles | None]:
+    elements, encoding, start = _header(data)
+    body = Body(data, start) if encoding != "ascii" else _text_as_binary(data, start, elements)
+    vertex: dict[str, npt.NDArray[np.generic]] = {}
+    counts = corners = np.empty(0, np.int64)
+    for element in elements:
+        if element.name == "face" and element.lists():
+            wanted = next((p for p in element.lists() if p.name in FACE_LISTS), None)
+            if wanted is None:
+                raise ParseError("its faces have no list called vertex_indices")
+            counts, corners = body.lists(element, wanted)
+        elif element.lists():
+            body.lists(element, element.lists()[0])
+        else:
+            rows = body.rows(element)
+            if element.name == "vertex":
+                vertex = {p.name: rows[p.name] for p in element.properties}
+    if not {"x", "y", "z"} <= vertex.keys():
+        raise ParseError("its header declares no vertices with x, y and z")
+    vertices = _stack(vertex, ("x", "y", "z"))
+    if not len(counts):
+        raise ParseError("it has no faces")
+    if counts.min() < 3:
+        raise ParseError(f"face {int(counts.argmin())} (counted from 0) has {counts.min()} corners; it needs three")
+    if corners.min() < 0 or corners.max() >= len(vertices):
+        at = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
+        face = int(np.searchsorted(np.cumsum(counts), at, "right"))
+        raise ParseError(f"face {face} (counted from 0) names vertex {corners[at]}; there are {len(vertices)}")
+    normals = _stack(vertex, ("nx", "ny", "nz")) if {"nx", "ny", "nz"} <= vertex.keys() else None
+    return vertices, corners[triangulate(vertices, corners, counts)], normals
+
+
+def _stack(columns: dict[str, npt.NDArray[np.generic]], names: tuple[str, ...]) -> Doubles:
+    return np.stack([columns[name] for name in names], axis=1).astype(np.float64)
+
+
+def _header(data: bytes) -> tuple[list[Element], str, int]:
+    """The elements in order, the byte order (`<`, `>`, or `ascii`), and where the data begin."""
+    if not data.startswith((b"ply\n", b"ply\r")):
+        raise ParseError("not a PLY file: it does not begin with `ply`")
+    end = data.find(b"end_header", 0, HEADER_BYTES)
+    newline = data.find(b"\n", end)
+    if end < 0 or newline < 0:
+        raise ParseError("the header is cut off: no `end_header`")
+    elements: list[Element] = []
+    encoding = ""
+    for line in data[:end].decode("latin-1").splitlines()[1:]:
+        match line.split():
+            case ["format", "ascii", _]:
+                encoding = "ascii"
+            case ["format", "binary_little_endian", _]:
+                encoding = "<"
+            case ["format", "binary_big_endian", _]:
+                encoding = ">"
+            case ["element", name, length] if length.isascii() and length.isdigit() and len(length) < 16:
+                elements.append(Element(name, int(length)))
+            case ["property", "list", count, dtype, name] if elements and count in TYPES and dtype in TYPES:
+                elements[-1].properties.append(Property(name, TYPES[dtype], TYPES[count]))
+            case ["property", dtype, name] if elements and dtype in TYPES:
+                elements[-1].properties.append(Property(name, TYPES[dtype]))
+            case [] | ["comment", *_] | ["obj_info", *_]:
+                pass
+            case _:
+                raise ParseError(f"the header has a line that is not understood: {line[:80]!r}")
+    if not encoding:
+        raise ParseError("the header names no format")
+    for element in elements:
+        if len({p.name for p in element.properties}) != len(element.properties):
+            raise ParseError(f"element {element.name} has two properties of one name")
+    if encoding != "ascii":
+        for p in (p for element in elements for p in element.properties):
+            p.dtype, p.count = encoding + p.dtype, p.count and encoding + p.count
+    return elements, encoding, newline + 1
+
+
+class Body:
+    """The data after the header, eaten element by element; never gives out more than the file holds."""
+
+    def __init__(self, data: bytes, at: int) -> None:
+        self.data, self.at = data, at
+
+    def rows(self, element: Element, lengths: dict[str, int] | None = None) -> npt.NDArray[np.void]:
+        dtype = element.row(lengths or {})
+        if not dtype.itemsize:
+            raise ParseError(f"element {element.name} has no properties")
+        self._need(element.length * dtype.itemsize, element)
+        rows = np.frombuffer(self.data, dtype, element.length, self.at)
+        self.at += rows.nbytes
+        return rows
+
+    def lists(self, element: Element, wanted: Property) -> tuple[Longs, Longs]:
+        """The lengths of the wanted list, and all its values, one row after the other."""
+        if not element.length:
+            return np.empty(0, np.int64), np.empty(0, np.int64)
+        start = self.at
+        lengths = self._walk(element, wanted, 1)[1]
+        self.at = start
+        if element.length * element.row(lengths).itemsize <= len(self.data) - start:
+            rows = self.rows(element, lengths)
+            if all((rows[_count_of(p)] == lengths[p.name]).all() for p in element.lists()):
+                values = rows[wanted.name]
+                return np.full(len(rows), values.shape[1]), _whole(values).reshape(-1)
+            self.at = start
+        counts, lengths, values = self._walk(element, wanted, element.length)
+        return np.array(counts), values
+
+    def _walk(self, element: Element, wanted: Property, rows: int) -> tuple[list[int], dict[str, int], Longs]:
+        """Row by row, for lists that differ: the wanted list's lengths, all lengths of the last row, the values."""
+        counts, pieces, lengths = [], [], {}
+        counters = [p.count and Struct(p.count[0] + CODES[p.count[1:]]) for p in element.properties]
+        sizes = [int(p.dtype[-1]) for p in element.properties]
+        for _ in range(rows):
+            for p, count, size in zip(element.properties, counters, sizes, strict=True):
+                n = 1
+                if count:
+                    self._need(count.size, element)
+                    n = self._length(count.unpack_from(self.data, self.at)[0], element)
+                    self.at += count.size
+                    lengths[p.name] = n
+                self._need(n * size, element)
+                if p is wanted:
+                    counts.append(n)
+                    pieces.append(self.data[self.at : self.at + n * size])
+                self.at += n * size
+        return counts, lengths, _whole(np.frombuffer(b"".join(pieces), wanted.dtype))
+
+    def _length(self, written: float, element: Element) -> int:
+        if not written >= 0 or written != written // 1:
+            raise ParseError(f"element {element.name} has a list of length {written}")
+        return int(written)
+
+    def _need(self, size: int, element: Element) -> None:
+        if size > len(self.data) - self.at:
+            raise ParseError(
+                f"the file is cut off: {element.length} rows of element {element.name} are promised, "
+                f"{len(self.data) - self.at} bytes are left"
+            )
+
+
+def _whole(values: npt.NDArray[Any]) -> Longs:
+    if values.dtype.kind == "f" and not ((np.abs(values) < 2**53) & (values == np.floor(values))).all():
+        raise ParseError("its faces have an index that is no whole number")
+    return values.astype(np.int64)
+
+
+def _text_as_binary(data: bytes, start: int, elements: list[Element]) -> Body:
+    """The numbers of a text file as float64, so that one reader does for both: they hold any 32-bit index exactly."""
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")  # numpy warns where it stops short of the end
+        try:
+            numbers = np.fromstring(data[start:], "<f8", sep=" ")
+        except (ValueError, DeprecationWarning):
+            raise ParseError("its data hold something that is not a number") from None
+    for p in (p for element in elements for p in element.properties):
+        p.dtype, p.count = "<f8", p.count and "<f8"
+    return Body(numbers.tobytes(), 0)

@@ -1,0 +1,77 @@
+"""Which format some bytes are in: by the bytes themselves, else by what the sender called them."""
+
+import re
+
+from service.assets.data import Kind
+
+KINDS: dict[str, Kind] = {
+    "obj": "mesh",
+    "ply": "mesh",
+    "stl": "mesh",
+    "glb": "mesh",
+    "gltf": "mesh",
+    "exr": "image",
+    "hdr": "image",
+    "png": "image",
+    "jpeg": "image",
+    "webp": "image",
+}
+
+MAGIC = (
+    (b"\x89PNG\r\n\x1a\n", "png"),
+    (b"\xff\xd8\xff", "jpeg"),
+    (b"\x76\x2f\x31\x01", "exr"),
+    (b"#?RADIANCE", "hdr"),
+    (b"#?RGBE", "hdr"),
+    (b"glTF", "glb"),
+    (b"ply\n", "ply"),
+    (b"ply\r", "ply"),
+)
+
+CONTENT_TYPES = {
+    "model/obj": "obj",
+    "text/prs.wavefront-obj": "obj",
+    "application/ply": "ply",
+    "model/ply": "ply",
+    "model/stl": "stl",
+    "application/sla": "stl",
+    "model/gltf-binary": "glb",
+    "model/gltf+json": "gltf",
+    "image/x-exr": "exr",
+    "image/aces": "exr",
+    "image/vnd.radiance": "hdr",
+    "image/x-hdr": "hdr",
+    "image/png": "png",
+    "image/jpeg": "jpeg",
+    "image/webp": "webp",
+}
+
+SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr"}
+
+# OBJ has no magic number: its first statement tells, after blank lines and comments.
+# Possessive quantifiers: a file of blanks would otherwise take exponential time.
+OBJ_START = re.compile(rb"(?:\s++|#[^\n]*+\n)*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
+STL_TEXT = re.compile(rb"\s*+solid\b[^\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
+GLTF_TEXT = re.compile(rb"\s*\{")
+
+
+def sniff(data: bytes, content_type: str | None = None, filename: str | None = None) -> str | None:
+    """A key of KINDS, or None where nothing tells."""
+    for magic, name in MAGIC:
+        if data.startswith(magic):
+            return name
+    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
+        return "webp"
+    head = data[:65536]
+    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+        return "stl"
+    if STL_TEXT.match(head):
+        return "stl"
+    if GLTF_TEXT.match(head) and b'"asset"' in data:
+        return "gltf"
+    if OBJ_START.match(head):
+        return "obj"
+    named = (content_type or "").partition(";")[0].strip().lower()
+    if named in CONTENT_TYPES:
+        return CONTENT_TYPES[named]
+    return SUFFIXES.get((filename or "").rpartition(".")[2].lower())

@@ -1,0 +1,164 @@
+"""The assets people uploaded, named by the hash of their bytes, in a folder that survives a restart."""
+
+import hashlib
+import json
+import logging
+import os
+import re
+import tempfile
+from collections.abc import Callable
+from dataclasses import asdict, replace
+from pathlib import Path
+from typing import Protocol
+
+from service.assets.data import AssetInfo, AssetLimits, ImageData, MeshData
+from service.assets.errors import ParseError
+from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
+from service.assets.sniff import KINDS, sniff
+from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
+
+log = logging.getLogger(__name__)
+
+ID = re.compile(r"sha256:[0-9a-f]{64}")
+FORMATS = "OBJ, PLY, STL, glTF and GLB meshes; EXR, Radiance HDR, PNG, JPEG and WebP images"
+
+
+class HasLimits(Protocol):
+    """As much of the configuration as concerns assets."""
+
+    @property
+    def max_triangles(self) -> int: ...
+
+
+class AssetStore:
+    """For any number of threads, and for several processes on one folder.
+
+    `builtin` gives assets that are there without having been uploaded, by id; it is called when one is first missed.
+    """
+
+    def __init__(
+        self,
+        root: Path,
+        config: HasLimits | None = None,
+        builtin: Callable[[], dict[str, bytes]] | None = None,
+    ) -> None:
+        limits = AssetLimits()
+        self.loader = Loader(replace(limits, max_triangles=config.max_triangles) if config else limits)
+        self._folder = root / "assets"
+        self._builtin = builtin
+
+    def add(self, data: bytes, content_type: str | None = None, filename: str | None = None) -> AssetInfo:
+        """Keeps the bytes, once they have been parsed. Raises UnsupportedMedia, AssetError, Unavailable."""
+        id = "sha256:" + hashlib.sha256(data).hexdigest()
+        known = self._known(id)
+        if known is not None:
+            return known
+        if not data:
+            raise AssetError("the asset is empty")
+        format = sniff(data, content_type, filename)
+        if format is None:
+            raise UnsupportedMedia(f"this is none of the formats known: {FORMATS}")
+        info = _describe(id, format, len(data), self._parse(id, format, lambda: data))
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            self._write(self._path(id), data)
+            self._write(self._path(id, ".json"), json.dumps(asdict(info)).encode())
+        except OSError as error:
+            log.error("asset not stored id=%s error=%s", id, error)
+            raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
+        log.info("asset stored id=%s format=%s bytes=%d", id, format, len(data))
+        return info
+
+    def read(self, id: str) -> bytes:
+        """Raises NotFound."""
+        if self._known(id):
+            return self._path(id).read_bytes()
+        return self._builtin_bytes(id)
+
+    def info(self, id: str) -> AssetInfo:
+        """Raises NotFound."""
+        known = self._known(id)
+        if known:
+            return known
+        data = self._builtin_bytes(id)
+        format = _format(data)
+        return _describe(id, format, len(data), self._parse(id, format, lambda: data))
+
+    def mesh(self, ref: str) -> MeshData:
+        """Raises AssetError."""
+        return as_mesh(self._load(ref), ref)
+
+    def image(self, ref: str) -> ImageData:
+        """Raises AssetError."""
+        return as_image(self._load(ref), ref)
+
+    def warm(self) -> None:
+        """Makes the first file as quick as the later ones; does not wait."""
+        self.loader.sandbox.warm()
+
+    def close(self) -> None:
+        self.loader.close()
+
+    def _load(self, ref: str) -> Parsed:
+        if not ID.fullmatch(ref):
+            raise AssetError(f"{ref[:100]!r} is not the id of an asset, `sha256:` and 64 hexadecimal digits")
+        known = self._known(ref)
+        try:
+            format = known.format if known else _format(self._builtin_bytes(ref))
+        except NotFound as error:
+            raise AssetError(error.detail) from None
+        return self._parse(ref, format, lambda: self.read(ref))
+
+    def _parse(self, id: str, format: str, read: Callable[[], bytes]) -> Parsed:
+        try:
+            return self.loader.load(id, lambda: self.loader.sandbox.parse(format, read()))
+        except ParseError as error:
+            raise refused(f"the {format.upper()} file", error) from None
+
+    def _known(self, id: str) -> AssetInfo | None:
+        """What stands beside the bytes: it is written last, so that it vouches for them."""
+        if not ID.fullmatch(id):
+            return None
+        try:
+            return AssetInfo(**json.loads(self._path(id, ".json").read_bytes()))
+        except (OSError, ValueError, TypeError):
+            return None
+
+    def _builtin_bytes(self, id: str) -> bytes:
+        found = self._builtin().get(id) if self._builtin and ID.fullmatch(id) else None
+        if found is None:
+            raise NotFound(f"there is no asset {id[:100]!r} here; upload it first")
+        return found
+
+    def _path(self, id: str, suffix: str = "") -> Path:
+        return self._folder / (id.removeprefix("sha256:") + suffix)
+
+    def _write(self, path: Path, data: bytes) -> None:
+        """Whole or not at all, also when the power fails."""
+        fd, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=self._folder)
+        try:
+            with open(fd, "wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(fd)
+            os.replace(beside, path)
+        except BaseException:
+            os.unlink(beside)
+            raise
+        folder = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(folder)
+        finally:
+            os.close(folder)
+
+
+def _format(data: bytes) -> str:
+    """Of one of our own assets: its bytes tell."""
+    return sniff(data) or "obj"
+
+
+def _describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
+    if isinstance(parsed, ImageData):
+        height, width, channels = parsed.pixels.shape
+        return AssetInfo(id, KINDS[format], format, size, width=width, height=height, channels=channels)
+    return AssetInfo(id, KINDS[format], format, size, vertices=len(parsed.vertices), triangles=len(parsed.faces))

@@ -1,0 +1,77 @@
+"""What PNG and EXR files carry beside their pixels, read from the bytes alone: no library opens the file."""
+
+import json
+import struct
+import zlib
+from collections.abc import Iterator
+from typing import Any
+
+KEY = "sunbox"
+PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
+EXR_MAGIC = b"\x76\x2f\x31\x01"
+TEXT_BYTES = 64 << 20  # of one inflated text chunk: a few kilobytes can claim gigabytes
+
+
+def read_metadata(data: bytes) -> dict[str, Any] | None:
+    """The JSON object that Sunbox left in a PNG or EXR, None where there is none. The caller validates it."""
+    if data.startswith(PNG_MAGIC):
+        text = next((text for key, text in _png_texts(data) if key == KEY.encode()), None)
+    else:
+        text = exr_attributes(data).get(KEY)
+    try:
+        found = json.loads(text) if text is not None else None
+    except (ValueError, RecursionError):
+        return None
+    return found if isinstance(found, dict) else None
+
+
+def exr_attributes(data: bytes) -> dict[str, bytes]:
+    """The attributes of an EXR's first header, as far as the bytes go; empty for another file."""
+    attributes: dict[str, bytes] = {}
+    if not data.startswith(EXR_MAGIC):
+        return attributes
+    at = 8
+    while data[at : at + 1] not in (b"\0", b""):
+        name_end = data.find(b"\0", at, at + 257)
+        type_end = data.find(b"\0", name_end + 1, name_end + 258)
+        value = type_end + 5
+        if name_end < 0 or type_end < 0 or value > len(data):
+            break
+        (size,) = struct.unpack_from("<I", data, type_end + 1)
+        attributes[data[at:name_end].decode("latin-1")] = data[value : value + size]
+        at = value + size
+    return attributes
+
+
+def png_with_text(png: bytes, text: str) -> bytes:
+    """The PNG with a tEXt chunk after its header; the text must be ASCII."""
+    body = b"tEXt" + KEY.encode() + b"\0" + text.encode("ascii")
+    chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
+    header = len(PNG_MAGIC) + 25  # IHDR is always 25 bytes long
+    return png[:header] + chunk + png[header:]
+
+
+def _png_texts(data: bytes) -> Iterator[tuple[bytes, bytes]]:
+    """Key and text of every text chunk: tEXt as it is, zTXt and iTXt inflated where they are compressed."""
+    at = len(PNG_MAGIC)
+    while at + 12 <= len(data):
+        size, kind = struct.unpack_from(">I4s", data, at)
+        key, _, rest = data[at + 8 : at + 8 + size].partition(b"\0") if kind in _TEXTS else (b"", b"", b"")
+        if kind == b"tEXt":
+            yield key, rest
+        elif kind == b"zTXt":
+            yield key, _inflated(rest[1:])
+        elif kind == b"iTXt":
+            text = rest[2:].split(b"\0", 2)[-1]  # after the language and the translated key
+            yield key, _inflated(text) if rest[:1] == b"\1" else text
+        at += 12 + size
+
+
+_TEXTS = (b"tEXt", b"zTXt", b"iTXt")
+
+
+def _inflated(data: bytes) -> bytes:
+    try:
+        return zlib.decompressobj().decompress(data, TEXT_BYTES)
+    except zlib.error:
+        return b""

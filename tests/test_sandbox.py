@@ -1,0 +1,216 @@
+"""The parsing child: no file costs more than its bounds, and what dies is replaced."""
+
+from __future__ import annotations
+
+import os
+import resource
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from service.assets import ImageData, MeshData, sandbox
+from service.assets.data import AssetLimits
+from service.assets.errors import ParseError
+from service.assets.sandbox import Sandbox
+from service.assets.wire import adopt, memory, publish
+from tests.asset_files import OBJ, TRIANGLE, exr
+
+
+@pytest.fixture
+def box() -> Iterator[Sandbox]:
+    with Sandbox(AssetLimits()) as box:
+        yield box
+
+
+def endless() -> bytes:
+    """A polygon of 12 000 corners, every second one concave: its ears take minutes."""
+    angle = np.arange(12000) * 2 * np.pi / 12000
+    radius = 1 + 0.5 * (np.arange(12000) % 2)
+    corners = "".join(f"v {x} {y} 0\n" for x, y in zip(radius * np.cos(angle), radius * np.sin(angle), strict=True))
+    return (corners + "f " + " ".join(str(k + 1) for k in range(12000)) + "\n").encode()
+
+
+def pid_of(box: Sandbox) -> int:
+    box.parse("obj", OBJ)
+    return box._idle[-1].process.pid
+
+
+def running(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
+    except OSError:
+        return False
+
+
+def gone_within(pid: int, seconds: float) -> bool:
+    until = time.monotonic() + seconds
+    while running(pid) and time.monotonic() < until:
+        time.sleep(0.01)
+    return not running(pid)
+
+
+def test_arrays_cross_the_border(box: Sandbox) -> None:
+    mesh = box.parse("obj", OBJ)
+    pixels = np.random.default_rng(0).random((5, 7, 3)).astype(np.float32)
+    image = box.parse("exr", exr(pixels))
+    assert isinstance(mesh, MeshData) and np.array_equal(mesh.vertices, TRIANGLE)
+    assert isinstance(image, ImageData) and np.array_equal(image.pixels, pixels)
+
+
+def test_an_open_file_is_as_good_as_bytes(box: Sandbox, tmp_path: Path) -> None:
+    (tmp_path / "m.obj").write_bytes(OBJ)
+    with open(tmp_path / "m.obj", "rb") as file:
+        assert isinstance(box.parse("obj", file.fileno()), MeshData)
+        assert not file.closed
+
+
+def test_one_child_serves_many_files(box: Sandbox) -> None:
+    pid = pid_of(box)
+    with pytest.raises(ParseError):
+        box.parse("obj", b"f 1 2 3\n")
+    assert pid_of(box) == pid
+
+
+def test_warming_loads_the_libraries(box: Sandbox) -> None:
+    box.warm()
+    pid = pid_of(box)
+    assert "libdraco" in (maps := Path(f"/proc/{pid}/maps").read_text()).lower() or "DracoPy" in maps
+    assert "OpenImageIO" in maps
+
+
+def test_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(sandbox, "SECONDS_PER_BYTE", 0)
+    with Sandbox(AssetLimits(seconds=0.5)) as box:
+        pid = pid_of(box)
+        began = time.monotonic()
+        with pytest.raises(ParseError, match=r"longer than the 0\.5 s|processor time than the 0\.5 s"):
+            box.parse("obj", endless())
+        assert time.monotonic() - began < 5
+        assert not running(pid)
+        assert pid_of(box) != pid
+
+
+def test_too_much_memory(box: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
+    pid = pid_of(box)
+    monkeypatch.setattr(sandbox, "BASE_BYTES", 4 << 20)
+    monkeypatch.setattr(sandbox, "BYTES_PER_MESH_BYTE", 0)
+    with pytest.raises(ParseError, match="more than the 4 MiB allowed"):
+        box.parse("obj", OBJ + b"v 0 0 0\n" * 1_000_000)
+    monkeypatch.undo()
+    assert isinstance(box.parse("obj", OBJ + b"v 0 0 0\n" * 100_000), MeshData)
+    assert pid_of(box) == pid
+
+
+def test_too_large_a_file() -> None:
+    with Sandbox(AssetLimits(max_file=100)) as box, pytest.raises(ParseError, match="101 bytes; 100 are allowed"):
+        box.parse("obj", b" " * 101)
+
+
+@pytest.mark.parametrize("number", [signal.SIGSEGV, signal.SIGKILL, signal.SIGABRT])
+def test_a_crash_is_an_answer(box: Sandbox, number: signal.Signals) -> None:
+    pid = pid_of(box)
+    threading.Timer(0.3, os.kill, (pid, number)).start()
+    with pytest.raises(ParseError, match=f"crashed the parser .*{number.name}|out of memory"):
+        box.parse("obj", endless())
+    assert pid_of(box) != pid
+
+
+def test_a_child_that_died_waiting_is_replaced(box: Sandbox) -> None:
+    pid = pid_of(box)
+    os.kill(pid, signal.SIGKILL)
+    box._idle[0].process.wait()
+    assert pid_of(box) != pid
+
+
+def test_two_files_at_once(box: Sandbox) -> None:
+    results: list[object] = []
+
+    def parse() -> None:
+        results.append(box.parse("obj", OBJ))
+
+    threads = [threading.Thread(target=parse) for _ in range(6)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join(30)
+    assert len(results) == 6 and 1 <= len(box._idle) <= AssetLimits().children
+
+
+def test_nothing_leaks(box: Sandbox) -> None:
+    def descriptors() -> int:
+        return len(os.listdir("/proc/self/fd"))
+
+    def theirs() -> int:
+        return len(os.listdir(f"/proc/{pid}/fd"))
+
+    pid = pid_of(box)
+    before = descriptors(), theirs()
+    for _ in range(5):
+        box.parse("obj", OBJ)
+        with pytest.raises(ParseError):
+            box.parse("obj", b"f 1 2 3\n")
+    assert descriptors() == before[0] and theirs() <= before[1]
+
+
+def test_the_child_is_confined(box: Sandbox, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_API_KEY", "secret")
+    pid = pid_of(box)
+    assert b"secret" not in Path(f"/proc/{pid}/environ").read_bytes()
+    assert resource.prlimit(pid, resource.RLIMIT_CORE)[0] == 0
+    assert resource.prlimit(pid, resource.RLIMIT_CPU)[0] < 60
+    assert os.getpriority(os.PRIO_PROCESS, pid) > os.getpriority(os.PRIO_PROCESS, 0)
+
+
+@pytest.mark.parametrize("busy", [False, True])
+def test_children_end_with_a_parent_that_is_killed(busy: bool, tmp_path: Path) -> None:
+    (tmp_path / "endless.obj").write_bytes(endless())
+    program = (
+        "import sys, time\n"
+        "from service.assets.sandbox import Sandbox\n"
+        "from service.assets.data import AssetLimits\n"
+        "box = Sandbox(AssetLimits())\n"
+        f"box.parse('obj', {OBJ!r})\n"
+        "print(box._idle[0].process.pid, flush=True)\n"
+        f"box.parse('obj', open({str(tmp_path / 'endless.obj')!r}, 'rb').read()) if {busy} else time.sleep(60)\n"
+    )
+    parent = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, cwd=sandbox.ROOT)
+    assert parent.stdout is not None
+    pid = int(parent.stdout.readline())
+    time.sleep(0.5)
+    assert running(pid)
+    parent.kill()
+    parent.wait()
+    parent.stdout.close()
+    assert gone_within(pid, 3)
+
+
+def test_closing_ends_the_children() -> None:
+    box = Sandbox(AssetLimits())
+    pid = pid_of(box)
+    box.close()
+    assert not running(pid)
+    with pytest.raises(ParseError, match="shutting down"):
+        box.parse("obj", OBJ)
+
+
+def test_unsealed_or_lying_memory_is_not_adopted() -> None:
+    fd, table = publish({"a": np.arange(6.0).reshape(2, 3)})
+    assert np.array_equal(adopt(fd, table)["a"], [[0, 1, 2], [3, 4, 5]])
+    with pytest.raises(ValueError, match="buffer"):
+        adopt(fd, [table[0] | {"shape": [200, 300]}])
+    with pytest.raises(ValueError, match="dtype"):
+        adopt(fd, [table[0] | {"dtype": "|O"}])
+    with pytest.raises(OSError):
+        os.write(fd, b"x")
+    os.close(fd)
+    loose = memory(bytes(48), "loose")
+    with pytest.raises(ValueError, match="sealed"):
+        adopt(loose, table)
+    os.close(loose)
