@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import ctypes.util
 import logging
+import threading
 from typing import Any
 
 from gpu.errors import ContextError
 
 log = logging.getLogger(__name__)
+_thread = threading.local()
 
 REQUIRED = 430  # compute shaders and storage buffers
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")
@@ -33,8 +35,23 @@ def create(device: int | None = None) -> Any:
             f"no OpenGL {REQUIRED / 100:.1f} context on {where} ({error}): needs a GPU driver with EGL, "
             "or Mesa's software renderer (on Debian `apt-get install libegl1 libgl1-mesa-dri`)"
         ) from error
+    _thread.current = context
     log.info("created context renderer=%s version=%s", context.info["GL_RENDERER"], context.info["GL_VERSION"])
     return context
+
+
+def use(context: Any) -> None:
+    """Make `context` the thread's current one, where another has been made or closed since."""
+    if getattr(_thread, "current", None) is not context:
+        context.__enter__()
+        _thread.current = context
+
+
+def release(context: Any) -> None:
+    """Release `context`; none is current afterwards."""
+    use(context)
+    context.release()
+    _thread.current = None
 
 
 def describe(context: Any) -> dict[str, Any]:

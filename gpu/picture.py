@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gpu import context as contexts
 from gpu import display, features, filters, layout
 from gpu.errors import NothingRendered, OutOfMemory
 from gpu.layout import Slot
@@ -64,6 +65,7 @@ class Picture:
 
     def reset(self) -> None:
         """Start again at zero samples, with the scene as it is now."""
+        contexts.use(self._context)
         kernel = self._kernels.get("pathtrace.comp", self.scene.defines(self.settings))
         self.compile_ms += self._kernels.last_compile_ms
         if kernel is not self._kernel:
@@ -89,12 +91,14 @@ class Picture:
 
     @property
     def warnings(self) -> list[str]:
+        contexts.use(self._context)
         ended = int(np.frombuffer(self._ended.read(4), np.uint32)[0])
         return [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
 
     def trace(self, budget_s: float, max_samples: int) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
         start = time.perf_counter()
+        contexts.use(self._context)
         self._bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
@@ -171,6 +175,7 @@ class Picture:
         self._kernel.run(-(-size[0] // 8), -(-size[1] // 8))
 
     def _need_samples(self) -> None:
+        contexts.use(self._context)
         if self.samples == 0:
             raise NothingRendered("no sample is complete yet")
 
@@ -233,6 +238,7 @@ class Picture:
         """
         if self.samples < 2:
             return None
+        contexts.use(self._context)
         weights = np.array([0.2126, 0.7152, 0.0722])
         mean = self.read()[..., :3] @ weights
         at = display.meter_pixels(self._cells, self._stride, (self.settings.width, self.settings.height))
@@ -270,6 +276,7 @@ class Picture:
         return pixels
 
     def release(self) -> None:
+        contexts.use(self._context)
         for buffer in (*self._main.values(), *self._meter.values(), *self._guides.values()):
             buffer.release()
         self._ended.release()

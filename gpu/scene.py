@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gpu import context as contexts
 from gpu import features, layout
 from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
@@ -95,6 +96,7 @@ class Scene:
 
         Uploads nothing else. Pictures of this scene must be reset by the caller.
         """
+        contexts.use(self._context)
         changes: dict[str, Any] = {}
         if camera is not None:
             changes["camera"] = camera
@@ -143,6 +145,7 @@ class Scene:
             ].sum()
 
     def release(self) -> None:
+        contexts.use(self._context)
         for buffer in self._buffers.values():
             buffer.release()
         self._texels.release()
