@@ -64,10 +64,10 @@ def preset(name: str) -> Callable[[], dict[str, Any]]:
 
 PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], float]] = {
     # scene, (width, height, samples), exposure
-    "bunny": (bunny, (960, 720, 400), -1.6),
-    "roughness": (roughness, (1200, 280, 1024), -0.5),
-    "cornell": (preset("cornell-boxes"), (600, 600, 2048), 0.0),
-    "sphere": (preset("sphere-on-floor"), (600, 600, 1024), 0.0),
+    "bunny": (bunny, (800, 600, 192), -1.6),
+    "roughness": (roughness, (1200, 280, 512), -0.5),
+    "cornell": (preset("cornell-boxes"), (512, 512, 1024), 0.0),
+    "sphere": (preset("sphere-on-floor"), (512, 512, 512), 0.0),
 }
 
 
