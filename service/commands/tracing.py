@@ -80,6 +80,8 @@ class Tracing:
         """The picture so far. Raises Failed before its first sample."""
         self._pixels = None
         self._task.read(Read(NUMBER, 1, view))
+        while self._pixels is None and self._task.ready:
+            self._task.step()  # the AOVs of the first hit are traced when asked for
         if self._pixels is None:
             raise Failed("stopped before the first sample: there is no picture yet")
         return self._pixels

@@ -30,7 +30,6 @@ class Loop:
             for message in coalesced(self._pending(wait=not busy)):
                 self._take(message)
             task = self._scheduler.choose(self._tasks.values())
-            busy = task is not None
             if task is not None:
                 began = time.perf_counter()
                 self._guard(task, task.step)
@@ -39,6 +38,7 @@ class Loop:
                 began = time.perf_counter()
                 if self._guard(task, task.answer):
                     task.used_s += time.perf_counter() - began
+            busy = any(task.ready for task in self._tasks.values())
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """What has come in by now; with `wait`, at least one message."""

@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from gpu import Picture, Renderer, Scene
 
 SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
+GUIDES = ("albedo", "normal", "depth")
 PROGRESS_S = 0.1  # between two reports of how far it is
 NOISE_PAUSE = 20  # times what reading the noise meter took until the next reading, which so costs 5 % at most
 
@@ -52,6 +53,8 @@ class Task:
         self._reason: Reason | None = None  # why it ended
         self._pixel_s: float | None = None  # what a sample of a pixel took lately
         self._served: tuple[object, ...] = ()
+        self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
+        self._guided: Picture | None = None  # whose they are, while some are missing
         self._reported = 0.0
         self._scale = 1.0  # of what is traced
         self._shown: float | None = None  # the scale of what there is to see
@@ -59,7 +62,9 @@ class Task:
 
     @property
     def ready(self) -> bool:
-        return self._ladder is not None and self._reason is None and (self.unseen or not self._paused)
+        if self._ladder is None:
+            return False
+        return self._guided is not None or (self._reason is None and (self.unseen or not self._paused))
 
     @property
     def unseen(self) -> bool:
@@ -92,7 +97,7 @@ class Task:
 
     def step(self) -> None:
         """Traces a slice, and ends the render when that was the last."""
-        if self._ladder is None or self._end_if_reached():
+        if self._ladder is None or self._trace_guides() or self._end_if_reached():
             return
         scale, picture = self._scale, self._ladder.picture(self._scale)
         cap = 1 if self.unseen or scale < 1.0 else self._cap()
@@ -117,6 +122,8 @@ class Task:
         if want is None or shown is None or self._ladder is None:
             return False
         picture = self._ladder.picture(shown)
+        if self._needs_guides(picture, want.view):
+            return False
         content = (self.generation, shown, picture.samples, self._reason)
         if content == self._served and not want.anyway:
             return False
@@ -128,8 +135,29 @@ class Task:
         return True
 
     def read(self, read: Read) -> None:
-        pixels = _pixels_of(self._full, read.view) if self._ladder and self._full.samples else None
+        full = self._full if self._ladder and self._full.samples else None
+        if full is not None and self._needs_guides(full, read.view):
+            self._reads.append(read)
+            return
+        pixels = _pixels_of(full, read.view) if full else None
         self._send(Image(self.number, read.serial, pixels, self.progress()))
+
+    def _needs_guides(self, picture: Picture, view: View) -> bool:
+        if view.aov not in GUIDES or picture.trace_guides(0.0):
+            return False
+        self._guided = picture
+        return True
+
+    def _trace_guides(self) -> bool:
+        """A slice of them, where somebody waits for them; then the readings that they held up."""
+        if self._guided is None:
+            return False
+        if self._guided.trace_guides(SLICE_S):
+            self._guided = None
+            reads, self._reads = self._reads, []
+            for read in reads:
+                self.read(read)
+        return True
 
     def pause(self) -> None:
         self._paused = True
@@ -144,8 +172,11 @@ class Task:
     def release(self) -> None:
         """Gives the GPU's memory back; the task can be loaded again."""
         ladder, scene = self._ladder, self._scene
-        self._ladder = self._scene = None
+        self._ladder = self._scene = self._guided = None
         self._shown = None
+        reads, self._reads = self._reads, []
+        for read in reads:
+            self.read(read)
         if ladder is not None:
             ladder.release()
         if scene is not None:
@@ -174,6 +205,7 @@ class Task:
         self._ladder = Ladder(self._renderer, self._scene, self._settings)
 
     def _restart(self) -> None:
+        self._guided = None
         self._clock = Clock()
         self._shown = None
         self._scale = self._ladder.first(self._pixel_s) if self._ladder and self._interactive else 1.0
