@@ -11,6 +11,7 @@ import json
 import subprocess
 import sys
 import tempfile
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -71,14 +72,33 @@ PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], fl
 }
 
 
+def photograph_editor(sunbox: Path, port: int = 8765, wait_s: float = 25) -> None:
+    """The editor with its first scene, converged, in a headless browser (a development dependency)."""
+    from playwright.sync_api import sync_playwright
+
+    flags = ["--no-sandbox", "--disable-dev-shm-usage"]
+    with subprocess.Popen([sunbox, "serve", "--port", str(port)]) as server, sync_playwright() as playwright:
+        time.sleep(3)
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=flags)
+        page = browser.new_page(viewport={"width": 1400, "height": 900}, color_scheme="dark")
+        page.goto(f"http://127.0.0.1:{port}/")
+        page.wait_for_timeout(1000 * wait_s)
+        page.screenshot(path=OUT / "editor.png")
+        browser.close()
+        server.terminate()
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path)
-    parser.add_argument("names", nargs="*", default=list(PICTURES), metavar="NAME")
+    parser.add_argument("names", nargs="*", default=[*PICTURES, "editor"], metavar="NAME")
     wanted = parser.parse_args()
     OUT.mkdir(exist_ok=True)
     sunbox = Path(sys.executable).with_name("sunbox")
     for name in wanted.names:
+        if name == "editor":
+            photograph_editor(sunbox)
+            continue
         document, (width, height, samples), exposure = PICTURES[name]
         with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
             json.dump(document(), file)
