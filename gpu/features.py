@@ -71,7 +71,13 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
 
 # What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
 # ever waits for a compiler.
-EDITED = {"HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")}
+    "HAS_METAL_ROUGH": _model(Model.METAL_ROUGH),
+    "HAS_BLINN_PHONG": _model(Model.BLINN_PHONG),
+    "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
+EDITED = {
+    "HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT"),
+    "HAS_BLINN_PHONG": ("HAS_AMBIENT",),
+}
 
 
 def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:

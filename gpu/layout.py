@@ -75,6 +75,8 @@ class LightKind(IntEnum):
 class Model(IntEnum):
     DIFFUSE = 0
     DISNEY = 1
+    METAL_ROUGH = 3
+    BLINN_PHONG = 4
 
 
 class Slot(IntEnum):
@@ -154,6 +156,11 @@ class Material(Record):
     sheen_tint: f32
     clearcoat: f32
     clearcoat_gloss: f32
+    unused: f32  # up to the next group of four
+    unused_pair: vec2
+    phong_specular: vec3  # blinn_phong; its diffuse is base_color
+    shininess: f32  # exponent, >= 0
+    ambient: vec3  # radiance added wherever a path meets the surface
 
 
 class Sphere(Record):

@@ -66,6 +66,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         peak,
         float(emission.max(initial=0.0)),
         float(points["intensity"].max(initial=0.0)) / (math.pi * built.radius**2),
+        float(materials["ambient"].max(initial=0.0)),
     )
     arrays = SceneArrays(
         camera=pack_camera(scene.camera, built.origin),

@@ -13,7 +13,9 @@ from service.scene.environment import Environment
 from service.scene.numbers import Vec3
 
 # What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
-RENAMED = {"albedo": "base_color"}
+RENAMED = {"albedo": "base_color", "diffuse": "base_color"}
+# Where a name means another thing in one model.
+RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
 
 
 def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> CameraArrays:
@@ -41,7 +43,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
     for record, material in zip(records, scene.materials.values(), strict=True):
         record["model"] = layout.Model[material.type.upper()]
         for name in type(material).model_fields:
-            member = RENAMED.get(name, name)
+            member = RENAMED_IN.get(material.type, RENAMED).get(name, RENAMED.get(name, name))
             if member in layout.Material.members:
                 record[member] = getattr(material, name)
     return records

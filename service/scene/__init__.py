@@ -7,7 +7,7 @@ from service.scene.color import Color
 from service.scene.document import Scene, parse_scene
 from service.scene.environment import ConstantEnvironment, Environment, ImageEnvironment
 from service.scene.light import PointLight
-from service.scene.material import DiffuseMaterial, DisneyMaterial, Material
+from service.scene.material import BlinnPhongMaterial, DiffuseMaterial, DisneyMaterial, Material, MetalRoughMaterial
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
 from service.scene.schema import schema
@@ -23,6 +23,7 @@ __all__ = [
     "ConstantEnvironment",
     "DiffuseMaterial",
     "DisneyMaterial",
+    "BlinnPhongMaterial",
     "Environment",
     "ImageEnvironment",
     "Limits",
@@ -36,6 +37,7 @@ __all__ = [
     "Shape",
     "SphereShape",
     "Transform",
+    "MetalRoughMaterial",
     "Vec3",
     "load_json",
     "merge_patch",
