@@ -278,6 +278,11 @@ class Frame(Record):
     moment_scale: f32  # second moments are of radiance times this
     environment_background: u32
     pixel_stride: u32  # 1: every pixel; n: one pixel of each n x n block, for the noise meter
+    environment_cube: u32  # 1: its texture holds the six faces of a cube
+    environment_sun: vec3  # unit, towards the sun's middle, before the environment's rotation
+    environment_sun_cap: f32  # 1 - cos of its angular radius
+    environment_sun_radiance: vec3
+    environment_sun_share: f32  # of the environment's samples
 
 
 # A leaf's link: bit 31 set, kind << 28, (count - 1) << 24, first: index into the array of that kind

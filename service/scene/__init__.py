@@ -5,7 +5,13 @@ from __future__ import annotations
 from service.scene.camera import Camera
 from service.scene.color import Color
 from service.scene.document import Scene, parse_scene
-from service.scene.environment import ConstantEnvironment, Environment, ImageEnvironment
+from service.scene.environment import (
+    ConstantEnvironment,
+    CubemapEnvironment,
+    Environment,
+    ImageEnvironment,
+    SkyEnvironment,
+)
 from service.scene.light import PointLight
 from service.scene.material import BlinnPhongMaterial, DiffuseMaterial, DisneyMaterial, Material, MetalRoughMaterial
 from service.scene.numbers import Vec3
@@ -17,27 +23,29 @@ from service.scene.text import load_json
 from service.scene.transform import MatrixTransform, Transform
 
 __all__ = [
+    "BlinnPhongMaterial",
     "BoxShape",
     "Camera",
     "Color",
     "ConstantEnvironment",
+    "CubemapEnvironment",
     "DiffuseMaterial",
     "DisneyMaterial",
-    "BlinnPhongMaterial",
     "Environment",
     "ImageEnvironment",
     "Limits",
     "Material",
     "MatrixTransform",
     "MeshShape",
+    "MetalRoughMaterial",
     "PointLight",
     "QuadShape",
     "Scene",
     "Settings",
     "Shape",
+    "SkyEnvironment",
     "SphereShape",
     "Transform",
-    "MetalRoughMaterial",
     "Vec3",
     "load_json",
     "merge_patch",
