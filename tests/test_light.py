@@ -290,3 +290,12 @@ def test_blinn_phong_under_a_point_light(gpu: Renderer, estimator: str) -> None:
         scene = document([QUAD], {"m": phong}, lights=[light], camera=camera)
         want = 0.3 * math.sqrt(0.5) + power * np.array([1, 0.5, 0.25])
         np.testing.assert_allclose(_spot(gpu, scene, 64, estimator=estimator), want, rtol=2e-3)
+
+
+@pytest.mark.parametrize("shininess", [0, 1e-30, 1e6, 1e20])
+def test_no_shininess_makes_a_nan(gpu: Renderer, shininess: float) -> None:
+    for diffuse, specular in ((0, 1), (1, 0), (0, 0), (0.5, 0.5)):
+        phong = {"type": "blinn_phong", "diffuse": diffuse, "specular": specular, "shininess": shininess}
+        scene = document([SPHERE], {"m": phong}, environment={"type": "constant", "radiance": 1})
+        for estimator in ESTIMATORS:
+            assert np.isfinite(render(gpu, scene, 16, estimator=estimator)).all()
