@@ -72,7 +72,8 @@ class Scene:
         if e is not None:
             texels = np.dstack([e.texels, e.probability]).astype(np.float32)
             alias = e.alias
-            self._scale_max = RADIANCE_MAX / max(float(e.texels.max()), 1.0)
+            peak = float(e.texels.max()) + (max(e.sun.radiance) if e.sun is not None else 0.0)
+            self._scale_max = RADIANCE_MAX / max(peak, 1.0)
         height, width = texels.shape[:2]
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
@@ -140,6 +141,12 @@ class Scene:
             frame["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
             frame["environment_scale"] = min(e.scale, self._scale_max)
             frame["environment_background"] = e.background
+            frame["environment_cube"] = e.cube
+            if e.sun is not None:
+                frame["environment_sun"] = e.sun.direction
+                frame["environment_sun_cap"] = e.sun.cap
+                frame["environment_sun_radiance"] = e.sun.radiance
+                frame["environment_sun_share"] = e.sun_share
             frame["environment_probability"] = a.lights["probability"][
                 a.lights["kind"] == LightKind.ENVIRONMENT
             ].sum()

@@ -104,7 +104,7 @@ STRUCTURE = {
     "/lights/0/type": (GONE, "area", "spot", 5),
     "/environment": (None, []),
     "/environment/colour": (1,),
-    "/environment/type": (GONE, "sky", "studio"),
+    "/environment/type": (GONE, "dome", "studio"),
     "/environment/background": (1, "true", None),
 }
 

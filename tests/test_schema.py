@@ -89,7 +89,7 @@ def test_colours_have_three_forms() -> None:
 
 def test_what_is_not_built_is_absent() -> None:
     text = json.dumps(WHOLE)
-    for name in ("texture", "principled", "spot", "directional", "cubemap", "visible_to_camera", "emission_sides"):
+    for name in ("texture", "principled", "spot", "directional", "visible_to_camera", "emission_sides"):
         assert f'"{name}"' not in text
 
 
