@@ -13,6 +13,7 @@ log = logging.getLogger(__name__)
 _thread = threading.local()
 
 REQUIRED = 430  # compute shaders and storage buffers
+PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
@@ -24,16 +25,21 @@ def create(device: int | None = None) -> Any:
     """
     import moderngl
 
-    if ctypes.util.find_library("EGL") is None:
-        raise ContextError("libEGL is not installed: on Debian `apt-get install libegl1 libgl1-mesa-dri`")
-    options: dict[str, Any] = {"backend": "egl"} | ({} if device is None else {"device_index": device})
+    # Either holds OpenGL's functions; the first comes without X11's libraries.
+    opengl = ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL")
+    for name, library in (("libEGL", ctypes.util.find_library("EGL")), ("libOpenGL", opengl)):
+        if library is None:
+            raise ContextError(f"{name} is not installed: on Debian `apt-get install {PACKAGES}`")
+    options: dict[str, Any] = {"backend": "egl", "libgl": opengl}
+    if device is not None:
+        options["device_index"] = device
     try:
         context = moderngl.create_context(REQUIRED, standalone=True, **options)
     except Exception as error:  # glcontext raises bare Exception, moderngl several others
         where = "the default EGL device" if device is None else f"EGL device {device}"
         raise ContextError(
             f"no OpenGL {REQUIRED / 100:.1f} context on {where} ({error}): needs a GPU driver with EGL, "
-            "or Mesa's software renderer (on Debian `apt-get install libegl1 libgl1-mesa-dri`)"
+            f"or Mesa's software renderer (on Debian `apt-get install {PACKAGES}`)"
         ) from error
     _thread.current = context
     log.info("created context renderer=%s version=%s", context.info["GL_RENDERER"], context.info["GL_VERSION"])

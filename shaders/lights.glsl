@@ -11,6 +11,9 @@ struct LightSample {
 LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true, NONE); }
 
 #include "lights/point.glsl"
+uniform sampler2D environment_texels; // rgb radiance; a: density of picking a direction here, per steradian
+#include "lights/cubemap.glsl"
+#include "lights/sun.glsl"
 #include "lights/environment.glsl"
 #include "lights/sphere.glsl"
 #include "lights/quad.glsl"

@@ -65,3 +65,23 @@ def test_only_files_and_numbers_of_shapes_are_risky() -> None:
     assert risky(scene({}), scene({"environment": IMAGE}))
     assert risky(scene({}), scene({"shapes": []}))
     assert risky(scene({}), scene({"shapes": [*SCENE["shapes"], {"type": "mesh", "asset": "x", "material": "ball"}]}))
+
+
+SKY = {"type": "sky", "sun_elevation": 30, "sun_azimuth": 40}
+CUBE = {
+    "type": "cubemap",
+    "assets": {face: f"sha256:{n:064d}" for n, face in enumerate(("px", "nx", "py", "ny", "pz", "nz"))},
+}
+
+
+def test_the_suns_azimuth_is_a_turn() -> None:
+    old = scene({"environment": SKY})
+    assert change(old, scene({"environment": {**SKY, "sun_azimuth": 90}})) == Change(environment=True)
+    assert change(old, scene({"environment": {**SKY, "sun_elevation": 31}})) == Change(whole=True)
+
+
+def test_another_face_of_a_cubemap_is_a_risk() -> None:
+    old = scene({"environment": CUBE})
+    other = {**CUBE, "assets": {**CUBE["assets"], "ny": "sha256:" + "f" * 64}}
+    assert risky(old, scene({"environment": other}))
+    assert not risky(old, scene({"environment": {**CUBE, "rotation": 3}}))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.scene import Scene
+from service.scene import CubemapEnvironment, Scene, SkyEnvironment
 
 BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for which packing has an answer
 
@@ -49,8 +49,13 @@ def _environment(scene: Scene) -> object:
     if e is None:
         return None
     scale = e.scale if e.scale > BLINDING else float(e.scale > 0)
-    return e.model_copy(update={"rotation": 0.0, "scale": scale})
+    still: dict[str, float] = {"rotation": 0.0, "scale": scale}
+    if isinstance(e, SkyEnvironment):
+        still["sun_azimuth"] = 0.0  # a turn of the map that the sky was baked into
+    return e.model_copy(update=still)
 
 
 def _files(scene: Scene) -> list[object]:
-    return [getattr(scene.environment, "asset", None), *(getattr(shape, "asset", None) for shape in scene.shapes)]
+    e = scene.environment
+    faces = list(e.assets) if isinstance(e, CubemapEnvironment) else [getattr(e, "asset", None)]
+    return [*faces, *(getattr(shape, "asset", None) for shape in scene.shapes)]

@@ -1,8 +1,5 @@
 // Light from infinity. An image is latitude-longitude, picked texel by texel from an alias table; inside a texel
 // the direction is uniform in longitude and in the cosine of its colatitude, so its density is constant there.
-uniform sampler2D environment_texels; // rgb radiance; a: density of picking a direction here, per steradian
-#include "lights/cubemap.glsl"
-#include "lights/sun.glsl"
 
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
     vec2 cs = frame.environment_turn;
