@@ -6,7 +6,7 @@ from service.scene.camera import Camera
 from service.scene.color import Color
 from service.scene.document import Scene, parse_scene
 from service.scene.environment import ConstantEnvironment, Environment, ImageEnvironment
-from service.scene.light import PointLight
+from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
 from service.scene.material import DiffuseMaterial, DisneyMaterial, Material
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
@@ -22,9 +22,11 @@ __all__ = [
     "Color",
     "ConstantEnvironment",
     "DiffuseMaterial",
+    "DirectionalLight",
     "DisneyMaterial",
     "Environment",
     "ImageEnvironment",
+    "Light",
     "Limits",
     "Material",
     "MatrixTransform",
@@ -35,6 +37,7 @@ __all__ = [
     "Settings",
     "Shape",
     "SphereShape",
+    "SpotLight",
     "Transform",
     "Vec3",
     "load_json",
