@@ -24,9 +24,8 @@ Light lights_pick(float u) {
 #if HAS_MANY_LIGHTS
     float x = u * float(frame.light_count);
     uint i = min(uint(x), frame.light_count - 1u);
-    Light l = light_pick(i);
-    if (x - float(i) >= l.threshold) l = light_pick(l.alias);
-    return l;
+    Light drawn = light_pick(i); // two of its words: a load of the whole would cost as much again
+    return light_pick(x - float(i) >= drawn.threshold ? drawn.alias : i);
 #else
     return light_load(0u);
 #endif
@@ -120,18 +119,19 @@ float lights_pdf(uint light, Nearest n, Point at, vec3 p, vec3 wi) {
 #if HAS_EMISSION
     Light l = light_pick(light);
     Emitter e = lights_emitter(l);
+    uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK; // as the light has them, without a load
     float pdf = 0.0;
 #if HAS_SPHERE_LIGHTS
-    if (l.kind == LIGHT_SPHERE) pdf = sphere_light_pdf(sphere_pick(l.index), p, e.sides, e.veil);
+    if (kind == SHAPE_SPHERE) pdf = sphere_light_pdf(sphere_pick(index), p, e.sides, e.veil);
 #endif
 #if HAS_QUAD_LIGHTS
-    if (l.kind == LIGHT_QUAD) pdf = quad_light_pdf(lights_quad(l.index), p, n.t, wi, e.sides);
+    if (kind == SHAPE_QUAD) pdf = quad_light_pdf(lights_quad(index), p, n.t, wi, e.sides);
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (l.kind == LIGHT_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(l.index), n.t, at.ng, wi, e.sides);
+    if (kind == SHAPE_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(index), n.t, at.ng, wi, e.sides);
 #endif
 #if HAS_ELLIPSOID_LIGHTS
-    if (l.kind == LIGHT_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(l.index), n.t, at, wi, e.sides);
+    if (kind == SHAPE_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(index), n.t, at, wi, e.sides);
 #endif
     return pdf * l.probability;
 #else

@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from gpu import layout
+from gpu.features import flags
 from gpu.layout import LightKind, ShapeKind
-from tests.documents import Shelf, box, mesh, packed, picture, quad, sphere
+from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere
 
 MANY = {
     ShapeKind.SPHERE: ("spheres", 8, lambda i: sphere(center=[3 * i, 0, 0])),
@@ -237,3 +238,22 @@ def test_hidden_shapes_carry_their_bit(count):
     assert sorted(arrays.quads["shape"].tolist()) == [layout.HIDDEN | i for i in range(1, count + 1)]
     assert set(arrays.triangles["shape"].tolist()) == {layout.HIDDEN | layout.SINGLE_SIDED | (count + 1)}
     assert arrays.boxes["shape"].tolist() == [layout.HIDDEN | (count + 2), count + 3]
+
+
+def test_each_light_and_each_way_to_pass_raises_its_flag():
+    """A scene that uses none of it raises none: it runs the kernel that it ran before there were any."""
+    every = {"HAS_SPOT_LIGHTS", "HAS_DIRECTIONAL_LIGHTS", "HAS_SUN_DISKS", "HAS_HIDDEN_SHAPES", "HAS_OPACITY",
+             "HAS_EMISSION_BOTH"}  # fmt: skip
+
+    def raised(*shapes, grey=None, lamp=None, **fields):
+        materials = {"grey": {**GREY, **(grey or {})}, "lamp": {**LAMP, **(lamp or {})}}
+        return flags(packed(*shapes, materials=materials, **fields).arrays) & every
+
+    assert raised(sphere(), quad(material="lamp"), lights=[POINT], grey={"emission_sides": "both"}) == set()
+    assert raised(lights=[SPOT]) == {"HAS_SPOT_LIGHTS"}
+    assert raised(lights=[SUN]) == {"HAS_DIRECTIONAL_LIGHTS"}
+    assert raised(lights=[{**SUN, "angular_diameter": 1}]) == {"HAS_DIRECTIONAL_LIGHTS", "HAS_SUN_DISKS"}
+    assert raised(box(), box(visible_to_camera=False)) == {"HAS_HIDDEN_SHAPES"}
+    assert raised(grey={"alpha": 0.5}) == {"HAS_OPACITY"}
+    assert raised(grey={"alpha": 0.5, "alpha_cutoff": 0.5}) == set()
+    assert raised(lamp={"emission_sides": "both"}) == {"HAS_EMISSION_BOTH"}
