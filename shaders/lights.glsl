@@ -128,7 +128,7 @@ float lights_pdf(uint light, Nearest n, Point at, vec3 p, vec3 wi) {
     if (kind == SHAPE_QUAD) pdf = quad_light_pdf(lights_quad(index), p, n.t, wi, e.sides);
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (kind == SHAPE_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(index), n.t, at.ng, wi, e.sides);
+    if (kind == SHAPE_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(index), p, n.t, at.ng, wi, e.sides);
 #endif
 #if HAS_ELLIPSOID_LIGHTS
     if (kind == SHAPE_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(index), n.t, at, wi, e.sides);

@@ -233,20 +233,26 @@ VIEWS = {
 }
 
 
+@pytest.mark.parametrize("kind", ["quad", "triangle"])
 @pytest.mark.parametrize("view", VIEWS)
-def test_quads_are_sampled_with_their_density(gpu: Renderer, view: str) -> None:
-    """Chi-square over cells of the quad: samples against the density that MIS takes, integrated in float64."""
+def test_flat_lamps_are_sampled_with_their_density(gpu: Renderer, view: str, kind: str) -> None:
+    """Chi-square over cells of the lamp: samples against the density that MIS takes, integrated in float64."""
     origin, u, v = (np.array(a, float) for a in VIEWS[view])
-    shape = {"type": "quad", "origin": origin.tolist(), "u": u.tolist(), "v": v.tolist(), "material": "lamp"}
-    packed = pack(parse_scene(document([shape], {"lamp": BOTH})), Images()).arrays
+    triangle = kind == "triangle"
+    shape: dict[str, Any] = {"type": "quad", "origin": origin.tolist(), "u": u.tolist(), "v": v.tolist()}
+    if triangle:
+        corners = [origin.tolist(), (origin + u).tolist(), (origin + v).tolist()]
+        shape = {"type": "mesh", "vertices": corners, "faces": [[0, 1, 2]], "smooth": False}
+    packed = pack(parse_scene(document([{**shape, "material": "lamp"}], {"lamp": BOTH})), Images()).arrays
     prober, n, cells, fine = Prober(gpu), 200_000, 16, 16
-    flags = frozenset({"HAS_EMISSION", "HAS_EMISSION_BOTH", "HAS_QUAD_LIGHTS"})
+    flags = frozenset({"HAS_EMISSION", "HAS_EMISSION_BOTH", "HAS_QUAD_LIGHTS", "HAS_TRIANGLE_LIGHTS"})
+    records = {Slot.TRIANGLES: packed.triangles} if triangle else {Slot.QUADS: packed.quads}
 
     def ask(sample: int, asks: np.ndarray) -> np.ndarray:
         wide = np.zeros((len(asks), 4), np.float32)
         wide[:, :2] = asks
         return prober.run(
-            "quads.comp", len(asks), {Slot.SUM: wide, Slot.QUADS: packed.quads}, (Slot.OUTPUT,), {"SAMPLE": sample},
+            f"{kind}s.comp", len(asks), {Slot.SUM: wide, **records}, (Slot.OUTPUT,), {"SAMPLE": sample},
             flags, p=tuple(-x for x in packed.origin), sides=2,
         )[0].astype(float)  # fmt: skip
 
@@ -259,11 +265,12 @@ def test_quads_are_sampled_with_their_density(gpu: Renderer, view: str) -> None:
     grid = np.stack(np.meshgrid(at, at, indexing="ij"), -1).reshape(-1, 2)
     p = origin + grid @ np.stack([u, v])
     d = np.linalg.norm(p, axis=1)
-    density = ask(0, grid)[:, 3] * np.abs(p @ normal) / d**3  # per area of the unit square
+    inside = np.where(np.isclose(grid.sum(1), 1), 0.5, grid.sum(1) < 1) if triangle else 1.0  # half cells on its edge
+    density = ask(0, grid)[:, 3] * np.abs(p @ normal) / d**3 * inside  # per area of the unit square
     expected = density.reshape(cells, fine, cells, fine).sum((1, 3)) / (cells * fine) ** 2
     assert expected.sum() == pytest.approx(1, abs=3e-3)
-    np.testing.assert_allclose(np.abs(place - 0.5).max(), 0.5, atol=1e-3)
-    assert stats.chi_square(observed, expected / expected.sum() * n) > stats.sidak(1e-3, len(VIEWS))
+    assert place.min() > -1e-3 and place.max() < 1.001 and (not triangle or place.sum(1).max() < 1.001)
+    assert stats.chi_square(observed, expected / expected.sum() * n) > stats.sidak(1e-3, 2 * len(VIEWS))
     again = ask(0, place)[:, 3]  # one density, whoever asks
     np.testing.assert_allclose(again, drawn[:, 3], rtol=2e-3)
 

@@ -13,16 +13,6 @@ struct QuadView {
     float s;
 };
 
-// Angle of (x, y) with y >= 0, within 7e-7 of itself: an odd polynomial fitted to atan's relative error on [0, 1].
-// Cheaper than atan(y, x), which knows all quadrants.
-float quad_light_argument(float y, float x) {
-    float a = abs(x), r = min(a, y) / max(a, y), q = r * r;
-    float angle = 0.0838723022 + q * (-0.0370138848 + q * 0.00786364667);
-    angle = r * (0.999999349 + q * (-0.333265174 + q * (0.198815021 + q * (-0.134872584 + q * angle))));
-    if (y > a) angle = 0.5 * PI - angle;
-    return x < 0.0 ? PI - angle : angle;
-}
-
 // The solid angle by two triangles [Van Oosterom & Strackee 1983, eq. 8], whose triple products are one height times
 // area, in which nothing cancels; the two angles are added as the arguments of complex numbers.
 QuadView quad_light_view(Quad q, vec3 p) {
@@ -43,7 +33,7 @@ QuadView quad_light_view(Quad q, vec3 p) {
     float h = w.z * lu * lv;
     float d1 = l.x * l.y * l.z + ab * l.z + ac * l.y + bc * l.x;
     float d2 = l.x * l.z * l.w + ac * l.w + ad * l.z + cd * l.x;
-    float s = 2.0 * quad_light_argument(h * (d1 + d2), d1 * d2 - h * h);
+    float s = 2.0 * sampling_angle(h * (d1 + d2), d1 * d2 - h * h);
     bool rectangle = abs(dot(q.dual_u, q.dual_v)) * q.u_length * q.v_length <= 1e-5;
     w.s = rectangle && s >= QUAD_LIGHT_LEAST ? s : 0.0;
     w.a = l.x;
