@@ -29,6 +29,10 @@ def _light(kind: LightKind) -> Callable[[SceneArrays], bool]:
     return lambda s: bool((s.lights["kind"] == kind).any())
 
 
+def _hidden(records: np.ndarray) -> bool:
+    return bool((records["shape"] & np.uint32(layout.HIDDEN)).any())
+
+
 def _model(model: Model) -> Callable[[SceneArrays], bool]:
     return lambda s: bool((s.materials["model"] == model).any())
 
@@ -51,10 +55,18 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_BVH_TRIANGLES": _tree(ShapeKind.TRIANGLE),
     "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
     "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
+    "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in COUNTS.values()),
+    "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()),
     "HAS_EMISSION": lambda s: bool((s.materials["emission"] > 0).any()),
+    "HAS_EMISSION_BOTH": lambda s: bool(
+        ((s.materials["emission"] > 0).any(axis=1) & (s.materials["emission_sides"] == 2)).any()
+    ),
     "HAS_LIGHTS": lambda s: len(s.lights) > 0,
     "HAS_MANY_LIGHTS": lambda s: len(s.lights) > 1,
     "HAS_POINT_LIGHTS": _light(LightKind.POINT),
+    "HAS_SPOT_LIGHTS": _light(LightKind.SPOT),
+    "HAS_DIRECTIONAL_LIGHTS": _light(LightKind.DIRECTIONAL),
+    "HAS_SUN_DISKS": lambda s: bool(((s.lights["kind"] == LightKind.DIRECTIONAL) & (s.lights["spread"] > 0)).any()),
     "HAS_SPHERE_LIGHTS": _light(LightKind.SPHERE),
     "HAS_QUAD_LIGHTS": _light(LightKind.QUAD),
     "HAS_TRIANGLE_LIGHTS": _light(LightKind.TRIANGLE),
@@ -94,7 +106,7 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
 # varying index. 0: too many to be worth it, or met through the tree.
-COUNTS = {
+COUNTS: dict[str, str] = {
     "SPHERE_COUNT": "spheres",
     "QUAD_COUNT": "quads",
     "BOX_COUNT": "boxes",
@@ -111,7 +123,13 @@ def counts(scene: SceneArrays) -> dict[str, int]:
     kinds = zip(COUNTS.items(), ShapeKind, strict=True)
     out = {name: 0 if kind in scene.bvh_kinds else len(getattr(scene, records)) for (name, records), kind in kinds}
     few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
-    return out | {name: n if n <= _FEW_MAX else 0 for name, n in few.items()}
+    return out | {name: n if n <= _FEW_MAX else 0 for name, n in few.items()} | {"QUAD_LAMP": _quad_lamp(scene)}
+
+
+def _quad_lamp(scene: SceneArrays) -> int:
+    """The index of the only emitting quad, where there is one and it stands in the kernel's loop; else -1."""
+    lamps = np.flatnonzero(scene.quads["light"] != layout.NONE)
+    return int(lamps[0]) if len(lamps) == 1 and ShapeKind.QUAD not in scene.bvh_kinds else -1
 
 
 def defines(
@@ -119,7 +137,7 @@ def defines(
 ) -> dict[str, object]:
     """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
-    out |= {name: 0 for name in (*COUNTS, *FEW)} | dict(shapes or {})
+    out |= {name: 0 for name in (*COUNTS, *FEW)} | {"QUAD_LAMP": -1} | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}

@@ -14,6 +14,7 @@ import numpy as np
 
 NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
+HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
 
 
 class LayoutError(TypeError):
@@ -64,12 +65,16 @@ class ShapeKind(IntEnum):
 
 
 class LightKind(IntEnum):
+    """Those from SPHERE on are shapes, which emit by their material."""
+
     POINT = 0
     ENVIRONMENT = 1
-    SPHERE = 2
-    QUAD = 3
-    TRIANGLE = 4
-    ELLIPSOID = 5
+    SPOT = 2
+    DIRECTIONAL = 3
+    SPHERE = 4
+    QUAD = 5
+    TRIANGLE = 6
+    ELLIPSOID = 7
 
 
 class Model(IntEnum):
@@ -156,8 +161,9 @@ class Material(Record):
     sheen_tint: f32
     clearcoat: f32
     clearcoat_gloss: f32
-    unused: f32  # up to the next group of four
-    unused_pair: vec2
+    opacity: f32  # the chance that a ray meets the surface
+    emission_sides: u32  # 1: the outward side emits; 2: both do
+    unused: u32  # up to the next group of four
     phong_specular: vec3  # blinn_phong; its diffuse is base_color
     shininess: f32  # exponent, >= 0
     ambient: vec3  # radiance added wherever a path meets the surface
@@ -232,14 +238,16 @@ class Node(Record):
 
 class Light(Record):
     slot = Slot.LIGHTS
-    position: vec3  # point lights
+    position: vec3  # point lights and spots
     kind: u32  # LightKind
-    intensity: vec3  # W/sr, point lights; shapes emit by their material
+    intensity: vec3  # W/sr, points and spots; directional: radiance of the disk, or irradiance; 0 for shapes
     index: u32  # into the array of the shape's kind
     probability: f32  # of being picked
     threshold: f32  # alias table: keep this light where u < threshold
     alias: u32  # else take that one
     material: u32
+    direction: vec3  # the way the light travels; a spot's is scaled, see spot.glsl
+    spread: f32  # spot: see spot.glsl; directional: 1 - cos of the disk's half angle, 0: no disk
 
 
 class EnvironmentAlias(Record):
@@ -283,6 +291,8 @@ class Frame(Record):
     environment_sun_cap: f32  # 1 - cos of its angular radius
     environment_sun_radiance: vec3
     environment_sun_share: f32  # of the environment's samples
+    sun_first: u32  # among the lights: directional ones with a disk stand side by side
+    sun_count: u32
 
 
 # A leaf's link: bit 31 set, kind << 28, (count - 1) << 24, first: index into the array of that kind
@@ -372,6 +382,7 @@ def _constants() -> str:
     for name in (
         "NONE",
         "SINGLE_SIDED",
+        "HIDDEN",
         "LEAF_BIT",
         "LEAF_KIND_SHIFT",
         "LEAF_COUNT_SHIFT",

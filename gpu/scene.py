@@ -134,6 +134,8 @@ class Scene:
         frame["node_scale"] = a.node_scale
         frame["node_count"] = len(a.nodes) // 8
         frame["light_count"] = len(a.lights)
+        suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
+        frame["sun_first"], frame["sun_count"] = suns.min(initial=len(a.lights)), len(suns)
         frame["moment_scale"] = 1.0 / a.radiance_scale
         frame["environment_turn"] = (1.0, 0.0)
         if a.environment is not None:

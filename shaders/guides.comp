@@ -8,6 +8,7 @@ layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; 
 #include "sampling.glsl"
 #include "shapes.glsl"
 #include "camera.glsl"
+#include "passing.glsl"
 
 void main() {
     uvec2 pixel;
@@ -19,8 +20,8 @@ void main() {
         Sampler rng = sobol_begin(pixel, frame.sample_first + i);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
-        Nearest n = shapes_nearest(o, d, NONE);
-        Point at = shapes_point(n, o, d);
+        Point at;
+        Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
         if (n.id != NONE) {
             albedo += vec4(material_load(at.material).base_color, 1.0);
             normal += vec4(dot(at.ng, d) > 0.0 ? -at.ns : at.ns, n.t);

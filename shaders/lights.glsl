@@ -2,7 +2,8 @@
 struct LightSample {
     vec3 wi;       // world, towards the light, from the point given
     float t;       // how far; INFINITY_T for the environment
-    vec3 radiance; // arriving, not yet divided by pdf; for a point light divided by d^2
+    vec3 radiance; // arriving, not yet divided by pdf; for a point light divided by d^2; of a shape's sample: the share
+                   // of its emission that gets out of the shape itself
     float pdf;     // per solid angle, picking included; 0: nothing comes
     bool extended; // false: only direct sampling finds this light
     uint id;       // the shape that shines, or NONE
@@ -11,6 +12,8 @@ struct LightSample {
 LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, true, NONE); }
 
 #include "lights/point.glsl"
+#include "lights/spot.glsl"
+#include "lights/directional.glsl"
 uniform sampler2D environment_texels; // rgb radiance; a: density of picking a direction here, per steradian
 #include "lights/cubemap.glsl"
 #include "lights/sun.glsl"
@@ -20,18 +23,49 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 #include "lights/triangle.glsl"
 #include "lights/ellipsoid.glsl"
 
-
-
 Light lights_pick(float u) {
 #if HAS_MANY_LIGHTS
     float x = u * float(frame.light_count);
     uint i = min(uint(x), frame.light_count - 1u);
-    Light l = light_pick(i);
-    if (x - float(i) >= l.threshold) l = light_pick(l.alias);
-    return l;
+    Light drawn = light_pick(i); // two of its words: a load of the whole would cost as much again
+    return light_pick(x - float(i) >= drawn.threshold ? drawn.alias : i);
 #else
     return light_load(0u);
 #endif
+}
+
+#if HAS_QUAD_LIGHTS
+// Loads at a constant place where there is one emitting quad, as in many a room: a third of a frame's time there.
+Quad lights_quad(uint i) {
+#if QUAD_LAMP >= 0
+    return quad_load(uint(QUAD_LAMP));
+#else
+    return quad_pick(i);
+#endif
+}
+#endif
+
+// What lights_sample and lights_pdf ask a shape's material.
+struct Emitter {
+    vec3 radiance;
+    uint sides; // 1: the outward one shines; 2: both do
+    float veil; // the chance that a ray passes through
+};
+
+Emitter lights_emitter(Light l) {
+    Emitter e = Emitter(vec3(0.0), 1u, 0.0);
+#if HAS_EMISSION
+    Material m = material_pick(l.material);
+    e.radiance = m.emission;
+#if HAS_EMISSION_BOTH
+    e.sides = m.emission_sides;
+#endif
+#if HAS_OPACITY
+    e.radiance *= m.opacity;
+    e.veil = 1.0 - m.opacity;
+#endif
+#endif
+    return e;
 }
 
 // p: the shaded point; u_pick chooses the light, the bits of two more numbers the direction.
@@ -42,35 +76,42 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
 #if HAS_POINT_LIGHTS
     if (l.kind == LIGHT_POINT) s = point_light_sample(l, p);
 #endif
+#if HAS_SPOT_LIGHTS
+    if (l.kind == LIGHT_SPOT) s = spot_light_sample(l, p);
+#endif
+#if HAS_DIRECTIONAL_LIGHTS
+    if (l.kind == LIGHT_DIRECTIONAL) s = directional_light_sample(l, u);
+#endif
 #if HAS_ENVIRONMENT
     if (l.kind == LIGHT_ENVIRONMENT) s = environment_light_sample(bits);
 #endif
+    Emitter e = lights_emitter(l);
 #if HAS_SPHERE_LIGHTS
     if (l.kind == LIGHT_SPHERE) {
-        s = sphere_light_sample(sphere_pick(l.index), p, u);
+        s = sphere_light_sample(sphere_pick(l.index), p, u, e.sides, e.veil);
         s.id = (SHAPE_SPHERE << LEAF_KIND_SHIFT) | l.index;
     }
 #endif
 #if HAS_QUAD_LIGHTS
     if (l.kind == LIGHT_QUAD) {
-        s = quad_light_sample(quad_pick(l.index), p, u);
+        s = quad_light_sample(lights_quad(l.index), p, u, e.sides);
         s.id = (SHAPE_QUAD << LEAF_KIND_SHIFT) | l.index;
     }
 #endif
 #if HAS_TRIANGLE_LIGHTS
     if (l.kind == LIGHT_TRIANGLE) {
-        s = triangle_light_sample(triangle_pick(l.index), p, u);
+        s = triangle_light_sample(triangle_pick(l.index), p, u, e.sides);
         s.id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | l.index;
     }
 #endif
 #if HAS_ELLIPSOID_LIGHTS
     if (l.kind == LIGHT_ELLIPSOID) {
-        s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u);
+        s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u, e.sides, e.veil);
         s.id = (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | l.index;
     }
 #endif
 #if HAS_EMISSION
-    if (l.kind >= LIGHT_SPHERE) s.radiance = material_pick(l.material).emission;
+    if (l.kind >= LIGHT_SPHERE) s.radiance *= e.radiance;
 #endif
     s.pdf *= l.probability;
     return s;
@@ -80,18 +121,20 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
 float lights_pdf(uint light, Nearest n, Point at, vec3 p, vec3 wi) {
 #if HAS_EMISSION
     Light l = light_pick(light);
+    Emitter e = lights_emitter(l);
+    uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK; // as the light has them, without a load
     float pdf = 0.0;
 #if HAS_SPHERE_LIGHTS
-    if (l.kind == LIGHT_SPHERE) pdf = sphere_light_pdf(sphere_pick(l.index), p);
+    if (kind == SHAPE_SPHERE) pdf = sphere_light_pdf(sphere_pick(index), p, e.sides, e.veil);
 #endif
 #if HAS_QUAD_LIGHTS
-    if (l.kind == LIGHT_QUAD) pdf = quad_light_pdf(quad_pick(l.index), n.t, at.ng, wi);
+    if (kind == SHAPE_QUAD) pdf = quad_light_pdf(lights_quad(index), p, n.t, wi, e.sides);
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (l.kind == LIGHT_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(l.index), n.t, at.ng, wi);
+    if (kind == SHAPE_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(index), p, n.t, at.ng, wi, e.sides);
 #endif
 #if HAS_ELLIPSOID_LIGHTS
-    if (l.kind == LIGHT_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(l.index), n.t, at, wi);
+    if (kind == SHAPE_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(index), n.t, at, wi, e.sides);
 #endif
     return pdf * l.probability;
 #else

@@ -2,6 +2,7 @@
 #include "surface.glsl"
 #include "bsdf.glsl"
 #include "lights.glsl"
+#include "passing.glsl"
 
 struct Radiance {
     vec3 color;
@@ -22,9 +23,30 @@ vec3 path_clamp(vec3 c, bool indirect) {
     return c;
 }
 
-// Emission towards the side the ray came from: a shape shines from its outward side.
+#if HAS_SUN_DISKS
+// What the disks of directional lights send along d, each weighed against finding it by direct sampling. `pdf` is the
+// density of d.
+vec3 path_disks(vec3 d, float pdf) {
+    vec3 sum = vec3(0.0);
+    uint i = 0u;
+    do {
+        Light l = light_load(frame.sun_first + i);
+        vec3 c = directional_light_radiance(l, d);
+#if ESTIMATOR == ESTIMATOR_MIS
+        c *= path_weight(pdf, directional_light_pdf(l) * l.probability);
+#endif
+        if (i < frame.sun_count) sum += c; // a kernel with every flag raised may have no disk
+    } while (++i < frame.sun_count);
+    return sum;
+}
+#endif
+
+// Emission towards the side the ray came from: the outward one, unless the material has both shine.
 vec3 path_emission(Point at, vec3 d) {
-#if HAS_EMISSION
+#if HAS_EMISSION_BOTH
+    Material m = material_pick(at.material);
+    if (at.light != NONE && (dot(d, at.ng) < 0.0 || m.emission_sides == 2u)) return m.emission;
+#elif HAS_EMISSION
     if (at.light != NONE && dot(d, at.ng) < 0.0) return material_pick(at.material).emission;
 #endif
     return vec3(0.0);
@@ -52,8 +74,8 @@ vec3 path_normal(Point at, vec3 wo_w) {
 
 Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     Radiance result = Radiance(vec3(0.0), 0.0);
-    Nearest n = shapes_nearest(o, d, NONE);
-    Point at = shapes_point(n, o, d);
+    Point at;
+    Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
     bool alive = n.id != NONE;
     if (alive) {
         result = Radiance(path_emission(at, d) + path_ambient(at), 1.0);
@@ -82,8 +104,12 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             uint pair = PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE;
             vec2 choice = sobol_pair(rng, pair + PAIR_CHOICE);
             uint flat_id = at.flat_id;
+            vec3 from = at.p;
+#if HAS_EMISSION_BOTH
+            from = shapes_leave(at, front); // inside or outside of the very shape that shines
+#endif
 #if HAS_LIGHTS
-            LightSample light = lights_sample(at.p, choice.x, sobol_bits(rng, pair + PAIR_LIGHT));
+            LightSample light = lights_sample(from, choice.x, sobol_bits(rng, pair + PAIR_LIGHT));
 #if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
             bool wanted = light.pdf > 0.0 && !light.extended;
 #else
@@ -92,13 +118,22 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             vec3 wi = frame_to_local(basis, light.wi);
             Scatter f = bsdf_eval(s, wo, wi);
             wanted = wanted && dot(light.wi, front) > 0.0 && max_component(f.f * light.radiance) > 0.0;
+#if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
+            wanted = wanted && light.id != n.id; // rounding may put a point on a ball's inside outside of it
+#endif
             float weight = 1.0;
 #if ESTIMATOR == ESTIMATOR_MIS
             if (light.extended) weight = path_weight(light.pdf, f.pdf);
 #endif
             if (wanted) {
-                bool hidden = shapes_occluded(shapes_leave(at, light.wi), light.wi, light.t, uvec2(flat_id, light.id));
                 vec3 c = throughput * (f.f * light.radiance * (weight / light.pdf));
+                uvec2 skip = uvec2(flat_id, light.id);
+#if HAS_OPACITY
+                c *= passing_share(shapes_leave(at, light.wi), light.wi, light.t, skip);
+                bool hidden = false;
+#else
+                bool hidden = shapes_occluded(shapes_leave(at, light.wi), light.wi, light.t, skip);
+#endif
                 if (!hidden) result.color += path_clamp(c, bounce > 0u);
             }
 #endif
@@ -125,12 +160,15 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
                 if (sobol_pair(rng, pair + PAIR_ROULETTE).x >= survive) alive = false;
                 throughput /= survive > 0.0 ? survive : 1.0;
             }
-            vec3 from = at.p;
             o = shapes_leave(at, d);
             n.id = NONE;
+#if HAS_OPACITY
+            if (alive) n = passing_nearest(o, d, flat_id, bounce, rng, at);
+#else
             if (alive) n = shapes_nearest(o, d, flat_id);
-            bool met = n.id != NONE;
             at = shapes_point(n, o, d);
+#endif
+            bool met = n.id != NONE;
 #if ESTIMATOR != ESTIMATOR_LIGHT
             vec3 arriving = vec3(0.0);
             float pdf_light = 0.0;
@@ -149,6 +187,9 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
 #if ESTIMATOR == ESTIMATOR_MIS
             arriving *= path_weight(next.pdf, pdf_light);
+#endif
+#if HAS_SUN_DISKS
+            if (!met) arriving += path_disks(d, next.pdf);
 #endif
             if (alive) result.color += path_clamp(throughput * arriving, bounce > 1u);
 #endif

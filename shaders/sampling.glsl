@@ -39,6 +39,16 @@ vec2 sampling_triangle(vec2 u) {
     return d > 0.0 ? vec2(b.x, b.y + d * 0.5) .xy : vec2(b.x - d * 0.5, b.y);
 }
 
+// Angle of (x, y) with y >= 0, within 7e-7 of itself: an odd polynomial fitted to atan's relative error on [0, 1].
+// Cheaper than atan(y, x), which knows all quadrants.
+float sampling_angle(float y, float x) {
+    float a = abs(x), r = min(a, y) / max(a, y), q = r * r;
+    float angle = 0.0838723022 + q * (-0.0370138848 + q * 0.00786364667);
+    angle = r * (0.999999349 + q * (-0.333265174 + q * (0.198815021 + q * (-0.134872584 + q * angle))));
+    if (y > a) angle = 0.5 * PI - angle;
+    return x < 0.0 ? PI - angle : angle;
+}
+
 // Offset in the pixel, importance-sampled from the reconstruction filter, so that every sample weighs one
 // [Ernst, Stamminger, Greiner 2006]. The table holds the inverse of the half profile's distribution, in pixels, at
 // 1 - (1 - k / n)^4: dense in the tail, where the inverse is steep.

@@ -10,6 +10,7 @@ struct Point {
     uint material;
     uint light;   // or NONE
     uint flat_id; // the shape, where a ray that leaves it cannot meet it again, else NONE
+    uint shape;   // in the scene document, with its bits
 };
 
 #include "frame.glsl"
@@ -78,7 +79,7 @@ bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
 Point shapes_point(Nearest n, vec3 o, vec3 d) {
     uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK;
     vec3 p = o + n.t * d;
-    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE);
+    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
     // llvmpipe reads all kinds, whichever was met: an index of another kind's array may be out of range, which
     // robust buffer access turns into 0.
 #if HAS_SPHERES || HAS_BVH_SPHERES

@@ -18,7 +18,10 @@ PROBES = Path(__file__).parent / "probes"
 def materials(**members: Any) -> np.ndarray:
     """One `layout.Material` with the contract's defaults of `disney`, but for what is given."""
     out = np.zeros(1, layout.Material.dtype)
-    defaults = {"base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0}
+    defaults = {
+        "base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0,
+        "opacity": 1.0,
+    }  # fmt: skip
     for name, value in {**defaults, **members}.items():
         out[name] = value
     return out

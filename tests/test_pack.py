@@ -66,7 +66,8 @@ def test_every_number_of_a_material_has_its_place(model):
     plain = parse_scene({**document(), "materials": {"m": {"type": model.name.lower(), **required}}})
     fields = type(plain.materials["m"]).model_fields
     seen = set()
-    for i, name in enumerate(sorted(set(fields) - {"type"})):
+    own = set(fields) - {"type", "emission_sides", "alpha", "alpha_cutoff"}
+    for i, name in enumerate(sorted(own)):
         value = [0.1, 0.2, 0.3] if isinstance(getattr(plain.materials["m"], name), tuple) else 0.1 + 0.01 * i
         material = {"type": model.name.lower(), **required, name: value}
         record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
@@ -74,7 +75,22 @@ def test_every_number_of_a_material_has_its_place(model):
         places = [m for m in layout.Material.members if np.array_equal(record[m], np.float32(value))]
         assert places == [MEMBERS.get((model, name), name)]
         seen.update(places)
-    assert len(seen) == len(fields) - 1
+    assert seen == {MEMBERS.get((model, name), name) for name in own}
+
+
+@pytest.mark.parametrize(
+    ("given", "opacity", "sides"),
+    [
+        ({}, 1, 1),
+        ({"alpha": 0.25, "emission_sides": "both"}, 0.25, 2),
+        ({"alpha": 0.25, "alpha_cutoff": 0.25, "emission_sides": "front"}, 1, 1),
+        ({"alpha": 0.25, "alpha_cutoff": 0.26}, 0, 1),
+    ],
+)
+def test_opacity_and_sides_are_what_alpha_and_its_cutoff_say(given, opacity, sides):
+    material = {"type": "disney", **given}
+    record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
+    assert (record["opacity"], record["emission_sides"]) == (opacity, sides)
 
 
 def test_materials_keep_the_order_of_the_document():

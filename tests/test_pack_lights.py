@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from gpu import layout
+from gpu.features import flags
 from gpu.layout import LightKind, ShapeKind
-from tests.documents import Shelf, box, mesh, packed, picture, quad, sphere
+from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere
 
 MANY = {
     ShapeKind.SPHERE: ("spheres", 8, lambda i: sphere(center=[3 * i, 0, 0])),
@@ -83,7 +84,7 @@ def test_lights_and_shapes_name_each_other():
     counts = {kind: int((arrays.lights["kind"] == kind).sum()) for kind in LightKind}
     assert counts == {
         LightKind.SPHERE: 1, LightKind.QUAD: 15, LightKind.ELLIPSOID: 1, LightKind.TRIANGLE: 24,
-        LightKind.POINT: 1, LightKind.ENVIRONMENT: 1,
+        LightKind.POINT: 1, LightKind.ENVIRONMENT: 1, LightKind.SPOT: 0, LightKind.DIRECTIONAL: 0,
     }  # fmt: skip
     for i, light in enumerate(arrays.lights):
         if name := KINDS.get(LightKind(int(light["kind"]))):
@@ -182,3 +183,77 @@ def test_texels_out_of_range_are_clamped_with_a_warning():
     bright = sky_of([[[1e18, 0, 0]]], scale=1e6)
     assert bright.arrays.environment.scale * 1e18 == pytest.approx(1e20)
     assert bright.warnings[0].startswith("/environment/scale: ")
+
+
+POINT = {"type": "point", "position": [0, 3, 0], "intensity": 2}
+SPOT = {
+    "type": "spot", "position": [1, 2, 3], "direction": [0, 0, -5], "intensity": [1, 2, 3], "inner_angle": 20,
+    "outer_angle": 60,
+}  # fmt: skip
+SUN = {"type": "directional", "direction": [0, -4, 3], "irradiance": [3, 2, 1]}
+
+
+def test_suns_with_a_disk_stand_side_by_side_behind_all_lights_but_the_sky():
+    disk = {**SUN, "angular_diameter": 10}
+    dark = [{**POINT, "intensity": 0}, {**SUN, "irradiance": 0}, {**SPOT, "inner_angle": 0, "outer_angle": 0}]
+    lights = packed(quad(material="lamp"), lights=[disk, SUN, SPOT, disk, POINT, *dark],
+                    environment={"type": "constant", "radiance": 1}).arrays.lights  # fmt: skip
+    kinds = [LightKind.QUAD, LightKind.SPOT, LightKind.POINT, *[LightKind.DIRECTIONAL] * 3, LightKind.ENVIRONMENT]
+    assert lights["kind"].tolist() == kinds
+    assert (lights["spread"][3:] > 0).tolist() == [False, True, True, False]
+    np.testing.assert_allclose(lights["direction"][3], [0, -0.8, 0.6], rtol=1e-6)
+    half = np.radians(5)
+    assert lights["spread"][4] == pytest.approx(1 - np.cos(half), rel=1e-6)
+    np.testing.assert_allclose(lights["intensity"][4], np.array([3, 2, 1]) / (np.pi * np.sin(half) ** 2), rtol=1e-6)
+
+
+def test_spots_and_suns_are_picked_by_their_power():
+    cone = 2 * np.pi * (1 - (np.cos(np.radians(20)) + np.cos(np.radians(60))) / 2)
+    share = np.array([cone * np.dot([1, 2, 3], [0.2126, 0.7152, 0.0722]), 4 * np.pi * 2])
+    np.testing.assert_allclose(pick(lights=[SPOT, POINT]), 0.95 * share / share.sum() + 0.025, rtol=1e-5)
+    # Through a disk around a ball of radius 1, 3 ** .5 around its corners, whether from a point or from a disk.
+    for sun in (SUN, {**SUN, "angular_diameter": 30}):
+        through = 3 * np.pi * np.dot([3, 2, 1], [0.2126, 0.7152, 0.0722])
+        expected = through / (through + 4 * np.pi * 2)
+        assert pick(sphere(), lights=[POINT, sun])[1] == pytest.approx(expected, rel=1e-5)
+    assert pick(sphere(), lights=[POINT, {**SUN, "irradiance": 1e9}])[0] == pytest.approx(0.2)
+
+
+def test_sides_that_shine_count():
+    materials = {"grey": {"type": "diffuse", "albedo": 0}}
+    materials |= {
+        side: {"type": "diffuse", "albedo": 0, "emission": 1, "emission_sides": side} for side in ("front", "both")
+    }
+    one, two = pick(quad(material="front"), quad(material="both"), materials=materials)
+    assert (two - 0.025) == pytest.approx(2 * (one - 0.025), rel=1e-5)
+    assert pick(sphere(material="front"), sphere(material="both"), materials=materials) == pytest.approx([0.5, 0.5])
+
+
+@pytest.mark.parametrize("count", [1, 30])
+def test_hidden_shapes_carry_their_bit(count):
+    shapes = [sphere(), *[quad(origin=[3 * i, 0, 0], visible_to_camera=False) for i in range(count)]]
+    shapes += [mesh(double_sided=False, visible_to_camera=False), box(visible_to_camera=False), box()]
+    arrays = packed(*shapes).arrays
+    assert arrays.spheres["shape"].tolist() == [0]
+    assert sorted(arrays.quads["shape"].tolist()) == [layout.HIDDEN | i for i in range(1, count + 1)]
+    assert set(arrays.triangles["shape"].tolist()) == {layout.HIDDEN | layout.SINGLE_SIDED | (count + 1)}
+    assert arrays.boxes["shape"].tolist() == [layout.HIDDEN | (count + 2), count + 3]
+
+
+def test_each_light_and_each_way_to_pass_raises_its_flag():
+    """A scene that uses none of it raises none: it runs the kernel that it ran before there were any."""
+    every = {"HAS_SPOT_LIGHTS", "HAS_DIRECTIONAL_LIGHTS", "HAS_SUN_DISKS", "HAS_HIDDEN_SHAPES", "HAS_OPACITY",
+             "HAS_EMISSION_BOTH"}  # fmt: skip
+
+    def raised(*shapes, grey=None, lamp=None, **fields):
+        materials = {"grey": {**GREY, **(grey or {})}, "lamp": {**LAMP, **(lamp or {})}}
+        return flags(packed(*shapes, materials=materials, **fields).arrays) & every
+
+    assert raised(sphere(), quad(material="lamp"), lights=[POINT], grey={"emission_sides": "both"}) == set()
+    assert raised(lights=[SPOT]) == {"HAS_SPOT_LIGHTS"}
+    assert raised(lights=[SUN]) == {"HAS_DIRECTIONAL_LIGHTS"}
+    assert raised(lights=[{**SUN, "angular_diameter": 1}]) == {"HAS_DIRECTIONAL_LIGHTS", "HAS_SUN_DISKS"}
+    assert raised(box(), box(visible_to_camera=False)) == {"HAS_HIDDEN_SHAPES"}
+    assert raised(grey={"alpha": 0.5}) == {"HAS_OPACITY"}
+    assert raised(grey={"alpha": 0.5, "alpha_cutoff": 0.5}) == set()
+    assert raised(lamp={"emission_sides": "both"}) == {"HAS_EMISSION_BOTH"}

@@ -15,7 +15,12 @@ GOOD: dict[str, Any] = {
     "version": 1,
     "camera": {"position": [0, 1, 4], "target": [0, 0.5, 0], "up": [0, 1, 0], "vfov": 40},
     "environment": {"type": "constant", "radiance": 0.5},
-    "lights": [{"type": "point", "position": [0, 3, 0], "intensity": 10}],
+    "lights": [
+        {"type": "point", "position": [0, 3, 0], "intensity": 10},
+        {"type": "spot", "position": [0, 3, 1], "direction": [0, -1, 0], "intensity": 5, "inner_angle": 10,
+         "outer_angle": 20},
+        {"type": "directional", "direction": [0, -1, 0], "irradiance": 1, "angular_diameter": 1},
+    ],
     "materials": {"a": {"type": "diffuse", "albedo": 0.5}, "b": {"type": "disney"}, "x/y~z": {"type": "disney"}},
     "shapes": [
         {"type": "sphere", "center": [0, 0.5, 0], "radius": 0.5, "material": "a"},
@@ -61,6 +66,11 @@ NUMBERS = {
     "/environment/scale": (-1, 1e21),
     "/environment/rotation": (NAN, "90"),
     "/materials/b/roughness": (-0.01, 1.5, True),
+    "/materials/a/alpha": (-0.01, 1.01, True, "1", None, NAN, [1, 1, 1]),
+    "/materials/b/alpha_cutoff": (-0.01, 1.01, None),
+    "/lights/1/inner_angle": (-1, 20.001, 90.1, NAN, "10", None),
+    "/lights/1/outer_angle": (GONE, 91, INF),
+    "/lights/2/angular_diameter": (-1, 90.1, True),
 }
 COLOURS = {
     "/materials/a/albedo": (1.5, -0.1, [0.5, 0.5], [0.5] * 4, [-0.1, 0.5, 0.5], [0.5, NAN, 0.5], [0.5, True, 0.5],
@@ -69,6 +79,8 @@ COLOURS = {
     "/materials/x~1y~0z/base_color": (2, [0, 0, 1.01]),
     "/materials/a/emission": ([-1, 0, 0], 1.1e20, INF),
     "/lights/0/intensity": (-1, 1.1e20, {"texture": "t"}),
+    "/lights/1/intensity": ([0, 0, -1], NAN),
+    "/lights/2/irradiance": (GONE, -1, 1.1e20),
     "/environment/radiance": (-1, [0, 0, NAN]),
 }  # fmt: skip
 VECTORS = {
@@ -77,6 +89,9 @@ VECTORS = {
     "/camera/up": ([0, 0, 0], [1e-60, 0, 0]),
     "/shapes/0/center": ([1e39, 0, 0], [1.1e9, 0, 0], [0, True, 0]),
     "/lights/0/position": ([INF, 0, 0],),
+    "/lights/1/position": ([2e9, 0, 0],),
+    "/lights/1/direction": (GONE, [0, 0, 0], [1e-60, 0, 0], 5, [0, 1]),
+    "/lights/2/direction": ([0, 0, 0], [NAN, 0, 1]),
 }
 STRUCTURE = {
     "/extra": (1,),
@@ -90,18 +105,20 @@ STRUCTURE = {
     "/materials/a/albdo": (0.5,),
     "/materials/a/albedo": (GONE,),
     "/materials/a/roughness": (0.5,),
-    "/materials/b/alpha": (0.5,),
+    "/materials/b/opacity": (0.5,),
+    "/materials/b/emission_sides": ("back", 2, None, True),
     "/materials/a/type": (GONE, "lambert", "principled", 5, None, [], {}),
     "/shapes": (GONE, {}, None),
     "/shapes/0": (None, 5, []),
     "/shapes/0/radius": (GONE,),
     "/shapes/0/raduis": (1,),
-    "/shapes/0/visible_to_camera": (True,),
+    "/shapes/0/visible_to_camera": (1, "true", None),
     "/shapes/0/type": (GONE, "torus"),
     "/shapes/0/material": (GONE, 0, "nosuch", None),
     "/lights": (None, {}),
     "/lights/0/power": (1,),
-    "/lights/0/type": (GONE, "area", "spot", 5),
+    "/lights/0/type": (GONE, "area", 5),
+    "/lights/2/position": ([0, 0, 0],),
     "/environment": (None, []),
     "/environment/colour": (1,),
     "/environment/type": (GONE, "dome", "studio"),
@@ -192,8 +209,8 @@ def test_all_mistakes_are_told_at_once_from_the_caller_s_root() -> None:
 
 
 def test_a_wrong_type_hides_what_it_makes_look_wrong() -> None:
-    spot = {"type": "spot", "position": [0, 0, 0], "direction": [0, -1, 0], "outer_angle": 30}
-    assert list(refused(edited("/lights/0", spot))) == ["/lights/0/type"]
+    area = {"type": "area", "position": [0, 0, 0], "direction": [0, -1, 0], "width": 30}
+    assert list(refused(edited("/lights/0", area))) == ["/lights/0/type"]
 
 
 def test_names_that_look_like_types_stay_in_the_pointer() -> None:

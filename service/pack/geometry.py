@@ -8,6 +8,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from gpu import layout
 from gpu.layout import Node, ShapeKind
 from service.assets import Assets
 from service.pack import lights, meshes, records
@@ -60,6 +61,7 @@ def geometry(
         found |= {kind: found[kind][places] for kind, places in order.items()}
         if len(normals) and ShapeKind.TRIANGLE in order:
             normals = normals[order[ShapeKind.TRIANGLE]]
+    _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
     warnings = [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
@@ -68,6 +70,15 @@ def geometry(
         found, normals, shining, areas, nodes, node_origin, node_scale, frozenset(bounds), vec3(origin), radius,
         tuple(warnings),
     )  # fmt: skip
+
+
+def _hide(records: dict[ShapeKind, np.ndarray], shapes: Sequence[Shape]) -> None:
+    """Marks the records of shapes that the camera looks through."""
+    hidden = np.array([not shape.visible_to_camera for shape in shapes], bool)
+    if hidden.any():
+        for array in records.values():
+            index = array["shape"] & np.uint32(~layout.SINGLE_SIDED & layout.NONE)
+            array["shape"] |= np.where(hidden[index], layout.HIDDEN, 0).astype(np.uint32)
 
 
 def _analytic(placed: Placed, origin: np.ndarray) -> dict[ShapeKind, tuple[np.ndarray, Bounds]]:

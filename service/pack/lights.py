@@ -1,4 +1,4 @@
-"""Which shapes, points and sky shine, and how often each is picked."""
+"""Which shapes, points, suns and sky shine, and how often each is picked."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from gpu import layout
 from gpu.distribution import LUMINANCE, alias_table
 from gpu.layout import LightKind, ShapeKind
-from service.scene.light import PointLight
+from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
 
 SHINING = {
     ShapeKind.SPHERE: LightKind.SPHERE,
@@ -21,7 +21,13 @@ SHINING = {
 
 # Power says little about what reaches a point: a far strong light must not starve a near weak one.
 EVEN = 0.05  # share of the picks that goes to all lights alike
-SKY_SHARE = (0.2, 0.8)  # bounds on the sky's where there are other lights; a wide floor makes its power look huge
+# Bounds on the share of the sky and the suns where there are nearer lights; a wide floor makes their power look huge
+FAR_SHARE = (0.2, 0.8)
+
+# Share of a spot's cone that its fading rim takes at least: its inverse, and what is added to it, fit into float32.
+LEAST_RIM = 1e-6
+# Radians: a disk narrower than this is a point, as float32 directions have no digits for a place on it.
+LEAST_DISK = 1e-6
 
 
 def mark(shapes: dict[ShapeKind, np.ndarray], emissive: np.ndarray) -> np.ndarray:
@@ -57,6 +63,12 @@ def areas(shapes: dict[ShapeKind, np.ndarray], lights: np.ndarray) -> np.ndarray
     return area
 
 
+def sides(lights: np.ndarray, materials: np.ndarray) -> np.ndarray:
+    """(n,): how many sides of each light of `mark` send light to others; the inside of a closed shape does not."""
+    open_ = (lights["kind"] == LightKind.QUAD) | (lights["kind"] == LightKind.TRIANGLE)
+    return np.where(open_, materials["emission_sides"][lights["material"]], 1)
+
+
 def _sphere_area(spheres: np.ndarray) -> np.ndarray:
     return np.asarray(4 * np.pi * spheres["radius"].astype(np.float64) ** 2)
 
@@ -74,14 +86,61 @@ def _ellipsoid_area(solids: np.ndarray) -> np.ndarray:
     return np.asarray(4 * np.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3) ** (1 / p))
 
 
-def points(lights: Sequence[PointLight], origin: Sequence[float]) -> np.ndarray:
-    """`layout.Light` records of the point lights that shine."""
+def standing(lights: Sequence[Light], origin: Sequence[float], radius: float) -> tuple[np.ndarray, np.ndarray]:
+    """`layout.Light` records of the lights that are no shapes and shine, suns with a disk last; and their power, W of
+    luminance: of a directional light what it sends through a disk of `radius` around the scene.
+    """
     records = np.zeros(len(lights), layout.Light.dtype)
-    for record, light in zip(records, lights, strict=True):
-        record["kind"] = LightKind.POINT
-        record["position"] = np.subtract(light.position, origin)
-        record["intensity"] = light.intensity
-    return records[(records["intensity"] > 0).any(axis=1)]
+    power = np.zeros(len(lights))
+    for i, light in enumerate(lights):
+        record = records[i]
+        match light:
+            case PointLight():
+                record["kind"], size = LightKind.POINT, 4 * math.pi
+            case SpotLight():
+                size = _spot(record, light)
+            case DirectionalLight():
+                size = _sun(record, light, radius)
+        if not isinstance(light, DirectionalLight):
+            record["position"] = np.subtract(light.position, origin)
+            record["intensity"] = light.intensity
+        power[i] = size * luminance(record["intensity"])
+    shining = np.flatnonzero((records["intensity"] > 0).any(axis=1) & (power > 0))
+    order = shining[np.argsort((records["kind"] == LightKind.DIRECTIONAL)[shining], kind="stable")]
+    order = order[np.argsort(_has_disk(records[order]), kind="stable")]
+    return records[order], power[order]
+
+
+def _has_disk(records: np.ndarray) -> np.ndarray:
+    return np.asarray((records["kind"] == LightKind.DIRECTIONAL) & (records["spread"] > 0))
+
+
+def _spot(record: np.ndarray, light: SpotLight) -> float:
+    """Solid angle, sr, that holds as much light as the cone with its rim: smoothstep has a mean of a half."""
+    inner, outer = (2 * math.sin(math.radians(a) / 2) ** 2 for a in (light.inner_angle, light.outer_angle))
+    record["kind"] = LightKind.SPOT
+    if outer == 0:
+        return 0.0
+    rim = max(outer - inner, LEAST_RIM * outer)
+    record["direction"] = _unit(light.direction) / math.sqrt(2 * rim)
+    record["spread"] = outer / rim
+    return math.pi * (inner + outer)
+
+
+def _sun(record: np.ndarray, light: DirectionalLight, radius: float) -> float:
+    """Area, m^2 (and sr where there is a disk), by which the power follows from the record's intensity."""
+    half = math.radians(light.angular_diameter) / 2
+    record["kind"], record["direction"] = LightKind.DIRECTIONAL, _unit(light.direction)
+    facing = 1.0
+    if half > LEAST_DISK:
+        record["spread"] = 2 * math.sin(half / 2) ** 2
+        facing = math.pi * math.sin(half) ** 2  # the integral of the cosine over the disk
+    record["intensity"] = np.divide(light.irradiance, facing)
+    return facing * math.pi * radius**2
+
+
+def _unit(v: Sequence[float]) -> np.ndarray:
+    return np.divide(v, math.hypot(*v))
 
 
 def weigh(lights: np.ndarray, power: np.ndarray, sky_power: float) -> np.ndarray:
@@ -90,21 +149,21 @@ def weigh(lights: np.ndarray, power: np.ndarray, sky_power: float) -> np.ndarray
     `power` (n,), W of luminance, all positive. The sky's is for a brightness of 1: turning that up or down edits no
     table, and the picture stays the same as one packed anew.
     """
+    power = power.astype(np.float64)
     if sky_power > 0:
         sky = np.zeros(1, layout.Light.dtype)
         sky["kind"] = LightKind.ENVIRONMENT
-        lights = np.concatenate([lights, sky])
+        lights, power = np.concatenate([lights, sky]), np.append(power, sky_power)
     if not len(lights):
         return lights
+    far = (lights["kind"] == LightKind.ENVIRONMENT) | (lights["kind"] == LightKind.DIRECTIONAL)
+    low, high = FAR_SHARE if far.any() and not far.all() else (0.0, 1.0)
+    share = min(max(float(power[far].sum() / power.sum()), low), high)
     weights = np.zeros(len(lights))
-    total = float(power.sum())
-    if len(power):
-        weights[: len(power)] = (1 - EVEN) * power / total + EVEN / len(power)
-    if sky_power > 0:
-        low, high = SKY_SHARE if len(power) else (1.0, 1.0)
-        share = min(max(sky_power / (sky_power + total), low), high)
-        weights[:-1] *= 1 - share
-        weights[-1] = share
+    for group, part in ((far, share), (~far, 1 - share)):
+        if group.any():
+            mine = power[group]
+            weights[group] = part * ((1 - EVEN) * mine / mine.sum() + EVEN / len(mine))
     lights["threshold"], lights["alias"], lights["probability"] = alias_table(weights)
     return lights
 

@@ -10,7 +10,7 @@ from typing import Protocol
 import numpy as np
 
 from gpu import EnvironmentArrays, SceneArrays
-from gpu.layout import LEAF_FIRST_MASK, ShapeKind
+from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets
 from service.pack import lights
 from service.pack.cache import PackCache, content, lasting
@@ -60,15 +60,15 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         )  # fmt: skip
         if scale > 0:  # what it sends through a disk around the scene
             sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
-    points = lights.points(scene.lights, built.origin)
+    standing, standing_power = lights.standing(scene.lights, built.origin, built.radius)
     emission = materials["emission"][built.lights["material"]]
-    area_power = np.pi * built.areas * lights.luminance(emission)
-    point_power = 4 * np.pi * lights.luminance(points["intensity"])
+    area_power = np.pi * built.areas * lights.luminance(emission) * lights.sides(built.lights, materials)
+    reached = np.where(standing["kind"] == LightKind.DIRECTIONAL, 1.0, math.pi * built.radius**2)
     peak = max(
         peak,
         float(emission.max(initial=0.0)),
         float(materials["ambient"].max(initial=0.0)),
-        float(points["intensity"].max(initial=0.0)) / (math.pi * built.radius**2),
+        float((standing["intensity"].max(axis=1, initial=0.0) / reached).max(initial=0.0)),
     )
     arrays = SceneArrays(
         camera=pack_camera(scene.camera, built.origin),
@@ -80,7 +80,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         triangles=built.shapes[ShapeKind.TRIANGLE],
         triangle_normals=built.triangle_normals,
         lights=lights.weigh(
-            np.concatenate([built.lights, points]), np.concatenate([area_power, point_power]), sky_power
+            np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power
         ),
         nodes=built.nodes,
         node_origin=built.node_origin,

@@ -10,12 +10,14 @@ from gpu import CameraArrays, layout
 from service.scene import Scene
 from service.scene.camera import Camera
 from service.scene.environment import Environment, SkyEnvironment
+from service.scene.material import Material
 from service.scene.numbers import Vec3
 
 # What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color"}
 # Where a name means another thing in one model.
 RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
+SIDES = {"front": 1, "both": 2}
 
 
 def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> CameraArrays:
@@ -43,10 +45,21 @@ def pack_materials(scene: Scene) -> np.ndarray:
     for record, material in zip(records, scene.materials.values(), strict=True):
         record["model"] = layout.Model[material.type.upper()]
         for name in type(material).model_fields:
+            if name == "emission_sides":
+                record[name] = SIDES[material.emission_sides]
+                continue
             member = RENAMED_IN.get(material.type, RENAMED).get(name, RENAMED.get(name, name))
             if member in layout.Material.members:
                 record[member] = getattr(material, name)
+        record["opacity"] = opacity(material)
     return records
+
+
+def opacity(material: Material) -> float:
+    """The chance that a ray meets the surface."""
+    if material.alpha_cutoff is None:
+        return material.alpha
+    return 1.0 if material.alpha >= material.alpha_cutoff else 0.0
 
 
 def pack_turn(environment: Environment) -> tuple[float, float]:

@@ -37,9 +37,9 @@ def risky(old: Scene, new: Scene) -> bool:
 def _skeleton(scene: Scene) -> tuple[object, ...]:
     """What arrays, light tables and kernels are made from: equal skeletons differ in values that are edited in place.
 
-    Emission is part of it: it decides which shapes are lights, and how often each is picked.
+    Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked.
     """
-    materials = [(name, m.type, m.emission) for name, m in scene.materials.items()]
+    materials = [(name, m.type, m.emission, m.emission_sides) for name, m in scene.materials.items()]
     return materials, scene.shapes, scene.lights, _environment(scene)
 
 

@@ -12,7 +12,7 @@ from service.scene.environment import (
     ImageEnvironment,
     SkyEnvironment,
 )
-from service.scene.light import PointLight
+from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
 from service.scene.material import BlinnPhongMaterial, DiffuseMaterial, DisneyMaterial, Material, MetalRoughMaterial
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
@@ -30,9 +30,11 @@ __all__ = [
     "ConstantEnvironment",
     "CubemapEnvironment",
     "DiffuseMaterial",
+    "DirectionalLight",
     "DisneyMaterial",
     "Environment",
     "ImageEnvironment",
+    "Light",
     "Limits",
     "Material",
     "MatrixTransform",
@@ -45,6 +47,7 @@ __all__ = [
     "Shape",
     "SkyEnvironment",
     "SphereShape",
+    "SpotLight",
     "Transform",
     "Vec3",
     "load_json",

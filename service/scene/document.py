@@ -12,7 +12,7 @@ from service.problems import FieldError, InvalidDocument
 from service.scene.base import OMITTABLE, Model, hint, refusal
 from service.scene.camera import Camera
 from service.scene.environment import Environment
-from service.scene.light import PointLight
+from service.scene.light import Light
 from service.scene.material import Material
 from service.scene.mistakes import MOST, among, mistakes
 from service.scene.numbers import described
@@ -33,7 +33,7 @@ class Scene(Model):
     environment: Annotated[
         Environment | None, OMITTABLE, hint("Environment", "What surrounds the scene; without one it is black.")
     ] = None
-    lights: Annotated[list[PointLight], hint("Lights", "Lights without extent.")] = Field(default_factory=list)
+    lights: Annotated[list[Light], hint("Lights", "Lights that are no shapes.")] = Field(default_factory=list)
     materials: Annotated[dict[str, Material], hint("Materials", "By names of your choice.")]
     shapes: Annotated[list[Shape], hint("Shapes", "Each made of one of the materials.")]
 

@@ -6,7 +6,7 @@ from typing import Annotated, Literal
 
 from pydantic import Field
 
-from service.scene.base import Model, hint
+from service.scene.base import OMITTABLE, Model, hint
 from service.scene.color import Radiometric, Reflectance
 from service.scene.numbers import Factor, Fraction
 
@@ -17,6 +17,21 @@ class _Surface(Model):
         hint("Emission", "Radiance that leaves the front side: above 0 the shape is an area light.",
              unit="W/(m^2 sr)", widget="color", soft=20),
     ] = (0.0, 0.0, 0.0)
+    emission_sides: Annotated[
+        Literal["front", "both"],
+        hint("Emitting sides", "Whether the emission leaves the outward side only, or the inward side as well."),
+    ] = "front"
+    alpha: Annotated[
+        Fraction,
+        hint("Alpha", "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+             unit="", widget="slider"),
+    ] = 1.0
+    alpha_cutoff: Annotated[
+        Fraction | None,
+        OMITTABLE,
+        hint("Alpha cutoff", "Where given, an alpha of at least this counts as 1, any other as 0.",
+             unit="", widget="slider"),
+    ] = None
 
 
 class DiffuseMaterial(_Surface):

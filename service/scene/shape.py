@@ -22,6 +22,9 @@ class _Placed(Model):
     transform: Annotated[
         AnyTransform | None, OMITTABLE, hint("Transform", "Where the shape stands; without it, as written.")
     ] = None
+    visible_to_camera: Annotated[
+        bool, hint("Visible to the camera", "Off: the camera looks through it; light, shadow and reflections stay.")
+    ] = True
 
 
 class SphereShape(_Placed):

@@ -1,16 +1,88 @@
-// A parallelogram that shines along its normal, sampled by area.
-float quad_light_pdf(Quad q, float t, vec3 ng, vec3 wi) {
-    float c = -dot(wi, ng);
+// A parallelogram that shines along its normal, or along both. A rectangle is sampled uniformly over the solid angle
+// that it fills [Urena, Fajardo, King 2013]; it is sampled by area where that is small, as fp32 has no digits for a
+// place inside it then, and where it is no rectangle.
+
+// sr: below, the place that a rounding of the angles moves is a thousandth of the rectangle.
+const float QUAD_LIGHT_LEAST = 2e-3;
+
+// A rectangle as p sees it: the ranges of its coordinates along u and v from p, its plane's distance, and its solid
+// angle, which is 0 where the quad is to be sampled by area.
+struct QuadView {
+    float x0, x1, y0, y1, z;
+    float a, d; // distances of the corners (x0, y0) and (x0, y1)
+    float s;
+};
+
+// The solid angle by two triangles [Van Oosterom & Strackee 1983, eq. 8], whose triple products are one height times
+// area, in which nothing cancels; the two angles are added as the arguments of complex numbers.
+QuadView quad_light_view(Quad q, vec3 p) {
+    QuadView w;
+    vec3 o = q.origin - p;
+    // In units of the edges' sum: products of six lengths below stay in range, or leave it for the area's sake.
+    float unit = 1.0 / (q.u_length + q.v_length);
+    float lu = q.u_length * unit, lv = q.v_length * unit;
+    w.x0 = dot(o, q.dual_u) * lu;
+    w.y0 = dot(o, q.dual_v) * lv;
+    w.x1 = w.x0 + lu;
+    w.y1 = w.y0 + lv;
+    w.z = abs(dot(o, q.normal)) * unit;
+    float z2 = w.z * w.z, xx = w.x0 * w.x1 + z2, yy = w.y0 * w.y1 + z2;
+    vec2 x2 = vec2(w.x0 * w.x0, w.x1 * w.x1), y2 = vec2(w.y0 * w.y0, w.y1 * w.y1);
+    vec4 l = sqrt(vec4(x2.xyy, x2.x) + vec4(y2.xxy, y2.y) + z2); // corners in turn: a, b, c, d
+    float ac = w.x0 * w.x1 + w.y0 * w.y1 + z2, ab = xx + y2.x, cd = xx + y2.y, bc = yy + x2.y, ad = yy + x2.x;
+    float h = w.z * lu * lv;
+    float d1 = l.x * l.y * l.z + ab * l.z + ac * l.y + bc * l.x;
+    float d2 = l.x * l.z * l.w + ac * l.w + ad * l.z + cd * l.x;
+    float s = 2.0 * sampling_angle(h * (d1 + d2), d1 * d2 - h * h);
+    bool rectangle = abs(dot(q.dual_u, q.dual_v)) * q.u_length * q.v_length <= 1e-5;
+    w.s = rectangle && s >= QUAD_LIGHT_LEAST ? s : 0.0;
+    w.a = l.x;
+    w.d = l.w;
+    return w;
+}
+
+float quad_light_area_pdf(Quad q, float t, vec3 wi) {
+    float c = abs(dot(wi, q.normal));
     return c > 0.0 ? t * t / (c * q.area) : 0.0;
 }
 
-LightSample quad_light_sample(Quad q, vec3 p, vec2 u) {
+bool quad_light_shines(Quad q, vec3 p, uint sides) { return sides == 2u || dot(q.origin - p, q.normal) < 0.0; }
+
+float quad_light_pdf(Quad q, vec3 p, float t, vec3 wi, uint sides) {
+    float s = quad_light_view(q, p).s;
+    if (!quad_light_shines(q, p, sides)) return 0.0;
+    return s > 0.0 ? 1.0 / s : quad_light_area_pdf(q, t, wi);
+}
+
+// Place along u and v, 0..1, uniform over the solid angle. The paper's k, the sum of two angles between the planes
+// through the edges, is made as its cosine and sine: exact where arc cosines are not.
+vec2 quad_light_place(QuadView w, vec2 u) {
+    float z2 = w.z * w.z, a0 = w.y0 * w.y0 + z2, a1 = w.y1 * w.y1 + z2;
+    float r0 = inversesqrt(a0), r1 = inversesqrt(a1);
+    vec2 k = vec2(w.x0 * w.x0 * w.y0 * w.y1 + z2 * w.a * w.d, w.x0 * w.z * (w.y1 * w.a - w.y0 * w.d));
+    k *= -r0 * r1 / (w.x0 * w.x0 + z2);
+    float part = u.x * w.s, c = cos(part), s = sin(part);
+    vec2 turn = vec2(c * k.x - s * k.y, s * k.x + c * k.y); // of the paper's au
+    float n = -(w.y0 * r0 * turn.x + w.y1 * r1); // its fu times sin au
+    float rest = n * n - z2 * r0 * r0 * turn.y * turn.y;
+    float x = (n > 0.0 ? w.z : -w.z) * turn.y * inversesqrt(max(rest, 1e-30));
+    x = clamp(x, w.x0, w.x1);
+    float d2 = x * x + z2;
+    float h = mix(w.y0 * inversesqrt(d2 + w.y0 * w.y0), w.y1 * inversesqrt(d2 + w.y1 * w.y1), u.y);
+    float y = clamp(h * sqrt(d2 / max(1.0 - h * h, 1e-12)), w.y0, w.y1);
+    return vec2(x - w.x0, y - w.y0) / vec2(w.x1 - w.x0, w.y1 - w.y0);
+}
+
+LightSample quad_light_sample(Quad q, vec3 p, vec2 u, uint sides) {
+    QuadView w = quad_light_view(q, p);
+    if (!quad_light_shines(q, p, sides)) return lights_none();
+    vec2 place = w.s > 0.0 ? quad_light_place(w, u) : u;
     Point at;
-    at.p = q.origin + u.x * q.u + u.y * q.v;
+    at.p = q.origin + place.x * q.u + place.y * q.v;
     at.ng = q.normal;
     at.error = gamma_error(6.0) * (abs(q.origin) + abs(q.u) + abs(q.v));
-    vec3 to = shapes_leave(at, q.normal) - p; // it is seen from its front only
+    vec3 to = shapes_leave(at, p - q.origin) - p; // on the side that it is seen from
     float t = length(to);
     vec3 wi = t > 0.0 ? to / t : q.normal;
-    return LightSample(wi, t, vec3(0.0), quad_light_pdf(q, t, q.normal, wi), true, NONE);
+    return LightSample(wi, t, vec3(1.0), w.s > 0.0 ? 1.0 / w.s : quad_light_area_pdf(q, t, wi), true, NONE);
 }

@@ -18,6 +18,7 @@ Point quad_point(Quad q, vec3 p, uint id) {
     r.tangent = q.u;
     r.material = q.material;
     r.light = q.light;
+    r.shape = q.shape;
     r.flat_id = id;
     return r;
 }

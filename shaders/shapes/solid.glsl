@@ -19,6 +19,7 @@ Point solid_point(Solid s, vec3 q, vec3 n) {
     r.ns = r.ng;
     r.material = s.material;
     r.light = s.light;
+    r.shape = s.shape;
     r.flat_id = NONE;
     r.tangent = axes[0];
     return r;

@@ -21,6 +21,7 @@ Point sphere_point(Sphere s, vec3 p) {
     r.ns = r.ng;
     r.material = s.material;
     r.light = s.light;
+    r.shape = s.shape;
     r.flat_id = NONE;
 #if HAS_ANISOTROPIC
     // Along growing u = 1/2 + atan2(x, z) / 2 pi; at a pole any direction serves.

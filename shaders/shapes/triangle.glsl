@@ -67,6 +67,7 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
 #endif
     r.material = tri.material;
     r.light = tri.light;
+    r.shape = tri.shape;
     r.flat_id = id;
     return r;
 }

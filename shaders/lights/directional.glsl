@@ -1,0 +1,22 @@
+// Light from infinity: parallel, or uniform over a disk of directions with radiance E / (pi sin^2 a), whose irradiance
+// on a surface that faces its middle is E.
+float directional_light_pdf(Light l) { return 1.0 / (TWO_PI * l.spread); }
+
+// Radiance from direction wi, which must be unit; half the square of a difference is 1 - cos without cancelling.
+vec3 directional_light_radiance(Light l, vec3 wi) {
+    vec3 off = wi + l.direction;
+    return 0.5 * dot(off, off) <= l.spread ? l.intensity : vec3(0.0);
+}
+
+LightSample directional_light_sample(Light l, vec2 u) {
+    vec3 wi = -l.direction;
+#if HAS_SUN_DISKS
+    if (l.spread > 0.0) {
+        float h = u.x * l.spread; // 1 - cos theta
+        float r = sqrt(h * (2.0 - h)), phi = TWO_PI * u.y;
+        wi = frame_to_world(frame_basis(wi), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
+        return LightSample(wi, INFINITY_T, l.intensity, directional_light_pdf(l), true, NONE);
+    }
+#endif
+    return LightSample(wi, INFINITY_T, l.intensity, 1.0, false, NONE);
+}
