@@ -8,6 +8,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import ShapeKind
+from gpu.sky import SunDisk
 
 Vec3 = tuple[float, float, float]
 
@@ -31,6 +32,9 @@ class EnvironmentArrays:
 
     A constant environment is one texel. `probability` (h, w) float32 is the density per steradian with which
     `alias` (h * w records of `layout.EnvironmentAlias`) picks a direction in that texel, at rotation 0.
+
+    With `cube` the map is six faces of n x n texels, (2 n, 3 n, 3): px nx py above ny pz nz, and `probability` is per
+    unit of area of the cube from -1 to 1. A `sun` shines on top of the map and takes `sun_share` of the samples.
     """
 
     texels: np.ndarray
@@ -39,6 +43,9 @@ class EnvironmentArrays:
     rotation: float  # radians about +Y
     scale: float
     background: bool
+    cube: bool = False
+    sun: SunDisk | None = None
+    sun_share: float = 0.0
 
 
 def _empty(record: type[layout.Record]) -> np.ndarray:

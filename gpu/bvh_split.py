@@ -18,7 +18,8 @@ def half_area(box: np.ndarray) -> float:
     x = np.float64(box[3]) - box[0]
     y = np.float64(box[4]) - box[1]
     z = np.float64(box[5]) - box[2]
-    return x * y + y * z + z * x
+    area: float = x * y + y * z + z * x
+    return area
 
 
 @jit

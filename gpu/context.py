@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import ctypes.util
 import logging
+import threading
 from typing import Any
 
 from gpu.errors import ContextError
 
 log = logging.getLogger(__name__)
+_thread = threading.local()
 
 REQUIRED = 430  # compute shaders and storage buffers
+PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
@@ -22,19 +25,39 @@ def create(device: int | None = None) -> Any:
     """
     import moderngl
 
-    if ctypes.util.find_library("EGL") is None:
-        raise ContextError("libEGL is not installed: on Debian `apt-get install libegl1 libgl1-mesa-dri`")
-    options: dict[str, Any] = {"backend": "egl"} | ({} if device is None else {"device_index": device})
+    # Either holds OpenGL's functions; the first comes without X11's libraries.
+    opengl = ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL")
+    for name, library in (("libEGL", ctypes.util.find_library("EGL")), ("libOpenGL", opengl)):
+        if library is None:
+            raise ContextError(f"{name} is not installed: on Debian `apt-get install {PACKAGES}`")
+    options: dict[str, Any] = {"backend": "egl", "libgl": opengl}
+    if device is not None:
+        options["device_index"] = device
     try:
         context = moderngl.create_context(REQUIRED, standalone=True, **options)
     except Exception as error:  # glcontext raises bare Exception, moderngl several others
         where = "the default EGL device" if device is None else f"EGL device {device}"
         raise ContextError(
             f"no OpenGL {REQUIRED / 100:.1f} context on {where} ({error}): needs a GPU driver with EGL, "
-            "or Mesa's software renderer (on Debian `apt-get install libegl1 libgl1-mesa-dri`)"
+            f"or Mesa's software renderer (on Debian `apt-get install {PACKAGES}`)"
         ) from error
+    _thread.current = context
     log.info("created context renderer=%s version=%s", context.info["GL_RENDERER"], context.info["GL_VERSION"])
     return context
+
+
+def use(context: Any) -> None:
+    """Make `context` the thread's current one, where another has been made or closed since."""
+    if getattr(_thread, "current", None) is not context:
+        context.__enter__()
+        _thread.current = context
+
+
+def release(context: Any) -> None:
+    """Release `context`; none is current afterwards."""
+    use(context)
+    context.release()
+    _thread.current = None
 
 
 def describe(context: Any) -> dict[str, Any]:

@@ -64,6 +64,42 @@ def solid_angles(height: int, width: int) -> np.ndarray:
     return np.asarray(2.0 * np.pi / width * 2.0 * np.sin(middle) * np.sin(0.5 * np.pi / height))
 
 
+def cube_solid_angles(n: int) -> np.ndarray:
+    """(n, n) float64, sr: of the texels of a cube's face."""
+    edges = np.linspace(-1.0, 1.0, n + 1)
+    a, b = edges[:, None], edges
+    corner = np.arctan2(a * b, np.sqrt(a * a + b * b + 1.0))  # of the rectangle from the middle of the face
+    return np.asarray(corner[1:, 1:] - corner[1:, :-1] - corner[:-1, 1:] + corner[:-1, :-1])
+
+
+def cube_tables(texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """As `environment_tables`, for six faces (2 n, 3 n, 3); the probability is per unit of area of the cube -1..1.
+
+    A texel is drawn by the luminance of its bilinear footprint, which ends at the face's edge, times its solid
+    angle, then a place in it uniformly. A black map is drawn uniformly.
+    """
+    n = texels.shape[0] // 2
+    faces = (texels @ LUMINANCE).astype(np.float64).reshape(2, n, 3, n).transpose(1, 3, 0, 2)  # (n, n, 2, 3)
+    solid = cube_solid_angles(n)[:, :, None, None]
+    weights = _clamped(_clamped(faces).swapaxes(0, 1)).swapaxes(0, 1) * solid
+    if not weights.sum() > 0.0:
+        weights = np.broadcast_to(solid, weights.shape)
+    threshold, alias, probability = alias_table(weights.transpose(2, 0, 3, 1).reshape(-1))
+    table = np.empty(6 * n * n, EnvironmentAlias.dtype)
+    table["threshold"], table["alias"] = threshold, alias
+    return (probability * (n * n / 4.0)).astype(np.float32).reshape(2 * n, 3 * n), table
+
+
+def _clamped(values: np.ndarray) -> np.ndarray:
+    """Means over texels along the first axis of `values` interpolated linearly, constant beyond the ends."""
+    out = 0.75 * values
+    out[1:] += 0.125 * values[:-1]
+    out[:-1] += 0.125 * values[1:]
+    out[0] += 0.125 * values[0]
+    out[-1] += 0.125 * values[-1]
+    return np.asarray(out)
+
+
 def environment_tables(texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(probability (h, w) float32, `layout.EnvironmentAlias` (h * w,)) for radiance (h, w, 3), not negative.
 

@@ -72,18 +72,28 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_TRIANGLE_LIGHTS": _light(LightKind.TRIANGLE),
     "HAS_ELLIPSOID_LIGHTS": _light(LightKind.ELLIPSOID),
     "HAS_ENVIRONMENT": lambda s: s.environment is not None,
-    "HAS_ENVIRONMENT_IMAGE": lambda s: s.environment is not None and s.environment.texels.size > 3,
+    "HAS_ENVIRONMENT_IMAGE": lambda s: (
+        s.environment is not None and s.environment.texels.size > 3 and not s.environment.cube
+    ),
+    "HAS_ENVIRONMENT_CUBE": lambda s: s.environment is not None and s.environment.cube,
+    "HAS_SUN": lambda s: s.environment is not None and s.environment.sun is not None,
     "HAS_APERTURE": lambda s: s.camera.aperture_radius > 0,
     "HAS_DISNEY": _model(Model.DISNEY),
     "HAS_SUBSURFACE": _disney("subsurface"),
     "HAS_SHEEN": _disney("sheen"),
     "HAS_ANISOTROPIC": _disney("anisotropic"),
     "HAS_CLEARCOAT": _disney("clearcoat"),
+    "HAS_METAL_ROUGH": _model(Model.METAL_ROUGH),
+    "HAS_BLINN_PHONG": _model(Model.BLINN_PHONG),
+    "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
 }
 
 # What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
 # ever waits for a compiler.
-EDITED = {"HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")}
+EDITED = {
+    "HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT"),
+    "HAS_BLINN_PHONG": ("HAS_AMBIENT",),
+}
 
 
 def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:

@@ -80,6 +80,8 @@ class LightKind(IntEnum):
 class Model(IntEnum):
     DIFFUSE = 0
     DISNEY = 1
+    METAL_ROUGH = 3
+    BLINN_PHONG = 4
 
 
 class Slot(IntEnum):
@@ -161,6 +163,10 @@ class Material(Record):
     clearcoat_gloss: f32
     opacity: f32  # the chance that a ray meets the surface
     emission_sides: u32  # 1: the outward side emits; 2: both do
+    unused: f32  # up to the next group of four
+    phong_specular: vec3  # blinn_phong; its diffuse is base_color
+    shininess: f32  # exponent, >= 0
+    ambient: vec3  # radiance added wherever a path meets the surface
 
 
 class Sphere(Record):
@@ -280,6 +286,11 @@ class Frame(Record):
     moment_scale: f32  # second moments are of radiance times this
     environment_background: u32
     pixel_stride: u32  # 1: every pixel; n: one pixel of each n x n block, for the noise meter
+    environment_cube: u32  # 1: its texture holds the six faces of a cube
+    environment_sun: vec3  # unit, towards the sun's middle, before the environment's rotation
+    environment_sun_cap: f32  # 1 - cos of its angular radius
+    environment_sun_radiance: vec3
+    environment_sun_share: f32  # of the environment's samples
     sun_first: u32  # among the lights: directional ones with a disk stand side by side
     sun_count: u32
 

@@ -11,6 +11,7 @@ from typing import Any
 
 import numpy as np
 
+from gpu import context as contexts
 from gpu import display, features, filters, layout
 from gpu.errors import NothingRendered, OutOfMemory
 from gpu.layout import Slot
@@ -64,6 +65,7 @@ class Picture:
 
     def reset(self) -> None:
         """Start again at zero samples, with the scene as it is now."""
+        contexts.use(self._context)
         kernel = self._kernels.get("pathtrace.comp", self.scene.defines(self.settings))
         self.compile_ms += self._kernels.last_compile_ms
         if kernel is not self._kernel:
@@ -89,12 +91,14 @@ class Picture:
 
     @property
     def warnings(self) -> list[str]:
+        contexts.use(self._context)
         ended = int(np.frombuffer(self._ended.read(4), np.uint32)[0])
         return [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
 
     def trace(self, budget_s: float, max_samples: int) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
         start = time.perf_counter()
+        contexts.use(self._context)
         self._bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
@@ -171,6 +175,7 @@ class Picture:
         self._kernel.run(-(-size[0] // 8), -(-size[1] // 8))
 
     def _need_samples(self) -> None:
+        contexts.use(self._context)
         if self.samples == 0:
             raise NothingRendered("no sample is complete yet")
 
@@ -198,7 +203,7 @@ class Picture:
         return mean
 
     def _read_guide(self, aov: str) -> np.ndarray:
-        self._trace_guides()
+        self.trace_guides()
         albedo, normal = (self._vectors(self._guides[s]) for s in (Slot.ALBEDO, Slot.NORMAL))
         n = np.float32(self._guide_samples)
         if aov == "albedo":
@@ -208,22 +213,31 @@ class Picture:
         hits = albedo[..., 3:]
         return np.where(hits > 0, normal[..., 3:] / np.maximum(hits, 1), 0).astype(np.float32)
 
-    def _trace_guides(self) -> None:
+    def trace_guides(self, budget_s: float = math.inf) -> bool:
+        """Trace the AOVs of the first hit for about `budget_s` seconds; whether they are all there.
+
+        They are traced when first asked for, over the camera rays of the picture's first 256 samples at most.
+        `read` traces what is still missing.
+        """
+        self._need_samples()
+        start = time.perf_counter()
         want = min(self.samples, _GUIDE_SAMPLES)
         size = (self.settings.width, self.settings.height)
         if not self._guides:
             for slot in (Slot.ALBEDO, Slot.NORMAL):
                 self._guides[slot] = self._context.buffer(reserve=16 * size[0] * size[1])
                 self._guides[slot].clear()
-        kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
-        self._bind()
-        for slot, buffer in self._guides.items():
-            buffer.bind_to_storage_buffer(int(slot))
-        while self._guide_samples < want:
-            count = min(8, want - self._guide_samples)
-            self._frame_buffer.write(self._frame((0, 0), size, self._guide_samples, count).tobytes())
+        if self._guide_samples < want:
+            kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
+            self._bind()
+            for slot, buffer in self._guides.items():
+                buffer.bind_to_storage_buffer(int(slot))
+        while self._guide_samples < want and time.perf_counter() - start < budget_s:
+            self._frame_buffer.write(self._frame((0, 0), size, self._guide_samples, 1).tobytes())
             kernel.run(-(-size[0] // 8), -(-size[1] // 8))
-            self._guide_samples += count
+            self._context.finish()
+            self._guide_samples += 1
+        return self._guide_samples >= want
 
     def noise(self) -> float | None:
         """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black.
@@ -233,15 +247,16 @@ class Picture:
         """
         if self.samples < 2:
             return None
-        weights = np.array([0.2126, 0.7152, 0.0722])
+        contexts.use(self._context)
+        weights = np.array([0.2126, 0.7152, 0.0722], np.float32)
         mean = self.read()[..., :3] @ weights
         at = display.meter_pixels(self._cells, self._stride, (self.settings.width, self.settings.height))
         sums = np.frombuffer(self._meter[Slot.SUM].read(), np.float32).reshape(-1, 4)[:, :3]
         other = sums / self.samples @ weights
-        average = float(mean.mean())
+        average = float(mean.mean(dtype=np.float64))
         if average == 0:
             return 0.0
-        difference = (mean[at[1], at[0]] - other) / average
+        difference = (mean[at[1], at[0]].astype(np.float64) - other) / average
         return float(np.sqrt(0.5 * np.mean(difference**2)))
 
     def display(
@@ -270,6 +285,7 @@ class Picture:
         return pixels
 
     def release(self) -> None:
+        contexts.use(self._context)
         for buffer in (*self._main.values(), *self._meter.values(), *self._guides.values()):
             buffer.release()
         self._ended.release()

@@ -28,6 +28,7 @@ class Renderer:
     def _own(self) -> None:
         if threading.get_ident() != self._thread:
             raise WrongThread("a Renderer belongs to the thread that made it")
+        contexts.use(self._context)
 
     def load(self, arrays: SceneArrays, editing: bool = False) -> Scene:
         """Upload a scene. `editing` keeps compiled what its materials' sliders could raise.
@@ -54,7 +55,7 @@ class Renderer:
         self._own()
         self._kernels.release()
         self._frame.release()
-        self._context.release()
+        contexts.release(self._context)
 
     def __enter__(self) -> Renderer:
         return self

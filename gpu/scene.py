@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from gpu import context as contexts
 from gpu import features, layout
 from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
@@ -71,7 +72,8 @@ class Scene:
         if e is not None:
             texels = np.dstack([e.texels, e.probability]).astype(np.float32)
             alias = e.alias
-            self._scale_max = RADIANCE_MAX / max(float(e.texels.max()), 1.0)
+            peak = float(e.texels.max()) + (max(e.sun.radiance) if e.sun is not None else 0.0)
+            self._scale_max = RADIANCE_MAX / max(peak, 1.0)
         height, width = texels.shape[:2]
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
@@ -95,6 +97,7 @@ class Scene:
 
         Uploads nothing else. Pictures of this scene must be reset by the caller.
         """
+        contexts.use(self._context)
         changes: dict[str, Any] = {}
         if camera is not None:
             changes["camera"] = camera
@@ -140,11 +143,18 @@ class Scene:
             frame["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
             frame["environment_scale"] = min(e.scale, self._scale_max)
             frame["environment_background"] = e.background
+            frame["environment_cube"] = e.cube
+            if e.sun is not None:
+                frame["environment_sun"] = e.sun.direction
+                frame["environment_sun_cap"] = e.sun.cap
+                frame["environment_sun_radiance"] = e.sun.radiance
+                frame["environment_sun_share"] = e.sun_share
             frame["environment_probability"] = a.lights["probability"][
                 a.lights["kind"] == LightKind.ENVIRONMENT
             ].sum()
 
     def release(self) -> None:
+        contexts.use(self._context)
         for buffer in self._buffers.values():
             buffer.release()
         self._texels.release()

@@ -5,6 +5,8 @@
 #include "lobes/sheen.glsl"
 #include "lobes/specular.glsl"
 #include "lobes/clearcoat.glsl"
+#include "lobes/metal_rough.glsl"
+#include "lobes/blinn_phong.glsl"
 
 struct Scatter {
     vec3 f;    // BSDF times |cos theta_i|
@@ -68,6 +70,18 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #endif
     }
 #endif
+#if HAS_METAL_ROUGH
+    if (s.model == MODEL_METAL_ROUGH) {
+        vec3 wm = normalize(wo + wi);
+        r = Scatter(metal_rough_eval(s, wo, wi, wm, dot(wi, wm)), metal_rough_pdf(s, wo, wi, wm));
+    }
+#endif
+#if HAS_BLINN_PHONG
+    if (s.model == MODEL_BLINN_PHONG) {
+        vec3 wm = normalize(wo + wi);
+        r = Scatter(blinn_phong_eval(s, wi, wm), blinn_phong_pdf(s, wi, wm, dot(wi, wm)));
+    }
+#endif
     r.f *= wi.z;
     return r;
 }
@@ -92,6 +106,12 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
         if (u_lobe >= w.diffuse + w.specular) wi = coat;
 #endif
     }
+#endif
+#if HAS_METAL_ROUGH
+    if (s.model == MODEL_METAL_ROUGH) wi = metal_rough_sample(s, wo, u_lobe, u);
+#endif
+#if HAS_BLINN_PHONG
+    if (s.model == MODEL_BLINN_PHONG) wi = blinn_phong_sample(s, wo, u_lobe, u);
 #endif
     return wi;
 }

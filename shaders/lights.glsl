@@ -14,6 +14,9 @@ LightSample lights_none() { return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.
 #include "lights/point.glsl"
 #include "lights/spot.glsl"
 #include "lights/directional.glsl"
+uniform sampler2D environment_texels; // rgb radiance; a: density of picking a direction here, per steradian
+#include "lights/cubemap.glsl"
+#include "lights/sun.glsl"
 #include "lights/environment.glsl"
 #include "lights/sphere.glsl"
 #include "lights/quad.glsl"

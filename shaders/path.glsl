@@ -52,6 +52,15 @@ vec3 path_emission(Point at, vec3 d) {
     return vec3(0.0);
 }
 
+// blinn_phong's radiance without a cause: from both sides, and no light to anything that picks lights.
+vec3 path_ambient(Point at) {
+#if HAS_AMBIENT
+    return material_pick(at.material).ambient;
+#else
+    return vec3(0.0);
+#endif
+}
+
 // A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation can turn it away at a
 // silhouette; it is then bent back until it is just in view, which loses no light to black rims.
 vec3 path_normal(Point at, vec3 wo_w) {
@@ -69,7 +78,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
     bool alive = n.id != NONE;
     if (alive) {
-        result = Radiance(path_emission(at, d), 1.0);
+        result = Radiance(path_emission(at, d) + path_ambient(at), 1.0);
     }
 #if HAS_ENVIRONMENT
     else if (frame.environment_background != 0u) {
@@ -183,6 +192,9 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             if (!met) arriving += path_disks(d, next.pdf);
 #endif
             if (alive) result.color += path_clamp(throughput * arriving, bounce > 1u);
+#endif
+#if HAS_AMBIENT
+            if (alive && met) result.color += path_clamp(throughput * path_ambient(at), bounce > 1u);
 #endif
             alive = alive && met;
         } while (alive && bounce < frame.max_bounces);

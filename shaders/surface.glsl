@@ -11,6 +11,8 @@ struct Surface {
     vec3 sheen;       // colour times amount
     float clearcoat;
     float alpha_coat;
+    vec3 phong;       // colour of blinn_phong's highlight
+    float shininess;
     vec2 tangent;     // direction in the shading frame that anisotropy stretches along
 };
 
@@ -27,6 +29,8 @@ Surface surface_make(Material m, vec2 tangent) {
     s.sheen = vec3(0.0);
     s.clearcoat = 0.0;
     s.alpha_coat = 1.0;
+    s.phong = m.phong_specular;
+    s.shininess = m.shininess;
     s.tangent = vec2(1.0, 0.0);
 #if HAS_DISNEY
     // Weights of the course notes' luminance, not Rec.709's: the model is kept for faithful comparison.
@@ -48,6 +52,14 @@ Surface surface_make(Material m, vec2 tangent) {
     s.clearcoat = m.clearcoat;
     s.alpha_coat = mix(0.1, 0.001, m.clearcoat_gloss);
 #endif
+#endif
+#if HAS_METAL_ROUGH
+    if (m.model == MODEL_METAL_ROUGH) {
+        s.spec0 = mix(vec3(0.04), m.base_color, m.metallic);
+        s.alpha_mask = max(0.001, m.roughness * m.roughness);
+        s.alpha = vec2(s.alpha_mask);
+        s.tangent = vec2(1.0, 0.0);
+    }
 #endif
     return s;
 }

@@ -8,6 +8,7 @@ from collections.abc import Iterator
 import pytest
 
 from gpu import ContextError, Renderer
+from tests.serving import Server
 
 
 @pytest.fixture(scope="session")
@@ -21,3 +22,12 @@ def gpu() -> Iterator[Renderer]:
         pytest.skip(str(error))
     yield renderer
     renderer.close()
+
+
+@pytest.fixture(scope="session")
+def server(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """`sunbox serve`, ready, for all tests of the session that leave it as it was."""
+    served = Server(tmp_path_factory.mktemp("server"))
+    served.wait()
+    yield served
+    served.stop()

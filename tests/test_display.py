@@ -21,7 +21,7 @@ def _neutral(c: np.ndarray) -> np.ndarray:
     peak = c.max(-1, keepdims=True)
     pressed = 1 - 0.24**2 / (np.maximum(peak, 0.76) + 0.24 - 0.76)
     g = 1 - 1 / (0.15 * (peak - pressed) + 1)
-    return np.where(peak < 0.76, c, c * pressed / peak * (1 - g) + pressed * g)
+    return np.where(peak < 0.76, c, c * pressed / np.maximum(peak, 1e-9) * (1 - g) + pressed * g)
 
 
 def _aces(c: np.ndarray) -> np.ndarray:

@@ -156,12 +156,16 @@ def _showcase() -> dict[str, Any]:
         {"type": "box", "min": [0.9, -1, -0.5], "max": [1.5, 0.3, 0.4], "material": "coat"},
         {**SPHERE, "center": [-1.5, 0.2, 0], "radius": 0.4, "material": "coat", "transform": {"scale": [1, 2, 0.5]}},
         {"type": "quad", "origin": [-1, 2.5, -1], "u": [2, 0, 0], "v": [0, 0, 2], "material": "lamp"},
+        {**SPHERE, "center": [0.9, 0.9, 0.2], "radius": 0.35, "material": "gltf"},
+        {**SPHERE, "center": [-0.6, -0.8, 1], "radius": 0.25, "material": "phong"},
     ]
     materials = {
         "floor": {"type": "diffuse", "albedo": [0.7, 0.6, 0.5]},
         "metal": {"type": "disney", "metallic": 1, "roughness": 0.35, "anisotropic": 0.5, "base_color": 0.9},
         "coat": {"type": "disney", "base_color": "#803020", "clearcoat": 1, "sheen": 0.5, "subsurface": 0.3},
         "lamp": LAMP,
+        "gltf": {"type": "metal_rough", "base_color": [0.9, 0.6, 0.3], "metallic": 0.7, "roughness": 0.4},
+        "phong": {"type": "blinn_phong", "diffuse": 0.3, "specular": 0.6, "shininess": 20, "ambient": 0.05},
     }
     env = {"type": "constant", "radiance": 0.3}
     light = {"type": "point", "position": [2, 2, 2], "intensity": 5}
@@ -263,3 +267,35 @@ def test_guides_of_the_first_hit(gpu: Renderer) -> None:
     assert made.read("albedo")[0, 0].max() == 0
     assert made.read()[16, 16, 3] == 1
     assert made.read()[0, 0, 3] == 0
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize("bounces", [0, 1, 5])
+def test_ambient_is_added_where_a_path_meets_the_surface(gpu: Renderer, estimator: str, bounces: int) -> None:
+    """A ball of ambient radiance inside a closed white one: the geometric series again, without any light."""
+    phong = {"type": "blinn_phong", "diffuse": 0.5, "specular": 0, "shininess": 0, "ambient": [3, 2, 1]}
+    room = {"type": "sphere", "center": [0, 0, 0], "radius": 9, "material": "m"}
+    scene = document([SPHERE, room], {"m": phong}, camera=NARROW)
+    image = _spot(gpu, scene, 1 << 14, estimator=estimator, max_bounces=bounces)
+    np.testing.assert_allclose(image, (2 - 0.5**bounces) * np.array([3, 2, 1]), rtol=0.02)
+
+
+@pytest.mark.parametrize("estimator", ESTIMATORS)
+def test_blinn_phong_under_a_point_light(gpu: Renderer, estimator: str) -> None:
+    for shininess, power in ((0, 1.0), (40, math.cos(math.radians(15)) ** 40), (1e6, 0.0)):
+        phong = {"type": "blinn_phong", "diffuse": 0.3, "specular": [1, 0.5, 0.25], "shininess": shininess}
+        light = {"type": "point", "position": [math.sqrt(0.5), 0, math.sqrt(0.5)], "intensity": math.pi}
+        camera = {"position": [math.sin(math.radians(-15)) * 4, 0, math.cos(math.radians(-15)) * 4],
+                  "target": [0, 0, 0], "vfov": 0.02}  # fmt: skip
+        scene = document([QUAD], {"m": phong}, lights=[light], camera=camera)
+        want = 0.3 * math.sqrt(0.5) + power * np.array([1, 0.5, 0.25])
+        np.testing.assert_allclose(_spot(gpu, scene, 64, estimator=estimator), want, rtol=2e-3)
+
+
+@pytest.mark.parametrize("shininess", [0, 1e-30, 1e6, 1e20])
+def test_no_shininess_makes_a_nan(gpu: Renderer, shininess: float) -> None:
+    for diffuse, specular in ((0, 1), (1, 0), (0, 0), (0.5, 0.5)):
+        phong = {"type": "blinn_phong", "diffuse": diffuse, "specular": specular, "shininess": shininess}
+        scene = document([SPHERE], {"m": phong}, environment={"type": "constant", "radiance": 1})
+        for estimator in ESTIMATORS:
+            assert np.isfinite(render(gpu, scene, 16, estimator=estimator)).all()

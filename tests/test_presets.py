@@ -63,7 +63,19 @@ def test_there_is_enough_to_choose_from() -> None:
     wanted = {"sphere-on-floor", "cornell-empty", "cornell-boxes", "cornell-spheres", "roughness-row", "sphere-field",
               "generated-mesh", "point-lights"}  # fmt: skip
     assert wanted <= set(SCENES)
-    assert len(presets.names("materials")) >= 12 and len(presets.names("environments")) >= 3
+    assert len(presets.names("materials")) >= 24 and len(presets.names("environments")) >= 6
+
+
+METALS = {"gold", "silver", "copper", "aluminium", "brushed-aluminium", "iron", "titanium", "chrome", "nickel",
+          "platinum", "brass"}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", sorted(METALS))
+def test_metals_say_who_measured_them(name: str) -> None:
+    path = Path(presets.__file__).parent / "materials" / f"{name}.json"
+    assert "measured n and k" in json.loads(path.read_text())["source"]
+    document = presets.get("materials", name)
+    assert "source" not in document and document["metallic"] == 1 and min(document["base_color"]) > 0.25
 
 
 @pytest.mark.parametrize("name", SCENES)

@@ -121,7 +121,7 @@ STRUCTURE = {
     "/lights/2/position": ([0, 0, 0],),
     "/environment": (None, []),
     "/environment/colour": (1,),
-    "/environment/type": (GONE, "sky", "studio"),
+    "/environment/type": (GONE, "dome", "studio"),
     "/environment/background": (1, "true", None),
 }
 

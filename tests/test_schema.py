@@ -90,7 +90,7 @@ def test_colours_have_three_forms() -> None:
 
 def test_what_is_not_built_is_absent() -> None:
     text = json.dumps(WHOLE)
-    for name in ("texture", "principled", "cubemap"):
+    for name in ("texture", "principled"):
         assert f'"{name}"' not in text
 
 

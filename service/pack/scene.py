@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import partial
 from typing import Protocol
 
 import numpy as np
@@ -14,10 +15,10 @@ from service.assets import Assets
 from service.pack import lights
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
-from service.pack.sky import Sky, make_sky
+from service.pack.sky import Sky, make_sky, sky_key
 from service.pack.values import pack_camera, pack_materials, pack_turn
 from service.scene import Scene
-from service.scene.environment import Environment, ImageEnvironment
+from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
 
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1
@@ -54,8 +55,9 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
             scale = BRIGHTEST / sky.peak
             warnings.append(f"/environment/scale: lowered to {scale:.3g}, as radiance ends at {BRIGHTEST:g}")
         environment = EnvironmentArrays(
-            sky.texels, sky.probability, sky.alias, rotation, scale, scene.environment.background
-        )
+            sky.texels, sky.probability, sky.alias, rotation, scale, scene.environment.background,
+            sky.cube, sky.sun, sky.sun_share,
+        )  # fmt: skip
         if scale > 0:  # what it sends through a disk around the scene
             sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
     standing, standing_power = lights.standing(scene.lights, built.origin, built.radius)
@@ -65,6 +67,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
     peak = max(
         peak,
         float(emission.max(initial=0.0)),
+        float(materials["ambient"].max(initial=0.0)),
         float((standing["intensity"].max(axis=1, initial=0.0) / reached).max(initial=0.0)),
     )
     arrays = SceneArrays(
@@ -107,6 +110,6 @@ def _geometry(
 
 
 def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> Sky:
-    if isinstance(environment, ImageEnvironment) and cache is not None and lasting(environment.asset):
-        return cache.get(("sky", environment.asset), lambda: make_sky(environment, assets))
-    return make_sky(environment, assets)
+    key = sky_key(environment)
+    make = partial(make_sky, environment, assets)
+    return make() if cache is None or key is None else cache.get(key, make)

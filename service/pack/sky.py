@@ -2,17 +2,37 @@
 
 from __future__ import annotations
 
+import math
+from collections import Counter
+from collections.abc import Hashable
 from dataclasses import dataclass
 
 import numpy as np
 
-from gpu.distribution import LUMINANCE, environment_tables, solid_angles
+from gpu.distribution import (
+    LUMINANCE,
+    cube_solid_angles,
+    cube_tables,
+    environment_tables,
+    solid_angles,
+)
+from gpu.sky import SunDisk, bake, sun_disk
 from service.assets import Assets, ImageData
+from service.pack.cache import lasting
 from service.problems import AssetError, FieldError, InvalidDocument
-from service.scene.environment import ConstantEnvironment, Environment
+from service.scene.environment import (
+    ConstantEnvironment,
+    CubeFaces,
+    CubemapEnvironment,
+    Environment,
+    ImageEnvironment,
+    SkyEnvironment,
+)
 from service.scene.numbers import BRIGHTEST
 
 LARGEST_SIDE = 16384  # texels; no driver promises larger textures
+LARGEST_FACE = LARGEST_SIDE // 3  # they share one texture, three across
+SUN_SHARE = (0.1, 0.9)  # bounds on the sun's part of the samples: a mirror looks at the dome, stone is lit by the sun
 
 
 @dataclass(frozen=True)
@@ -25,24 +45,89 @@ class Sky:
     irradiance: float  # luminance of radiance, integrated over all directions
     peak: float  # the greatest channel
     warnings: tuple[str, ...] = ()
+    cube: bool = False
+    sun: SunDisk | None = None
+    sun_share: float = 0.0
+
+
+def sky_key(environment: Environment) -> Hashable:
+    """Equal where `make_sky` makes equal skies; None where nothing is gained or a file may change."""
+    if isinstance(environment, ImageEnvironment):
+        return ("image", environment.asset) if lasting(environment.asset) else None
+    if isinstance(environment, CubemapEnvironment):
+        faces = tuple(environment.assets.model_dump().values())
+        return ("cubemap", faces) if all(map(lasting, faces)) else None
+    if isinstance(environment, SkyEnvironment):
+        e = environment
+        return "sky", e.sun_elevation, e.turbidity, e.ground_albedo, e.sun
+    return None
 
 
 def make_sky(environment: Environment, assets: Assets) -> Sky:
     """Raises InvalidDocument."""
     if isinstance(environment, ConstantEnvironment):
         return _sky(np.array(environment.radiance, np.float32).reshape(1, 1, 3), ())
-    try:
-        image = assets.image(environment.asset)
-    except AssetError as error:
-        raise _refused(error.detail) from None
+    if isinstance(environment, CubemapEnvironment):
+        return _cube(environment.assets, assets)
+    if isinstance(environment, SkyEnvironment):
+        return _clear(environment)
+    image = _image(environment.asset, assets, "/environment/asset")
     height, width = image.pixels.shape[:2]
     if max(height, width) > LARGEST_SIDE:
-        raise _refused(f"is {width} x {height}; at most {LARGEST_SIDE} a side")
-    return _sky(*_clamped(_linear(image)))
+        raise _refused("/environment/asset", f"is {width} x {height}; at most {LARGEST_SIDE} a side")
+    return _sky(*_clamped(_linear(image), "/environment/asset"))
 
 
-def _refused(detail: str) -> InvalidDocument:
-    return InvalidDocument([FieldError("/environment/asset", detail)])
+def _image(reference: str, assets: Assets, pointer: str) -> ImageData:
+    try:
+        return assets.image(reference)
+    except AssetError as error:
+        raise _refused(pointer, error.detail) from None
+
+
+def _refused(pointer: str, detail: str) -> InvalidDocument:
+    return InvalidDocument([FieldError(pointer, detail)])
+
+
+def _cube(faces: CubeFaces, assets: Assets) -> Sky:
+    pointers = {name: f"/environment/assets/{name}" for name in CubeFaces.model_fields}
+    images = {name: _image(getattr(faces, name), assets, pointer) for name, pointer in pointers.items()}
+    sizes = {name: image.pixels.shape[:2] for name, image in images.items()}
+    wanted = Counter(height for height, _ in sizes.values()).most_common(1)[0][0]
+    errors = []
+    for name, (height, width) in sizes.items():
+        if height != width:
+            errors.append(FieldError(pointers[name], f"is {width} x {height}: the face of a cube is square"))
+        elif height > LARGEST_FACE:
+            errors.append(FieldError(pointers[name], f"is {width} x {height}; at most {LARGEST_FACE} a side"))
+        elif height != wanted:
+            errors.append(FieldError(pointers[name], f"is {width} x {height}, others are {wanted} x {wanted}"))
+    if errors:
+        raise InvalidDocument(errors)
+    parts, warnings = zip(*(_clamped(_linear(image), pointers[name]) for name, image in images.items()), strict=True)
+    texels = np.vstack([np.hstack(parts[:3]), np.hstack(parts[3:])]).astype(np.float32)
+    probability, alias = cube_tables(texels)
+    solid = np.tile(cube_solid_angles(wanted), (2, 3))
+    irradiance = float(((texels @ LUMINANCE) * solid).sum())
+    peak = min(float(texels.max()), BRIGHTEST)
+    return Sky(texels, probability, alias, irradiance, peak, sum(warnings, ()), cube=True)
+
+
+def _clear(environment: SkyEnvironment) -> Sky:
+    elevation = math.radians(environment.sun_elevation)
+    texels = bake(elevation, environment.turbidity, environment.ground_albedo, environment.sun)
+    dome = _sky(texels, ())
+    if not environment.sun:
+        return dome
+    sun = sun_disk(elevation, environment.turbidity)
+    strength = float(sun.irradiance @ LUMINANCE)
+    if not strength > 0:  # behind all that air
+        return dome
+    low, high = SUN_SHARE
+    total = dome.irradiance + strength
+    share = min(max(strength / total, low), high)
+    peak = dome.peak + max(sun.radiance)
+    return Sky(dome.texels, dome.probability, dome.alias, total, peak, sun=sun, sun_share=share)
 
 
 def _linear(image: ImageData) -> np.ndarray:
@@ -56,14 +141,14 @@ def _linear(image: ImageData) -> np.ndarray:
     return np.where(pixels <= 0.04045, pixels / np.float32(12.92), steep)
 
 
-def _clamped(texels: np.ndarray) -> tuple[np.ndarray, tuple[str, ...]]:
+def _clamped(texels: np.ndarray, pointer: str) -> tuple[np.ndarray, tuple[str, ...]]:
     warnings = []
     for count, what in (
         (np.count_nonzero((texels < 0).any(axis=2)), "negative texels raised to 0"),
         (np.count_nonzero((texels > BRIGHTEST).any(axis=2)), f"texels beyond {BRIGHTEST:g} lowered to it"),
     ):
         if count:
-            warnings.append(f"/environment/asset: {count} {what}")
+            warnings.append(f"{pointer}: {count} {what}")
     return np.clip(texels, 0, np.float32(BRIGHTEST)) if warnings else texels, tuple(warnings)
 
 

@@ -9,12 +9,14 @@ import numpy as np
 from gpu import CameraArrays, layout
 from service.scene import Scene
 from service.scene.camera import Camera
-from service.scene.environment import Environment
+from service.scene.environment import Environment, SkyEnvironment
 from service.scene.material import Material
 from service.scene.numbers import Vec3
 
 # What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
-RENAMED = {"albedo": "base_color"}
+RENAMED = {"albedo": "base_color", "diffuse": "base_color"}
+# Where a name means another thing in one model.
+RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
 SIDES = {"front": 1, "both": 2}
 
 
@@ -46,7 +48,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
             if name == "emission_sides":
                 record[name] = SIDES[material.emission_sides]
                 continue
-            member = RENAMED.get(name, name)
+            member = RENAMED_IN.get(material.type, RENAMED).get(name, RENAMED.get(name, name))
             if member in layout.Material.members:
                 record[member] = getattr(material, name)
         record["opacity"] = opacity(material)
@@ -62,7 +64,10 @@ def opacity(material: Material) -> float:
 
 def pack_turn(environment: Environment) -> tuple[float, float]:
     """(rotation in radians, factor on the radiance), as `Scene.edit` takes them."""
-    return math.radians(math.fmod(environment.rotation, 360.0)), environment.scale
+    degrees = math.fmod(environment.rotation, 360.0)
+    if isinstance(environment, SkyEnvironment):  # packed with the sun over -Z; its azimuth turns the other way round
+        degrees -= math.fmod(environment.sun_azimuth, 360.0)
+    return math.radians(degrees), environment.scale
 
 
 def vec3(v: np.ndarray) -> Vec3:

@@ -1,6 +1,7 @@
 """Built-in scenes, materials and environments: JSON documents, and the assets that our own code makes for them.
 
-A file's `title` is for menus and no part of its document; `"builtin:NAME"` in it stands for an asset of `generated`.
+A file's `title` is for menus, its `source` says where numbers were measured; neither is part of the document.
+`"builtin:NAME"` in it stands for an asset of `generated`.
 """
 
 from __future__ import annotations
@@ -61,5 +62,5 @@ def _titled(kind: str, name: str) -> dict[str, Any]:
 
 @cache
 def _text(kind: str, name: str) -> str:
-    document = {key: value for key, value in _titled(kind, name).items() if key != "title"}
+    document = {key: value for key, value in _titled(kind, name).items() if key not in ("title", "source")}
     return re.sub(r'"builtin:([a-z-]+)"', lambda match: f'"{asset_id(match[1])}"', json.dumps(document))

@@ -5,9 +5,15 @@ from __future__ import annotations
 from service.scene.camera import Camera
 from service.scene.color import Color
 from service.scene.document import Scene, parse_scene
-from service.scene.environment import ConstantEnvironment, Environment, ImageEnvironment
+from service.scene.environment import (
+    ConstantEnvironment,
+    CubemapEnvironment,
+    Environment,
+    ImageEnvironment,
+    SkyEnvironment,
+)
 from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
-from service.scene.material import DiffuseMaterial, DisneyMaterial, Material
+from service.scene.material import BlinnPhongMaterial, DiffuseMaterial, DisneyMaterial, Material, MetalRoughMaterial
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
 from service.scene.schema import schema
@@ -17,10 +23,12 @@ from service.scene.text import load_json
 from service.scene.transform import MatrixTransform, Transform
 
 __all__ = [
+    "BlinnPhongMaterial",
     "BoxShape",
     "Camera",
     "Color",
     "ConstantEnvironment",
+    "CubemapEnvironment",
     "DiffuseMaterial",
     "DirectionalLight",
     "DisneyMaterial",
@@ -31,11 +39,13 @@ __all__ = [
     "Material",
     "MatrixTransform",
     "MeshShape",
+    "MetalRoughMaterial",
     "PointLight",
     "QuadShape",
     "Scene",
     "Settings",
     "Shape",
+    "SkyEnvironment",
     "SphereShape",
     "SpotLight",
     "Transform",

@@ -8,7 +8,7 @@ from pydantic import Field, model_validator
 
 from service.scene.base import Model, hint, refusal
 from service.scene.color import Radiometric
-from service.scene.numbers import BRIGHTEST, Degrees, Factor
+from service.scene.numbers import BRIGHTEST, Degrees, Factor, Fraction
 
 
 class _Surroundings(Model):
@@ -55,4 +55,51 @@ class ImageEnvironment(_Surroundings):
     ]
 
 
-Environment = Annotated[ConstantEnvironment | ImageEnvironment, Field(discriminator="type")]
+class CubeFaces(Model):
+    """Six square images of one size, in OpenGL's layout, each named by the axis in its middle."""
+
+    px: Annotated[str, Field(min_length=1), hint("+X", "Image of what lies towards +X; right is -Z, up is +Y.")]
+    nx: Annotated[str, Field(min_length=1), hint("-X", "Image of what lies towards -X; right is +Z, up is +Y.")]
+    py: Annotated[str, Field(min_length=1), hint("+Y", "Image of what lies above; right is +X, up is -Z.")]
+    ny: Annotated[str, Field(min_length=1), hint("-Y", "Image of what lies below; right is +X, up is +Z.")]
+    pz: Annotated[str, Field(min_length=1), hint("+Z", "Image of what lies towards +Z; right is +X, up is +Y.")]
+    nz: Annotated[str, Field(min_length=1), hint("-Z", "Image of what lies towards -Z; right is -X, up is +Y.")]
+
+
+class CubemapEnvironment(_Surroundings):
+    """Six HDR images, the faces of a cube."""
+
+    type: Literal["cubemap"]
+    assets: Annotated[CubeFaces, hint("Faces", "Six square HDR images of one size.")]
+
+
+class SkyEnvironment(_Surroundings):
+    """A clear sky by day: Hosek and Wilkie's model of dome and sun, above Lambertian ground."""
+
+    type: Literal["sky"]
+    sun_elevation: Annotated[
+        float,
+        Field(ge=0, le=90),
+        hint("Sun elevation", "Height of the sun: 0 is at the horizon, 90 overhead.", unit="degrees", widget="angle"),
+    ]
+    sun_azimuth: Annotated[
+        Degrees,
+        hint("Sun azimuth", "Where the sun stands: 0 is -Z, 90 is +X.", unit="degrees", widget="angle",
+             soft=(-180, 180)),
+    ]
+    turbidity: Annotated[
+        float,
+        Field(ge=1, le=10),
+        hint("Turbidity", "Haze: 1 is pure air, 3 a clear day, 6 hazy, 10 murky.", unit="", widget="slider"),
+    ] = 3.0
+    ground_albedo: Annotated[
+        Fraction,
+        hint("Ground albedo", "Share of light that the ground sends back, also into the sky: 0.3 is soil and grass.",
+             unit="", widget="slider"),
+    ] = 0.3
+    sun: Annotated[bool, hint("Sun", "Off: the dome alone, as if the sun itself were hidden.")] = True
+
+
+Environment = Annotated[
+    ConstantEnvironment | ImageEnvironment | CubemapEnvironment | SkyEnvironment, Field(discriminator="type")
+]

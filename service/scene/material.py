@@ -8,7 +8,7 @@ from pydantic import Field
 
 from service.scene.base import OMITTABLE, Model, hint
 from service.scene.color import Radiometric, Reflectance
-from service.scene.numbers import Fraction
+from service.scene.numbers import Factor, Fraction
 
 
 class _Surface(Model):
@@ -102,4 +102,52 @@ class DisneyMaterial(_Surface):
     ] = 1.0
 
 
-Material = Annotated[DiffuseMaterial | DisneyMaterial, Field(discriminator="type")]
+class MetalRoughMaterial(_Surface):
+    """The core BRDF of glTF 2.0: a metal or a dielectric of index 1.5, without coat."""
+
+    type: Literal["metal_rough"]
+    base_color: Annotated[
+        Reflectance,
+        hint("Base colour", "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+             unit="", widget="color"),
+    ]
+    metallic: Annotated[
+        Fraction,
+        hint("Metallic", "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+             unit="", widget="slider"),
+    ]
+    roughness: Annotated[
+        Fraction,
+        hint("Roughness", "0 is polished, 1 is matte; its square is the width of the highlight.",
+             unit="", widget="slider"),
+    ]
+
+
+class BlinnPhongMaterial(_Surface):
+    """The classic highlight of early rasterisers, as a baseline: it conserves no energy."""
+
+    type: Literal["blinn_phong"]
+    diffuse: Annotated[
+        Reflectance,
+        hint("Diffuse", "Share of light that is sent back equally in all directions.", unit="", widget="color"),
+    ]
+    specular: Annotated[
+        Reflectance,
+        hint("Specular", "Colour of the highlight; not normalised: a sharper one sends back less light.",
+             unit="", widget="color"),
+    ]
+    shininess: Annotated[
+        Factor,
+        hint("Shininess", "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
+             unit="", widget="slider", soft=1000),
+    ]
+    ambient: Annotated[
+        Radiometric,
+        hint("Ambient", "Radiance added wherever the surface is met; it lights nothing by being picked as a light.",
+             unit="W/(m^2 sr)", widget="color", soft=1),
+    ] = (0.0, 0.0, 0.0)
+
+
+Material = Annotated[
+    DiffuseMaterial | DisneyMaterial | MetalRoughMaterial | BlinnPhongMaterial, Field(discriminator="type")
+]

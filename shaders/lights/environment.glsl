@@ -1,6 +1,5 @@
 // Light from infinity. An image is latitude-longitude, picked texel by texel from an alias table; inside a texel
 // the direction is uniform in longitude and in the cosine of its colatitude, so its density is constant there.
-uniform sampler2D environment_texels; // rgb radiance; a: density per steradian of picking a direction here
 
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
     vec2 cs = frame.environment_turn;
@@ -12,10 +11,7 @@ vec3 environment_turn_back(vec3 d) {
     return vec3(cs.x * d.x + cs.y * d.z, d.y, -cs.y * d.x + cs.x * d.z);
 }
 
-// Radiance from world direction w, and the density of environment_light_sample there.
-vec4 environment_radiance(vec3 w) {
-#if HAS_ENVIRONMENT_IMAGE
-    vec3 d = environment_turn(w);
+vec4 environment_image(vec3 d) {
     ivec2 size = textureSize(environment_texels, 0);
     float azimuth = d.x == 0.0 && d.z == 0.0 ? 0.0 : atan(d.x, -d.z);
     float polar = atan(length(d.xz), d.y); // exact near the poles, where acos(y) is not
@@ -29,11 +25,28 @@ vec4 environment_radiance(vec3 w) {
     vec4 a = texelFetch(environment_texels, ivec2(x0, y0), 0), b = texelFetch(environment_texels, ivec2(x1, y0), 0);
     vec4 e = texelFetch(environment_texels, ivec2(x0, y1), 0), g = texelFetch(environment_texels, ivec2(x1, y1), 0);
     vec3 radiance = mix(mix(a.rgb, b.rgb, f.x), mix(e.rgb, g.rgb, f.x), f.y);
-    float left = at.y == y0 ? (at.x == x0 ? a.a : b.a) : (at.x == x0 ? e.a : g.a);
-    return vec4(radiance * frame.environment_scale, left);
-#elif HAS_ENVIRONMENT
-    vec4 t = texelFetch(environment_texels, ivec2(0), 0);
-    return vec4(t.rgb * frame.environment_scale, t.a);
+    return vec4(radiance, at.y == y0 ? (at.x == x0 ? a.a : b.a) : (at.x == x0 ? e.a : g.a));
+}
+
+// Radiance from world direction w, and the density of environment_light_sample there.
+vec4 environment_radiance(vec3 w) {
+#if HAS_ENVIRONMENT
+    vec3 d = environment_turn(w);
+#if HAS_ENVIRONMENT_IMAGE
+    vec4 l = environment_image(d);
+#else
+    vec4 l = texelFetch(environment_texels, ivec2(0), 0);
+#endif
+#if HAS_ENVIRONMENT_CUBE
+    vec4 cube = cubemap_radiance(d);
+    if (frame.environment_cube != 0u) l = cube;
+#endif
+#if HAS_SUN
+    bool sunny = sun_holds(d);
+    if (sunny && d.y > 0.0) l.rgb += frame.environment_sun_radiance;
+    l.a = mix(l.a, sunny ? 1.0 / (TWO_PI * frame.environment_sun_cap) : 0.0, frame.environment_sun_share);
+#endif
+    return vec4(l.rgb * frame.environment_scale, l.a);
 #else
     return vec4(0.0);
 #endif
@@ -41,7 +54,14 @@ vec4 environment_radiance(vec3 w) {
 
 LightSample environment_light_sample(uvec2 bits) {
     vec2 u = sobol_units(bits);
-#if HAS_ENVIRONMENT_IMAGE
+#if HAS_SUN
+    uint cut = uint(frame.environment_sun_share * 4294967296.0);
+    bool sunny = bits.x < cut;
+    vec3 to_sun = sun_sample(vec2(float(bits.x) / max(float(cut), 1.0), u.y));
+    bits.x = sunny ? bits.x : sun_rest(bits.x, cut);
+    u.x = sobol_unit(bits.x);
+#endif
+#if HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE
     uvec2 size = uvec2(textureSize(environment_texels, 0));
     // All 32 bits: a float's 24 would leave a large map three for the place inside the texel.
     uint i, low;
@@ -56,6 +76,8 @@ LightSample environment_light_sample(uvec2 bits) {
     int row = int(float(i) / float(size.x)), column = int(i) - row * int(size.x);
     int carry = column < 0 ? -1 : column >= int(size.x) ? 1 : 0;
     ivec2 at = ivec2(column - carry * int(size.x), row + carry);
+#endif
+#if HAS_ENVIRONMENT_IMAGE
     float phi = (float(at.x) + u.y) / float(size.x) * TWO_PI - PI;
     // The row's band between two colatitudes, uniform in cosine; near a pole by sines, without cancelling.
     float top = float(at.y) / float(size.y) * PI, bottom = float(at.y + 1) / float(size.y) * PI;
@@ -65,7 +87,14 @@ LightSample environment_light_sample(uvec2 bits) {
     float phi = TWO_PI * u.y - PI, h = u.x; // as an image of one texel
 #endif
     float y = 1.0 - 2.0 * h, r = 2.0 * sqrt(max(0.0, h * (1.0 - h)));
-    vec3 wi = environment_turn_back(vec3(r * sin(phi), y, -r * cos(phi)));
+    vec3 d = vec3(r * sin(phi), y, -r * cos(phi));
+#if HAS_ENVIRONMENT_CUBE
+    if (frame.environment_cube != 0u) d = cubemap_point(at, vec2(u.y, clamp(v, 0.0, 1.0)));
+#endif
+#if HAS_SUN
+    if (sunny) d = to_sun;
+#endif
+    vec3 wi = environment_turn_back(d);
     vec4 l = environment_radiance(wi);
     return LightSample(wi, INFINITY_T, l.rgb, l.a, true, NONE);
 }

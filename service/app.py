@@ -1,0 +1,147 @@
+"""The application: routes and the editor's files; and the server that runs it until it is told to end."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import logging
+import os
+import signal
+import socket
+import sys
+import threading
+from collections.abc import AsyncIterator, Iterator
+from contextlib import asynccontextmanager
+from importlib import metadata
+from pathlib import Path
+
+import uvicorn
+from fastapi import FastAPI
+from fastapi.middleware.cors import CORSMiddleware
+from starlette.responses import FileResponse, Response
+from starlette.staticfiles import StaticFiles
+
+from service import presets
+from service.assets import AssetStore
+from service.config import Config
+from service.guard import Guard
+from service.rendering.engine import Engine
+from service.rendering.reading import Reader
+from service.rendering.warming import Warming
+from service.routes import assets, info, renders, stream
+from service.routes import presets as preset_routes
+from service.routes.errors import respond, tell_errors
+from service.routes.house import House
+
+WEB = Path(__file__).parents[1] / "web"
+MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
+PING_S = 15.0  # proxies cut connections that are idle for a minute
+GRACE_S = 10  # for answers under way when the server ends
+LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
+
+log = logging.getLogger(__name__)
+
+
+def create_app(config: Config) -> FastAPI:
+    """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
+    store = AssetStore(config.data_dir, config, presets.builtin_assets)
+    own = House(config, store, Reader(config, store), Engine(config.device))
+    app = FastAPI(
+        title="Sunbox",
+        version=metadata.version("sunbox"),
+        description="A progressive path-tracing render service: JSON scenes in, converging pictures out.",
+        lifespan=_lifespan,
+        docs_url=None,
+        redoc_url=None,
+    )
+    app.state.house = own
+    for router in (info.router, preset_routes.router, assets.router, renders.router, stream.router):
+        app.include_router(router)
+    app.add_api_route("/docs", _docs, include_in_schema=False)
+    app.mount("/", StaticFiles(directory=WEB, html=True))
+    tell_errors(app)
+    origins = config.allowed_origins
+    app.add_middleware(
+        CORSMiddleware, allow_origins=origins, allow_methods=["*"], allow_headers=["*"], expose_headers=["Location"]
+    )
+    app.add_middleware(Guard, max_body=config.max_body, allowed_origins=origins, refuse=respond)
+    return app
+
+
+def run(config: Config) -> int:
+    """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 when the address can't be had."""
+    try:
+        listener = socket.create_server((config.host, config.port), family=_family(config.host), backlog=2048)
+    except OSError as error:
+        log.error("can't listen on %s port %d: %s", config.host, config.port, error.strerror or error)
+        return 1
+    host, port = listener.getsockname()[:2]
+    app = create_app(config)
+    settings = uvicorn.Config(
+        app,
+        log_config=None,
+        access_log=False,
+        server_header=False,
+        ws_per_message_deflate=False,
+        ws_max_size=MESSAGE_BYTES,
+        ws_ping_interval=PING_S,
+        timeout_graceful_shutdown=GRACE_S,
+    )
+    address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+    _Server(settings, app.state.house, address).run([listener])
+    return 0
+
+
+class _Server(uvicorn.Server):
+    """Says where it is once it answers; ends by closing its clients as going away, with exit code 0."""
+
+    def __init__(self, config: uvicorn.Config, house: House, address: str) -> None:
+        super().__init__(config)
+        self._house = house
+        self._address = address
+
+    async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        await super().startup(sockets)
+        sys.stdout.write(f"Sunbox is at {self._address}\n")
+        sys.stdout.flush()
+
+    async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        await self._house.farewell()
+        await super().shutdown(sockets)
+
+    @contextlib.contextmanager
+    def capture_signals(self) -> Iterator[None]:
+        """uvicorn's own raises the signal again in the end, which would be the exit code."""
+        loop = asyncio.get_running_loop()
+        for number in (signal.SIGINT, signal.SIGTERM):
+            loop.add_signal_handler(number, self._end)
+        yield
+
+    def _end(self) -> None:
+        self.force_exit = self.should_exit  # the second time
+        self.should_exit = True
+        # Threads that pack a huge scene can't be interrupted, and Python waits for them.
+        last_resort = threading.Timer(LAST_RESORT_S, os._exit, [0])
+        last_resort.daemon = True
+        last_resort.start()
+
+
+@asynccontextmanager
+async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
+    own: House = app.state.house
+    own.engine.start()
+    own.assets.warm()
+    warming = asyncio.create_task(Warming(own.engine, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run())
+    yield
+    warming.cancel()
+    await own.farewell()
+    await own.engine.close()
+    await asyncio.to_thread(own.assets.close)
+
+
+async def _docs() -> Response:
+    return FileResponse(WEB / "docs.html")
+
+
+def _family(host: str) -> socket.AddressFamily:
+    return socket.AF_INET6 if ":" in host else socket.AF_INET

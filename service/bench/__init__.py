@@ -1,0 +1,1 @@
+"""Measurements of the product by the product: `sunbox bench`."""

@@ -1,0 +1,122 @@
+"""The README's pictures, rendered again: `python -m service.bench.gallery DATA [NAME ...]`.
+
+DATA is a folder with `mesh/stanford-bunny.obj` (Stanford Computer Graphics Laboratory) and `hdri/studio.exr`
+(Poly Haven, CC0). Pictures go to web/gallery. Their scenes are here or among the presets.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+from service import presets
+
+OUT = Path(__file__).resolve().parents[2] / "web" / "gallery"
+STUDIO = {"type": "image", "asset": "hdri/studio.exr", "background": False}
+
+
+def bunny() -> dict[str, Any]:
+    """The Stanford bunny, glazed, on a plane under a studio's lamps."""
+    place = {"translate": [0.4, -0.99, 0], "scale": 30}
+    return {
+        "version": 1,
+        "camera": {"position": [1.2, 2.6, 8.2], "target": [0, 1.95, 0], "vfov": 36},
+        "environment": {**STUDIO, "rotation": 200, "background": True},
+        "materials": {
+            "glaze": {"type": "disney", "base_color": "#2f6f73", "roughness": 0.35, "clearcoat": 1, "specular": 0.6},
+            "table": {"type": "disney", "base_color": "#b9a58c", "roughness": 0.7, "specular": 0.3},
+        },
+        "shapes": [
+            {"type": "mesh", "asset": "mesh/stanford-bunny.obj", "material": "glaze", "transform": place},
+            {"type": "quad", "origin": [-40, 0, 40], "u": [80, 0, 0], "v": [0, 0, -80], "material": "table"},
+        ],
+    }
+
+
+def roughness() -> dict[str, Any]:
+    """Nine gold spheres, roughness 0 to 1 from left to right."""
+    materials: dict[str, Any] = {"table": {"type": "diffuse", "albedo": 0.25}}
+    shapes: list[dict[str, Any]] = [
+        {"type": "quad", "origin": [-80, 0, 80], "u": [160, 0, 0], "v": [0, 0, -160], "material": "table"}
+    ]
+    for k in range(9):
+        name = f"roughness-{k / 8}"
+        materials[name] = {"type": "disney", "base_color": [1, 0.77, 0.34], "metallic": 1, "roughness": k / 8}
+        shapes.append({"type": "sphere", "center": [(k - 4) * 1.06, 0.5, 0], "radius": 0.5, "material": name})
+    return {
+        "version": 1,
+        "camera": {"position": [0, 1.3, 14], "target": [0, 0.45, 0], "vfov": 11.5},
+        "environment": {**STUDIO, "rotation": 200, "background": True},
+        "materials": materials,
+        "shapes": shapes,
+    }
+
+
+def preset(name: str) -> Callable[[], dict[str, Any]]:
+    return lambda: presets.get("scenes", name)
+
+
+PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], float]] = {
+    # scene, (width, height, samples), exposure
+    "bunny": (bunny, (800, 600, 192), -1.6),
+    "roughness": (roughness, (1200, 280, 512), -0.5),
+    "cornell": (preset("cornell-boxes"), (512, 512, 1024), 0.0),
+    "sphere": (preset("sphere-on-floor"), (512, 512, 512), 0.0),
+}
+
+
+def photograph_editor(sunbox: Path, port: int = 8765, wait_s: float = 25) -> None:
+    """The editor with its first scene, converged, in a headless browser (a development dependency)."""
+    from playwright.sync_api import sync_playwright
+
+    flags = ["--no-sandbox", "--disable-dev-shm-usage"]
+    with subprocess.Popen([sunbox, "serve", "--port", str(port)]) as server, sync_playwright() as playwright:
+        time.sleep(3)
+        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=flags)
+        page = browser.new_page(viewport={"width": 1400, "height": 900}, color_scheme="dark")
+        page.goto(f"http://127.0.0.1:{port}/")
+        page.wait_for_timeout(1000 * wait_s)
+        page.screenshot(path=OUT / "editor.png")
+        browser.close()
+        server.terminate()
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("data", type=Path)
+    parser.add_argument("names", nargs="*", default=[*PICTURES, "editor"], metavar="NAME")
+    wanted = parser.parse_args()
+    OUT.mkdir(exist_ok=True)
+    sunbox = Path(sys.executable).with_name("sunbox")
+    for name in wanted.names:
+        if name == "editor":
+            photograph_editor(sunbox)
+            continue
+        document, (width, height, samples), exposure = PICTURES[name]
+        with tempfile.NamedTemporaryFile("w", suffix=".json") as file:
+            json.dump(document(), file)
+            file.flush()
+            command: list[str | Path] = [
+                sunbox,
+                "render",
+                file.name,
+                "-o",
+                OUT / f"{name}.png",
+                "--asset-root",
+                wanted.data,
+            ]
+            command += ["--exposure", str(exposure)]
+            command += ["--spp", str(samples), "--set", f"width={width}", "--set", f"height={height}"]
+            subprocess.run(command, check=True)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,135 @@
+"""What a person at the editor waits for, measured at the socket of a real server: start-up and slider moves."""
+
+from __future__ import annotations
+
+import json
+import os
+import socket
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import AbstractContextManager, contextmanager, suppress
+from pathlib import Path
+from typing import Any
+from urllib.request import urlopen
+
+from websockets.sync.client import ClientConnection, connect
+from websockets.typing import Subprotocol
+
+SCENE = "sphere-on-floor"  # the editor's default
+SIZE = 512
+MOVES = 60
+PAUSE_S = 0.15  # between slider moves: the pace of a hand; the picture goes on refining meanwhile
+PATIENCE_S = 60.0
+
+
+def measure() -> dict[str, float]:
+    """Milliseconds: server start to first image with empty and with filled caches, and first frames after a move."""
+    with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder:
+        with _server(folder) as (port, began), _stream(port) as stream:
+            cold_ms = Editor(port, stream).start(began)
+        with _server(folder) as (port, began), _stream(port) as stream:
+            editor = Editor(port, stream)
+            warm_ms = editor.start(began)
+            moves = sorted(editor.move() for _ in range(MOVES))
+    return {
+        "server_start_cold_ms": cold_ms,
+        "server_start_warm_ms": warm_ms,
+        "slider_p50_ms": moves[len(moves) // 2],
+        "slider_p95_ms": moves[int(0.95 * len(moves))],
+        "slider_worst_ms": moves[-1],
+    }
+
+
+@contextmanager
+def _server(folder: str) -> Iterator[tuple[int, float]]:
+    """A server of our own with its caches in `folder`: its port, and when its process was started."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        port = probe.getsockname()[1]
+    environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
+    environment |= {"SUNBOX_DATA_DIR": folder, "MESA_SHADER_CACHE_DIR": folder}
+    began = time.perf_counter()
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port)]
+    told = Path(folder, "server.log")
+    with told.open("wb") as log:
+        server = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
+    try:
+        while not _listens(port):
+            if server.poll() is not None:
+                raise RuntimeError(f"the server ended instead of starting: {told.read_text()[-500:]}")
+            time.sleep(0.01)
+        yield port, began
+    finally:
+        server.terminate()
+        try:
+            server.wait(20)
+        except subprocess.TimeoutExpired:
+            server.kill()
+
+
+class Editor:
+    """As the editor behaves: acknowledges every frame, moves a slider now and then."""
+
+    def __init__(self, port: int, stream: ClientConnection) -> None:
+        self._stream = stream
+        with urlopen(f"http://127.0.0.1:{port}/v1/presets/scenes/{SCENE}", timeout=PATIENCE_S) as answer:
+            self._scene = json.load(answer)
+        self._material = self._scene["shapes"][0]["material"]
+        self._generation = 0
+
+    def start(self, began: float) -> float:
+        """Milliseconds from `began` to the first image."""
+        settings = {"width": SIZE, "height": SIZE, "max_samples": 1 << 20}
+        self._send("start", scene=self._scene, settings=settings)
+        return 1e3 * (self._first_frame() - began)
+
+    def move(self) -> float:
+        """Milliseconds from sending a slider's new value to having the first frame that shows it."""
+        until = time.perf_counter() + PAUSE_S
+        while (left := until - time.perf_counter()) > 0:
+            with suppress(TimeoutError):
+                self._receive(left)
+        value = 0.1 + 0.8 * (self._generation * 0.618 % 1)  # the golden ratio: no value comes twice
+        sent = time.perf_counter()
+        self._send("update", scene={"materials": {self._material: {"roughness": value}}})
+        return 1e3 * (self._first_frame() - sent)
+
+    def _send(self, kind: str, **message: Any) -> None:
+        self._generation += 1
+        self._stream.send(json.dumps({"type": kind, "generation": self._generation, **message}))
+
+    def _first_frame(self) -> float:
+        """When the first frame of the present generation had come."""
+        until = time.perf_counter() + PATIENCE_S
+        while self._receive(until - time.perf_counter()) != self._generation:
+            pass
+        return time.perf_counter()
+
+    def _receive(self, timeout: float) -> int | None:
+        """The generation of the next frame, acknowledged; None for other messages."""
+        message = self._stream.recv(timeout)
+        if isinstance(message, str):
+            told = json.loads(message)
+            if told["type"] == "error":
+                raise RuntimeError(f"the server refused the benchmark's own message: {told['problem']}")
+            return None
+        header = json.loads(message[4 : 4 + int.from_bytes(message[:4], "little")])
+        self._stream.send(json.dumps({"type": "ack", "seq": header["seq"]}))
+        return int(header["generation"])
+
+
+def _stream(port: int) -> AbstractContextManager[ClientConnection]:
+    protocol = [Subprotocol("sunbox.v1")]
+    address = f"ws://127.0.0.1:{port}/v1/stream"
+    return connect(address, subprotocols=protocol, max_size=None, open_timeout=PATIENCE_S)
+
+
+def _listens(port: int) -> bool:
+    try:
+        socket.create_connection(("127.0.0.1", port)).close()
+    except ConnectionRefusedError:
+        return False
+    return True

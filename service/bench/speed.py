@@ -1,0 +1,116 @@
+"""How fast: paths per second on scenes of each kind, compile times, and what a person at the editor waits for."""
+
+from __future__ import annotations
+
+import os
+import statistics
+import tempfile
+import time
+from collections.abc import Callable
+from concurrent.futures import ProcessPoolExecutor
+from dataclasses import dataclass
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from gpu import Renderer, RenderSettings
+from service.bench import latency, machine
+from service.bench.scenes import BenchAssets, Case, cases
+from service.pack import pack
+from service.scene import parse_scene
+
+if TYPE_CHECKING:
+    from gpu import Picture
+
+SIZE = 512
+RUN_S = 1.5  # long enough that beginning and ending a run do not count
+
+
+@dataclass(frozen=True)
+class Options:
+    runs: int
+    mesh_file: Path | None = None
+    environment_file: Path | None = None
+
+
+def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
+    """Machine, a row for each case, latencies; `told` hears what is being measured."""
+    rows = []
+    for case in cases():
+        told(f"{case.name}, {case.max_bounces} bounces")
+        rows.append(_in_fresh_processes(case, options))
+    told("server start and slider moves")
+    return {
+        "machine": machine.describe(rows[0]["renderer"]),
+        "size": [SIZE, SIZE],
+        "scenes": [{key: value for key, value in row.items() if key != "renderer"} for row in rows],
+        "latency": latency.measure(),
+    }
+
+
+def _in_fresh_processes(case: Case, options: Options) -> dict[str, Any]:
+    """The first process finds an empty shader cache, the second one what the first left there."""
+    with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as cache:
+        rows = []
+        for runs in (0, options.runs):
+            with ProcessPoolExecutor(1, mp_context=get_context("spawn")) as process:
+                rows.append(process.submit(_measure_case, case, options, runs, cache).result())
+    return {**rows[1], "compile_cold_ms": rows[0]["compile_ms"], "compile_warm_ms": rows[1].pop("compile_ms")}
+
+
+def _measure_case(case: Case, options: Options, runs: int, cache: str) -> dict[str, Any]:
+    os.environ["MESA_SHADER_CACHE_DIR"] = cache
+    began = time.perf_counter()
+    assets = BenchAssets(options.mesh_file, options.environment_file)
+    packed = pack(parse_scene(case.scene), assets)
+    pack_ms = 1e3 * (time.perf_counter() - began)
+    renderer = Renderer()
+    settings = RenderSettings(width=SIZE, height=SIZE, max_bounces=case.max_bounces)
+    picture = renderer.picture(renderer.load(packed.arrays), settings)
+    row: dict[str, Any] = {
+        "name": case.name,
+        "max_bounces": case.max_bounces,
+        "triangles": len(packed.arrays.triangles),
+        "pack_ms": pack_ms,
+        "compile_ms": picture.compile_ms,
+        "renderer": renderer.info,
+    }
+    if runs:
+        seconds = _seconds_per_sample(picture, runs)
+        row["ms_per_sample"] = 1e3 * statistics.median(seconds)
+        row["spread"] = (max(seconds) - min(seconds)) / statistics.median(seconds)
+        row["mpaths_per_s"] = SIZE * SIZE / statistics.median(seconds) / 1e6
+    renderer.close()
+    return row
+
+
+def _seconds_per_sample(picture: Picture, runs: int) -> list[float]:
+    """Wall seconds for a sample of every pixel, a value for each run of about RUN_S."""
+    once = _trace(picture, 2)  # the tiles find their size
+    samples = max(2, round(RUN_S * 2 / once))
+    return [_trace(picture, samples) / samples for _ in range(runs)]
+
+
+def _trace(picture: Picture, samples: int) -> float:
+    picture.reset()
+    began = time.perf_counter()
+    while picture.samples < samples:
+        picture.trace(1.0, samples)
+    return time.perf_counter() - began
+
+
+def table(document: dict[str, Any]) -> str:
+    """The document for people: a row for each scene, then the latencies, then the machine."""
+    name = max(len(row["name"]) for row in document["scenes"])
+    lines = [f"{'512 x 512':{name}}  bounces  Mpaths/s  ms/sample  spread  compile cold  warm ms"]
+    for row in document["scenes"]:
+        lines.append(
+            f"{row['name']:{name}}  {row['max_bounces']:7}  {row['mpaths_per_s']:8.2f}  {row['ms_per_sample']:9.1f}"
+            f"  {100 * row['spread']:4.0f} %  {row['compile_cold_ms']:12.0f}  {row['compile_warm_ms']:7.0f}"
+        )
+    lines.append("")
+    for key, value in document["latency"].items():
+        lines.append(f"{key.removesuffix('_ms').replace('_', ' '):24}{value:8.1f} ms")
+    lines.append("")
+    lines += [f"{key:10} {value}" for key, value in document["machine"].items()]
+    return "\n".join(lines)

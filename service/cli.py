@@ -1,0 +1,103 @@
+"""The command line: `sunbox serve | render | info | bench`.
+
+Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
+Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from collections.abc import Callable, Sequence
+from importlib import import_module
+
+from service.commands import CommandError
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """The exit code. What went wrong is one line or a few on stderr, never a traceback."""
+    parsed = parser().parse_args(arguments)
+    # Nothing here multiplies large matrices, and a pool of threads for that costs 60 ms at every start.
+    os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+    run = import_module(f"service.commands.{parsed.command}").run
+    try:
+        return int(run(parsed))
+    except CommandError as error:
+        for line in error.lines:
+            print(f"error: {line}", file=sys.stderr)
+        return error.exit_code
+    except KeyboardInterrupt:
+        return 130
+    except MemoryError:
+        print("error: out of memory", file=sys.stderr)
+        return 1
+    except BrokenPipeError:  # `sunbox info | head`: whoever read has seen enough
+        sys.stderr.close()
+        return 141
+
+
+def parser() -> argparse.ArgumentParser:
+    top = argparse.ArgumentParser("sunbox", description="A progressive path tracer: JSON scenes in, pictures out.")
+    commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
+    _serve(commands.add_parser("serve", help="serve the editor and the API"))
+    _render(commands.add_parser("render", help="render a scene to a file"))
+    _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
+    _bench(commands.add_parser("bench", help="measure"))
+    return top
+
+
+def _serve(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    add("--host", help="address to listen on (default: SUNBOX_HOST or 127.0.0.1)")
+    add("--port", type=_port, help="port to listen on (default: SUNBOX_PORT or 8000)")
+
+
+def _render(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    add("input", metavar="INPUT", help="a scene's JSON document")
+    add("-o", "--output", required=True, metavar="OUT", help="the picture: .png, .exr, .hdr or .npy")
+    spp = "samples per pixel: the setting max_samples"
+    add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
+    add("--seed", dest="set", action="append", type=_setting("seed"), metavar="N", help="the setting seed")
+    add("--set", action="append", metavar="KEY=VALUE", help="any setting; its value in JSON or a bare word")
+    aovs = "albedo, normal, depth or variance in the place of color; all: every one as a layer of an .exr"
+    add("--aov", metavar="NAME", default="color", help=aovs)
+    add("--exposure", metavar="STOPS", default="0", help="for .png (default: 0)")
+    curves = "for .png: linear, exponential, reinhard, aces, agx or pbr_neutral (default)"
+    add("--tone-map", metavar="NAME", default="pbr_neutral", help=curves)
+    add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
+    _asset_root(command)
+
+
+def _info(command: argparse.ArgumentParser) -> None:
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON document")
+    _asset_root(command)
+
+
+def _asset_root(command: argparse.ArgumentParser) -> None:
+    text = "a folder that assets may come from besides the scene's own; may be given again"
+    command.add_argument("--asset-root", action="append", default=[], metavar="DIR", help=text)
+
+
+def _bench(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    add("what", nargs="?", choices=["speed"], default="speed", help="paths per second, compile times, latencies")
+    add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
+    add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
+    add("--mesh", metavar="FILE", help="measure this mesh instead of the generated one")
+    add("--environment", metavar="FILE", help="light the scenes with this HDR image instead of the generated one")
+
+
+def _setting(name: str) -> Callable[[str], str]:
+    return lambda value: f"{name}={value}"
+
+
+def _port(text: str) -> int:
+    if not text.isascii() or not text.isdigit() or int(text) > 65535:
+        raise argparse.ArgumentTypeError(f"{text!r} is not a port: a whole number from 0 to 65535")
+    return int(text)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

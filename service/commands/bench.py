@@ -1,0 +1,38 @@
+"""`sunbox bench speed`: measures and prints a table; `-o` keeps the figures as JSON."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+from pathlib import Path
+
+from service.commands import BadInput, Failed, files
+
+
+def run(arguments: argparse.Namespace) -> int:
+    if arguments.runs < 1:
+        raise BadInput(f"--runs {arguments.runs}: at least one is needed")
+    given = [Path(name) if name else None for name in (arguments.mesh, arguments.environment)]
+    for path in filter(None, given):
+        files.read(path)
+    output = _output(arguments.output)
+    from gpu import GpuError
+    from service.bench import speed
+
+    try:
+        document = speed.measure(speed.Options(arguments.runs, *given), lambda what: print(what, file=sys.stderr))
+    except GpuError as error:
+        raise Failed(str(error)) from None
+    print(speed.table(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    return 0
+
+
+def _output(name: str | None) -> Path | None:
+    """Where the JSON goes. Its folder is made: `make bench` names one that a fresh checkout lacks."""
+    if name is None:
+        return None
+    Path(name).parent.mkdir(parents=True, exist_ok=True)
+    return files.writable(Path(name))

@@ -1,0 +1,50 @@
+"""Files that the commands read and write: nothing half-written is ever left under its final name."""
+
+from __future__ import annotations
+
+import os
+from contextlib import suppress
+from pathlib import Path
+
+from service.commands import BadInput, Failed
+
+
+def read(path: Path) -> bytes:
+    """The file's bytes; BadInput naming it when there is none to read."""
+    try:
+        return path.read_bytes()
+    except (OSError, ValueError) as error:  # ValueError: a NUL in the name
+        raise BadInput(f"{str(path)!r}: cannot be read: {_reason(error)}") from None
+
+
+def writable(path: Path) -> Path:
+    """Where to write for `path` (its links followed); BadInput now rather than after an hour of rendering."""
+    try:
+        target = Path(os.path.realpath(path))
+        if target.is_dir():
+            raise BadInput(f"{str(path)!r}: is a folder; name a file to write")
+        if not target.parent.is_dir():
+            raise BadInput(f"{str(path)!r}: its folder does not exist")
+    except ValueError as error:
+        raise BadInput(f"{str(path)!r}: {_reason(error)}") from None
+    if not os.access(target.parent, os.W_OK):
+        raise BadInput(f"{str(path)!r}: its folder cannot be written to")
+    return target
+
+
+def write(path: Path, data: bytes) -> None:
+    """Writes beside `path` and renames: readers see the old file or the whole new one. Raises Failed."""
+    beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
+    try:
+        try:
+            beside.write_bytes(data)
+            os.replace(beside, path)
+        finally:
+            with suppress(OSError):
+                beside.unlink(missing_ok=True)
+    except OSError as error:
+        raise Failed(f"{str(path)!r}: cannot be written: {_reason(error)}") from None
+
+
+def _reason(error: Exception) -> str:
+    return (getattr(error, "strerror", None) or str(error)).lower()

@@ -1,0 +1,63 @@
+"""`sunbox info [SCENE.json]`: what would render here, within which limits, and what a scene asks of it."""
+
+from __future__ import annotations
+
+import argparse
+from collections import Counter
+from collections.abc import Iterable
+from importlib import metadata
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.commands import Failed
+from service.commands.configuration import configuration
+from service.commands.documents import pack_scene, read_scene
+
+if TYPE_CHECKING:
+    from service.pack import Packed
+    from service.scene import Scene
+
+
+def run(arguments: argparse.Namespace) -> int:
+    rows = [("sunbox", metadata.version("sunbox"))]
+    config = configuration()
+    if arguments.scene:
+        source = Path(arguments.scene)
+        scene = read_scene(source)
+        packed = pack_scene(source, scene, arguments.asset_root, config)
+        rows += [("scene", str(source)), *contents(scene, packed)]
+    from gpu import GpuError, Renderer
+
+    try:
+        with Renderer(config.device) as renderer:
+            rows += [(name, str(renderer.info[name])) for name in ("renderer", "version", "vendor")]
+    except GpuError as error:
+        raise Failed(str(error)) from None
+    rows += [("most pixels", f"{config.max_pixels:,}"), ("most triangles", f"{config.max_triangles:,}")]
+    _print(rows)
+    return 0
+
+
+def contents(scene: Scene, packed: Packed) -> list[tuple[str, str]]:
+    """What the scene is made of, a row for each kind of thing, and the kernel flags that it raises."""
+    from gpu.features import flags
+
+    rows = [
+        ("shapes", _counted(shape.type for shape in scene.shapes)),
+        ("triangles", str(len(packed.arrays.triangles))),
+        ("materials", _counted(material.type for material in scene.materials.values())),
+        ("lights", _counted(light.type for light in scene.lights)),
+        ("environment", scene.environment.type if scene.environment else "none"),
+        ("features", " ".join(sorted(flags(packed.arrays)))),
+    ]
+    return rows + [("warning", warning) for warning in packed.warnings]
+
+
+def _counted(kinds: Iterable[str]) -> str:
+    return ", ".join(f"{count} {kind}" for kind, count in Counter(kinds).most_common()) or "none"
+
+
+def _print(rows: list[tuple[str, Any]]) -> None:
+    width = max(len(name) for name, _ in rows)
+    for name, value in rows:
+        print(f"{name:{width}}  {value}")

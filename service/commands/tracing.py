@@ -1,0 +1,112 @@
+"""One render in this process: the renderer's own task, whose messages are heard here instead of by a server."""
+
+from __future__ import annotations
+
+import signal
+from collections.abc import Iterator
+from contextlib import contextmanager
+from types import FrameType
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from service.commands import Failed
+from service.commands.progress import ProgressLine
+from service.rendering.messages import (
+    Done,
+    FromRenderer,
+    Image,
+    Loaded,
+    Progress,
+    Progressed,
+    Read,
+    StopRule,
+    Update,
+    View,
+)
+from service.rendering.worker.task import Task
+
+if TYPE_CHECKING:
+    from gpu import Renderer
+    from service.pack import Packed
+    from service.quality import ResolvedSettings
+
+NUMBER = 1  # of the only task
+
+
+class Interrupt:
+    """Remembers the first SIGINT or SIGTERM; the second one does what it always does."""
+
+    signal: int | None = None
+
+    @contextmanager
+    def watch(self) -> Iterator[None]:
+        before = {number: signal.signal(number, self._take) for number in (signal.SIGINT, signal.SIGTERM)}
+        try:
+            yield
+        finally:
+            for number, handler in before.items():
+                signal.signal(number, handler)
+
+    def _take(self, number: int, frame: FrameType | None) -> None:
+        self.signal = number
+        signal.signal(number, signal.default_int_handler if number == signal.SIGINT else signal.SIG_DFL)
+
+
+class Tracing:
+    """A packed scene being rendered. What goes wrong on the GPU is raised as GpuError."""
+
+    def __init__(self, renderer: Renderer, packed: Packed, settings: ResolvedSettings) -> None:
+        self.progress = Progress()
+        self.warnings = list(packed.warnings)
+        self.settings = settings
+        self._line = ProgressLine()
+        self._reason: str | None = None
+        self._pixels: np.ndarray | None = None
+        stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
+        self._task = Task(renderer, NUMBER, self._hear)
+        self._task.update(Update(NUMBER, 1, scene=packed.arrays, settings=settings.for_gpu(), stop=stop))
+
+    def run(self, interrupt: Interrupt) -> None:
+        """Returns when the first limit is reached, or soon after a signal."""
+        while self._task.ready:
+            if interrupt.signal is None:
+                self._task.step()
+            else:
+                self._task.stop()
+        self._line.close()
+
+    def pixels(self, view: View) -> np.ndarray:
+        """The picture so far. Raises Failed before its first sample."""
+        self._pixels = None
+        self._task.read(Read(NUMBER, 1, view))
+        while self._pixels is None and self._task.ready:
+            self._task.step()  # the AOVs of the first hit are traced when asked for
+        if self._pixels is None:
+            raise Failed("stopped before the first sample: there is no picture yet")
+        return self._pixels
+
+    def status(self, setup_s: float) -> dict[str, Any]:
+        """What GET /v1/renders/{id} says of a render at its end."""
+        return {
+            "state": "cancelled" if self._reason == "stopped" else "done",
+            "reason": self._reason,
+            "samples": self.progress.samples,
+            "noise": self.progress.noise,
+            "elapsed_s": self.progress.elapsed_s,
+            "setup_s": setup_s,
+            "eta_s": self.progress.eta_s,
+            "warnings": self.warnings,
+            "settings": self.settings.document(),
+        }
+
+    def _hear(self, message: FromRenderer) -> None:
+        if isinstance(message, Image):
+            self._pixels = message.pixels
+        elif isinstance(message, Progressed):
+            if self._line.due():
+                self._line.show(message.progress)
+        elif isinstance(message, Loaded | Done):
+            self.warnings += [warning for warning in message.warnings if warning not in self.warnings]
+            if isinstance(message, Done):
+                self.progress, self._reason = message.progress, message.reason

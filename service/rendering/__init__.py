@@ -1,0 +1,1 @@
+"""What is wanted of the renderer, how far it is, and the process that owns the GPU."""

@@ -1,0 +1,171 @@
+"""One render asked for over REST: what is wanted, how far it is, and its picture."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import secrets
+from typing import Any, Literal
+
+import numpy as np
+
+from service.pack import Packed
+from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocument, ServiceError, problem
+from service.quality import ResolvedSettings
+from service.rendering.engine import Engine
+from service.rendering.messages import (
+    Done,
+    Failed,
+    FromRenderer,
+    Image,
+    Loaded,
+    Progress,
+    Progressed,
+    Read,
+    Stop,
+    Update,
+    View,
+)
+from service.rendering.reading import stop_rule, weight
+
+State = Literal["queued", "running", "done", "cancelled", "failed"]
+
+ID_BYTES = 16  # 128 bits: nobody guesses one
+PICTURE_BYTES = 112  # the renderer's accumulators, a pixel: three vec4, two more with the AOVs, and the noise meter's
+
+
+class Job:
+    """Runs on the event loop. Finished, it holds its picture in the renderer until `release`."""
+
+    def __init__(self, engine: Engine, packed: Packed, settings: ResolvedSettings, setup_s: float) -> None:
+        self.id = secrets.token_urlsafe(ID_BYTES)
+        self.state: State = "queued"
+        self.finished = asyncio.Event()
+        self.bytes = settings.render_width * settings.render_height * PICTURE_BYTES + weight(packed)
+        self._engine = engine
+        self._packed: Packed | None = packed
+        self._settings = settings
+        self._warnings = list(packed.warnings)
+        self._setup_s = setup_s
+        self._progress = Progress()
+        self._reason: str | None = None
+        self._error: ServiceError | None = None
+        self._task: int | None = None
+        self._reads: dict[int, asyncio.Future[Image]] = {}
+        self._serials = itertools.count(1)
+
+    async def run(self) -> None:
+        """From queued to finished, whichever way."""
+        if self._packed is None:
+            return
+        try:
+            self._task = self._engine.open(self)
+            arrays, self._packed = self._packed.arrays, None
+            settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
+            await self._engine.send_scene(Update(self._task, 1, arrays, settings, stop))
+            if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
+                self._engine.send(Stop(self._task))
+        except ServiceError as error:
+            self._fail(error)
+        await self.finished.wait()
+
+    def cancel(self) -> None:
+        """Stops at once; the image so far stays."""
+        if self.finished.is_set():
+            return
+        self.state, self._packed = "cancelled", None
+        if self._task is not None:
+            self._engine.send(Stop(self._task))
+        self.finished.set()
+
+    def release(self) -> None:
+        """Forgets the picture."""
+        if self._task is not None:
+            self._engine.drop(self._task)
+            self._task = None
+
+    def status(self) -> dict[str, Any]:
+        progress = self._progress
+        status: dict[str, Any] = {
+            "id": self.id,
+            "state": self.state,
+            "reason": self._reason,
+            "samples": progress.samples,
+            "noise": progress.noise,
+            "elapsed_s": progress.elapsed_s,
+            "setup_s": self._setup_s,
+            "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
+            "warnings": self._warnings,
+            "settings": self._settings.document(),
+        }
+        return status if self._error is None else status | {"problem": problem(self._error)}
+
+    async def image(self, view: View) -> tuple[np.ndarray, Progress]:
+        """The picture so far. Raises Conflict before its first sample, and what became of it when it failed."""
+        if self._error is not None:
+            raise self._error
+        if self._task is None:
+            raise Conflict("There is no sample yet.")
+        serial = next(self._serials)
+        self._reads[serial] = asyncio.get_running_loop().create_future()
+        self._engine.send(Read(self._task, serial, view))
+        image = await self._reads[serial]
+        if image.pixels is None:
+            raise Conflict("There is no sample yet.")
+        return image.pixels, image.progress
+
+    def heard(self, message: FromRenderer) -> None:
+        if isinstance(message, Image):
+            self._answer(message.serial, message)
+        elif isinstance(message, Loaded):
+            self._setup_s += message.setup_s
+            self._warnings += message.warnings
+            if self.state == "queued":
+                self.state = "running"
+        elif isinstance(message, Progressed):
+            self._progress = message.progress
+        elif isinstance(message, Done):
+            self._end(message)
+        elif isinstance(message, Failed):
+            error = error_of(message)
+            if message.serial is not None:
+                self._answer(message.serial, error)
+            else:
+                self._fail(error)
+
+    def lost(self, detail: str) -> None:
+        self._task = None
+        if self.finished.is_set():
+            self._forget(Gone(detail))
+        else:
+            self._fail(Internal(detail))
+
+    def _end(self, done: Done) -> None:
+        self._progress, self._reason = done.progress, done.reason
+        self._warnings += [warning for warning in done.warnings if warning not in self._warnings]
+        if not self.finished.is_set():
+            self.state = "cancelled" if done.reason == "stopped" else "done"
+            self.finished.set()
+
+    def _fail(self, error: ServiceError) -> None:
+        self.state = "failed"
+        self._forget(error)
+        self.finished.set()
+
+    def _forget(self, error: ServiceError) -> None:
+        self._error, self._packed = error, None
+        for serial in list(self._reads):
+            self._answer(serial, error)
+
+    def _answer(self, serial: int, answer: Image | ServiceError) -> None:
+        future = self._reads.pop(serial, None)
+        if future is None or future.done():
+            return
+        if isinstance(answer, ServiceError):
+            future.set_exception(answer)
+        else:
+            future.set_result(answer)
+
+
+def error_of(failed: Failed) -> ServiceError:
+    return InvalidDocument([FieldError("/scene", failed.detail)]) if failed.refused else Internal(failed.detail)

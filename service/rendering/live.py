@@ -1,0 +1,108 @@
+"""A stream's scene as it is edited: the documents, what they mean, and what the renderer was given of them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+from service.pack import PackCache, pack_camera, pack_materials, pack_turn
+from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
+from service.quality import ResolvedSettings
+from service.rendering import protocol
+from service.rendering.change import change, risky
+from service.rendering.messages import Update
+from service.rendering.reading import Reader, stop_rule
+from service.scene import Scene, merge_patch
+
+
+@dataclass(frozen=True)
+class Version:
+    """One generation: the documents as the client wrote them, and as they are understood."""
+
+    generation: int
+    scene_document: Any
+    settings_document: Any
+    scene: Scene
+    settings: ResolvedSettings
+
+
+class Live:
+    """Not for the event loop: its methods parse and pack. One call at a time."""
+
+    def __init__(self, reader: Reader, task: int) -> None:
+        self.version: Version | None = None  # the last valid one
+        self._reader = reader
+        self._task = task
+        self._cache = PackCache()
+        self._given: Version | None = None  # the last one that the renderer has
+        self._origin = (0.0, 0.0, 0.0)  # what its coordinates are relative to
+
+    def take(self, message: protocol.Start | protocol.Update) -> Update | None:
+        """What the renderer must be told at once; None where that can wait for `settle`, after newer updates.
+
+        Raises InvalidDocument or Conflict, and nothing has changed then.
+        """
+        if self.version is not None and message.generation <= self.version.generation:
+            last = self.version.generation
+            raise InvalidDocument([FieldError("/generation", f"must rise: {message.generation} comes after {last}")])
+        version = self._started(message) if isinstance(message, protocol.Start) else self._updated(message)
+        # Whether such a scene can be packed is known when it was; then the update is as good as made.
+        update = self._give(version) if self._given is None or risky(self._given.scene, version.scene) else None
+        self.version = version
+        return update
+
+    def settle(self) -> Update | None:
+        """What the renderer must be told to be where the documents are; None when it is there."""
+        version = self.version
+        if version is None or version is self._given:
+            return None
+        try:
+            return self._give(version)
+        except ServiceError:
+            self.version = self._given
+            raise
+
+    def forget(self) -> None:
+        """The renderer lost what it was given: the next update carries everything."""
+        self._given = None
+
+    def _started(self, message: protocol.Start) -> Version:
+        scene, settings = self._reader.both(message.scene, message.settings)
+        return Version(message.generation, message.scene, message.settings, scene, settings)
+
+    def _updated(self, message: protocol.Update) -> Version:
+        old = self.version
+        if old is None:
+            raise Conflict("Nothing was started yet: send start before update.")
+        new = replace(old, generation=message.generation)
+        if "scene" in message.model_fields_set:
+            document = merge_patch(old.scene_document, message.scene)
+            new = replace(new, scene_document=document, scene=self._reader.scene(document))
+        if "settings" in message.model_fields_set:
+            document = merge_patch(old.settings_document, message.settings)
+            new = replace(new, settings_document=document, settings=self._reader.settings(document))
+        return new
+
+    def _give(self, version: Version) -> Update:
+        update = self._difference(version)
+        self._given = version
+        return update
+
+    def _difference(self, new: Version) -> Update:
+        old, update = self._given, Update(self._task, new.generation, interactive=True)
+        if old is None or old.settings.for_gpu() != new.settings.for_gpu():
+            update = replace(update, settings=new.settings.for_gpu())
+        if old is None or stop_rule(old.settings) != stop_rule(new.settings):
+            update = replace(update, stop=stop_rule(new.settings))
+        touched = change(old.scene, new.scene) if old is not None else None
+        if touched is None or touched.whole:
+            arrays = self._reader.pack(new.scene, self._cache).arrays
+            self._origin = arrays.origin
+            return replace(update, scene=arrays)
+        environment = new.scene.environment
+        return replace(
+            update,
+            camera=pack_camera(new.scene.camera, self._origin) if touched.camera else None,
+            materials=pack_materials(new.scene) if touched.materials else None,
+            environment=pack_turn(environment) if touched.environment and environment is not None else None,
+        )

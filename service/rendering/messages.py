@@ -1,0 +1,196 @@
+"""What the server and the renderer's process say to each other. Immutable; arrays inside travel as shared memory."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+import numpy as np
+
+Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
+Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """Rendering ends at the first of these; None: no such limit."""
+
+    max_samples: int | None = None
+    time_limit: float | None = None  # s
+    target_noise: float | None = None
+
+
+@dataclass(frozen=True)
+class View:
+    """How a picture is to be shown; costs no samples."""
+
+    aov: str = "color"
+    exposure: float = 0.0
+    tone_map: str = "pbr_neutral"
+    encoding: Encoding = "u1"
+
+
+@dataclass(frozen=True)
+class Progress:
+    samples: int = 0
+    noise: float | None = None
+    elapsed_s: float = 0.0
+    eta_s: float | None = None
+
+
+# --- to the renderer ---
+
+
+@dataclass(frozen=True)
+class Update:
+    """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
+
+    `scene` is a gpu.SceneArrays, `settings` the arguments of gpu.RenderSettings; `camera`, `materials` and
+    `environment` are those of `Scene.edit`. Any of them starts accumulation again, `stop` alone doesn't.
+    """
+
+    task: int
+    generation: int
+    scene: Any = None
+    settings: dict[str, Any] | None = None
+    stop: StopRule | None = None
+    camera: Any = None
+    materials: np.ndarray | None = None
+    environment: tuple[float, float] | None = None
+    interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
+
+    @property
+    def edits(self) -> dict[str, Any]:
+        named = {"camera": self.camera, "materials": self.materials, "environment": self.environment}
+        return {name: value for name, value in named.items() if value is not None}
+
+    @property
+    def restarts(self) -> bool:
+        return self.scene is not None or self.settings is not None or bool(self.edits)
+
+    def then(self, later: Update) -> Update:
+        """This update and a later one of the same task as one."""
+        if later.scene is not None:  # a whole scene: the edits before it are in it
+            return replace(later, settings=later.settings or self.settings, stop=later.stop or self.stop)
+        names = ("settings", "stop", "camera", "materials", "environment")
+        values = {name: getattr(later, name) for name in names if getattr(later, name) is not None}
+        return replace(self, generation=later.generation, **values)
+
+
+@dataclass(frozen=True)
+class Want:
+    """Asks for one Frame, as soon as there is newer content than was last given; `anyway`: or any at all."""
+
+    task: int
+    serial: int
+    view: View
+    anyway: bool = False
+
+
+@dataclass(frozen=True)
+class Read:
+    """Asks for one Image of what there is."""
+
+    task: int
+    serial: int
+    view: View
+
+
+@dataclass(frozen=True)
+class Pause:
+    task: int
+
+
+@dataclass(frozen=True)
+class Resume:
+    task: int
+
+
+@dataclass(frozen=True)
+class Stop:
+    """No more samples; what there is stays readable until Drop."""
+
+    task: int
+
+
+@dataclass(frozen=True)
+class Drop:
+    task: int
+
+
+# --- from the renderer ---
+
+
+@dataclass(frozen=True)
+class Ready:
+    info: dict[str, Any]  # of the GL implementation
+
+
+@dataclass(frozen=True)
+class Unable:
+    """There is no renderer on this machine, and why."""
+
+    detail: str
+
+
+@dataclass(frozen=True)
+class Loaded:
+    task: int
+    generation: int
+    setup_s: float
+    compile_ms: float
+    warnings: list[str]
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Pixels (height, width, 4) for a Want; `last`: nothing better will follow."""
+
+    task: int
+    serial: int
+    generation: int
+    pixels: np.ndarray
+    progress: Progress
+    scale: float
+    last: bool
+
+
+@dataclass(frozen=True)
+class Image:
+    """Pixels (height, width, channels) for a Read; None before the first sample."""
+
+    task: int
+    serial: int
+    pixels: np.ndarray | None
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Progressed:
+    task: int
+    generation: int
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Done:
+    task: int
+    generation: int
+    reason: Reason
+    progress: Progress
+    warnings: list[str]
+
+
+@dataclass(frozen=True)
+class Failed:
+    """The task can't go on; an Update with a scene may revive it. `refused`: the scene asks for too much."""
+
+    task: int
+    generation: int
+    detail: str
+    refused: bool = False
+    serial: int | None = None  # of the Read that failed, when only that did
+
+
+ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop
+FromRenderer = Ready | Unable | Loaded | Frame | Image | Progressed | Done | Failed

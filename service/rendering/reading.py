@@ -1,0 +1,81 @@
+"""From what a caller wrote to what the renderer takes, with its limits and assets. Not for the event loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+from pydantic import Field, TypeAdapter
+
+from service.assets import Assets
+from service.config import Config
+from service.pack import PackCache, Packed, pack
+from service.problems import FieldError, InvalidDocument
+from service.quality import ResolvedSettings, resolve
+from service.rendering.messages import StopRule
+from service.scene import Scene, load_json, parse_scene, parse_settings
+from service.scene.base import Model
+from service.scene.mistakes import validated
+
+
+class _Request(Model):
+    scene: Any
+    settings: Any = Field(default_factory=dict)
+
+
+_REQUEST = TypeAdapter(_Request)
+
+
+class Reader:
+    """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
+
+    def __init__(self, config: Config, assets: Assets) -> None:
+        self._config = config
+        self._assets = assets
+
+    def request(self, body: bytes) -> tuple[ResolvedSettings, Packed]:
+        """A whole `{scene, settings}`."""
+        request = validated(_REQUEST, load_json(body), "")
+        scene, settings = self.both(request.scene, request.settings)
+        return settings, self.pack(scene)
+
+    def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
+        """Both documents, or the mistakes of both."""
+        errors: list[FieldError] = []
+        understood: list[Any] = []
+        for parse, document in ((self.scene, scene), (self.settings, settings)):
+            try:
+                understood.append(parse(document))
+            except InvalidDocument as error:
+                errors += error.errors
+        if errors:
+            raise InvalidDocument(errors)
+        return understood[0], understood[1]
+
+    def scene(self, document: Any) -> Scene:
+        return parse_scene(document, "/scene")
+
+    def settings(self, document: Any) -> ResolvedSettings:
+        return resolve(parse_settings(document, "/settings", self._config))
+
+    def pack(self, scene: Scene, cache: PackCache | None = None) -> Packed:
+        with _under("/scene"):
+            return pack(scene, self._assets, cache, self._config)
+
+
+def stop_rule(settings: ResolvedSettings) -> StopRule:
+    return StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
+
+
+def weight(packed: Packed) -> int:
+    """Bytes of the arrays."""
+    return sum(getattr(value, "nbytes", 0) for value in vars(packed.arrays).values())
+
+
+@contextmanager
+def _under(pointer: str) -> Iterator[None]:
+    try:
+        yield
+    except InvalidDocument as error:
+        raise error.under(pointer) from None

@@ -1,0 +1,55 @@
+"""What the first client would have to wait for, done before it comes: modules, the builder's code, kernels."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from functools import partial
+from typing import Any
+
+from service.problems import ServiceError
+from service.rendering.engine import Engine
+from service.rendering.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
+from service.rendering.reading import Reader
+from service.rendering.threads import packing
+
+SETTINGS = {"width": 64, "height": 64}
+
+log = logging.getLogger(__name__)
+
+
+class Warming:
+    """A first picture that nobody asked for: `document` in the default settings, as a stream would have it."""
+
+    def __init__(self, engine: Engine, reader: Reader, document: Any) -> None:
+        self._engine = engine
+        self._reader = reader
+        self._document = document
+        self._seen = asyncio.Event()
+
+    async def run(self) -> None:
+        """Leaves nothing behind, and no error either: who comes later meets it himself."""
+        began = time.monotonic()
+        try:
+            packed = await packing(lambda: self._reader.pack(self._reader.scene(self._document)))
+            settings = await packing(partial(self._reader.settings, SETTINGS))
+            task = self._engine.open(self)
+        except ServiceError as error:
+            log.warning("not warmed up: %s", error)
+            return
+        try:
+            stop = StopRule(max_samples=1)
+            await self._engine.send_scene(Update(task, 1, packed.arrays, settings.for_gpu(), stop, interactive=True))
+            self._engine.send(Want(task, 1, View()))
+            await self._seen.wait()
+            log.info("warmed up seconds=%.2f", time.monotonic() - began)
+        finally:
+            self._engine.drop(task)
+
+    def heard(self, message: FromRenderer) -> None:
+        if isinstance(message, Frame | Failed):
+            self._seen.set()
+
+    def lost(self, detail: str) -> None:
+        self._seen.set()

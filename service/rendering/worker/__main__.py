@@ -1,0 +1,62 @@
+"""The renderer's process, from its first line to its last."""
+
+from __future__ import annotations
+
+import argparse
+import ctypes
+import logging
+import os
+import signal
+import socket
+
+from service.rendering import link
+from service.rendering.messages import Ready, Unable
+
+NICENESS = 10  # the server's event loop and the encoders come first; llvmpipe's threads inherit it
+PR_SET_PDEATHSIG = 1
+
+log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m service.rendering.worker")
+    parser.add_argument("descriptor", type=int)
+    parser.add_argument("--device", type=int)
+    parser.add_argument("--log-level", type=int, default=logging.WARNING)
+    parser.add_argument("--server", type=int, required=True, help="its process id")
+    arguments = parser.parse_args()
+    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the server, which ends this process in good order
+    if not _end_with(arguments.server):
+        return 0
+    os.nice(NICENESS)
+    logging.basicConfig(level=arguments.log_level, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    with socket.socket(fileno=arguments.descriptor) as end:
+        try:
+            return _serve(end, arguments.device)
+        except link.Closed:
+            return 0
+
+
+def _serve(end: socket.socket, device: int | None) -> int:
+    from gpu import GpuError, Renderer
+    from service.rendering.worker.loop import Loop
+
+    try:
+        renderer = Renderer(device)
+    except GpuError as error:
+        link.send(end, Unable(str(error)))
+        return 1
+    link.send(end, Ready(renderer.info))
+    log.info("started renderer=%s", renderer.info.get("renderer"))
+    Loop(end, renderer).run()
+    return 0
+
+
+def _end_with(server: int) -> bool:
+    """Has the kernel kill this process when the server dies, however it dies; False when it is dead already."""
+    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
+    return os.getppid() == server
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

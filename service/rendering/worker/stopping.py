@@ -1,0 +1,71 @@
+"""When a render has had enough, how long that will take, and what time it is by its own clock."""
+
+from __future__ import annotations
+
+import time
+
+from service.rendering.messages import Reason, StopRule
+
+MAX_SAMPLES = 1 << 24  # of the contract: where float32 sums stop counting
+# The meter tells the truth from 16 samples on; stopping on an earlier reading would be stopping by luck.
+TRUSTED_SAMPLES = 16
+
+
+class Clock:
+    """Wall time from the first dispatch to the end of the last one, pauses left out."""
+
+    def __init__(self) -> None:
+        self._banked_s = 0.0
+        self._began: float | None = None
+        self._ended = 0.0
+
+    def start(self) -> None:
+        if self._began is None:
+            self._began = self._ended = time.monotonic()
+
+    def lap(self) -> None:
+        """A dispatch has ended."""
+        self._ended = time.monotonic()
+
+    def pause(self) -> None:
+        self._banked_s = self.elapsed_s
+        self._began = None
+
+    @property
+    def elapsed_s(self) -> float:
+        return self._banked_s + (self._ended - self._began if self._began is not None else 0.0)
+
+    @property
+    def now_s(self) -> float:
+        """Like `elapsed_s`, and the wait since the last dispatch."""
+        return self._banked_s + (time.monotonic() - self._began if self._began is not None else 0.0)
+
+
+def reached(stop: StopRule, samples: int, noise: float | None) -> Reason | None:
+    if samples >= (stop.max_samples or MAX_SAMPLES):
+        return "max_samples"
+    if stop.target_noise is not None and noise is not None and samples >= TRUSTED_SAMPLES:
+        return "target_noise" if noise <= stop.target_noise else None
+    return None
+
+
+def late(stop: StopRule, now_s: float, sample_s: float, even: bool) -> bool:
+    """Whether time is up. A pass under way (not `even`) may be finished, and one that nearly fits begun."""
+    if stop.time_limit is None:
+        return False
+    overrun_s = 0.05 * stop.time_limit + 0.05  # half of what the contract allows: a slice is not to be halted
+    if now_s >= stop.time_limit + overrun_s:
+        return True
+    return even and (now_s >= stop.time_limit or (now_s > 0 and now_s + sample_s > stop.time_limit + overrun_s))
+
+
+def eta_s(stop: StopRule, samples: int, noise: float | None, elapsed_s: float) -> float | None:
+    """Seconds to the first of the limits; None: can't be said. Noise falls with the root of the samples."""
+    totals = [] if stop.time_limit is None else [stop.time_limit]
+    if samples and elapsed_s > 0.0:
+        per_sample = elapsed_s / samples
+        if stop.max_samples is not None:
+            totals.append(per_sample * stop.max_samples)
+        if stop.target_noise is not None and noise is not None:
+            totals.append(per_sample * max(TRUSTED_SAMPLES, samples * (noise / stop.target_noise) ** 2))
+    return max(0.0, min(totals) - elapsed_s) if totals else None

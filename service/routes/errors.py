@@ -1,0 +1,49 @@
+"""Every error as an `application/problem+json` answer (RFC 9457)."""
+
+from __future__ import annotations
+
+from fastapi import FastAPI, Request
+from fastapi.exceptions import RequestValidationError
+from starlette.exceptions import HTTPException
+from starlette.responses import JSONResponse, Response
+
+from service.problems import FieldError, InvalidDocument, ServiceError, answer, problem
+
+MEDIA_TYPE = "application/problem+json"
+
+
+def respond(error: Exception) -> Response:
+    retry_after = getattr(error, "retry_after", None)
+    headers = {} if retry_after is None else {"retry-after": str(retry_after)}
+    return JSONResponse(problem(error), answer(error).status, headers, MEDIA_TYPE)
+
+
+def tell_errors(app: FastAPI) -> None:
+    """Has `app` answer in this form whatever goes wrong, the framework's own refusals included."""
+    app.add_exception_handler(ServiceError, _refused)
+    app.add_exception_handler(RequestValidationError, _invalid)
+    app.add_exception_handler(HTTPException, _unrouted)
+    app.add_exception_handler(Exception, _refused)
+
+
+async def _refused(request: Request, error: Exception) -> Response:
+    return respond(error)
+
+
+async def _invalid(request: Request, error: Exception) -> Response:
+    """Of parameters in the address; documents are not FastAPI's to validate."""
+    assert isinstance(error, RequestValidationError)
+    # Not `input` nor `ctx`: they may hold NaN, which is no JSON.
+    errors = [FieldError("/" + "/".join(map(str, e["loc"][1:])), e["msg"]) for e in error.errors()]
+    return respond(InvalidDocument(errors))
+
+
+async def _unrouted(request: Request, error: Exception) -> Response:
+    assert isinstance(error, HTTPException)
+    body = {
+        "type": "about:blank",
+        "title": error.detail,
+        "status": error.status_code,
+        "detail": f"{request.method} {request.url.path}: {error.detail}",
+    }
+    return JSONResponse(body, error.status_code, error.headers, MEDIA_TYPE)

@@ -1,0 +1,136 @@
+"""Pictures: asked for in one shot, or started, watched, looked at and cancelled."""
+
+from __future__ import annotations
+
+import asyncio
+import contextlib
+import time
+from enum import IntEnum
+from functools import partial
+from typing import Annotated, Any, Literal
+
+from fastapi import APIRouter, Query, Request, Response
+from pydantic import BaseModel, ConfigDict, Field
+
+from service import images
+from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
+from service.rendering.job import Job
+from service.rendering.messages import Encoding, View
+from service.rendering.threads import encoding, packing
+from service.routes.house import STARTING_S, House, house
+
+router = APIRouter(prefix="/v1", tags=["renders"])
+
+LONGEST_WAIT_S = 60.0  # proxies cut idle connections about there
+DISPLAYED = ("png", "jpeg", "webp")
+REQUEST = {
+    "type": "object",
+    "required": ["scene"],
+    "properties": {"scene": {"type": "object"}, "settings": {"type": "object"}},
+}
+BODY = {"requestBody": {"required": True, "content": {"application/json": {"schema": REQUEST}}}}
+
+
+class Bits(IntEnum):
+    EIGHT = 8
+    SIXTEEN = 16
+
+
+class ImageQuery(BaseModel):
+    """How an image is written. EXR, npy and HDR hold linear values; exposure and tone map are for the others."""
+
+    model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
+    format: Literal["png", "jpeg", "webp", "exr", "hdr", "npy"] = "png"
+    bits: Bits = Bits.EIGHT
+    aov: Literal["color", "albedo", "normal", "depth", "variance"] = "color"
+    exposure: Annotated[float, Field(ge=-60, le=60)] = 0.0
+    tone_map: Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"] = "pbr_neutral"
+
+    def view(self) -> View:
+        if self.bits == Bits.SIXTEEN and self.format != "png":
+            raise InvalidDocument([FieldError("/bits", f"16 is for png; a {self.format} file has its own")])
+        encoding: Encoding = "linear" if self.format not in DISPLAYED else "f4" if self.bits == Bits.SIXTEEN else "u1"
+        return View(self.aov, self.exposure, self.tone_map, encoding)
+
+
+@router.post("/render", summary="Render and return the image", openapi_extra=BODY, response_class=Response)
+async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
+    view = query.view()
+    job = await _job(request)
+    house(request).renders.submit(job, listed=False)
+    try:
+        await _finished_or_gone(request, job)
+        if not job.finished.is_set():
+            return Response(status_code=499)  # nobody reads it
+        if job.state == "cancelled":
+            raise Unavailable("The server is shutting down.")
+        return await _image(job, query, view)
+    finally:
+        job.cancel()
+        job.release()
+
+
+@router.post("/renders", status_code=202, summary="Start a render", openapi_extra=BODY)
+async def start(request: Request, response: Response) -> dict[str, Any]:
+    job = await _job(request)
+    house(request).renders.submit(job)
+    response.headers["location"] = f"renders/{job.id}"
+    return job.status()
+
+
+@router.get("/renders", summary="All renders")
+async def renders(request: Request) -> list[dict[str, Any]]:
+    return [job.status() for job in house(request).renders.all()]
+
+
+@router.get("/renders/{id}", summary="How far it is")
+async def status(
+    request: Request, id: str, wait: Annotated[float, Query(ge=0, le=LONGEST_WAIT_S, allow_inf_nan=False)] = 0
+) -> dict[str, Any]:
+    job = house(request).renders.get(id)
+    if wait:
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(job.finished.wait(), wait)
+    return job.status()
+
+
+@router.get("/renders/{id}/image", summary="The image so far", response_class=Response)
+async def image(request: Request, id: str, query: Annotated[ImageQuery, Query()]) -> Response:
+    return await _image(house(request).renders.get(id), query, query.view())
+
+
+@router.delete("/renders/{id}", status_code=204, summary="Cancel; the image so far stays")
+async def cancel(request: Request, id: str) -> None:
+    house(request).renders.get(id).cancel()
+
+
+async def _job(request: Request) -> Job:
+    began = time.monotonic()
+    own: House = house(request)
+    body = await request.body()
+    await own.engine.ready(STARTING_S)
+    settings, packed = await packing(partial(own.reader.request, body))
+    return Job(own.engine, packed, settings, time.monotonic() - began)
+
+
+async def _finished_or_gone(request: Request, job: Job) -> None:
+    """Returns when the job is finished, or the connection closed."""
+    gone = asyncio.ensure_future(_disconnected(request))
+    finished = asyncio.ensure_future(job.finished.wait())
+    await asyncio.wait({gone, finished}, return_when=asyncio.FIRST_COMPLETED)
+    gone.cancel()
+    finished.cancel()
+
+
+async def _disconnected(request: Request) -> None:
+    while (await request.receive())["type"] != "http.disconnect":
+        pass
+
+
+async def _image(job: Job, query: ImageQuery, view: View) -> Response:
+    pixels, progress = await job.image(view)
+    if progress.samples == 0:
+        raise Conflict("There is no sample yet.")
+    metadata = {"settings": job.status()["settings"], "samples": progress.samples}
+    data = await encoding(partial(images.encode, pixels, query.format, bits=int(query.bits), metadata=metadata))
+    return Response(data, media_type=images.MIME[query.format], headers={"cache-control": "no-store"})

@@ -1,0 +1,21 @@
+// The sky's sun: a disk of even radiance in the space of the environment, picked with a share of its own and uniform
+// in its cone. What is below the horizon is behind the ground.
+
+// 1 - cos is taken from the difference of the directions: cos itself knows a disk this small to no better than .5 %.
+bool sun_holds(vec3 d) {
+    vec3 off = d - frame.environment_sun;
+    return dot(off, off) < 2.0 * frame.environment_sun_cap;
+}
+
+vec3 sun_sample(vec2 u) {
+    float h = u.x * frame.environment_sun_cap;
+    float r = sqrt(h * (2.0 - h)), phi = TWO_PI * u.y;
+    return frame_to_world(frame_basis(frame.environment_sun), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
+}
+
+// The first of the two random numbers, stretched again to all 32 bits where the sun was not picked.
+uint sun_rest(uint bits, uint cut) {
+    uint x = bits - cut;
+    float stretch = frame.environment_sun_share / (1.0 - frame.environment_sun_share);
+    return x + uint(float(x) * stretch);
+}

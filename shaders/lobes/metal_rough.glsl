@@ -1,0 +1,22 @@
+// The core BRDF of glTF 2.0, its appendix B simplified: Lambert under GGX, by what Fresnel leaves [Khronos 2021].
+// The highlight is lobes/specular.glsl with one alpha for distribution and masking.
+
+vec3 metal_rough_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
+    vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
+    return (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color + specular_eval(s, wo, wi, wm, cos_d);
+}
+
+// Chance of the diffuse lobe.
+float metal_rough_matte(Surface s, vec3 wo) {
+    float matte = (1.0 - s.metallic) * luminance(s.base_color);
+    return matte / (matte + specular_weight(s, wo));
+}
+
+float metal_rough_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
+    return mix(specular_pdf(s, wo, wm), diffuse_pdf(wi), metal_rough_matte(s, wo));
+}
+
+vec3 metal_rough_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    vec3 mirrored = specular_sample(s, wo, u);
+    return u_lobe < metal_rough_matte(s, wo) ? diffuse_sample(u) : mirrored;
+}

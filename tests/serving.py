@@ -1,0 +1,167 @@
+"""A real server in a process of its own, and a client of its stream."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import httpx
+import numpy as np
+from websockets.sync.client import connect
+from websockets.typing import Origin, Subprotocol
+
+PATIENCE_S = 30.0  # two cores that other tests may share
+
+SCENE: dict[str, Any] = {
+    "version": 1,
+    "camera": {"position": [0, 0, 4], "target": [0, 0, 0]},
+    "environment": {"type": "constant", "radiance": [0.5, 0.7, 1.0]},
+    "lights": [{"type": "point", "position": [2, 3, 4], "intensity": 30}],
+    "materials": {
+        "ball": {"type": "disney", "base_color": [0.8, 0.3, 0.2], "roughness": 0.4},
+        "floor": {"type": "diffuse", "albedo": 0.6},
+    },
+    "shapes": [
+        {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "ball"},
+        {"type": "quad", "origin": [-5, -1, 5], "u": [10, 0, 0], "v": [0, 0, -10], "material": "floor"},
+    ],
+}
+SMALL = {"width": 32, "height": 24, "max_samples": 8}
+ENDLESS = {"width": 32, "height": 24, "max_samples": 1 << 24}
+
+
+class Server:
+    """`sunbox serve` on a free port, with its data in `folder`."""
+
+    def __init__(self, folder: Path, **variables: str) -> None:
+        self._log = folder / "server.log"
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
+        environment |= {"SUNBOX_DATA_DIR": str(folder / "data"), **variables}
+        command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
+        with self._log.open("wb") as log:
+            self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
+        assert self.process.stdout is not None
+        said = self.process.stdout.readline()
+        assert "http://" in said, self._log.read_text()
+        self.url = said[said.index("http://") :].strip().rstrip("/")
+        self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S)
+
+    def wait(self) -> None:
+        until = time.monotonic() + PATIENCE_S
+        while self.http.get("/readyz").status_code != 200:
+            assert time.monotonic() < until, self._log.read_text()
+            time.sleep(0.05)
+
+    def children(self) -> list[int]:
+        found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(self.process.pid)], capture_output=True, text=True)
+        return [int(pid) for pid in found.stdout.split()]
+
+    def stop(self, number: int = signal.SIGTERM) -> int:
+        """The exit code."""
+        self.http.close()
+        self.process.send_signal(number)
+        try:
+            return self.process.wait(20)
+        finally:
+            self.process.kill()
+
+
+@dataclass(frozen=True)
+class Picture:
+    """A frame as it came."""
+
+    header: dict[str, Any]
+    image: bytes
+    at: float
+
+    def __getattr__(self, name: str) -> Any:
+        return self.header[name]
+
+    def array(self) -> np.ndarray:
+        """(height, width, 4) of an rgba32f frame."""
+        return np.frombuffer(self.image, "<f4").reshape(self.header["height"], self.header["width"], 4)
+
+
+class Client:
+    """The other end of the stream. Acknowledges what it receives unless told otherwise."""
+
+    def __init__(self, url: str, origin: str | None = None) -> None:
+        address = url.replace("http://", "ws://") + "/v1/stream"
+        offered = None if origin is None else Origin(origin)
+        self.socket = connect(address, subprotocols=[Subprotocol("sunbox.v1")], max_size=None, origin=offered)
+        self.acknowledges = True
+
+    def say(self, kind: str, **message: Any) -> None:
+        self.socket.send(json.dumps({"type": kind, **message}))
+
+    def start(self, generation: int = 1, scene: Any = SCENE, settings: Any = SMALL, **message: Any) -> None:
+        self.say("start", generation=generation, scene=scene, settings=settings, **message)
+
+    def hear(self, timeout: float = PATIENCE_S) -> Picture | dict[str, Any]:
+        """Raises TimeoutError when nothing comes."""
+        data = self.socket.recv(timeout)
+        if isinstance(data, str):
+            told: dict[str, Any] = json.loads(data)
+            return told
+        length = int.from_bytes(data[:4], "little")
+        picture = Picture(json.loads(data[4 : 4 + length]), data[4 + length :], time.monotonic())
+        if self.acknowledges:
+            self.say("ack", seq=picture.seq)
+        return picture
+
+    def until(self, kind: str) -> tuple[dict[str, Any], list[Picture]]:
+        """The next message of that type, and the frames before it."""
+        frames: list[Picture] = []
+        while True:
+            heard = self.hear()
+            if isinstance(heard, Picture):
+                frames.append(heard)
+            elif heard["type"] == kind:
+                return heard, frames
+
+    def frame(self, generation: int | None = None) -> Picture:
+        """The next frame, of that generation; other messages are skipped."""
+        while True:
+            heard = self.hear()
+            if isinstance(heard, Picture) and generation in (None, heard.generation):
+                return heard
+
+    def finished(self) -> tuple[dict[str, Any], Picture]:
+        """The next `done`, and the frame of all its samples, which comes before or after."""
+        last: Picture | None = None
+        done: dict[str, Any] | None = None
+        while done is None or last is None or last.samples < done["samples"] or last.generation != done["generation"]:
+            heard = self.hear()
+            if isinstance(heard, Picture):
+                last = heard
+            elif heard["type"] == "done":
+                done = heard
+        return done, last
+
+    def silence(self, seconds: float = 0.4) -> list[Picture | dict[str, Any]]:
+        """What came in that time."""
+        until, heard = time.monotonic() + seconds, []
+        while (left := until - time.monotonic()) > 0:
+            try:
+                heard.append(self.hear(left))
+            except TimeoutError:
+                break
+        return heard
+
+
+@contextmanager
+def client(server: Server) -> Iterator[Client]:
+    """A stream that has said hello."""
+    opened = Client(server.url)
+    with opened.socket:
+        assert opened.until("hello")
+        yield opened

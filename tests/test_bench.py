@@ -1,0 +1,73 @@
+"""The benchmark measures what it says: its scenes are valid, its mesh is whole, its figures are figures."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.bench import latency, machine, scenes, speed
+from service.cli import main
+from service.pack import pack
+from service.scene import parse_scene
+
+
+@pytest.mark.parametrize("case", scenes.cases(), ids=lambda case: f"{case.name}-{case.max_bounces}")
+def test_scene_packs_without_a_warning(case: scenes.Case) -> None:
+    packed = pack(parse_scene(case.scene), scenes.BenchAssets())
+    assert packed.warnings == []
+    assert len(packed.arrays.triangles) == (73_728 if "mesh" in case.name else 0)
+
+
+def test_divided_mesh_is_the_same_surface() -> None:
+    mesh = scenes.BenchAssets().mesh(scenes.MESH)
+    corners = mesh.vertices[mesh.faces]
+    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    assert mesh.normals is not None and (np.einsum("ij,ij->i", across, mesh.normals[mesh.faces[:, 2]]) > 0).all()
+    thirds = np.linalg.norm(across, axis=1).reshape(3, -1)
+    assert thirds[0] == pytest.approx(thirds[1], rel=1e-3) and thirds[0] == pytest.approx(thirds[2], rel=1e-3)
+
+
+def test_given_mesh_takes_the_place_of_the_generated_one(tmp_path: Path) -> None:
+    path = tmp_path / "one.obj"
+    path.write_text("v 0 5 0\nv 10 5 0\nv 0 15 0\nf 1 2 3\n")
+    mesh = scenes.BenchAssets(mesh_file=path).mesh(scenes.MESH)
+    assert mesh.vertices.tolist() == [[-1, 0, 0], [1, 0, 0], [-1, 2, 0]]
+
+
+def test_case_is_measured(gpu: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    monkeypatch.setattr(speed, "SIZE", 32)
+    monkeypatch.setattr(speed, "RUN_S", 0.05)
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", "")  # put back afterwards: measuring sets it
+    row = speed._measure_case(scenes.cases()[0], speed.Options(runs=2), 2, str(tmp_path))
+    assert row["mpaths_per_s"] == pytest.approx(32 * 32 / row["ms_per_sample"] / 1e3)
+    assert row["mpaths_per_s"] > 0 and row["compile_ms"] > 0 and row["spread"] >= 0
+
+
+def test_latencies_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(latency, "MOVES", 5)
+    figures = latency.measure()
+    assert figures["server_start_warm_ms"] > figures["slider_p50_ms"] > 0
+    assert figures["slider_p50_ms"] <= figures["slider_p95_ms"] <= figures["slider_worst_ms"]
+
+
+def test_command_prints_a_table_and_keeps_the_figures(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    row = {"name": "a sphere", "max_bounces": 8, "mpaths_per_s": 12.3456, "ms_per_sample": 21.2, "spread": 0.02}
+    document = {
+        "machine": machine.describe({"renderer": "a driver", "version": "4.5"}),
+        "size": [512, 512],
+        "scenes": [{**row, "compile_cold_ms": 90.0, "compile_warm_ms": 4.0}],
+        "latency": {"slider_p95_ms": 64.2},
+    }
+    monkeypatch.setattr(speed, "measure", lambda options, told: document)
+    output = tmp_path / "new" / "bench.json"
+    assert main(["bench", "speed", "-o", str(output)]) == 0
+    said = capsys.readouterr().out
+    assert "12.35" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
+    assert json.loads(output.read_text()) == document
+    assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2

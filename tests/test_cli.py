@@ -1,0 +1,278 @@
+"""The command line, driven as from a shell; what needs no OpenGL runs without it."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import signal
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import settings as gpu_settings
+from service.cli import main
+from service.commands import render
+from service.commands.progress import ProgressLine, describe
+from service.images import read_metadata
+from service.rendering.messages import Progress
+
+SCENE: dict[str, Any] = {
+    "version": 1,
+    "camera": {"position": [0, 0, 4], "target": [0, 0, 0]},
+    "environment": {"type": "constant", "radiance": 1},
+    "materials": {"a": {"type": "diffuse", "albedo": 0.5}},
+    "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "a"}],
+}
+SMALL = ["--set", "width=16", "--set", "height=12", "--spp", "4"]
+
+
+@pytest.fixture
+def scene(tmp_path: Path) -> Path:
+    path = tmp_path / "scene.json"
+    path.write_text(json.dumps(SCENE))
+    return path
+
+
+def refused(capsys: pytest.CaptureFixture[str], folder: Path, *arguments: str) -> str:
+    """What the command line says when it refuses: exit code 2, a few plain lines, no file left."""
+    before = set(folder.iterdir())
+    try:
+        code = main(["render", *arguments])
+    except SystemExit as usage:
+        code = usage.code if isinstance(usage.code, int) else 1
+    said = capsys.readouterr()
+    assert (code, said.out) == (2, "")
+    assert "Traceback" not in said.err and 0 < len(said.err.splitlines()) <= 12
+    assert set(folder.iterdir()) == before
+    return said.err
+
+
+@pytest.mark.parametrize(
+    ("keys", "value", "pointer"),
+    [
+        (("materials", "a", "albedo"), 2, "/materials/a/albedo"),
+        (("materials", "a", "albdo"), 0.5, "/materials/a/albdo"),
+        (("materials", "a", "type"), "lambert", "/materials/a/type"),
+        (("shapes", 0, "material"), "b", "/shapes/0/material"),
+        (("shapes", 0, "radius"), float("nan"), "/shapes/0/radius"),
+        (("environment",), {"type": "image", "asset": "missing.exr"}, "/environment/asset"),
+        (("environment",), {"type": "image", "asset": "../outside.exr"}, "/environment/asset"),
+        (("version",), 2, "/version"),
+    ],
+)
+def test_scene_mistake_names_its_pointer(
+    keys: tuple[str | int, ...], value: object, pointer: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    document = json.loads(json.dumps(SCENE))
+    place = document
+    for key in keys[:-1]:
+        place = place[key]
+    place[keys[-1]] = value
+    source = tmp_path / "scene.json"
+    source.write_text(json.dumps(document))
+    assert f"error: {pointer}: " in refused(capsys, tmp_path, str(source), "-o", str(tmp_path / "out.npy"))
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["--set", "width=0"], "/width"),
+        (["--set", "height=10.5"], "/height"),
+        (["--set", "samples=9"], "/samples"),
+        (["--set", "target_noise=nan"], "/target_noise"),
+        (["--set", "estimator=bdpt"], "/estimator"),
+        (["--set", "denoise=true"], "/denoise"),
+        (["--set", "width"], "key=value"),
+        (["--spp", "-4"], "/max_samples"),
+        (["--seed", "1.5"], "/seed"),
+        (["--aov", "beauty"], "variance"),
+        (["--aov", "all"], ".exr"),
+        (["--tone-map", "filmic"], "pbr_neutral"),
+        (["--exposure", "nan"], "-60 to 60"),
+        (["--stats", "missing/stats.json"], "does not exist"),
+        (["--asset-root", "missing"], "--asset-root"),
+        (["--frames", "3"], "--frames"),
+    ],
+)
+def test_argument_mistake_is_named(
+    arguments: list[str], said: str, scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert said in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "out.npy"), *arguments)
+
+
+@pytest.mark.parametrize("data", [b"", b"{", b"[]", b"\xff\xfe\0", b'{"version": 1, "version": 1}', b"[" * 100_000])
+def test_file_that_is_no_scene_is_refused(data: bytes, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    source = tmp_path / "scene.json"
+    source.write_bytes(data)
+    refused(capsys, tmp_path, str(source), "-o", str(tmp_path / "out.png"))
+
+
+def test_input_and_output_are_checked(scene: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert "no such file" in refused(capsys, tmp_path, str(tmp_path / "none.json"), "-o", str(tmp_path / "a.png"))
+    assert "directory" in refused(capsys, tmp_path, str(tmp_path), "-o", str(tmp_path / "a.png"))
+    assert ".exr" in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "a.tiff"))
+    assert "does not exist" in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "none" / "a.png"))
+
+
+def test_mistakes_are_found_before_opengl_is_loaded(scene: Path, tmp_path: Path) -> None:
+    program = (
+        "import sys; from service.cli import main\n"
+        f"code = main(['render', {str(scene)!r}, '-o', {str(tmp_path / 'a.png')!r}, '--set', 'width=0'])\n"
+        "heavy = {'moderngl', 'numba', 'fastapi', 'trimesh', 'OpenImageIO', 'PIL'} & set(sys.modules)\n"
+        "sys.exit(code if not heavy else str(heavy))"
+    )
+    answer = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 2, answer.stderr
+
+
+@pytest.mark.parametrize(("aov", "channels"), [("color", 4), ("albedo", 3), ("normal", 3), ("depth", 1)])
+def test_npy_holds_linear_floats(aov: str, channels: int, gpu: Any, scene: Path, tmp_path: Path) -> None:
+    out = tmp_path / "out.npy"
+    assert main(["render", str(scene), "-o", str(out), "--aov", aov, *SMALL]) == 0
+    pixels = np.load(out, allow_pickle=False)
+    assert (pixels.shape, pixels.dtype) == ((12, 16, channels), np.float32)
+    if aov == "albedo":
+        assert pixels[6, 8] == pytest.approx([0.5] * 3)
+
+
+@pytest.mark.parametrize(
+    ("suffix", "magic"),
+    [("png", b"\x89PNG"), ("exr", b"\x76\x2f\x31\x01"), ("hdr", b"#?RADIANCE"), ("PNG", b"\x89PNG")],
+)
+def test_format_follows_the_name(suffix: str, magic: bytes, gpu: Any, scene: Path, tmp_path: Path) -> None:
+    out = tmp_path / f"out.{suffix}"
+    assert main(["render", str(scene), "-o", str(out), "--exposure", "-1", "--tone-map", "agx", *SMALL]) == 0
+    assert out.read_bytes().startswith(magic)
+
+
+def test_all_aovs_become_layers(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    import OpenImageIO
+
+    out = tmp_path / "out.exr"
+    assert main(["render", str(scene), "-o", str(out), "--aov", "all", *SMALL]) == 0
+    layers = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "variance": "RGB"}
+    names = {f"{layer}.{channel}" for layer, channels in layers.items() for channel in channels}
+    assert set(OpenImageIO.ImageBuf(str(out)).spec().channelnames) == {*"RGBA", *names}
+
+
+def test_same_seed_same_bytes(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    pictures = []
+    for seed in ("7", "7", "8"):
+        assert main(["render", str(scene), "-o", str(tmp_path / "out.npy"), "--seed", seed, *SMALL]) == 0
+        pictures.append((tmp_path / "out.npy").read_bytes())
+    assert pictures[0] == pictures[1] != pictures[2]
+
+
+def test_stats_say_what_became_of_it(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    stats = tmp_path / "stats.json"
+    assert main(["render", str(scene), "-o", str(tmp_path / "out.png"), "--stats", str(stats), *SMALL]) == 0
+    told = json.loads(stats.read_text())
+    assert (told["state"], told["samples"], told["warnings"]) == ("done", 4, [])
+    assert told["noise"] > 0 and told["setup_s"] > 0 and told["elapsed_s"] > 0
+    settings = told["settings"]
+    assert (settings["width"], settings["max_samples"], settings["filter"]) == (16, 4, "blackman_harris")
+
+
+def test_time_limit_ends_a_render_without_sample_limit(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    stats = tmp_path / "stats.json"
+    size = ["--set", "width=64", "--set", "height=64", "--set", "time_limit=0.5"]
+    assert main(["render", str(scene), "-o", str(tmp_path / "out.png"), "--stats", str(stats), *size]) == 0
+    told = json.loads(stats.read_text())
+    assert 0.5 <= told["elapsed_s"] <= 0.65 and told["samples"] > 1
+
+
+def test_target_noise_ends_a_render(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    stats = tmp_path / "stats.json"
+    size = ["--set", "width=64", "--set", "height=64", "--set", "target_noise=0.01", "--set", "sampler=independent"]
+    assert main(["render", str(scene), "-o", str(tmp_path / "out.png"), "--stats", str(stats), *size]) == 0
+    assert 0 < json.loads(stats.read_text())["noise"] <= 0.01
+
+
+def test_interrupt_keeps_the_image_so_far(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    out, stats = tmp_path / "out.npy", tmp_path / "stats.json"
+    command = [sys.executable, "-m", "service.cli", "render", str(scene), "-o", str(out), "--stats", str(stats)]
+    ours, terminal = os.openpty()
+    render = subprocess.Popen([*command, "--set", "time_limit=60"], stderr=terminal)
+    os.close(terminal)
+    with open(ours, "rb", buffering=0) as seen:
+        shown = seen.read(200)  # the first bar: there are samples
+        render.send_signal(signal.SIGINT)
+        assert render.wait(timeout=30) == 130
+    assert b"samples" in shown and b"left" in shown
+    assert np.load(out).shape == (512, 512, 4)
+    assert json.loads(stats.read_text())["state"] == "cancelled"
+
+
+def test_info_names_the_renderer_and_the_scene(gpu: Any, scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["info", str(scene)]) == 0
+    said = capsys.readouterr().out
+    assert "1 sphere" in said and "HAS_SPHERES" in said and "HAS_BVH" not in said
+    assert main(["info"]) == 0
+    assert "renderer" in capsys.readouterr().out
+
+
+def test_choices_are_those_of_the_renderer() -> None:
+    assert (set(render.AOVS), set(render.TONE_MAPS)) == (set(gpu_settings.AOVS), set(gpu_settings.TONE_MAPS))
+
+
+def test_configuration_mistake_is_named(
+    scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("SUNBOX_MAX_PIXELS", "many")
+    assert "SUNBOX_MAX_PIXELS" in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "out.npy"))
+    monkeypatch.setenv("SUNBOX_MAX_PIXELS", "100")
+    assert "/width" in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "out.npy"))
+
+
+def test_picture_says_what_it_was_made_from(gpu: Any, scene: Path, tmp_path: Path) -> None:
+    for name in ("out.png", "out.exr"):
+        assert main(["render", str(scene), "-o", str(tmp_path / name), "--seed", "3", *SMALL]) == 0
+        told = read_metadata((tmp_path / name).read_bytes())
+        assert told is not None and (told["samples"], told["settings"]["seed"]) == (4, 3)
+
+
+def test_failure_leaves_the_old_picture(
+    gpu: Any, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def full(*_: object) -> None:
+        raise OSError(28, "No space left on device")
+
+    out = tmp_path / "out.npy"
+    out.write_bytes(b"old")
+    monkeypatch.setattr("os.replace", full)
+    assert main(["render", str(scene), "-o", str(out), *SMALL]) == 1
+    assert "no space left" in capsys.readouterr().err
+    assert out.read_bytes() == b"old" and {path.name for path in tmp_path.iterdir()} == {"out.npy", "scene.json"}
+
+
+def test_missing_opengl_is_exit_1(scene: Path, tmp_path: Path) -> None:
+    command = [sys.executable, "-m", "service.cli", "render", str(scene), "-o", str(tmp_path / "out.png")]
+    environment = {**os.environ, "SUNBOX_DEVICE": "99"}
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 1 and answer.stderr.startswith("error: ") and "Traceback" not in answer.stderr
+    assert not (tmp_path / "out.png").exists()
+
+
+class Terminal(io.StringIO):
+    def isatty(self) -> bool:
+        return True
+
+
+def test_progress_is_redrawn_on_a_terminal_only(monkeypatch: pytest.MonkeyPatch) -> None:
+    progress = Progress(samples=64, noise=0.0123, elapsed_s=60, eta_s=60)
+    assert describe(progress) == "64 samples, noise 1.23 %, 1:00, 1:00 left"
+    monkeypatch.setenv("COLUMNS", "100")
+    terminal = Terminal()
+    line = ProgressLine(terminal)
+    line.show(progress)
+    line.close()
+    assert terminal.getvalue() == f"\r[{'#' * 12}{'.' * 12}] 64 samples, noise 1.23 %, 1:00, 1:00 left\n"
+    log = io.StringIO()
+    assert not ProgressLine(log).due()
+    ProgressLine(log).show(progress)
+    assert log.getvalue() == describe(progress) + "\n"

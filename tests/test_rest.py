@@ -1,0 +1,426 @@
+"""The REST interface, against a real server."""
+
+from __future__ import annotations
+
+import hashlib
+import io
+import json
+import os
+import signal
+import socket
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+from urllib.parse import urljoin, urlsplit
+
+import httpx
+import numpy as np
+import pytest
+from PIL import Image
+from websockets.exceptions import ConnectionClosed
+
+from service.images import read_metadata
+from tests.serving import ENDLESS, SCENE, SMALL, Server
+from tests.serving import client as opened
+
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+@pytest.fixture
+def http(server: Server) -> httpx.Client:
+    return server.http
+
+
+@pytest.fixture
+def running(http: httpx.Client) -> Iterator[str]:
+    """A render without end, with some samples."""
+    id = start(http, ENDLESS)["id"]
+    wait_until(lambda: status(http, id)["samples"] > 0)
+    yield id
+    http.delete(f"/v1/renders/{id}")
+
+
+def start(http: httpx.Client, settings: Any = SMALL, scene: Any = SCENE) -> Any:
+    answer = http.post("/v1/renders", json={"scene": scene, "settings": settings})
+    assert answer.status_code == 202, answer.text
+    return answer.json()
+
+
+def status(http: httpx.Client, id: str, wait: float = 0) -> Any:
+    return http.get(f"/v1/renders/{id}", params={"wait": wait}).json()
+
+
+def wait_until(reached: Any) -> None:
+    until = time.monotonic() + 20
+    while not reached():
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+def pixels(http: httpx.Client, id: str, aov: str = "color") -> np.ndarray:
+    answer = http.get(f"/v1/renders/{id}/image", params={"format": "npy", "aov": aov})
+    return np.load(io.BytesIO(answer.content))
+
+
+def is_problem(answer: httpx.Response, status: int, *pointers: str) -> bool:
+    body = answer.json()
+    assert answer.headers["content-type"] == "application/problem+json", answer.text
+    assert answer.status_code == body["status"] == status and {"type", "title", "detail"} <= body.keys(), body
+    assert [error["pointer"] for error in body.get("errors", [])] == list(pointers), body
+    return True
+
+
+def test_one_shot(http: httpx.Client) -> None:
+    answer = http.post("/v1/render", json={"scene": SCENE, "settings": SMALL}, params={"format": "webp"})
+    assert answer.status_code == 200 and answer.headers["content-type"] == "image/webp"
+    assert Image.open(io.BytesIO(answer.content)).size == (32, 24)
+    assert all(render["samples"] != 8 for render in http.get("/v1/renders").json())
+
+
+def test_a_render_from_queued_to_done(http: httpx.Client) -> None:
+    answer = http.post("/v1/renders", json={"scene": SCENE, "settings": SMALL})
+    assert answer.status_code == 202
+    location = answer.headers["location"]
+    assert location.startswith("renders/"), "relative, so that it holds under a subpath"
+    address = urlsplit(urljoin(str(answer.url), location)).path
+    assert answer.json()["state"] == "queued"
+    done = http.get(address, params={"wait": 20}).json()
+    assert done["state"] == "done" and done["reason"] == "max_samples" and done["samples"] == 8
+    assert done["noise"] > 0 and done["elapsed_s"] > 0 and done["setup_s"] > 0 and done["eta_s"] == 0
+    assert done["warnings"] == [] and done["settings"]["max_bounces"] == 8 and done["settings"]["width"] == 32
+    assert done["id"] in [render["id"] for render in http.get("/v1/renders").json()]
+    assert http.delete(address).status_code == 204 and http.get(address).json()["state"] == "done"
+
+
+def test_the_same_request_gives_the_same_bits(http: httpx.Client) -> None:
+    ids = [start(http, {**SMALL, "max_samples": 100})["id"] for _ in range(3)]  # side by side
+    for id in ids:
+        assert status(http, id, 20)["state"] == "done"
+    first, *others = (pixels(http, id) for id in ids)
+    assert all(np.array_equal(first, other) for other in others)
+
+
+@pytest.mark.parametrize(
+    ("format", "mime"),
+    [
+        ("png", "image/png"),
+        ("jpeg", "image/jpeg"),
+        ("webp", "image/webp"),
+        ("exr", "image/x-exr"),
+        ("hdr", "image/vnd.radiance"),
+        ("npy", "application/octet-stream"),
+    ],
+)
+@pytest.mark.parametrize("aov", ["color", "albedo", "normal", "depth", "variance"])
+def test_every_format_of_every_aov(http: httpx.Client, running: str, format: str, mime: str, aov: str) -> None:
+    answer = http.get(f"/v1/renders/{running}/image", params={"format": format, "aov": aov})
+    assert answer.status_code == 200 and answer.headers["content-type"] == mime
+    assert len(answer.content) > 100
+
+
+def test_image_shapes_and_depths(http: httpx.Client) -> None:
+    id = start(http)["id"]
+    status(http, id, 20)
+    for aov, channels in {"color": 4, "albedo": 3, "normal": 3, "depth": 1, "variance": 3}.items():
+        array = pixels(http, id, aov)
+        assert array.shape == (24, 32, channels) and array.dtype == np.float32
+    png = http.get(f"/v1/renders/{id}/image").content
+    assert read_metadata(png)["samples"] == 8
+    bright = http.get(f"/v1/renders/{id}/image", params={"exposure": 2, "tone_map": "linear"}).content
+    assert np.array(Image.open(io.BytesIO(bright))).mean() > np.array(Image.open(io.BytesIO(png))).mean()
+    sixteen = http.get(f"/v1/renders/{id}/image", params={"bits": 16}).content
+    assert sixteen[24] == 16  # IHDR's bit depth
+
+
+@pytest.mark.parametrize(
+    ("query", "name"),
+    [
+        ("bits=12", "bits"),
+        ("bits=16&format=jpeg", "bits"),
+        ("format=gif", "format"),
+        ("aov=beauty", "aov"),
+        ("exposure=nan", "exposure"),
+        ("exposure=61", "exposure"),
+        ("tone_map=filmic", "tone_map"),
+        ("tonemap=aces", "tonemap"),
+    ],
+)
+def test_bad_image_queries(http: httpx.Client, running: str, query: str, name: str) -> None:
+    assert is_problem(http.get(f"/v1/renders/{running}/image?{query}"), 422, f"/{name}")
+    assert is_problem(http.post(f"/v1/render?{query}", json={"scene": SCENE}), 422, f"/{name}")
+
+
+def test_cancelling(http: httpx.Client, running: str) -> None:
+    before = time.monotonic()
+    assert http.delete(f"/v1/renders/{running}").status_code == 204
+    cancelled = status(http, running)
+    assert cancelled["state"] == "cancelled" and time.monotonic() - before < 0.5
+    wait_until(lambda: status(http, running)["reason"] == "stopped")
+    samples = status(http, running)["samples"]
+    image = pixels(http, running)
+    time.sleep(0.2)
+    assert status(http, running)["samples"] == samples and np.array_equal(pixels(http, running), image)
+
+
+def test_no_image_before_the_first_sample(http: httpx.Client) -> None:
+    large = {"width": 1500, "height": 1500, "max_bounces": 64}
+    id = start(http, large)["id"]
+    answer = http.get(f"/v1/renders/{id}/image")
+    http.delete(f"/v1/renders/{id}")
+    assert is_problem(answer, 409)
+
+
+def test_closing_the_connection_cancels(server: Server, running: str) -> None:
+    """Nothing shares the GPU with the running render once the one shot's client is gone."""
+    endless = json.dumps({"scene": SCENE, "settings": {**ENDLESS, "width": 64}}).encode()
+    address = urlsplit(server.url)
+    with socket.create_connection((address.hostname, address.port)) as connection:
+        head = f"POST /v1/render HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Length: {len(endless)}\r\n\r\n"
+        connection.sendall(head.encode() + endless)
+        time.sleep(0.4)
+        shared = speed(server.http, running)
+    time.sleep(0.3)
+    assert speed(server.http, running) > 1.3 * shared
+
+
+def speed(http: httpx.Client, id: str) -> float:
+    before, began = status(http, id)["samples"], time.monotonic()
+    time.sleep(0.6)
+    return (status(http, id)["samples"] - before) / (time.monotonic() - began)
+
+
+@pytest.mark.parametrize("limit", [0.2, 0.5])
+def test_time_limit_is_kept_and_ends_between_samples(http: httpx.Client, limit: float) -> None:
+    id = start(http, {"width": 256, "height": 256, "time_limit": limit})["id"]
+    done = status(http, id, 20)
+    assert done["reason"] == "time_limit" and done["settings"]["max_samples"] is None
+    assert 0.5 * limit < done["elapsed_s"] <= 1.1 * limit + 0.1
+    again = start(http, {"width": 256, "height": 256, "max_samples": done["samples"]})["id"]
+    status(http, again, 30)
+    assert np.array_equal(pixels(http, id), pixels(http, again))
+
+
+def test_target_noise(http: httpx.Client) -> None:
+    id = start(http, {"width": 64, "height": 64, "target_noise": 0.1})["id"]
+    done = status(http, id, 20)
+    assert done["reason"] == "target_noise" and done["noise"] <= 0.1 and done["samples"] >= 16
+
+
+@pytest.mark.parametrize(
+    ("body", "status", "pointers"),
+    [
+        (b"", 400, []),
+        (b"{", 400, []),
+        (b'{"scene": {}, "scene": {}}', 400, []),
+        (b'"\xff"', 400, []),
+        (b"[" * 100_000, 400, []),
+        (b"[]", 422, [""]),
+        (b"{}", 422, ["/scene"]),
+        (b'{"scene": NaN}', 422, ["/scene"]),
+        (b'{"scene": 1e999, "settings": {"seed": -Infinity}}', 422, ["/scene", "/settings/seed"]),
+    ],
+)
+@pytest.mark.parametrize("address", ["/v1/render", "/v1/renders"])
+def test_bad_bodies(http: httpx.Client, address: str, body: bytes, status: int, pointers: list[str]) -> None:
+    answer = http.post(address, content=body)
+    assert is_problem(answer, status, *pointers)
+    assert "NaN" not in answer.text or status == 422
+
+
+@pytest.mark.parametrize(
+    ("change", "pointer"),
+    [
+        (
+            {"materials": {"ball": {"type": "diffuse", "albedo": 2}, "floor": {"type": "disney"}}},
+            "/scene/materials/ball/albedo",
+        ),
+        ({"environment": {"type": "image", "asset": "sha256:" + "0" * 64}}, "/scene/environment/asset"),
+        ({"textures": {}}, "/scene/textures"),
+    ],
+)
+def test_bad_scenes(http: httpx.Client, change: dict[str, Any], pointer: str) -> None:
+    assert is_problem(http.post("/v1/renders", json={"scene": {**SCENE, **change}}), 422, pointer)
+
+
+def test_what_is_not_there(http: httpx.Client) -> None:
+    for name in (
+        "nothing",
+        "renders/nobody",
+        "renders/nobody/image",
+        "assets/sha256:0",
+        "presets/shapes",
+        "presets/scenes/x",
+    ):
+        assert is_problem(http.get(f"/v1/{name}"), 404)
+    assert is_problem(http.get("/nothing"), 404)
+    assert is_problem(http.delete("/v1/renders/nobody"), 404)
+    assert is_problem(http.post("/v1/info"), 405)
+    assert is_problem(http.get("/v1/renders/nobody?wait=-1"), 422, "/wait")
+
+
+def test_assets(http: httpx.Client) -> None:
+    id = "sha256:" + hashlib.sha256(OBJ).hexdigest()
+    for _ in range(2):
+        answer = http.post("/v1/assets", content=OBJ, params={"filename": "a.obj"})
+        assert answer.status_code == 201
+        stored = answer.json()
+        assert (stored["id"], stored["kind"], stored["bytes"], stored["triangles"]) == (id, "mesh", len(OBJ), 1)
+    assert http.get(f"/v1/assets/{id}").content == OBJ
+    mesh = {"type": "mesh", "asset": id, "material": "ball"}
+    render = start(http, scene={**SCENE, "shapes": [mesh]})
+    assert status(http, render["id"], 20)["state"] == "done"
+    assert is_problem(http.post("/v1/assets", content=b"v 1 nan 0\nf 1 1 1\n", params={"filename": "a.obj"}), 422)
+    assert is_problem(http.post("/v1/assets", content=b"hello"), 415)
+
+
+def test_every_preset_is_there(http: httpx.Client) -> None:
+    for kind in ("scenes", "materials", "environments"):
+        listed = http.get(f"/v1/presets/{kind}").json()
+        assert listed and all({"name", "title"} == entry.keys() for entry in listed)
+        for entry in listed:
+            assert "title" not in http.get(f"/v1/presets/{kind}/{entry['name']}").json()
+
+
+def test_the_service_describes_itself(http: httpx.Client) -> None:
+    assert http.get("/healthz").status_code == http.get("/readyz").status_code == 200
+    info = http.get("/v1/info").json()
+    assert info["renderer"]["renderer"] and info["limits"]["max_pixels"] and info["quality"]["draft"]["max_samples"]
+    schema = http.get("/v1/schema").json()
+    assert schema.keys() == {"scene", "settings", "view"}
+    assert schema["view"]["properties"]["exposure"]["maximum"] == 60
+    paths = http.get("/openapi.json").json()["paths"]
+    assert {"/v1/render", "/v1/renders", "/v1/renders/{id}/image", "/v1/assets", "/v1/info"} <= paths.keys()
+
+
+def test_pages_come_from_here_alone(http: httpx.Client) -> None:
+    for address in ("/", "/docs"):
+        answer = http.get(address)
+        assert answer.status_code == 200 and answer.headers["content-type"].startswith("text/html")
+        assert "'self'" in answer.headers["content-security-policy"]
+        assert 'src="http' not in answer.text and 'href="http' not in answer.text and 'src="/' not in answer.text
+    assert http.get("/docs.js").status_code == http.get("/docs.css").status_code == 200
+
+
+@pytest.mark.parametrize("host", ["evil.example", "evil.example:8000", "", "127.0.0.1.evil.example"])
+def test_foreign_hosts_on_a_loopback_address(http: httpx.Client, host: str) -> None:
+    assert is_problem(http.get("/v1/info", headers={"host": host}), 403)
+
+
+@pytest.mark.parametrize("host", ["localhost", "127.0.0.1:1234", "[::1]:80"])
+def test_own_hosts(http: httpx.Client, host: str) -> None:
+    assert http.get("/v1/info", headers={"host": host}).status_code == 200
+
+
+@pytest.mark.parametrize("origin", ["http://evil.example", "null", "http://localhost:1"])
+def test_foreign_origins_change_nothing(http: httpx.Client, origin: str) -> None:
+    for method, address in (("POST", "/v1/renders"), ("POST", "/v1/assets"), ("DELETE", "/v1/renders/x")):
+        assert is_problem(http.request(method, address, headers={"origin": origin}), 403)
+    answer = http.get("/v1/info", headers={"origin": origin})
+    assert answer.status_code == 200 and "access-control-allow-origin" not in answer.headers
+
+
+def test_own_origin_may(server: Server) -> None:
+    answer = server.http.post("/v1/assets", content=OBJ, headers={"origin": server.url})
+    assert answer.status_code == 201
+
+
+@pytest.fixture(scope="module")
+def strict(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    folder = tmp_path_factory.mktemp("strict")
+    origins = "https://friend.example, http://other.example:81"
+    served = Server(folder, SUNBOX_MAX_BODY="4000", SUNBOX_MAX_PIXELS="1000", SUNBOX_ALLOWED_ORIGINS=origins)
+    served.wait()
+    yield served
+    served.process.kill()
+
+
+def test_announced_bodies_are_refused_unread(strict: Server) -> None:
+    address = urlsplit(strict.url)
+    with socket.create_connection((address.hostname, address.port), 5) as connection:
+        head = f"POST /v1/assets HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Length: 4001\r\n\r\n"
+        connection.sendall(head.encode())
+        assert b" 413 " in connection.recv(100)
+
+
+def test_unannounced_bodies_are_counted(strict: Server) -> None:
+    answer = strict.http.post("/v1/assets", content=iter([b"x" * 1000] * 5))
+    assert is_problem(answer, 413)
+    assert strict.http.post("/v1/assets", content=iter([OBJ])).status_code == 201
+
+
+def test_compressed_bodies_are_not_taken(strict: Server) -> None:
+    assert is_problem(strict.http.post("/v1/assets", content=OBJ, headers={"content-encoding": "gzip"}), 415)
+
+
+def test_pixels(strict: Server) -> None:
+    answer = strict.http.post("/v1/renders", json={"scene": SCENE, "settings": {"width": 40, "height": 26}})
+    assert is_problem(answer, 422, "/settings/width")
+    assert strict.http.get("/v1/info").json()["limits"]["max_pixels"] == 1000
+
+
+def test_allowed_origins(strict: Server) -> None:
+    for origin in ("https://friend.example", "http://other.example:81"):
+        answer = strict.http.post("/v1/assets", content=OBJ, headers={"origin": origin})
+        assert answer.status_code == 201 and answer.headers["access-control-allow-origin"] == origin
+    assert strict.http.get("/v1/info", headers={"host": "friend.example"}).status_code == 200
+    assert is_problem(strict.http.post("/v1/assets", content=OBJ, headers={"origin": "http://friend.example"}), 403)
+
+
+def test_the_end(strict: Server) -> None:
+    """Clients are told, nobody waits, nothing stays."""
+    children = strict.children()
+    assert children
+    with opened(strict) as stream:
+        stream.start(settings={**ENDLESS, "width": 30})
+        stream.frame()
+        began = time.monotonic()
+        assert strict.stop(signal.SIGTERM) == 0
+        assert time.monotonic() - began < 15
+        with pytest.raises(ConnectionClosed) as closed:
+            stream.until("never")
+        assert closed.value.rcvd is not None and closed.value.rcvd.code == 1001
+    assert not [pid for pid in children if Path(f"/proc/{pid}").exists()]
+
+
+def test_children_end_when_the_server_is_killed(server: Server, tmp_path: Path) -> None:
+    doomed = Server(tmp_path)
+    doomed.wait()
+    children = doomed.children()
+    assert children
+    os.kill(doomed.process.pid, signal.SIGKILL)
+    doomed.process.wait()
+    wait_until(lambda: not [pid for pid in children if Path(f"/proc/{pid}").exists()])
+
+
+def renderer_of(server: Server) -> int:
+    commands = {pid: Path(f"/proc/{pid}/cmdline").read_bytes() for pid in server.children()}
+    (pid,) = (pid for pid, command in commands.items() if b"rendering.worker" in command)
+    return pid
+
+
+def test_losing_the_renderer(server: Server, tmp_path: Path) -> None:
+    """Who waited is told; the next request finds another renderer."""
+    fragile = Server(tmp_path)
+    fragile.wait()
+    try:
+        finished = start(fragile.http)["id"]
+        status(fragile.http, finished, 20)
+        unfinished = start(fragile.http, ENDLESS)["id"]
+        wait_until(lambda: status(fragile.http, unfinished)["samples"] > 0)
+        with opened(fragile) as stream:
+            stream.start(settings=ENDLESS)
+            stream.frame()
+            os.kill(renderer_of(fragile), signal.SIGKILL)
+            assert stream.until("error")[0]["problem"]["status"] == 500
+            with pytest.raises(ConnectionClosed) as closed:
+                stream.until("never")
+            assert closed.value.rcvd is not None and closed.value.rcvd.code == 4500
+        failed = status(fragile.http, unfinished)
+        assert failed["state"] == "failed" and failed["problem"]["status"] == 500
+        assert is_problem(fragile.http.get(f"/v1/renders/{unfinished}/image"), 500)
+        assert status(fragile.http, finished)["state"] == "done"
+        assert is_problem(fragile.http.get(f"/v1/renders/{finished}/image"), 410)
+        assert status(fragile.http, start(fragile.http)["id"], 20)["state"] == "done"
+    finally:
+        assert fragile.stop(signal.SIGINT) == 0

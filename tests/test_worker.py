@@ -1,0 +1,370 @@
+"""The renderer's process: whose turn it is, when it is enough, and that nothing brings it down."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import dataclass
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings
+from service.pack import pack
+from service.problems import Unavailable
+from service.rendering.engine import Engine
+from service.rendering.messages import (
+    Done,
+    Failed,
+    Frame,
+    FromRenderer,
+    Image,
+    Loaded,
+    Pause,
+    Progressed,
+    Read,
+    Resume,
+    Stop,
+    StopRule,
+    Update,
+    View,
+    Want,
+)
+from service.rendering.scheduler import FIRST_FRAME_LEAD_S, Scheduler
+from service.rendering.worker.ladder import FULL_S, NEXT_S, Ladder
+from service.rendering.worker.loop import coalesced
+from service.rendering.worker.stopping import eta_s, late, reached
+from service.scene import parse_scene
+from tests.documents import Shelf
+from tests.serving import SCENE
+
+ENDLESS = StopRule()
+LINEAR = View(encoding="linear")
+
+
+@dataclass(eq=False)
+class Turn:
+    ready: bool = True
+    unseen: bool = False
+    used_s: float = 0.0
+
+
+def turns(tasks: list[Turn], count: int, slice_s: float = 0.02) -> list[int]:
+    """How often each had its turn."""
+    scheduler, had = Scheduler(), [0] * len(tasks)
+    for _ in range(count):
+        task = scheduler.choose(tasks)
+        assert task is not None
+        task.used_s += slice_s
+        had[tasks.index(task)] += 1
+    return had
+
+
+def test_everyone_gets_the_same_time() -> None:
+    assert turns([Turn(), Turn(), Turn()], 300) == [100, 100, 100]
+    assert turns([Turn(), Turn(ready=False)], 10) == [10, 0]
+    assert Scheduler().choose([Turn(ready=False)]) is None
+
+
+def test_who_was_idle_saves_nothing_up() -> None:
+    scheduler, busy, late_comer = Scheduler(), Turn(), Turn(ready=False)
+    for _ in range(100):
+        assert scheduler.choose([busy, late_comer]) is busy
+        busy.used_s += 1.0
+    late_comer.ready = True
+    had = 0
+    for _ in range(20):
+        task = scheduler.choose([busy, late_comer])
+        assert task is not None
+        task.used_s += 1.0
+        had += task is late_comer
+    assert 9 <= had <= 11
+
+
+def test_a_first_frame_goes_first_but_starves_nobody() -> None:
+    newest, other = Turn(unseen=True, used_s=FIRST_FRAME_LEAD_S / 2), Turn()
+    scheduler = Scheduler()
+    assert scheduler.choose([newest, other]) is newest
+    had = turns([Turn(unseen=True), Turn()], 200)  # as when an edit follows an edit
+    assert had[1] > 80
+
+
+@pytest.mark.parametrize(
+    ("stop", "samples", "noise", "expected"),
+    [
+        (StopRule(10), 9, None, None),
+        (StopRule(10), 10, None, "max_samples"),
+        (StopRule(), 1 << 24, None, "max_samples"),
+        (StopRule(target_noise=0.1), 16, 0.09, "target_noise"),
+        (StopRule(target_noise=0.1), 16, 0.11, None),
+        (StopRule(target_noise=0.1), 15, 0.01, None),  # the meter is not to be trusted yet
+        (StopRule(target_noise=0.1), 20, None, None),
+    ],
+)
+def test_reached(stop: StopRule, samples: int, noise: float | None, expected: str | None) -> None:
+    assert reached(stop, samples, noise) == expected
+
+
+@pytest.mark.parametrize(
+    ("now_s", "sample_s", "even", "expected"),
+    [
+        (1.9, 0.01, True, False),
+        (2.0, 0.01, True, True),
+        (2.0, 0.01, False, False),  # a pass under way may be finished ...
+        (2.15, 0.01, False, True),  # ... but not for long
+        (1.5, 1.0, True, True),  # the next would end too late
+        (1.5, 1.0, False, False),
+        (0.0, 9.0, True, False),  # one is tried in any case
+    ],
+)
+def test_late(now_s: float, sample_s: float, even: bool, expected: bool) -> None:
+    assert late(StopRule(time_limit=2.0), now_s, sample_s, even) is expected
+    assert not late(StopRule(), now_s, sample_s, even)
+
+
+def test_eta_is_that_of_the_first_limit() -> None:
+    assert eta_s(StopRule(100), 25, None, 2.0) == pytest.approx(6.0)
+    assert eta_s(StopRule(100, time_limit=5.0), 25, None, 2.0) == pytest.approx(3.0)
+    assert eta_s(StopRule(target_noise=0.1), 100, 0.2, 2.0) == pytest.approx(6.0)
+    assert eta_s(StopRule(), 25, 0.1, 2.0) is None and eta_s(StopRule(100), 0, None, 0.0) is None
+
+
+class Pictures:
+    """As much of a renderer as a ladder needs before it is climbed."""
+
+    def picture(self, scene: Any, settings: RenderSettings) -> RenderSettings:
+        return settings
+
+
+@pytest.mark.parametrize("side", [1, 40, 512, 4096])
+@pytest.mark.parametrize("pixel_s", [None, 1e-9, 1.2e-7, 1e-6, 1e-3])
+def test_ladder(side: int, pixel_s: float | None) -> None:
+    renderer: Any = Pictures()
+    ladder = Ladder(renderer, renderer, RenderSettings(side, side))
+    scale = ladder.first(pixel_s)
+    assert scale == 1.0 or side * scale >= 16
+    if pixel_s and side * side * pixel_s <= FULL_S:
+        assert scale == 1.0
+    climbed = [scale]
+    while climbed[-1] < 1.0:
+        climbed.append(ladder.next(climbed[-1], pixel_s))
+    assert all(higher >= 2 * lower for lower, higher in pairwise(climbed))
+    if pixel_s and side * side * pixel_s <= NEXT_S:
+        assert len(climbed) <= 2
+
+
+def test_coalescing_keeps_order_where_it_matters() -> None:
+    camera, material, limit = Update(1, 2, camera="c"), Update(1, 3, camera="d"), Update(1, 4, stop=StopRule(9))
+    want, other = Want(1, 5, View()), Update(2, 1, camera="e")
+    assert list(coalesced(iter([camera, want, material, other, limit]))) == [
+        Update(1, 4, camera="d", stop=StopRule(9)),
+        other,
+        want,
+    ]
+    assert list(coalesced(iter([camera, Stop(1), material]))) == [camera, Stop(1), material]
+
+
+class Ears:
+    """Hears what becomes of a task."""
+
+    def __init__(self) -> None:
+        self.messages: asyncio.Queue[FromRenderer | str] = asyncio.Queue()
+
+    def heard(self, message: FromRenderer) -> None:
+        self.messages.put_nowait(message)
+
+    def lost(self, detail: str) -> None:
+        self.messages.put_nowait(detail)
+
+    async def next(self, kind: Any) -> Any:
+        while True:
+            message = await asyncio.wait_for(self.messages.get(), 20)
+            if isinstance(message, kind):
+                return message
+
+
+@pytest.fixture(scope="module")
+def arrays(gpu: Renderer) -> Any:
+    return pack(parse_scene(SCENE), Shelf()).arrays
+
+
+@pytest.fixture(scope="module")
+def rendering(gpu: Renderer) -> Iterator[Callable[[Callable[[Engine], Awaitable[None]]], None]]:
+    """Runs a test with a renderer's process that all tests of this file share."""
+    with asyncio.Runner() as runner:
+        engine = Engine()
+
+        async def start() -> None:
+            engine.start()
+            await engine.ready(20)
+
+        runner.run(start())
+        yield lambda test: runner.run(test(engine))  # type: ignore[arg-type]
+        runner.run(engine.close())
+
+
+def settings(side: int = 32, **others: Any) -> dict[str, Any]:
+    return {"width": side, "height": side, **others}
+
+
+def test_load_trace_done_read(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(20)))
+        loaded = await ears.next(Loaded)
+        assert loaded.generation == 1 and loaded.setup_s > 0 and loaded.warnings == []
+        done = await ears.next(Done)
+        assert done.reason == "max_samples" and done.progress.samples == 20 and done.progress.noise > 0
+        engine.send(Read(task, 3, LINEAR))
+        engine.send(Read(task, 4, View(encoding="f4")))
+        linear, shown = await ears.next(Image), await ears.next(Image)
+        assert (linear.serial, shown.serial) == (3, 4)
+        assert linear.pixels.shape == shown.pixels.shape == (32, 32, 4) and 0 <= shown.pixels.min() <= 1
+        engine.drop(task)
+
+    rendering(test)
+
+
+def test_pauses_and_other_tasks_change_no_pixel(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        async def picture(disturbed: bool) -> np.ndarray:
+            ears = Ears()
+            task = engine.open(ears)
+            await engine.send_scene(Update(task, 1, arrays, settings(128), StopRule(24)))
+            for _ in range(3 if disturbed else 0):
+                await asyncio.sleep(0.03)
+                engine.send(Pause(task))
+                await asyncio.sleep(0.02)
+                engine.send(Resume(task))
+            await ears.next(Done)
+            engine.send(Read(task, 1, LINEAR))
+            pixels = (await ears.next(Image)).pixels
+            engine.drop(task)
+            return np.array(pixels)
+
+        alone = await picture(disturbed=False)
+        crowd = await asyncio.gather(*(picture(disturbed=True) for _ in range(3)))
+        assert all(np.array_equal(alone, one) for one in crowd)
+
+    rendering(test)
+
+
+def test_a_want_is_answered_once_and_only_by_something_new(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(4), interactive=True))
+        await ears.next(Done)
+        engine.send(Want(task, 1, View()))
+        frame = await ears.next(Frame)
+        assert frame.serial == 1 and frame.last and frame.progress.samples == 4 and frame.pixels.dtype == np.uint8
+        engine.send(Want(task, 2, View()))
+        with pytest.raises(TimeoutError):
+            await asyncio.wait_for(ears.next(Frame), 0.2)
+        engine.send(Want(task, 3, View(exposure=1.0), anyway=True))
+        assert (await ears.next(Frame)).serial == 3
+        engine.drop(task)
+
+    rendering(test)
+
+
+def test_a_failure_is_the_tasks_own(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        good, bad = Ears(), Ears()
+        one, other = engine.open(good), engine.open(bad)
+        await engine.send_scene(Update(one, 1, arrays, settings(), ENDLESS))
+        await engine.send_scene(Update(other, 1, arrays, settings(filter="sinc"), ENDLESS))
+        failed = await bad.next(Failed)
+        assert failed.generation == 1 and failed.detail and failed.serial is None
+        before = (await good.next(Progressed)).progress.samples
+        assert (await good.next(Progressed)).progress.samples > before
+        engine.send(Update(other, 2, materials=arrays.materials))  # in vain, and harmless
+        await engine.send_scene(Update(other, 3, arrays, settings(), StopRule(2)))
+        assert (await bad.next(Done)).generation == 3
+        engine.send(Read(other, 9, View(aov="beauty")))
+        assert (await bad.next(Failed)).serial == 9
+        engine.send(Read(other, 10, LINEAR))
+        assert (await bad.next(Image)).pixels is not None
+        engine.drop(one)
+        engine.drop(other)
+
+    rendering(test)
+
+
+def test_an_image_before_the_first_sample_is_none(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays, settings(2048, max_bounces=64), ENDLESS))
+        engine.send(Read(task, 1, LINEAR))
+        assert (await ears.next(Image)).pixels is None
+        began = time.monotonic()
+        engine.send(Stop(task))
+        done = await ears.next(Done)
+        assert done.reason == "stopped" and time.monotonic() - began < 1
+        engine.drop(task)
+
+    rendering(test)
+
+
+def test_idle_costs_nothing(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(4)))
+        await ears.next(Done)
+        assert engine.process_id is not None
+        before = cpu_ticks(engine.process_id)
+        await asyncio.sleep(0.4)
+        assert cpu_ticks(engine.process_id) - before <= 1
+        engine.drop(task)
+
+    rendering(test)
+
+
+def cpu_ticks(pid: int) -> int:
+    fields = Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()
+    return int(fields[11]) + int(fields[12])
+
+
+def test_it_is_polite(rendering: Any) -> None:
+    async def test(engine: Engine) -> None:
+        nice = Path(f"/proc/{engine.process_id}/stat").read_text().rsplit(")", 1)[1].split()[16]
+        assert int(nice) >= 10
+
+    rendering(test)
+
+
+def test_no_renderer_is_told_after_three_tries(gpu: Renderer) -> None:
+    async def test() -> None:
+        engine = Engine(device=99)
+        engine.start()
+        with pytest.raises(Unavailable) as refused:
+            await engine.ready(20)
+        assert refused.value.detail and "starting" not in refused.value.detail
+        with pytest.raises(Unavailable):
+            engine.open(Ears())
+        await engine.close()
+
+    asyncio.run(test())
+
+
+def test_it_ends_with_its_link(gpu: Renderer, arrays: Any) -> None:
+    async def test() -> None:
+        engine, ears = Engine(), Ears()
+        engine.start()
+        await engine.ready(20)
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays, settings(512), ENDLESS))
+        await ears.next(Loaded)
+        pid, began = engine.process_id, time.monotonic()
+        await engine.close()
+        assert time.monotonic() - began < 3 and not Path(f"/proc/{pid}").exists()
+        assert await ears.next(str)
+
+    asyncio.run(test())

@@ -1,0 +1,167 @@
+"""A real server and the editor in a real browser."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import time
+import urllib.request
+from collections.abc import Callable, Iterator
+from pathlib import Path
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
+
+from gpu import Renderer
+from tests.serving import Server
+
+CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
+PATIENCE_S = 30.0  # two cores that other tests may share
+
+
+def free_port() -> int:
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+class MortalServer:
+    """`sunbox serve` on a port of its own, that can be stopped and started again."""
+
+    def __init__(self, folder: Path) -> None:
+        self.port = free_port()
+        self.url = f"http://127.0.0.1:{self.port}"
+        self.folder = folder
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def start(self) -> None:
+        with (self.folder / "server.log").open("ab") as log:
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", "service.cli", "serve", "--port", str(self.port)],
+                env=os.environ | {"SUNBOX_DATA_DIR": str(self.folder / "data")},
+                stdout=log,
+                stderr=log,
+            )
+        deadline = time.monotonic() + PATIENCE_S
+        while not self.is_ready():
+            if self.process.poll() is not None or time.monotonic() > deadline:
+                pytest.fail("the server did not start:\n" + (self.folder / "server.log").read_text())
+            time.sleep(0.05)
+
+    def is_ready(self) -> bool:
+        try:
+            with urllib.request.urlopen(self.url + "/readyz", timeout=5) as answer:
+                return bool(answer.status == 200)
+        except OSError:  # refused, or not ready yet
+            return False
+
+    def stop(self) -> None:
+        if self.process is None:
+            return
+        self.process.terminate()
+        try:
+            self.process.wait(20)
+        finally:
+            self.process.kill()
+            self.process = None
+
+
+@pytest.fixture
+def mortal(gpu: Renderer, tmp_path: Path) -> Iterator[MortalServer]:
+    served = MortalServer(tmp_path)
+    served.start()
+    yield served
+    served.stop()
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    if not Path(CHROMIUM).exists():
+        if os.environ.get("CI"):
+            pytest.fail("no chromium")
+        pytest.skip("Debian's chromium is not installed")
+    with sync_playwright() as playwright:
+        launched = playwright.chromium.launch(
+            executable_path=CHROMIUM, args=["--no-sandbox", "--disable-dev-shm-usage"]
+        )
+        yield launched
+        launched.close()
+
+
+class Editor:
+    """The page, and what a test asks of it."""
+
+    def __init__(self, page: Page) -> None:
+        self.page = page
+        self.complaints: list[str] = []
+        self.requests: list[str] = []
+        page.on("console", lambda message: self._note(message.type, message.text))
+        page.on("pageerror", lambda error: self.complaints.append(str(error)))
+        page.on("request", lambda request: self.requests.append(request.url))
+        page.on("websocket", lambda opened: self.requests.append(opened.url))
+
+    def _note(self, kind: str, text: str) -> None:
+        if kind in ("error", "warning"):
+            self.complaints.append(f"{kind}: {text}")
+
+    def open(self, url: str) -> None:
+        self.page.goto(url + "/")
+        self.wait("a picture", lambda: self.samples() >= 1)
+
+    def wait(self, what: str, reached: Callable[[], object]) -> None:
+        deadline = time.monotonic() + PATIENCE_S
+        while not reached():
+            if time.monotonic() > deadline:
+                pytest.fail(f"waited in vain for {what}; page says: {self.complaints}, {self.text('#messages')!r}")
+            self.page.wait_for_timeout(30)
+
+    def text(self, selector: str) -> str:
+        return self.page.inner_text(selector)
+
+    def samples(self) -> int:
+        digits = "".join(filter(str.isdigit, self.text("#samples").split("/")[0]))
+        return int(digits or 0)
+
+    def pixels(self) -> list[float]:
+        """The canvas in 12x12 averages of red, green and blue: too coarse for noise to count."""
+        values: list[float] = self.page.evaluate("""() => {
+            const small = new OffscreenCanvas(12, 12).getContext("2d");
+            small.imageSmoothingQuality = "high";
+            small.drawImage(document.querySelector("#picture"), 0, 0, 12, 12);
+            return [...small.getImageData(0, 0, 12, 12).data].filter((_, i) => i % 4 < 3);
+        }""")
+        return values
+
+    def settled(self) -> list[float]:
+        """The pixels after enough samples at full size that noise is no reason to differ."""
+        self.wait("a settled picture", lambda: self.page.is_hidden("#preview") and self.samples() >= 4)
+        return self.pixels()
+
+    def differs(self, before: list[float], least: float = 4.0) -> bool:
+        """Whether the tenth of the picture that changed most differs by so many of 255 steps."""
+        apart = sorted((abs(a - b) for a, b in zip(before, self.pixels(), strict=True)), reverse=True)
+        most = apart[: len(apart) // 10]
+        return sum(most) / len(most) > least
+
+    def wait_for_change(self, before: list[float], least: float = 4.0) -> None:
+        self.wait("other pixels", lambda: self.differs(before, least))
+
+    def field(self, name: str, kind: str = "range", form: str = "#panel") -> str:
+        return f"{form} [data-field={name}] input[type={kind}]"
+
+
+@pytest.fixture
+def context(browser: Browser) -> Iterator[BrowserContext]:
+    opened = browser.new_context(viewport={"width": 800, "height": 560})
+    yield opened
+    opened.close()
+
+
+@pytest.fixture
+def editor(server: Server, context: BrowserContext) -> Editor:
+    opened = Editor(context.new_page())
+    opened.open(server.url)
+    return opened

@@ -1,0 +1,233 @@
+"""The editor by what a user sees: each thing that a hand does changes the picture, or leaves it alone."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from urllib.parse import urlsplit
+
+import numpy as np
+import pytest
+from PIL import Image
+from playwright.sync_api import Browser, BrowserContext
+
+from tests.serving import Server
+from tests.web.conftest import Editor, MortalServer
+
+STAGE = "#stage"
+
+
+def middle(editor: Editor) -> tuple[float, float]:
+    box = editor.page.locator(STAGE).bounding_box()
+    assert box is not None
+    return box["x"] + box["width"] / 2, box["y"] + box["height"] / 2
+
+
+def drag(editor: Editor, right: float, down: float, button: str = "left") -> None:
+    x, y = middle(editor)
+    mouse = editor.page.mouse
+    mouse.move(x, y)
+    mouse.down(button=button)  # type: ignore[arg-type]
+    mouse.move(x + right, y + down, steps=5)
+    mouse.up(button=button)  # type: ignore[arg-type]
+
+
+def test_the_page_is_clean_and_stays_at_home(editor: Editor, server: Server) -> None:
+    editor.settled()
+    assert editor.complaints == []
+    assert {urlsplit(url).netloc for url in editor.requests} == {urlsplit(server.url).netloc}
+    assert any(url.startswith("ws:") for url in editor.requests)
+    assert np.std(editor.pixels()) > 2, "the canvas shows one flat colour"
+
+
+def test_controls_come_from_the_schema(editor: Editor) -> None:
+    schema = editor.page.request.get(editor.page.url + "v1/schema").json()
+    disney = next(model for model in schema["scene"]["$defs"].values() if "clearcoat_gloss" in model["properties"])
+    editor.page.select_option("#model", "disney")
+    for name, field in disney["properties"].items():
+        row = editor.page.locator(f"#material-form [data-field={name}]")
+        assert row.count() == (name != "type"), name
+        if name != "type":
+            assert row.locator("label").inner_text().startswith(field["title"])
+            assert row.locator("p.unseen").text_content() == field["description"]
+
+
+def test_a_slider_changes_the_picture(editor: Editor) -> None:
+    editor.page.select_option("#model", "disney")
+    metallic = editor.page.locator(editor.field("metallic"))
+    metallic.focus()
+    metallic.press("Home")
+    before = editor.settled()
+    metallic.press("End")
+    editor.wait_for_change(before)
+    assert editor.page.input_value(editor.field("metallic", "number")) == "1"
+
+    before = editor.settled()
+    editor.page.click("#material-form [data-field=metallic] .reset")
+    editor.wait_for_change(before)
+    assert editor.page.input_value(editor.field("metallic", "number")) == "0"
+    assert editor.page.is_hidden("#material-form [data-field=metallic] .reset")
+
+
+def test_colours_pass_through_srgb(editor: Editor) -> None:
+    before = editor.settled()
+    text = editor.page.locator("#material-form [data-field] input[type=text]").first
+    mode = editor.page.locator("#material-form .mode").first
+    text.fill("#00ff80")
+    text.press("Enter")
+    editor.wait_for_change(before)
+    mode.click()
+    assert text.input_value() == "0 1 0.2159"  # ((128/255 + .055) / 1.055)^2.4
+    text.fill("1 0 0.2158605")
+    text.press("Enter")
+    mode.click()
+    assert text.input_value() == "#ff0080"
+
+
+@pytest.mark.parametrize(("picker", "choice"), [("scene", "cornell"), ("environment", None), ("material", None)])
+def test_presets_change_the_picture(editor: Editor, picker: str, choice: str | None) -> None:
+    before = editor.settled()
+    if picker == "material":
+        buttons = editor.page.locator("#material-presets button:not([aria-pressed=true])")
+        buttons.nth(1).click()
+        assert buttons.count() > 1
+    else:
+        values = editor.page.eval_on_selector_all(f"#{picker} option", "all => all.map((each) => each.value)")
+        current = editor.page.input_value(f"#{picker}")
+        others = [value for value in values if value not in (current, "", "(none)")]
+        editor.page.select_option(f"#{picker}", next((v for v in others if choice and choice in v), others[0]))
+    editor.wait_for_change(before)
+    assert editor.complaints == []
+
+
+def test_the_camera_obeys_mouse_and_keys(editor: Editor) -> None:
+    def press(key: str) -> None:
+        for _ in range(4):
+            editor.page.keyboard.press(key)
+
+    moves: list[Callable[[], None]] = [
+        lambda: drag(editor, 120, 40),  # orbit
+        lambda: drag(editor, 60, 30, button="right"),  # pan
+        lambda: editor.page.mouse.wheel(0, 400),  # zoom
+        lambda: press("ArrowLeft"),
+        lambda: press("Shift+ArrowUp"),
+        lambda: press("+"),
+    ]
+    first = before = editor.settled()
+    for move in moves:
+        move()
+        editor.wait_for_change(before)
+        before = editor.settled()
+    editor.page.keyboard.press("f")
+    editor.wait("the first view", lambda: not editor.differs(first))
+
+
+def test_fingers_pinch_and_drag(browser: Browser, server: Server) -> None:
+    phone = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    editor = Editor(phone.new_page())
+    editor.open(server.url)
+    session = phone.new_cdp_session(editor.page)
+    x, y = middle(editor)
+
+    def touch(kind: str, *points: tuple[float, float]) -> None:
+        touches = [{"x": px, "y": py, "id": i} for i, (px, py) in enumerate(points)]
+        session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": touches})
+
+    before = editor.settled()
+    touch("touchStart", (x, y))
+    touch("touchMove", (x + 80, y + 10))
+    touch("touchEnd")
+    editor.wait_for_change(before)
+    before = editor.settled()
+    touch("touchStart", (x - 30, y), (x + 30, y))
+    touch("touchMove", (x - 60, y), (x + 60, y))
+    touch("touchEnd")
+    editor.wait_for_change(before)
+    phone.close()
+
+
+def test_pause_stops_the_samples(editor: Editor) -> None:
+    editor.settled()
+    editor.page.keyboard.press("Space")
+    editor.page.wait_for_timeout(400)
+    before = editor.samples()
+    assert editor.text("#state") == "Paused"
+    editor.page.wait_for_timeout(600)
+    assert editor.samples() == before
+    editor.page.click("#pause")
+    editor.wait("more samples", lambda: editor.samples() > before)
+
+
+def test_exposure_keeps_the_samples(editor: Editor) -> None:
+    before, samples = editor.settled(), editor.samples()
+    entry = editor.page.locator(editor.field("exposure", "number"))
+    entry.fill("-3")
+    entry.press("Enter")
+    editor.wait_for_change(before, 15)
+    assert editor.samples() >= samples
+    editor.page.select_option("#view-form select", "linear")
+    assert editor.complaints == []
+
+
+def test_a_refused_value_is_shown_where_it_was_written(editor: Editor) -> None:
+    editor.page.select_option("#model", "disney")
+    editor.settled()
+    entry = editor.page.locator(editor.field("roughness", "number"))
+    entry.fill("7")
+    entry.press("Enter")
+    editor.wait("a message", lambda: "/roughness" in editor.text("#messages"))
+    assert entry.get_attribute("aria-invalid") == "true"
+    assert editor.page.is_visible("[data-field=roughness] .trouble")
+    editor.wait("the last valid scene", lambda: editor.samples() > 4)
+    before = editor.settled()
+    entry.fill("0.05")
+    entry.press("Enter")
+    editor.wait_for_change(before, 2)
+    assert editor.text("#messages") == ""
+    assert entry.get_attribute("aria-invalid") is None
+
+
+def test_undo_and_redo(editor: Editor) -> None:
+    first = editor.settled()
+    drag(editor, 150, 0)
+    editor.wait_for_change(first)
+    moved = editor.settled()
+    editor.page.keyboard.press("Control+z")
+    editor.wait("the first view", lambda: not editor.differs(first))
+    editor.settled()
+    editor.page.keyboard.press("Control+Shift+z")
+    editor.wait("the other view", lambda: not editor.differs(moved))
+
+
+def test_the_download_is_the_rendered_picture(editor: Editor) -> None:
+    editor.settled()
+    with editor.page.expect_download() as waiting:
+        editor.page.click("#download")
+    path = waiting.value.path()
+    picture = Image.open(io.BytesIO(path.read_bytes()))
+    picture.load()
+    size = editor.page.evaluate("[picture.width, picture.height]")
+    assert (picture.format, list(picture.size)) == ("PNG", size)
+    assert waiting.value.suggested_filename.endswith(".png")
+    small = np.asarray(picture.convert("RGB").resize((12, 12), Image.Resampling.BOX), float).reshape(-1)
+    assert np.abs(small - editor.settled()).mean() < 6
+
+
+def test_a_lost_server_is_told_and_found_again(context: BrowserContext, mortal: MortalServer) -> None:
+    editor = Editor(context.new_page())
+    editor.open(mortal.url)
+    first = editor.settled()
+    drag(editor, 150, 0)
+    editor.wait_for_change(first)
+    before = editor.settled()
+    mortal.stop()
+    try:
+        editor.wait("the message", lambda: "connection" in editor.text("#messages"))
+        assert editor.text("#state") == "Offline"
+        assert not editor.differs(before), "the last picture stays in sight"
+    finally:
+        mortal.start()
+    editor.wait("the connection", lambda: editor.text("#messages") == "")
+    editor.wait("a fresh picture", lambda: editor.samples() >= 1)
+    editor.settled()
+    assert not editor.differs(before), "the view that was lost comes back"

@@ -1,0 +1,95 @@
+"""How the page behaves at the stream, seen on the wire."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+import pytest
+from playwright.sync_api import BrowserContext, WebSocket
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+
+HIDE = """(hidden) => {
+    Object.defineProperty(document, "hidden", { value: hidden, configurable: true });
+    document.dispatchEvent(new Event("visibilitychange"));
+}"""
+
+
+class Wire:
+    def __init__(self, editor: Editor) -> None:
+        self.said: list[dict[str, Any]] = []
+        self.frames: list[dict[str, Any]] = []
+        editor.page.on("websocket", self._listen)
+
+    def _listen(self, socket: WebSocket) -> None:
+        socket.on("framesent", lambda text: self.said.append(json.loads(text)))
+        socket.on("framereceived", self._receive)
+
+    def _receive(self, data: str | bytes) -> None:
+        if isinstance(data, bytes):
+            length = int.from_bytes(data[:4], "little")
+            self.frames.append(json.loads(data[4 : 4 + length]))
+
+    def kinds(self) -> list[str]:
+        return [message["type"] for message in self.said]
+
+
+@pytest.fixture
+def wire(server: Server, context: BrowserContext) -> tuple[Editor, Wire]:
+    editor = Editor(context.new_page())
+    wire = Wire(editor)
+    editor.open(server.url)
+    return editor, wire
+
+
+def test_a_drag_is_one_small_update_at_a_time(wire: tuple[Editor, Wire]) -> None:
+    editor, heard = wire
+    editor.settled()
+    editor.page.evaluate("""async () => {
+        const slider = document.querySelector("[data-field=roughness] input[type=range]");
+        for (let i = 0; i <= 60; i++) {
+            slider.value = i / 60;
+            slider.dispatchEvent(new Event("input"));
+            await new Promise(requestAnimationFrame);
+        }
+    }""")
+    editor.wait("the end of the drag", lambda: '"roughness": 1}' in json.dumps(heard.said))
+    updates = [message for message in heard.said if message["type"] == "update"]
+    assert 1 < len(updates) <= 61
+    (name,) = updates[-1]["scene"]["materials"]
+    assert updates[-1] == {
+        "type": "update",
+        "generation": updates[-1]["generation"],
+        "scene": {"materials": {name: {"roughness": 1}}},
+    }
+    generations = [message["generation"] for message in heard.said if "generation" in message]
+    assert generations == sorted(set(generations))
+    seen = {frame["generation"] for frame in heard.frames}
+    assert len(seen) >= len(updates) / 2, "most of what the hand did was seen"
+
+
+def test_every_frame_is_acknowledged(wire: tuple[Editor, Wire]) -> None:
+    editor, heard = wire
+    editor.settled()
+    editor.page.keyboard.press("ArrowLeft")
+    editor.page.keyboard.press("Space")
+    editor.wait("quiet", lambda: editor.text("#state") == "Paused")
+    editor.page.wait_for_timeout(500)
+    acknowledged = [message["seq"] for message in heard.said if message["type"] == "ack"]
+    assert sorted(acknowledged) == [frame["seq"] for frame in heard.frames]
+
+
+def test_a_hidden_page_pauses(wire: tuple[Editor, Wire]) -> None:
+    editor, heard = wire
+    editor.settled()
+    editor.page.evaluate(HIDE, True)
+    editor.wait("a pause", lambda: "pause" in heard.kinds())
+    editor.page.wait_for_timeout(300)
+    frames = len(heard.frames)
+    editor.page.wait_for_timeout(500)
+    assert len(heard.frames) == frames
+    editor.page.evaluate(HIDE, False)
+    editor.wait("more frames", lambda: len(heard.frames) > frames + 1)
+    assert heard.kinds().count("resume") == 1

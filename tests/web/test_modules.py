@@ -1,0 +1,129 @@
+"""The editor's own arithmetic, module by module, in the browser that runs it."""
+
+from __future__ import annotations
+
+import math
+import random
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser, Page
+
+from tests.serving import Server
+
+
+@pytest.fixture(scope="module")
+def page(browser: Browser, server: Server) -> Iterator[Page]:
+    opened = browser.new_page()
+    opened.goto(server.url + "/icon.svg")  # any page of the same origin: the editor itself need not run
+    yield opened
+    opened.close()
+
+
+def call(page: Page, module: str, function: str, *arguments: Any) -> Any:
+    script = """async ([module, name, args]) => {
+        const all = await import(new URL(module, location));
+        const result = all[name](...args);
+        return result === undefined ? "undefined" : result;
+    }"""
+    return page.evaluate(script, [module, function, list(arguments)])
+
+
+def document(chance: random.Random, depth: int = 3) -> Any:
+    kind = chance.choice(["object", "object", "array", "leaf"]) if depth else "leaf"
+    if kind == "object":
+        typed = {"type": chance.choice("ab")} if chance.random() < 0.4 else {}
+        return typed | {key: document(chance, depth - 1) for key in chance.sample("xyzw", chance.randint(0, 3))}
+    if kind == "array":
+        return [document(chance, depth - 1) for _ in range(chance.randint(0, 2))]
+    return chance.choice([0, 1.5, "s", True, "~/"])
+
+
+def without_lost_types(before: Any, after: Any) -> bool:
+    """False where a type appears or vanishes on an object that stays: no document of ours does that."""
+    if not (isinstance(before, dict) and isinstance(after, dict)):
+        return True
+    return ("type" in before) == ("type" in after) and all(
+        without_lost_types(before[key], after[key]) for key in before.keys() & after.keys()
+    )
+
+
+def test_a_diff_leads_from_one_document_to_the_other(page: Page) -> None:
+    chance = random.Random(3)
+    pairs = [({"r": document(chance)}, {"r": document(chance)}) for _ in range(300)]
+    pairs = [pair for pair in pairs if without_lost_types(*pair)]
+    assert len(pairs) > 100
+    results = page.evaluate(
+        """async (pairs) => {
+        const { merge, diff } = await import(new URL("patch.js", location));
+        return pairs.map(([from, to]) => {
+            const patch = diff(from, to);
+            return { merged: patch === undefined ? from : merge(from, patch), none: patch === undefined };
+        });
+    }""",
+        [list(pair) for pair in pairs],
+    )
+    for (before, after), result in zip(pairs, results, strict=True):
+        assert result["merged"] == after
+        assert result["none"] == (before == after)
+
+
+def test_a_diff_is_small(page: Page) -> None:
+    before = {"materials": {"a": {"type": "disney", "roughness": 1, "metallic": 0}, "b": {"type": "diffuse"}}}
+    after = {"materials": {"a": {"type": "disney", "roughness": 0.3}, "b": {"type": "diffuse"}}}
+    assert call(page, "patch.js", "diff", before, after) == {"materials": {"a": {"roughness": 0.3, "metallic": None}}}
+    other = {"materials": {"a": {"type": "diffuse"}, "b": {"type": "diffuse"}}}
+    assert call(page, "patch.js", "diff", before, other) == {"materials": {"a": {"type": "diffuse"}}}
+    assert call(page, "patch.js", "diff", before, before) == "undefined"
+
+
+def test_pointers(page: Page) -> None:
+    name = "a/b~c"
+    place = call(page, "patch.js", "pointer", "materials", name, "albedo")
+    assert place == "/materials/a~1b~0c/albedo"
+    assert call(page, "patch.js", "put", {"materials": {name: {}}}, place, 0.5) == {
+        "materials": {name: {"albedo": 0.5}}
+    }
+    assert call(page, "patch.js", "at", {"materials": {name: {"albedo": 0.25}}}, place) == 0.25
+
+
+@pytest.mark.parametrize("byte", [0, 1, 10, 11, 128, 254, 255])
+def test_srgb_there_and_back(page: Page, byte: int) -> None:
+    text = f"#{byte:02x}8001"
+    linear = call(page, "color.js", "linear", text)
+    encoded = byte / 255
+    assert math.isclose(linear[0], encoded / 12.92 if encoded <= 0.04045 else ((encoded + 0.055) / 1.055) ** 2.4)
+    assert call(page, "color.js", "hex", linear) == text
+
+
+CAMERA: dict[str, Any] = {"position": [1.0, 2.0, 5.0], "target": [0.0, 1.0, 0.0], "up": [0.0, 1.0, 0.0], "vfov": 40}
+
+
+def test_orbiting_keeps_the_distance_and_the_poles(page: Page) -> None:
+    distance = math.dist(CAMERA["position"], CAMERA["target"])
+    for right, down in [(0.3, 0), (0, 0.2), (-2, 5), (1, -5)]:
+        moved = call(page, "camera.js", "orbit", CAMERA, right, down)
+        assert math.isclose(math.dist(moved["position"], CAMERA["target"]), distance, rel_tol=1e-5)
+        height = (moved["position"][1] - 1) / distance
+        assert abs(height) < math.cos(math.radians(1.9)), "the view must keep an up"
+    right = call(page, "camera.js", "orbit", CAMERA | {"position": [0, 1, 5]}, 0.1, 0)
+    assert right["position"][0] < 0, "the content follows the hand to the right"
+
+
+def test_panning_follows_the_hand(page: Page) -> None:
+    camera = CAMERA | {"position": [0.0, 1.0, 5.0]}
+    moved = call(page, "camera.js", "pan", camera, 0.5, 0.25)
+    height = 2 * 5 * math.tan(math.radians(20))
+    assert moved["target"] == pytest.approx([-0.5 * height, 1 + 0.25 * height, 0])
+    assert moved["position"] == pytest.approx([-0.5 * height, 1 + 0.25 * height, 5])
+
+
+def test_the_picture_fills_its_box_within_an_area(page: Page) -> None:
+    size = call(page, "viewport.js", "pictureSize", {"width": 1200, "height": 800}, 2, 512 * 512)
+    assert size["width"] * size["height"] == pytest.approx(512 * 512, rel=0.01)
+    assert size["width"] / size["height"] == pytest.approx(1.5, rel=0.01)
+    assert call(page, "viewport.js", "pictureSize", {"width": 300, "height": 200}, 1, 512 * 512) == {
+        "width": 300,
+        "height": 200,
+    }

@@ -1,0 +1,18 @@
+// Colours as the document has them ([r, g, b] linear, a number, "#rrggbb") and as a colour input has them.
+
+export const toSrgb = (x) => (x <= 0.0031308 ? 12.92 * x : 1.055 * x ** (1 / 2.4) - 0.055);
+export const toLinear = (x) => (x <= 0.04045 ? x / 12.92 : ((x + 0.055) / 1.055) ** 2.4);
+
+export const HEX = /^#?([0-9a-f]{6})$/i;
+
+// Linear [r, g, b] of any colour that a document may hold.
+export function linear(color) {
+  if (typeof color === "number") return [color, color, color];
+  if (typeof color !== "string") return color;
+  const bits = parseInt(HEX.exec(color)[1], 16);
+  return [bits >> 16, (bits >> 8) & 255, bits & 255].map((byte) => toLinear(byte / 255));
+}
+
+// "#rrggbb" (sRGB) of a linear colour; what does not fit into 0..1 is cut off.
+export const hex = (color) =>
+  "#" + color.map((x) => Math.round(255 * toSrgb(Math.min(Math.max(x, 0), 1))).toString(16).padStart(2, "0")).join("");

@@ -1,0 +1,168 @@
+// The widgets of a form: each has an `element`, shows a value, and calls `input` with a new one while
+// the hand moves and `commit` when it comes to rest. `undefined` stands for "as the server likes". `refuse`
+// says what was wrong with something written, `restore` goes back to the value there was.
+
+import { HEX, hex, linear } from "./color.js";
+import { element, isBeingEdited } from "./dom.js";
+import { compact, inWords, unitText } from "./words.js";
+
+const UNSET = "–"; // neither document nor schema has a value
+
+function numberEntry(field, id, { input, commit, refuse, restore }) {
+  const box = element("input", {
+    type: "number", id, class: "entry", step: String(field.step),
+    min: field.min === undefined ? undefined : String(field.min),
+    placeholder: UNSET,
+    oninput: () => { box.dataset.dirty = "yes"; },
+    onblur: () => { delete box.dataset.dirty; },
+    onwheel: () => box.blur(), // the wheel scrolls the panel; it must not turn the number on the way
+    onkeydown: (event) => {
+      if (event.key !== "Escape") return;
+      delete box.dataset.dirty;
+      restore();
+    },
+    onchange: () => {
+      delete box.dataset.dirty;
+      if (box.validity.badInput) return refuse("A number is needed here.");
+      if (box.value === "" && field.required) return restore();
+      input(box.value === "" ? undefined : Number(box.value));
+      commit();
+    },
+  });
+  const show = (value) => {
+    if (!isBeingEdited(box)) box.value = value === undefined || value === null ? "" : compact(value);
+  };
+  return { element: box, show };
+}
+
+function track(field, id, { input, commit }) {
+  const { min, max } = field.soft;
+  // A bound that does not belong to the range: the slider stops one step before it.
+  const inside = (value) => {
+    if (value <= field.open.min) return field.open.min + field.step;
+    return value >= field.open.max ? field.open.max - field.step : value;
+  };
+  const range = element("input", {
+    type: "range", id, min: String(min), max: String(max), step: String(field.step),
+    oninput: () => input(inside(range.valueAsNumber)),
+    onchange: commit,
+  });
+  const show = (value) => {
+    range.value = String(value ?? min);
+    range.style.setProperty("--fill", String((range.valueAsNumber - min) / (max - min)));
+    const words = (value ?? null) === null ? "not set" : `${compact(value)} ${unitText(field.unit)}`.trim();
+    range.setAttribute("aria-valuetext", words);
+  };
+  return { element: range, show };
+}
+
+function slider(field, id, events) {
+  const range = track(field, id, events);
+  const entry = numberEntry(field, `${id}-entry`, events);
+  entry.element.setAttribute("aria-label", `${field.title}, number`);
+  return {
+    element: element("div", { class: "slider" }, range.element, entry.element),
+    show(value) {
+      range.show(value);
+      entry.show(value);
+    },
+  };
+}
+
+function choice(field, id, { input, commit }) {
+  const select = element("select", { id, onchange: () => { input(select.value); commit(); } });
+  for (const name of field.choices.filter((option) => option !== null)) {
+    select.append(element("option", { value: name }, inWords(name)));
+  }
+  return { element: select, show: (value) => { select.value = value ?? ""; } };
+}
+
+function toggle(field, id, { input, commit }) {
+  const box = element("input", {
+    type: "checkbox", id, class: "toggle", onchange: () => { input(box.checked); commit(); },
+  });
+  return { element: box, show: (value) => { box.checked = Boolean(value); } };
+}
+
+const NUMBERS = /^\s*[\d.eE+-]+(?:[\s,]+[\d.eE+-]+){2}\s*$/;
+
+// Swatch and text; a colour that may pass 1 is split into a tint and a strength.
+function color(field, id, { input, commit, refuse, restore }) {
+  const bright = !(field.max <= 1);
+  let strength = 1;
+  let tint = [1, 1, 1];
+  let isLinear = false; // what the text shows
+  const give = () => input(tint.map((x) => Number((x * strength).toPrecision(5))));
+
+  const swatch = element("input", {
+    type: "color", id, onchange: commit,
+    oninput: () => {
+      tint = linear(swatch.value);
+      if (bright && strength === 0) strength = 1;
+      give();
+    },
+  });
+  const text = element("input", {
+    type: "text", class: "entry", spellcheck: "false", autocomplete: "off",
+    "aria-label": `${field.title}, #rrggbb or three linear numbers`,
+    oninput: () => { text.dataset.dirty = "yes"; },
+    onblur: () => { delete text.dataset.dirty; },
+    onkeydown: (event) => {
+      if (event.key !== "Escape") return;
+      delete text.dataset.dirty;
+      restore();
+    },
+    onchange: () => {
+      delete text.dataset.dirty;
+      const match = HEX.exec(text.value.trim());
+      if (match) input(linear(match[0]).map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
+      else if (NUMBERS.test(text.value)) input(text.value.trim().split(/[\s,]+/).map(Number));
+      else return refuse("Write #rrggbb, or three linear numbers such as 0.2 0.4 0.6.");
+      commit();
+    },
+  });
+  const mode = element("button", {
+    type: "button", class: "mode", "aria-label": `${field.title}: linear numbers`, "aria-pressed": "false",
+    onclick: () => {
+      isLinear = !isLinear;
+      mode.setAttribute("aria-pressed", String(isLinear));
+      write();
+    },
+  });
+  const write = () => {
+    const shown = isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
+    if (!isBeingEdited(text)) text.value = shown;
+    mode.textContent = isLinear ? "lin" : "hex";
+  };
+  const row = element("div", { class: "color" }, swatch, text, mode);
+  const power = bright && slider(
+    { ...field, title: `${field.title}, strength` },
+    `${id}-strength`,
+    { input: (value) => { strength = value ?? 0; give(); }, commit, refuse, restore },
+  );
+
+  return {
+    element: power ? element("div", {}, row, power.element) : row,
+    show(value) {
+      const now = linear(value ?? 0);
+      const most = Math.max(...now);
+      if (bright) {
+        strength = most;
+        if (most > 0) tint = now.map((x) => x / most);
+        power.show(strength);
+      } else tint = now;
+      swatch.value = hex(tint);
+      write();
+    },
+  };
+}
+
+const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
+
+export function control(field, id, events) {
+  if (field.widget === "color") return color(field, id, events);
+  if (field.widget === "choice") return choice(field, id, events);
+  if (field.widget === "toggle") return toggle(field, id, events);
+  if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);
+  return slider(field, id, events);
+}

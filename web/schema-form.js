@@ -1,0 +1,77 @@
+// A form made from a model of the server's schema: a row for each field, with its range, unit, hint,
+// default and a button that goes back to it.
+
+import { linear } from "./color.js";
+import { control } from "./controls.js";
+import { element, freshId } from "./dom.js";
+import { equal } from "./patch.js";
+import { describe } from "./tooltip.js";
+import { unitText } from "./words.js";
+
+const isSame = ({ widget }, a, b) =>
+  widget === "color" && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
+
+function row(field, { change, commit, forgive }) {
+  const id = freshId(field.name);
+  const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
+  const mark = (text) => {
+    trouble.hidden = !text;
+    trouble.textContent = text ?? "";
+    for (const input of widget.element.parentNode.querySelectorAll("input, select")) {
+      if (text) input.setAttribute("aria-invalid", "true");
+      else input.removeAttribute("aria-invalid");
+    }
+  };
+  let latest;
+  const widget = control(field, id, {
+    input: (value) => { mark(null); change(field.name, value); },
+    commit,
+    refuse: mark,
+    restore: () => { mark(null); widget.show(latest); forgive(); },
+  });
+  const reset = element("button", {
+    type: "button", class: "reset", "aria-label": `Reset ${field.title}`,
+    onclick: () => { mark(null); change(field.name, undefined); commit(); },
+  });
+  const label = element("label", { for: id }, field.title);
+  if (field.unit) {
+    const unit = unitText(field.unit);
+    label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
+  }
+  const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
+  const parts = [label, widget.element, reset, hint, trouble];
+  const node = element("div", { class: "field", "data-field": field.name }, ...parts);
+  for (const input of node.querySelectorAll("input, select")) {
+    input.setAttribute("aria-describedby", `${hint ? hint.id : ""} ${trouble.id}`.trim());
+  }
+  if (hint) describe(node, label, field.hint);
+  return {
+    element: node, mark,
+    show(value, initial = field.initial) {
+      latest = value ?? initial;
+      if (trouble.hidden) widget.show(latest); // else what was refused stays in sight
+      reset.hidden = field.required || value === undefined || isSame(field, value, initial);
+    },
+  };
+}
+
+// Calls `change(name, value)` with each new value (undefined: the default again), `commit()` when the
+// hand comes to rest, `forgive()` when something refused is taken back by hand.
+export function schemaForm(fields, { change, commit, forgive }) {
+  const rows = new Map(fields.map((field) => [field.name, row(field, { change, commit, forgive })]));
+  return {
+    element: element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
+    // `initials` stand in for the schema's defaults where these depend on something else.
+    show(values, initials = {}) {
+      for (const [name, each] of rows) each.show(values[name], initials[name]);
+    },
+    // Says at a field what is wrong with it; false where this form has no such field.
+    mark(name, text) {
+      rows.get(name)?.mark(text);
+      return rows.has(name);
+    },
+    forgive() {
+      for (const each of rows.values()) each.mark(null);
+    },
+  };
+}

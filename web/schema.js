@@ -1,0 +1,91 @@
+// The server's JSON Schema, read as the editor needs it: which models there are and which fields they
+// have, with range, default, unit and hint. No range and no default is repeated in JavaScript.
+
+// A node with its references followed; what stands beside a reference wins.
+function resolve(schema, node) {
+  if (!node?.$ref) return node ?? {};
+  const target = node.$ref.split("/").slice(1).reduce((place, key) => place[key], schema);
+  const { $ref, ...beside } = node;
+  return { ...resolve(schema, target), ...beside };
+}
+
+const branches = (schema, node) => {
+  const options = node.anyOf ?? node.oneOf;
+  return options ? options.map((option) => resolve(schema, option)).filter((option) => option.type !== "null") : [node];
+};
+
+// What a property of a model is: the model's schema after references and optional wrappers.
+export function property(schema, model, name) {
+  return resolve(schema, resolve(schema, model).properties[name]);
+}
+
+// The models that a union offers, by the value of their `type`: {disney: model, ...}.
+export function variants(schema, union) {
+  const found = {};
+  const visit = (node) => {
+    const kind = node.properties?.type;
+    if (kind) found[kind.const ?? kind.enum?.[0] ?? kind.default] = node;
+    else if (node.anyOf || node.oneOf) branches(schema, node).forEach(visit);
+  };
+  visit(resolve(schema, union));
+  return found;
+}
+
+// The model of a property that is one, be it optional.
+export const model = (schema, owner, name) =>
+  branches(schema, property(schema, owner, name)).find((node) => node.properties);
+
+export const materialModels = (schema) => variants(schema, property(schema, schema, "materials").additionalProperties);
+export const environmentModels = (schema) => variants(schema, schema.properties.environment);
+
+const bound = (nodes, key) => nodes.map((node) => node[key]).find((value) => value !== undefined);
+
+function step(min, max, whole) {
+  if (whole) return 1;
+  // About two hundred to two thousand steps from end to end, and a round number.
+  return Number.isFinite(max - min) ? 10 ** Math.ceil(Math.log10((max - min) / 500)) : 0.01;
+}
+
+function field(schema, name, raw, required) {
+  const top = resolve(schema, raw);
+  const options = branches(schema, top);
+  const nodes = [top, ...options];
+  const color = bound(nodes, "x-widget") === "color";
+  const numeric = options.find((node) => ["number", "integer"].includes(node.type));
+  const whole = !options.some((node) => node.type === "number");
+  const limits = [top, ...(numeric ? [numeric] : [])];
+  const choices = bound(nodes, "enum");
+  const open = { min: bound(limits, "exclusiveMinimum"), max: bound(limits, "exclusiveMaximum") };
+  const min = bound(limits, "minimum") ?? open.min;
+  const max = bound(limits, "maximum") ?? open.max;
+  const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
+  const widget = color ? "color"
+    : choices ? "choice"
+    : options.some((node) => node.type === "boolean") ? "toggle"
+    : numeric ? (bound(nodes, "x-widget") ?? "number") : null;
+  if (!widget || bound(nodes, "const") !== undefined) return null;
+  return {
+    name, widget, choices, min, max, open, required,
+    title: top.title ?? name,
+    hint: bound(nodes, "description") ?? "",
+    unit: bound(nodes, "x-unit") ?? "",
+    soft,
+    step: step(soft.min, soft.max, whole && !color),
+    whole,
+    initial: top.default ?? undefined,
+  };
+}
+
+// The fields of a model that a control can be made for; vectors, names and fixed members have none.
+export function fields(schema, owner) {
+  const { properties = {}, required = [] } = resolve(schema, owner);
+  return Object.entries(properties)
+    .map(([name, raw]) => field(schema, name, raw, required.includes(name)))
+    .filter((found) => found !== null);
+}
+
+// What the schema says where a document is silent, for all or some of a model's members.
+export function defaults(schema, owner, names = Object.keys(owner.properties)) {
+  const known = names.map((name) => [name, property(schema, owner, name).default]);
+  return Object.fromEntries(known.filter(([, value]) => value !== undefined && value !== null));
+}

@@ -1,0 +1,33 @@
+// The line under the picture: how far it is, how good, how long.
+
+import { count, duration, percent } from "./words.js";
+
+const NOTHING = "–";
+
+export class Status {
+  #places = {};
+
+  constructor(root) {
+    for (const name of ["samples", "noise", "elapsed", "left", "progress", "preview", "state"]) {
+      this.#places[name] = root.querySelector(`#${name}`);
+    }
+  }
+
+  // A frame's header; `limit` is the number of samples at which the picture is ready, or null.
+  frame({ samples, noise, elapsed_s, eta_s, scale }, limit) {
+    const places = this.#places;
+    places.samples.textContent = limit ? `${count(samples)} / ${count(limit)}` : count(samples);
+    places.noise.textContent = noise === null ? NOTHING : percent(noise);
+    places.elapsed.textContent = duration(elapsed_s);
+    places.left.textContent = eta_s === null ? NOTHING : duration(eta_s);
+    places.progress.value = eta_s === null ? (limit ? samples / limit : 0) : elapsed_s / (elapsed_s + eta_s || 1);
+    places.preview.hidden = scale >= 1;
+    places.preview.textContent = `Preview, 1/${Math.round(1 / scale)} size`;
+  }
+
+  // "Rendering", "Paused", "Done", ...: the word that leads the line.
+  state(word) {
+    this.#places.state.textContent = word;
+    this.#places.state.dataset.state = word.toLowerCase().replaceAll(" ", "-");
+  }
+}

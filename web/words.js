@@ -1,0 +1,29 @@
+// Numbers, units and names as an artist reads them.
+
+const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²" };
+const NAMES = {
+  aces: "ACES", agx: "AgX", pbr_neutral: "PBR neutral", mis: "MIS", bsdf: "BSDF", blackman_harris: "Blackman\u2013Harris",
+};
+
+export const unitText = (unit) => UNITS[unit] ?? unit;
+
+// "two_boxes" -> "Two boxes".
+export function inWords(name) {
+  const spaced = name.replaceAll(/[_-]/g, " ");
+  return NAMES[name] ?? spaced.charAt(0).toUpperCase() + spaced.slice(1);
+}
+
+// Four digits that count, without trailing zeros.
+export const compact = (value) => String(Number(value.toPrecision(4)));
+
+export function duration(seconds) {
+  if (seconds < 9.95) return `${seconds.toFixed(1)} s`;
+  if (seconds < 99.5) return `${Math.round(seconds)} s`;
+  const minutes = Math.round(seconds / 60);
+  return minutes < 100 ? `${minutes} min` : `${Math.round(minutes / 60)} h`;
+}
+
+export const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))} %`;
+
+// 16777216 -> "16 777 216", with spaces that do not break.
+export const count = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
