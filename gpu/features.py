@@ -34,7 +34,14 @@ def _model(model: Model) -> Callable[[SceneArrays], bool]:
 
 
 def _disney(member: str) -> Callable[[SceneArrays], bool]:
-    return lambda s: bool(((s.materials["model"] == Model.DISNEY) & (s.materials[member] > 0)).any())
+    models = (Model.DISNEY, Model.PRINCIPLED)
+    return lambda s: bool((np.isin(s.materials["model"], models) & (s.materials[member] > 0)).any())
+
+
+def _transmits(materials: np.ndarray) -> np.ndarray:
+    m = materials
+    out: np.ndarray = (m["model"] == Model.PRINCIPLED) & (m["transmission"] > 0) & (m["metallic"] < 1)
+    return out
 
 
 FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
@@ -67,11 +74,15 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_SHEEN": _disney("sheen"),
     "HAS_ANISOTROPIC": _disney("anisotropic"),
     "HAS_CLEARCOAT": _disney("clearcoat"),
+    "HAS_PRINCIPLED": _model(Model.PRINCIPLED),
+    "HAS_TRANSMISSION": lambda s: bool(_transmits(s.materials).any()),
+    "HAS_ATTENUATION": lambda s: bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any()),
 }
 
 # What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
 # ever waits for a compiler.
-EDITED = {"HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")}
+_OPAQUE = ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")
+EDITED = {"HAS_DISNEY": _OPAQUE, "HAS_PRINCIPLED": (*_OPAQUE, "HAS_TRANSMISSION", "HAS_ATTENUATION")}
 
 
 def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:

@@ -91,7 +91,7 @@ STRUCTURE = {
     "/materials/a/albedo": (GONE,),
     "/materials/a/roughness": (0.5,),
     "/materials/b/alpha": (0.5,),
-    "/materials/a/type": (GONE, "lambert", "principled", 5, None, [], {}),
+    "/materials/a/type": (GONE, "lambert", "plaster", 5, None, [], {}),
     "/shapes": (GONE, {}, None),
     "/shapes/0": (None, 5, []),
     "/shapes/0/radius": (GONE,),

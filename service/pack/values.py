@@ -43,7 +43,8 @@ def pack_materials(scene: Scene) -> np.ndarray:
         for name in type(material).model_fields:
             member = RENAMED.get(name, name)
             if member in layout.Material.members:
-                record[member] = getattr(material, name)
+                value = getattr(material, name)
+                record[member] = layout.ABSENT if value is None else value
     return records
 
 

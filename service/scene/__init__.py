@@ -7,7 +7,7 @@ from service.scene.color import Color
 from service.scene.document import Scene, parse_scene
 from service.scene.environment import ConstantEnvironment, Environment, ImageEnvironment
 from service.scene.light import PointLight
-from service.scene.material import DiffuseMaterial, DisneyMaterial, Material
+from service.scene.material import DiffuseMaterial, DisneyMaterial, Material, PrincipledMaterial
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
 from service.scene.schema import schema
@@ -30,6 +30,7 @@ __all__ = [
     "MatrixTransform",
     "MeshShape",
     "PointLight",
+    "PrincipledMaterial",
     "QuadShape",
     "Scene",
     "Settings",
