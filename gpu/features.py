@@ -38,7 +38,14 @@ def _model(model: Model) -> Callable[[SceneArrays], bool]:
 
 
 def _disney(member: str) -> Callable[[SceneArrays], bool]:
-    return lambda s: bool(((s.materials["model"] == Model.DISNEY) & (s.materials[member] > 0)).any())
+    models = (Model.DISNEY, Model.PRINCIPLED)
+    return lambda s: bool((np.isin(s.materials["model"], models) & (s.materials[member] > 0)).any())
+
+
+def _transmits(materials: np.ndarray) -> np.ndarray:
+    m = materials
+    out: np.ndarray = (m["model"] == Model.PRINCIPLED) & (m["transmission"] > 0) & (m["metallic"] < 1)
+    return out
 
 
 FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
@@ -86,12 +93,17 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_METAL_ROUGH": _model(Model.METAL_ROUGH),
     "HAS_BLINN_PHONG": _model(Model.BLINN_PHONG),
     "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
+    "HAS_PRINCIPLED": _model(Model.PRINCIPLED),
+    "HAS_TRANSMISSION": lambda s: bool(_transmits(s.materials).any()),
+    "HAS_ATTENUATION": lambda s: bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any()),
 }
 
 # What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
 # ever waits for a compiler.
+_OPAQUE = ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")
 EDITED = {
-    "HAS_DISNEY": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT"),
+    "HAS_DISNEY": _OPAQUE,
+    "HAS_PRINCIPLED": (*_OPAQUE, "HAS_TRANSMISSION", "HAS_ATTENUATION"),
     "HAS_BLINN_PHONG": ("HAS_AMBIENT",),
 }
 

@@ -12,7 +12,10 @@ from typing import ClassVar
 
 import numpy as np
 
+from gpu import energy
+
 NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
+ABSENT = -1.0  # a material's number that was not given
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
 
@@ -80,6 +83,7 @@ class LightKind(IntEnum):
 class Model(IntEnum):
     DIFFUSE = 0
     DISNEY = 1
+    PRINCIPLED = 2
     METAL_ROUGH = 3
     BLINN_PHONG = 4
 
@@ -109,7 +113,8 @@ FRAME_BLOCK = 0  # uniform blocks
 FILTER_BLOCK = 1
 # Buffers with a NAME_COUNT that kernels are compiled for: uniform blocks where it is above 0. Binding points
 COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}
-ENVIRONMENT_TEXTURE = 0  # texture unit
+ENVIRONMENT_TEXTURE = 0  # texture units
+ENERGY_TEXTURES = {"albedo": 1, "alike": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
 
 
 class Record:
@@ -163,10 +168,18 @@ class Material(Record):
     clearcoat_gloss: f32
     opacity: f32  # the chance that a ray meets the surface
     emission_sides: u32  # 1: the outward side emits; 2: both do
-    unused: u32  # up to the next group of four
+    sheen_roughness: f32
     phong_specular: vec3  # blinn_phong; its diffuse is base_color
     shininess: f32  # exponent, >= 0
     ambient: vec3  # radiance added wherever a path meets the surface
+    transmission: f32
+    attenuation_color: vec3  # what is left of light after attenuation_distance inside
+    attenuation_distance: f32  # ABSENT: clear
+    specular_color: vec3
+    clearcoat_roughness: f32  # ABSENT: from clearcoat_gloss
+    sheen_color: vec3  # ABSENT: from sheen_tint
+    anisotropic_rotation: f32  # degrees
+    ior: f32  # inside over outside; ABSENT: from `specular`
 
 
 class Sphere(Record):
@@ -389,6 +402,10 @@ def _constants() -> str:
         "LEAF_FIRST_MASK",
     ):
         out.append(f"const uint {name} = {globals()[name]}u;")
+    out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in ENERGY_TEXTURES.items()]
+    out.append(f"#define ENERGY_ASPECTS {energy.ASPECT_SHAPE[0]}")
+    for name in ("ROUGHNESS_END", "LEAST_ASPECT", "LARGEST_ETA", "COMMON_ETA", "LEAST_SHEEN_ROUGHNESS"):
+        out.append(f"const float ENERGY_{name} = {getattr(energy, name)!r};")
     return "\n".join(out)
 
 

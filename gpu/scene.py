@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
-from gpu import features, layout
+from gpu import energy, features, layout
 from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
 from gpu.layout import LightKind, Slot
@@ -37,6 +37,21 @@ _BLOCKS = {layout.BUFFERS[name][1]: block for name, block in layout.COUNTED.item
 RADIANCE_MAX = 1e20  # what a texel times the environment's scale may reach
 
 
+def upload_tables(context: Any) -> dict[int, Any]:
+    """Textures of `gpu.energy` by texture unit, linear and clamped: their first axes are folded into the third."""
+    out = {}
+    for name, unit in layout.ENERGY_TEXTURES.items():
+        table = getattr(energy.tables(), name)
+        channels = 1 if name == "sheen" else table.shape[-1]
+        height, width = table.shape[-3:-1] if channels > 1 else table.shape[-2:]
+        size = (width, height, table.size // (width * height * channels))
+        texture = context.texture3d(size, channels, np.ascontiguousarray(table), dtype="f4")
+        texture.filter = (context.LINEAR, context.LINEAR)
+        texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+        out[unit] = texture
+    return out
+
+
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
@@ -49,6 +64,7 @@ class Scene:
         self._buffers = {slot: self._upload(getattr(arrays, name)) for slot, name in _BUFFERS.items()}
         self._texels, alias = self._upload_environment()
         self._buffers[Slot.ENVIRONMENT_ALIAS] = self._upload(alias)
+        self._tables = upload_tables(context) if "HAS_PRINCIPLED" in self._raised else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
         log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
 
@@ -111,6 +127,8 @@ class Scene:
             changes["environment"] = replace(self.arrays.environment, rotation=rotation, scale=scale)
         self.arrays = replace(self.arrays, **changes)
         self._raise_flags()
+        if "HAS_PRINCIPLED" in self._raised and not self._tables:
+            self._tables = upload_tables(self._context)
 
     def bind(self) -> None:
         """Bind every buffer of the scene to its slot."""
@@ -119,6 +137,8 @@ class Scene:
             if slot in _BLOCKS:
                 buffer.bind_to_uniform_block(_BLOCKS[slot])
         self._texels.use(layout.ENVIRONMENT_TEXTURE)
+        for unit, table in self._tables.items():
+            table.use(unit)
 
     def write_frame(self, frame: np.ndarray) -> None:
         """Fill the scene's part of a `layout.Frame` record."""
@@ -158,3 +178,5 @@ class Scene:
         for buffer in self._buffers.values():
             buffer.release()
         self._texels.release()
+        for table in self._tables.values():
+            table.release()

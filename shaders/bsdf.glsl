@@ -7,6 +7,12 @@
 #include "lobes/clearcoat.glsl"
 #include "lobes/metal_rough.glsl"
 #include "lobes/blinn_phong.glsl"
+#include "energy.glsl"
+#include "lobes/matte.glsl"
+#include "lobes/fabric.glsl"
+#include "lobes/coat.glsl"
+#include "lobes/scattered.glsl"
+#include "lobes/facets.glsl"
 
 struct Scatter {
     vec3 f;    // BSDF times |cos theta_i|
@@ -44,8 +50,15 @@ vec3 bsdf_turn_back(Surface s, vec3 w) {
     return vec3(s.tangent.x * w.x - s.tangent.y * w.y, s.tangent.y * w.x + s.tangent.x * w.y, w.z);
 }
 
+#include "principled.glsl"
+
 Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
+#if HAS_TRANSMISSION
+    bool below = s.model == MODEL_PRINCIPLED && wi.z < 0.0;
+    if (wo.z <= 0.0 || (wi.z <= 0.0 && !below)) return Scatter(vec3(0.0), 0.0);
+#else
     if (wo.z <= 0.0 || wi.z <= 0.0) return Scatter(vec3(0.0), 0.0);
+#endif
     Scatter r = Scatter(diffuse_lambert(s), diffuse_pdf(wi));
 #if HAS_DISNEY
     if (s.model == MODEL_DISNEY) {
@@ -82,9 +95,24 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
         r = Scatter(blinn_phong_eval(s, wi, wm), blinn_phong_pdf(s, wi, wm, dot(wi, wm)));
     }
 #endif
+#if HAS_PRINCIPLED
+    if (s.model == MODEL_PRINCIPLED) r = principled_eval(s, wo, wi);
+#endif
+#if HAS_TRANSMISSION
+    r.f *= abs(wi.z);
+#else
     r.f *= wi.z;
+#endif
     return r;
 }
+
+#if HAS_PRINCIPLED
+struct Sampled {
+    vec3 wi;
+    bool specular; // from a perfectly specular lobe: `there` is its f and its chance, in place of bsdf_eval's
+    Scatter there;
+};
+#endif
 
 // Direction for light to come from; may lie below the surface, where bsdf_eval gives pdf 0.
 vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
@@ -115,3 +143,29 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
     return wi;
 }
+
+#if HAS_PRINCIPLED
+Sampled bsdf_pick(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    Sampled r = Sampled(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0));
+    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.specular, r.there);
+    return r;
+}
+
+// As with the other models uniform over the hemisphere, or over the sphere where the material transmits.
+Sampled bsdf_pick_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    Sampled r = bsdf_pick(s, wo, u_lobe, u);
+    float rest = s.model == MODEL_PRINCIPLED ? 1.0 - principled_specular(s, wo) : 1.0;
+    if (!r.specular) {
+        r.wi = sampling_hemisphere(u);
+        float pdf = 0.5 * INV_PI;
+#if HAS_TRANSMISSION
+        if (s.model == MODEL_PRINCIPLED && s.transmission > 0.0) {
+            r.wi = sampling_sphere(u);
+            pdf *= 0.5;
+        }
+#endif
+        r.there = Scatter(bsdf_eval(s, wo, r.wi).f, pdf * rest);
+    }
+    return r;
+}
+#endif

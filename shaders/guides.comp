@@ -23,7 +23,12 @@ void main() {
         Point at;
         Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
         if (n.id != NONE) {
-            albedo += vec4(material_load(at.material).base_color, 1.0);
+            Material m = material_load(at.material);
+            vec3 seen = m.base_color;
+#if HAS_TRANSMISSION
+            if (m.model == MODEL_PRINCIPLED) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));
+#endif
+            albedo += vec4(seen, 1.0);
             normal += vec4(dot(at.ng, d) > 0.0 ? -at.ns : at.ns, n.t);
         }
     } while (++i < frame.sample_count);

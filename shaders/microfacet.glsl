@@ -44,3 +44,14 @@ float microfacet_smith(float c, float a) {
     float a2 = a * a;
     return 1.0 / (c + sqrt(a2 + c * c - a2 * c * c));
 }
+
+// Length that stretches with alpha: Smith's G1(w) is 2 |cos| / (|cos| + length) [Heitz 2014, eq. 72].
+float microfacet_stretch(vec3 w, vec2 alpha) {
+    vec2 a = alpha * w.xy;
+    return sqrt(dot(a, a) + w.z * w.z);
+}
+
+// Masking of two directions on one side, heights correlated, over 4 cos cos [Heitz 2014, eq. 99].
+float microfacet_visibility(vec3 wo, vec3 wi, vec2 alpha) {
+    return 0.5 / (abs(wo.z) * microfacet_stretch(wi, alpha) + abs(wi.z) * microfacet_stretch(wo, alpha));
+}

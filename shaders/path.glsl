@@ -9,6 +9,9 @@ struct Radiance {
     float alpha; // 1: met a surface, or a background that is shown
 };
 
+// Stands for the density of a direction that only a mirror could have taken.
+const float PATH_CERTAIN = 1e30;
+
 // Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
 float path_weight(float a, float b) {
     float r = b / a;
@@ -72,6 +75,24 @@ vec3 path_normal(Point at, vec3 wo_w) {
     return n;
 }
 
+#if HAS_TRANSMISSION
+// The square of the index on wi's side, over the camera's. What comes from infinity comes from outside, even where an
+// open sheet of glass leads there.
+float path_dense(float dense, float wi_z, Surface s, float t) {
+    if (wi_z < 0.0) dense /= s.eta * s.eta;
+    return t == INFINITY_T ? max(dense, 1.0) : dense;
+}
+#endif
+
+// Whether a direction is on the same side of the shading normal and of the surface itself.
+bool path_agrees(float shading, float geometric) {
+#if HAS_TRANSMISSION
+    return shading * geometric > 0.0;
+#else
+    return geometric > 0.0;
+#endif
+}
+
 Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     Radiance result = Radiance(vec3(0.0), 0.0);
     Point at;
@@ -88,6 +109,16 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     alive = alive && frame.max_bounces > 0u;
     vec3 throughput = vec3(1.0);
     uint bounce = 0u;
+#if HAS_TRANSMISSION
+    // Radiance over the square of the index is what passes a boundary unchanged: `dense` is that square here over
+    // that at the camera, kept apart so that roulette does not see it.
+    float dense = 1.0;
+    vec3 fog = vec3(0.0); // rate of attenuation along the ray
+    if (alive && dot(at.ng, d) > 0.0) {
+        Material m = material_pick(at.material);
+        if (surface_transmits(m)) throughput = exp(-surface_attenuation(m) * n.t);
+    }
+#endif
     if (alive) {
         do {
             vec3 wo_w = -d;
@@ -99,8 +130,16 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             float along2 = dot(along, along);
             if (along2 > 0.0) tangent = along * inversesqrt(along2);
 #endif
-            Surface s = surface_make(material_pick(at.material), tangent);
+            Material m = material_pick(at.material);
+            Surface s = surface_make(m, tangent);
             vec3 wo = frame_to_local(basis, wo_w);
+#if HAS_PRINCIPLED
+            principled_face(wo, dot(at.ng, wo_w) < 0.0, s);
+#endif
+#if HAS_TRANSMISSION
+            bool clear = surface_transmits(m);
+            vec3 inner = surface_attenuation(m);
+#endif
             uint pair = PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE;
             vec2 choice = sobol_pair(rng, pair + PAIR_CHOICE);
             uint flat_id = at.flat_id;
@@ -117,7 +156,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
             vec3 wi = frame_to_local(basis, light.wi);
             Scatter f = bsdf_eval(s, wo, wi);
-            wanted = wanted && dot(light.wi, front) > 0.0 && max_component(f.f * light.radiance) > 0.0;
+            wanted = wanted && path_agrees(wi.z, dot(light.wi, front)) && max_component(f.f * light.radiance) > 0.0;
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
             wanted = wanted && light.id != n.id; // rounding may put a point on a ball's inside outside of it
 #endif
@@ -127,6 +166,10 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
             if (wanted) {
                 vec3 c = throughput * (f.f * light.radiance * (weight / light.pdf));
+#if HAS_TRANSMISSION
+                c *= path_dense(dense, wi.z, s, light.t);
+                c *= exp(-(clear ? (dot(at.ng, light.wi) < 0.0 ? inner : vec3(0.0)) : fog) * light.t);
+#endif
                 uvec2 skip = uvec2(flat_id, light.id);
 #if HAS_OPACITY
                 c *= passing_share(shapes_leave(at, light.wi), light.wi, light.t, skip);
@@ -138,15 +181,26 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             }
 #endif
 #if ESTIMATOR == ESTIMATOR_UNIFORM
+#if HAS_PRINCIPLED
+            Sampled picked = bsdf_pick_uniform(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
+            vec3 wi_next = picked.wi;
+            Scatter next = picked.there;
+#else
             vec3 wi_next = sampling_hemisphere(sobol_pair(rng, pair + PAIR_BSDF));
             Scatter next = bsdf_eval(s, wo, wi_next);
             next.pdf = 0.5 * INV_PI;
+#endif
+#elif HAS_PRINCIPLED
+            Sampled picked = bsdf_pick(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
+            vec3 wi_next = picked.wi;
+            Scatter next = bsdf_eval(s, wo, wi_next);
+            if (picked.specular) next = picked.there;
 #else
             vec3 wi_next = bsdf_sample(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
             Scatter next = bsdf_eval(s, wo, wi_next);
 #endif
             d = frame_to_world(basis, wi_next);
-            alive = next.pdf > 0.0 && dot(d, front) > 0.0;
+            alive = next.pdf > 0.0 && path_agrees(wi_next.z, dot(d, front));
             throughput *= next.f / (alive ? next.pdf : 1.0);
             float reach = max_component(throughput);
             alive = alive && reach > 0.0;
@@ -162,6 +216,10 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             }
             o = shapes_leave(at, d);
             n.id = NONE;
+#if HAS_TRANSMISSION
+            dense = path_dense(dense, wi_next.z, s, 0.0);
+            if (clear) fog = dot(at.ng, d) < 0.0 ? inner : vec3(0.0);
+#endif
 #if HAS_OPACITY
             if (alive) n = passing_nearest(o, d, flat_id, bounce, rng, at);
 #else
@@ -169,7 +227,10 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             at = shapes_point(n, o, d);
 #endif
             bool met = n.id != NONE;
-#if ESTIMATOR != ESTIMATOR_LIGHT
+#if HAS_TRANSMISSION
+            throughput *= exp(-fog * n.t);
+#endif
+#if ESTIMATOR != ESTIMATOR_LIGHT || HAS_PRINCIPLED
             vec3 arriving = vec3(0.0);
             float pdf_light = 0.0;
 #if HAS_EMISSION
@@ -185,16 +246,33 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
                 pdf_light = l.a * frame.environment_probability;
             }
 #endif
-#if ESTIMATOR == ESTIMATOR_MIS
+#if HAS_PRINCIPLED && ESTIMATOR == ESTIMATOR_MIS
+            if (!picked.specular) arriving *= path_weight(next.pdf, pdf_light);
+#elif HAS_PRINCIPLED && ESTIMATOR == ESTIMATOR_LIGHT
+            if (!picked.specular) arriving = vec3(0.0);
+#elif ESTIMATOR == ESTIMATOR_MIS
             arriving *= path_weight(next.pdf, pdf_light);
 #endif
 #if HAS_SUN_DISKS
+#if HAS_PRINCIPLED && ESTIMATOR == ESTIMATOR_LIGHT
+            if (!met && picked.specular) arriving += path_disks(d, PATH_CERTAIN);
+#elif HAS_PRINCIPLED
+            if (!met) arriving += path_disks(d, picked.specular ? PATH_CERTAIN : next.pdf);
+#else
             if (!met) arriving += path_disks(d, next.pdf);
+#endif
+#endif
+#if HAS_TRANSMISSION
+            arriving *= met ? dense : max(dense, 1.0);
 #endif
             if (alive) result.color += path_clamp(throughput * arriving, bounce > 1u);
 #endif
 #if HAS_AMBIENT
-            if (alive && met) result.color += path_clamp(throughput * path_ambient(at), bounce > 1u);
+            vec3 ambient = path_ambient(at);
+#if HAS_TRANSMISSION
+            ambient *= dense;
+#endif
+            if (alive && met) result.color += path_clamp(throughput * ambient, bounce > 1u);
 #endif
             alive = alive && met;
         } while (alive && bounce < frame.max_bounces);

@@ -14,7 +14,83 @@ struct Surface {
     vec3 phong;       // colour of blinn_phong's highlight
     float shininess;
     vec2 tangent;     // direction in the shading frame that anisotropy stretches along
+#if HAS_PRINCIPLED
+    float transmission;    // share of the base that is clear
+    float eta_outside;     // index inside over outside
+    float eta;             // index beyond the surface over index on wo's side
+    bool inside;           // wo is inside a body that transmits
+    bool mirror;           // the base is perfectly smooth
+    bool straight;         // the index is 1: rays pass as if nothing were there
+    bool coat_mirror;
+    vec3 specular_color;
+    float aspect;          // of the specular lobe, 1 where it is round
+    float sheen_roughness;
+    vec4 kept;             // energy_albedo at wo
+    vec4 kept_mean;
+    float coat_kept;       // share of light that the coat and the sheen keep from what is under them, at wo
+    float sheen_kept;
+#endif
 };
+
+// A lobe narrower than this is a mirror.
+const float SURFACE_LEAST_ROUGHNESS = 0.01;
+
+#if HAS_PRINCIPLED
+// The part of `principled` that the direction does not change; principled_face adds the rest.
+void surface_principled(Material m, vec2 tangent, inout Surface s) {
+    float largest = max_component(m.base_color);
+    vec3 tint = largest > 0.0 ? m.base_color / largest : vec3(1.0);
+    s.specular_color = m.specular_color * mix(vec3(1.0), tint, m.specular_tint);
+    float f0 = sqrt(0.08 * m.specular);
+    s.eta_outside = m.ior >= 1.0 ? m.ior : (1.0 + f0) / (1.0 - f0);
+    s.straight = s.eta_outside < 1.0001;
+    if (s.straight) s.eta_outside = 1.0;
+    s.eta = s.eta_outside;
+    s.transmission = 0.0;
+    s.inside = false;
+#if HAS_TRANSMISSION
+    s.transmission = m.transmission;
+#endif
+    s.mirror = m.roughness < SURFACE_LEAST_ROUGHNESS;
+    s.aspect = 1.0;
+#if HAS_ANISOTROPIC
+    s.aspect = sqrt(1.0 - 0.9 * m.anisotropic);
+    float turn = radians(m.anisotropic_rotation);
+    vec2 cs = vec2(cos(turn), sin(turn));
+    s.tangent = m.anisotropic > 0.0 ? vec2(cs.x * tangent.x - cs.y * tangent.y, cs.y * tangent.x + cs.x * tangent.y)
+                                    : vec2(1.0, 0.0);
+#endif
+    float a = sqr(max(m.roughness, SURFACE_LEAST_ROUGHNESS));
+    s.alpha = vec2(a / s.aspect, a * s.aspect);
+#if HAS_SHEEN
+    s.sheen = m.sheen * (m.sheen_color.x >= 0.0 ? m.sheen_color : mix(vec3(1.0), tint, m.sheen_tint));
+    s.sheen *= 1.0 - m.metallic;
+    s.sheen_roughness = max(m.sheen_roughness, ENERGY_LEAST_SHEEN_ROUGHNESS);
+#endif
+    s.coat_mirror = false;
+#if HAS_CLEARCOAT
+    s.coat_mirror = m.clearcoat_roughness >= 0.0 && m.clearcoat_roughness < SURFACE_LEAST_ROUGHNESS;
+    float rough = max(m.clearcoat_roughness, SURFACE_LEAST_ROUGHNESS);
+    s.alpha_coat = m.clearcoat_roughness >= 0.0 ? rough * rough : mix(0.1, 0.001, m.clearcoat_gloss);
+#endif
+}
+
+// What share of light is left after each metre inside, as a rate: transmittance is exp(-rate t).
+vec3 surface_attenuation(Material m) {
+#if HAS_ATTENUATION
+    if (m.attenuation_distance > 0.0) return min(-log(m.attenuation_color) / m.attenuation_distance, vec3(1e30));
+#endif
+    return vec3(0.0);
+}
+
+bool surface_transmits(Material m) {
+#if HAS_TRANSMISSION
+    return m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0;
+#else
+    return false;
+#endif
+}
+#endif
 
 Surface surface_make(Material m, vec2 tangent) {
     Surface s;
@@ -60,6 +136,12 @@ Surface surface_make(Material m, vec2 tangent) {
         s.alpha = vec2(s.alpha_mask);
         s.tangent = vec2(1.0, 0.0);
     }
+#endif
+#if HAS_PRINCIPLED
+#if HAS_CLEARCOAT
+    s.clearcoat = m.clearcoat;
+#endif
+    if (m.model == MODEL_PRINCIPLED) surface_principled(m, tangent, s);
 #endif
     return s;
 }

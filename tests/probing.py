@@ -11,17 +11,19 @@ import numpy as np
 from gpu import Renderer, features, filters, layout
 from gpu.layout import Slot
 from gpu.program import SHADERS, Kernels
+from gpu.scene import upload_tables
 
 PROBES = Path(__file__).parent / "probes"
 
 
 def materials(**members: Any) -> np.ndarray:
-    """One `layout.Material` with the contract's defaults of `disney`, but for what is given."""
+    """One `layout.Material` with the contract's defaults, but for what is given."""
     out = np.zeros(1, layout.Material.dtype)
-    defaults = {
-        "base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0,
-        "opacity": 1.0,
-    }  # fmt: skip
+    defaults = {"base_color": 0.5, "roughness": 0.5, "specular": 0.5, "sheen_tint": 0.5, "clearcoat_gloss": 1.0}
+    defaults["opacity"] = 1.0
+    defaults |= {"specular_color": 1.0, "attenuation_color": 1.0, "sheen_roughness": 0.5}
+    for name in ("ior", "attenuation_distance", "clearcoat_roughness", "sheen_color"):
+        defaults[name] = layout.ABSENT
     for name, value in {**defaults, **members}.items():
         out[name] = value
     return out
@@ -60,8 +62,11 @@ class Prober:
         blocks[1].bind_to_uniform_block(layout.FRAME_BLOCK)
         for name, value in {**uniforms, "count": count}.items():
             kernel[name].value = value
+        tables = upload_tables(self.context) if "HAS_PRINCIPLED" in raised else {}
+        for unit, texture in tables.items():
+            texture.use(unit)
         kernel.run(-(-count // 64))
         results = [np.frombuffer(made[slot].read(), np.float32).reshape(count, 4) for slot in outputs]
-        for buffer in (*made.values(), *blocks):
+        for buffer in (*made.values(), *blocks, *tables.values()):
             buffer.release()
         return results

@@ -41,8 +41,30 @@ ROWS = {
     "blinn-phong mirror": materials(model=BLINN_PHONG, base_color=0, phong_specular=1, shininess=1e6),
 }  # fmt: skip
 RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] != BLINN_PHONG]
+P = Model.PRINCIPLED
+GLASS = {"model": P, "transmission": 1, "base_color": (1, 0.8, 0.6)}
+PRINCIPLED = {
+    "plastic": materials(model=P, roughness=0.3),
+    "rough plastic": materials(model=P, roughness=1, specular=1, base_color=(0.9, 0.2, 0.1)),
+    "principled metal": materials(model=P, metallic=1, roughness=0.7, base_color=(1, 0.78, 0.34)),
+    "principled brushed": materials(model=P, metallic=1, roughness=0.4, anisotropic=0.9, anisotropic_rotation=30),
+    "flat": materials(model=P, subsurface=1, roughness=0.6),
+    "velvet": materials(model=P, sheen=1, sheen_roughness=0.6, base_color=0.1),
+    "satin": materials(model=P, sheen=1, sheen_roughness=0, specular=0, sheen_color=(1, 0.2, 0.4)),
+    "principled coat": materials(model=P, clearcoat=1, clearcoat_gloss=0, base_color=(0.4, 0, 0)),
+    "rough coat": materials(model=P, clearcoat=0.8, clearcoat_roughness=0.4, metallic=0.5, specular_color=(1, 0, 0)),
+    "frosted": materials(roughness=0.3, **GLASS),
+    "rough glass": materials(roughness=0.8, ior=1.8, **GLASS),
+    "brushed glass": materials(roughness=0.5, anisotropic=0.8, **GLASS),
+    "all at once": materials(
+        model=P, base_color=(0.6, 0.3, 0.2), metallic=0.3, subsurface=0.4, specular=0.8, roughness=0.45,
+        specular_tint=0.5, anisotropic=0.6, sheen=0.7, sheen_tint=0.3, clearcoat=0.8, clearcoat_gloss=0.2,
+        transmission=0.6,
+    ),
+}  # fmt: skip
 ANGLES = (0.0, 35.0, 70.0, 87.0)
 FLAGS = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG"})
+PRINCIPLED_FLAGS = frozenset({"HAS_PRINCIPLED", *EDITED["HAS_PRINCIPLED"]})
 TANGENT = np.array([0.8, 0.6])
 CASES = [(name, angle) for name in ROWS for angle in ANGLES]
 
@@ -57,21 +79,28 @@ def _wo(angle: float) -> np.ndarray:
     return np.array([math.sin(t) * 0.6, math.sin(t) * -0.8, math.cos(t)])
 
 
-def _eval(prober: Prober, row: str, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-    asks = np.zeros((len(wi), 4), np.float32)
-    asks[:, :3] = wi
-    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}
+def _ask(
+    prober: Prober, row: str, wo: np.ndarray, ask: np.ndarray, sample: int, inside: int
+) -> tuple[np.ndarray, np.ndarray]:
+    asks = np.zeros((len(ask), 4), np.float32)
+    asks[:, :3] = ask
+    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row] if row in ROWS else PRINCIPLED[row]}
+    flags = FLAGS if row in ROWS else PRINCIPLED_FLAGS
+    defines = {"SAMPLE": sample, "INSIDE": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
-    return prober.run("bsdf.comp", len(wi), inputs, outputs, {"SAMPLE": 0}, FLAGS, wo=tuple(wo))[0].astype(float)
+    f, wi = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, wo=tuple(wo))
+    return f.astype(float), wi.astype(float)
 
 
-def _sample(prober: Prober, row: str, wo: np.ndarray, u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    asks = np.zeros((len(u), 4), np.float32)
-    asks[:, :3] = u
-    inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}
-    outputs = (Slot.MOMENTS, Slot.OUTPUT)
-    f, wi = prober.run("bsdf.comp", len(u), inputs, outputs, {"SAMPLE": 1}, FLAGS, wo=tuple(wo))
-    return f.astype(float), wi[:, :3].astype(float)
+def _eval(prober: Prober, row: str, wo: np.ndarray, wi: np.ndarray, inside: int = 0) -> np.ndarray:
+    return _ask(prober, row, wo, wi, 0, inside)[0]
+
+
+def _sample(
+    prober: Prober, row: str, wo: np.ndarray, u: np.ndarray, inside: int = 0
+) -> tuple[np.ndarray, np.ndarray]:
+    f, wi = _ask(prober, row, wo, u, 1, inside)
+    return f, wi[:, :3]
 
 
 def _hemisphere(rng: np.random.Generator, n: int) -> np.ndarray:
@@ -178,3 +207,61 @@ def test_a_wrong_pdf_is_seen(prober: Prober) -> None:
     observed, expected = grid.counts(wi[f[:, 3] > 0]), grid.sums(on_grid[:, 3]) * n
     p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()))
     assert p < 1e-6
+
+
+def _clear(row: str) -> float:
+    return float(PRINCIPLED[row]["transmission"][0])
+
+
+@pytest.mark.parametrize("inside", [0, 1])
+@pytest.mark.parametrize("row", PRINCIPLED)
+def test_principled_is_reciprocal(prober: Prober, row: str, inside: int) -> None:
+    """f is symmetric; across the surface f of basic radiance over the square of the index on wi's side is."""
+    if inside and not _clear(row):
+        return
+    rng = np.random.default_rng(2)
+    m = PRINCIPLED[row][0]
+    root = math.sqrt(0.08 * m["specular"])
+    eta2 = (float(m["ior"]) if m["ior"] > 0 else (1 + root) / (1 - root)) ** 2
+    for wo in _hemisphere(rng, 5):
+        wi = _hemisphere(rng, 48)
+        there = _eval(prober, row, wo, wi, inside)[:, :3] / wi[:, 2:]
+        back = np.concatenate([_eval(prober, row, w, wo[None], inside)[:, :3] / wo[2] for w in wi])
+        np.testing.assert_allclose(there, back, rtol=3e-3, atol=1e-6)
+        if _clear(row):
+            under = wi * [1, 1, -1]
+            there = _eval(prober, row, wo, under, inside)[:, :3] / wi[:, 2:] / (1 if inside else eta2)
+            # From the other side, whose frame is turned about x: y and z change sign.
+            turned, source = under * [1, 1, -1], wo * [1, 1, -1]
+            back = [_eval(prober, row, w, source[None], 1 - inside)[:, :3] / wo[2] for w in turned]
+            back = np.concatenate(back) / (eta2 if inside else 1)
+            assert there.max() > 0
+            np.testing.assert_allclose(there, back, rtol=3e-3, atol=1e-6)
+
+
+@pytest.mark.parametrize(("row", "angle"), [(row, angle) for row in PRINCIPLED for angle in (30.0, 50.0, 70.0)])
+def test_principled_samples_follow_their_pdf(prober: Prober, row: str, angle: float) -> None:
+    """Over the whole sphere in cells of cosine and azimuth, from outside and from inside."""
+    rng = np.random.default_rng(4)
+    n, rows, columns, fine = 60_000, 20, 20, 32
+    wo = _wo(angle)
+    z = (np.arange(rows * fine) + 0.5) / (rows * fine) * 2 - 1
+    phi = (np.arange(columns * fine) + 0.5) / (columns * fine) * 2 * np.pi
+    zz, pp = (a.ravel() for a in np.meshgrid(z, phi, indexing="ij"))
+    r = np.sqrt(1 - zz * zz)
+    grid = np.stack([r * np.cos(pp), r * np.sin(pp), zz], 1)
+    for inside in (0, 1) if _clear(row) else (0,):
+        on_grid = _eval(prober, row, wo, grid, inside)
+        cells = on_grid.reshape(rows, fine, columns, fine, 4).sum((1, 3)) * (4 * np.pi / len(grid))
+        f, wi = _sample(prober, row, wo, rng.random((n, 3)), inside)
+        alive = f[:, 3] > 0
+        edges = [np.linspace(-1, 1, rows + 1), np.linspace(0, 2 * np.pi, columns + 1)]
+        at = np.arctan2(wi[alive, 1], wi[alive, 0]) % (2 * np.pi)
+        observed = np.histogram2d(wi[alive, 2], at, edges)[0]
+        expected = cells[..., 3] * n
+        assert observed.sum() == pytest.approx(expected.sum(), abs=0.012 * n)
+        p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()), 25.0)
+        assert p > stats.sidak(1e-3, 4 * len(PRINCIPLED)), f"chi-square p = {p:.2g}"
+        weights = np.where(alive[:, None], f[:, :3] / np.where(alive, f[:, 3], 1)[:, None], 0)
+        albedo, error = cells[..., :3].sum((0, 1)), weights.std(0) / math.sqrt(n)
+        assert (np.abs(weights.mean(0) - albedo) < 4.5 * error + 5e-3 * albedo + 1e-6).all()

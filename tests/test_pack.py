@@ -68,7 +68,8 @@ def test_every_number_of_a_material_has_its_place(model):
     seen = set()
     own = set(fields) - {"type", "emission_sides", "alpha", "alpha_cutoff"}
     for i, name in enumerate(sorted(own)):
-        value = [0.1, 0.2, 0.3] if isinstance(getattr(plain.materials["m"], name), tuple) else 0.1 + 0.01 * i
+        coloured = isinstance(getattr(plain.materials["m"], name), tuple) or name == "sheen_color"
+        value = [0.1, 0.2, 0.3] if coloured else (0.1 if name != "ior" else 1.1) + 0.01 * i
         material = {"type": model.name.lower(), **required, name: value}
         record = pack_materials(parse_scene({**document(), "materials": {"m": material}}))[0]
         assert record["model"] == model

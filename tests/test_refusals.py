@@ -107,7 +107,7 @@ STRUCTURE = {
     "/materials/a/roughness": (0.5,),
     "/materials/b/opacity": (0.5,),
     "/materials/b/emission_sides": ("back", 2, None, True),
-    "/materials/a/type": (GONE, "lambert", "principled", 5, None, [], {}),
+    "/materials/a/type": (GONE, "lambert", "plaster", 5, None, [], {}),
     "/shapes": (GONE, {}, None),
     "/shapes/0": (None, 5, []),
     "/shapes/0/radius": (GONE,),

@@ -50,7 +50,8 @@ def pack_materials(scene: Scene) -> np.ndarray:
                 continue
             member = RENAMED_IN.get(material.type, RENAMED).get(name, RENAMED.get(name, name))
             if member in layout.Material.members:
-                record[member] = getattr(material, name)
+                value = getattr(material, name)
+                record[member] = layout.ABSENT if value is None else value
         record["opacity"] = opacity(material)
     return records
 

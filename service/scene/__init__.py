@@ -13,7 +13,14 @@ from service.scene.environment import (
     SkyEnvironment,
 )
 from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
-from service.scene.material import BlinnPhongMaterial, DiffuseMaterial, DisneyMaterial, Material, MetalRoughMaterial
+from service.scene.material import (
+    BlinnPhongMaterial,
+    DiffuseMaterial,
+    DisneyMaterial,
+    Material,
+    MetalRoughMaterial,
+    PrincipledMaterial,
+)
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
 from service.scene.schema import schema
@@ -41,6 +48,7 @@ __all__ = [
     "MeshShape",
     "MetalRoughMaterial",
     "PointLight",
+    "PrincipledMaterial",
     "QuadShape",
     "Scene",
     "Settings",

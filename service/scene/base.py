@@ -51,8 +51,9 @@ def hint(
 
 
 def field_names(model: type[BaseModel]) -> list[str]:
-    """A model's own fields before those that it shares with its siblings: the order of a form."""
-    return sorted(model.model_fields, key=lambda name: name not in model.__annotations__)
+    """A model's own fields before those that it shares with all of its kind: the order of a form."""
+    kind = next(c for c in reversed(model.__mro__) if issubclass(c, Model) and c is not Model)
+    return sorted(model.model_fields, key=lambda name: kind is not model and name in kind.__annotations__)
 
 
 def _without_null(source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:

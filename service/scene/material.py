@@ -8,7 +8,7 @@ from pydantic import Field
 
 from service.scene.base import OMITTABLE, Model, hint
 from service.scene.color import Radiometric, Reflectance
-from service.scene.numbers import Factor, Fraction
+from service.scene.numbers import Degrees, Factor, Fraction, PositiveLength, RefractiveIndex
 
 
 class _Surface(Model):
@@ -148,6 +148,62 @@ class BlinnPhongMaterial(_Surface):
     ] = (0.0, 0.0, 0.0)
 
 
+class PrincipledMaterial(DisneyMaterial):
+    """The production model: reciprocal, never gains light, puts back what microfacets lose, and may be glass."""
+
+    type: Literal["principled"]  # type: ignore[assignment]
+    transmission: Annotated[
+        Fraction,
+        hint("Transmission", "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
+             unit="", widget="slider"),
+    ] = 0.0
+    ior: Annotated[
+        RefractiveIndex | None,
+        OMITTABLE,
+        hint("Index of refraction", "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
+             unit="", widget="slider", default=1.5),
+    ] = None
+    attenuation_color: Annotated[
+        Reflectance,
+        hint("Attenuation colour", "What is left of white light after the attenuation distance inside.",
+             unit="", widget="color"),
+    ] = (1.0, 1.0, 1.0)
+    attenuation_distance: Annotated[
+        PositiveLength | None,
+        OMITTABLE,
+        hint("Attenuation distance", "How far inside light takes the attenuation colour; without it, clear.",
+             unit="m", widget="slider", soft=5),
+    ] = None
+    specular_color: Annotated[
+        Reflectance,
+        hint("Specular colour", "Tints the dielectric's reflection head-on; grazing stays white.",
+             unit="", widget="color"),
+    ] = (1.0, 1.0, 1.0)
+    anisotropic_rotation: Annotated[
+        Degrees,
+        hint("Anisotropic rotation", "Turns the stretch of the highlight, counter-clockwise from the tangent.",
+             unit="degrees", widget="angle", soft=(-180, 180)),
+    ] = 0.0
+    sheen_color: Annotated[
+        Reflectance | None,
+        OMITTABLE,
+        hint("Sheen colour", "Colour of the sheen, in place of white tinted by the sheen tint.",
+             unit="", widget="color"),
+    ] = None
+    sheen_roughness: Annotated[
+        Fraction,
+        hint("Sheen roughness", "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
+             unit="", widget="slider"),
+    ] = 0.5
+    clearcoat_roughness: Annotated[
+        Fraction | None,
+        OMITTABLE,
+        hint("Clearcoat roughness", "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
+             unit="", widget="slider", default=0.03),
+    ] = None
+
+
 Material = Annotated[
-    DiffuseMaterial | DisneyMaterial | MetalRoughMaterial | BlinnPhongMaterial, Field(discriminator="type")
+    DiffuseMaterial | DisneyMaterial | PrincipledMaterial | MetalRoughMaterial | BlinnPhongMaterial,
+    Field(discriminator="type"),
 ]

@@ -24,6 +24,7 @@ def _not_vanishing(value: float) -> float:
 
 
 Fraction = Annotated[float, Field(ge=0, le=1)]
+RefractiveIndex = Annotated[float, Field(ge=1, le=4)]
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]
 Length = Annotated[float, Field(ge=0, le=LARGEST)]
 PositiveLength = Annotated[float, Field(gt=0, le=LARGEST), AfterValidator(_not_vanishing)]

@@ -35,7 +35,12 @@ float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
     bool inside = min(u, min(v, w)) >= 0.0 || max(u, max(v, w)) <= 0.0;
     bool hit = inside && det != 0.0 && t > 0.0 && t < t_max;
 #if HAS_SINGLE_SIDED
-    if ((tri.shape & SINGLE_SIDED) != 0u) {
+    bool single = (tri.shape & SINGLE_SIDED) != 0u;
+#if HAS_TRANSMISSION
+    Material m = material_load(tri.material); // a body that is left must have a back
+    if (m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0) single = false;
+#endif
+    if (single) {
         hit = hit && dot(cross(tri.v1 - tri.v0, tri.v2 - tri.v0), d) < 0.0;
     }
 #endif

@@ -1,4 +1,5 @@
-// Evaluates or samples the BSDF of material 0 for one wo: asks[i] is wi, or (u_lobe, u, u) with MODE 1.
+// Evaluates or samples the BSDF of material 0 for one wo: asks[i] is wi, or (u_lobe, u, u) with SAMPLE 1. With INSIDE,
+// wo is inside the body. Perfectly specular samples have directions[i].w = 1.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
 #include "constants.glsl"
@@ -17,12 +18,25 @@ void main() {
     if (i >= count) return;
     Surface s = surface_make(material_load(0u), normalize(vec2(0.8, 0.6)));
     vec4 ask = asks[i];
-#if SAMPLE
+    float specular = 0.0;
+#if HAS_PRINCIPLED
+    principled_face(wo, INSIDE == 1, s);
+#endif
+#if SAMPLE && HAS_PRINCIPLED
+    Sampled picked = bsdf_pick(s, wo, ask.x, ask.yz);
+    vec3 wi = picked.wi;
+    Scatter f = bsdf_eval(s, wo, wi);
+    if (picked.specular) {
+        f = picked.there;
+        specular = 1.0;
+    }
+#elif SAMPLE
     vec3 wi = bsdf_sample(s, wo, ask.x, ask.yz);
+    Scatter f = bsdf_eval(s, wo, wi);
 #else
     vec3 wi = ask.xyz;
-#endif
     Scatter f = bsdf_eval(s, wo, wi);
+#endif
     answers[i] = vec4(f.f, f.pdf);
-    directions[i] = vec4(wi, 0.0);
+    directions[i] = vec4(wi, specular);
 }
