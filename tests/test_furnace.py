@@ -15,7 +15,7 @@ from gpu.layout import ABSENT, Model, Slot
 from tests.probing import Prober, materials
 from tests.rendering import document, picture, render
 
-FLAGS = frozenset({"HAS_PRINCIPLED", *EDITED["HAS_PRINCIPLED"]})
+FLAGS = frozenset({"HAS_PRINCIPLED", "HAS_TRANSMISSION", "HAS_ATTENUATION", *EDITED["HAS_DISNEY"]})
 WHITE = {"type": "constant", "radiance": 1}
 SPHERE = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
