@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from gpu import layout
+from gpu import glsl
 from gpu.errors import CompileError
 
 log = logging.getLogger(__name__)
@@ -23,7 +23,7 @@ _WHERE = re.compile(r"(\d+)[:(](\d+)")
 
 def _read(name: str, folders: Sequence[Path]) -> str:
     if name == "layout.glsl":
-        return layout.glsl()
+        return glsl.text()
     for folder in folders:
         if (folder / name).is_file():
             return (folder / name).read_text()

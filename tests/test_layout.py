@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import Renderer, layout
+from gpu import Renderer, glsl, layout
 from gpu.features import COUNTS, FEW, FLAGS, defines
 from gpu.layout import BUFFERS, COUNTED, LayoutError, Record, f32, vec3
 
@@ -32,7 +32,7 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
     known = defines(frozenset()) | ({f"{name.upper()}_COUNT": count} if block else {})
     head = "\n".join(f"#define {k} {v}" for k, v in known.items())
     kernel = gpu._context.compute_shader(
-        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout.glsl()}\n"
+        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
         f"void main() {{\n    uint i = gl_GlobalInvocationID.x;\n    if (i >= {count}u) return;\n"
         f"    {record.__name__} r = {name}_load(i);\n" + "\n".join(lines) + "\n}\n"
@@ -64,7 +64,7 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
             expected.append(words[record.offsets[member] + k])
     head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset()).items())
     kernel = gpu._context.compute_shader(
-        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout.glsl()}\n"
+        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
         "void main() {\n    if (gl_GlobalInvocationID.x > 0u) return;\n" + "\n".join(lines) + "\n}\n"
     )
