@@ -59,6 +59,29 @@ def roughness() -> dict[str, Any]:
     }
 
 
+def materials() -> dict[str, Any]:
+    """Six of the material presets under the sky of a low sun."""
+    names = ("glass", "gold", "car-paint", "velvet", "porcelain", "amber")
+    floor = {"type": "quad", "origin": [-40, 0, 40], "u": [80, 0, 0], "v": [0, 0, -80], "material": "floor"}
+    spheres = [
+        {
+            "type": "sphere",
+            "center": [(k % 3 - 1) * 1.3 + (0.0 if k > 2 else 0.65), 0.5, k // 3 * 1.5],
+            "radius": 0.5,
+            "material": name,
+        }
+        for k, name in enumerate(names)
+    ]
+    return {
+        "version": 1,
+        "camera": {"position": [0.6, 2.6, 6.6], "target": [0, 0.5, 0.55], "vfov": 26},
+        "environment": {**presets.get("environments", "low-sun"), "rotation": 250, "scale": 0.1},
+        "materials": {"floor": {"type": "diffuse", "albedo": 0.4}}
+        | {name: presets.get("materials", name) for name in names},
+        "shapes": [*spheres, floor],
+    }
+
+
 def preset(name: str) -> Callable[[], dict[str, Any]]:
     return lambda: presets.get("scenes", name)
 
@@ -67,6 +90,7 @@ PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], fl
     # scene, (width, height, samples), exposure
     "bunny": (bunny, (800, 600, 192), -1.6),
     "roughness": (roughness, (1200, 280, 512), -0.5),
+    "materials": (materials, (800, 440, 300), 0.0),
     "cornell": (preset("cornell-boxes"), (512, 512, 1024), 0.0),
     "sphere": (preset("sphere-on-floor"), (512, 512, 512), 0.0),
 }
