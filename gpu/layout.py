@@ -217,7 +217,6 @@ class Solid(Record):
     row_y: vec3
     shape: u32
     row_z: vec3
-    handedness: f32  # -1 where the map mirrors, else 1
 
 
 class Triangle(Record):

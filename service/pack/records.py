@@ -58,7 +58,6 @@ def _solids(solids: Solids, origin: np.ndarray, cube: np.ndarray | None) -> tupl
     rows = np.linalg.inv(axes)
     records["center"] = center
     records["row_x"], records["row_y"], records["row_z"] = rows[:, 0], rows[:, 1], rows[:, 2]
-    records["handedness"] = np.sign(np.linalg.det(axes))
     # How far the shape reaches along a world axis: the sum of the object axes' parts for the cube, their length
     # for the ball.
     reach = np.linalg.norm(axes, axis=2) if cube is None else np.abs(axes) @ cube
