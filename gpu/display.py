@@ -14,8 +14,10 @@ def srgb(linear: np.ndarray) -> np.ndarray:
 
 def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
     """(h, w, c) of an AOV as (h, w, 4) display values, opaque: albedo sRGB, normal .5 + .5 n, depth and variance
-    divided by their maximum."""
-    if aov == "albedo":
+    divided by their maximum, ids in colours that tell neighbours apart."""
+    if aov in ("shape_id", "material_id"):
+        shown = _coloured(values)
+    elif aov == "albedo":
         shown = srgb(values)
     elif aov == "normal":
         shown = 0.5 + 0.5 * values
@@ -27,6 +29,13 @@ def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
     out = np.ones((*values.shape[:2], 4), np.float32)
     out[..., :3] = np.clip(shown, 0, 1)
     return out if dtype == "f4" else np.round(out * 255).astype(np.uint8)
+
+
+def _coloured(ids: np.ndarray) -> np.ndarray:
+    """(h, w, 1) whole numbers as (h, w, 3): hues a golden section apart: no two of a few are alike. 0 is black."""
+    hue = 2 * np.pi * ((ids.astype(np.float64) * 0.6180339887498949) % 1)
+    phase = np.array([0, 2, 4]) * np.pi / 3
+    return np.where(ids > 0, 0.55 + 0.4 * np.cos(hue - phase), 0.0)
 
 
 def _hash(x: np.ndarray) -> np.ndarray:

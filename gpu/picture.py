@@ -24,6 +24,7 @@ _PASS_S = 0.2  # samples per pass aim at this, once there are some
 _MAX_SAMPLES_A_PASS = 256
 _GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
 _METER_PIXELS = 4096  # the noise meter looks at about so many pixels
+IDS = ("shape_id", "material_id")
 
 
 class Picture:
@@ -186,11 +187,14 @@ class Picture:
 
     def read(self, aov: str = "color") -> np.ndarray:
         """Linear (height, width, channels) float32, row 0 at the top: color 4 (premultiplied), albedo 3, normal 3,
-        depth 1 (0 where nothing is hit), variance 3 (of the pixel's mean).
+        depth 1 (0 where nothing is hit), variance 3 (of the pixel's mean), shape_id and material_id 1 (index + 1 of
+        what the first sample's camera ray met; 0 where it met nothing).
 
         Waits for the GPU. Raises NothingRendered before a sample is complete.
         """
         self._need_samples()
+        if aov in IDS:
+            return self._read_id(aov)
         if aov in ("albedo", "normal", "depth"):
             return self._read_guide(aov)
         moments = self._vectors(self._main[Slot.MOMENTS])
@@ -213,6 +217,12 @@ class Picture:
         hits = albedo[..., 3:]
         return np.where(hits > 0, normal[..., 3:] / np.maximum(hits, 1), 0).astype(np.float32)
 
+    def _read_id(self, aov: str) -> np.ndarray:
+        self.trace_guides()
+        met = np.frombuffer(self._guides[Slot.OUTPUT].read(), np.uint32)
+        ids: np.ndarray = met.reshape(self.settings.height, self.settings.width, 2)[..., IDS.index(aov), None]
+        return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
+
     def trace_guides(self, budget_s: float = math.inf) -> bool:
         """Trace the AOVs of the first hit for about `budget_s` seconds; whether they are all there.
 
@@ -224,8 +234,8 @@ class Picture:
         want = min(self.samples, _GUIDE_SAMPLES)
         size = (self.settings.width, self.settings.height)
         if not self._guides:
-            for slot in (Slot.ALBEDO, Slot.NORMAL):
-                self._guides[slot] = self._context.buffer(reserve=16 * size[0] * size[1])
+            for slot, pixel_bytes in ((Slot.ALBEDO, 16), (Slot.NORMAL, 16), (Slot.OUTPUT, 8)):
+                self._guides[slot] = self._context.buffer(reserve=pixel_bytes * size[0] * size[1])
                 self._guides[slot].clear()
         if self._guide_samples < want:
             kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))

@@ -8,7 +8,7 @@ ESTIMATORS = ("mis", "bsdf", "light", "uniform")
 SAMPLERS = ("sobol", "independent")
 FILTERS = ("box", "tent", "gaussian", "blackman_harris")
 TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
-AOVS = ("color", "albedo", "normal", "depth", "variance")
+AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_id")
 
 
 @dataclass(frozen=True)

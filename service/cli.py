@@ -61,7 +61,7 @@ def _render(command: argparse.ArgumentParser) -> None:
     add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
     add("--seed", dest="set", action="append", type=_setting("seed"), metavar="N", help="the setting seed")
     add("--set", action="append", metavar="KEY=VALUE", help="any setting; its value in JSON or a bare word")
-    aovs = "albedo, normal, depth or variance in the place of color; all: every one as a layer of an .exr"
+    aovs = "albedo, normal, depth, variance, shape_id or material_id instead of color; all: each a layer of an .exr"
     add("--aov", metavar="NAME", default="color", help=aovs)
     add("--exposure", metavar="STOPS", default="0", help="for .png (default: 0)")
     curves = "for .png: linear, exponential, reinhard, aces, agx or pbr_neutral (default)"

@@ -1,8 +1,10 @@
-// Entry: albedo, normal and depth of the first hit, over the same camera rays as the picture's first samples.
+// Entry: albedo, normal and depth of the first hit, over the same camera rays as the picture's first samples; and which
+// shape and material the first of them met.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit
 layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
+layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec2 met[]; }; // index + 1 of shape and material; 0: none
 #include "constants.glsl"
 #include "sobol.glsl"
 #include "sampling.glsl"
@@ -22,6 +24,10 @@ void main() {
         camera_ray(pixel, rng, o, d);
         Point at;
         Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
+        if (frame.sample_first + i == 0u) {
+            uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
+            met[slot] = n.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
+        }
         if (n.id != NONE) {
             Material m = material_load(at.material);
             vec3 seen = m.base_color;

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import TONE_MAPS, NothingRendered, Picture, Renderer, RenderSettings
-from gpu.display import srgb
+from gpu.display import encode, srgb
 from service.pack import pack
 from service.scene import parse_scene
 from tests.rendering import Images, document, picture
@@ -139,3 +139,11 @@ def test_clamp_bounds_indirect_light_only(gpu: Renderer) -> None:
     clamped = picture(gpu, scene, 64, max_bounces=4, clamp=0.05).read()
     assert (picture(gpu, scene, 64, max_bounces=1, clamp=0.05).read() == direct).all()
     assert direct[..., :3].sum() < clamped[..., :3].sum() < 0.97 * full[..., :3].sum()
+
+
+def test_ids_are_told_apart_by_colour() -> None:
+    ids = np.arange(9, dtype=np.float32).reshape(3, 3, 1)
+    shown = encode("shape_id", ids).reshape(9, 4)
+    assert (shown[0] == [0, 0, 0, 255]).all()
+    apart = np.abs(shown[:, None, :3].astype(int) - shown[None, :, :3]).max(axis=2)
+    assert (apart + 255 * np.eye(9)).min() > 30

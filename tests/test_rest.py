@@ -112,7 +112,7 @@ def test_the_same_request_gives_the_same_bits(http: httpx.Client) -> None:
         ("npy", "application/octet-stream"),
     ],
 )
-@pytest.mark.parametrize("aov", ["color", "albedo", "normal", "depth", "variance"])
+@pytest.mark.parametrize("aov", ["color", "albedo", "normal", "depth", "variance", "shape_id"])
 def test_every_format_of_every_aov(http: httpx.Client, running: str, format: str, mime: str, aov: str) -> None:
     answer = http.get(f"/v1/renders/{running}/image", params={"format": format, "aov": aov})
     assert answer.status_code == 200 and answer.headers["content-type"] == mime
@@ -122,7 +122,7 @@ def test_every_format_of_every_aov(http: httpx.Client, running: str, format: str
 def test_image_shapes_and_depths(http: httpx.Client) -> None:
     id = start(http)["id"]
     status(http, id, 20)
-    for aov, channels in {"color": 4, "albedo": 3, "normal": 3, "depth": 1, "variance": 3}.items():
+    for aov, channels in {"color": 4, "albedo": 3, "normal": 3, "depth": 1, "variance": 3, "material_id": 1}.items():
         array = pixels(http, id, aov)
         assert array.shape == (24, 32, channels) and array.dtype == np.float32
     png = http.get(f"/v1/renders/{id}/image").content

@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from service.rendering.messages import Encoding
 
 FORMATS = ("png", "exr", "hdr", "npy")
-AOVS = ("color", "albedo", "normal", "depth", "variance")
+AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_id")
 TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
 
 

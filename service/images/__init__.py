@@ -33,6 +33,8 @@ LAYERS = {
     "normal": ("normal.X", "normal.Y", "normal.Z"),
     "depth": ("depth.Z",),
     "variance": ("variance.R", "variance.G", "variance.B"),
+    "shape_id": ("shape_id.I",),
+    "material_id": ("material_id.I",),
 }
 
 Array = npt.NDArray[Any]
@@ -69,7 +71,7 @@ def encode(
 
 
 def encode_layers(layers: dict[str, Array], metadata: Metadata | None = None) -> bytes:
-    """An EXR with every AOV as a layer: R G B A, albedo.R, normal.X, depth.Z, variance.R ... in LAYERS' order."""
+    """An EXR with every AOV as a layer: R G B A, albedo.R, normal.X, depth.Z ... in the order of LAYERS."""
     names = [name for name in LAYERS if name in layers]
     flat = [layers[name].reshape(*layers[name].shape[:2], -1) for name in names]
     return _exr(np.concatenate(flat, axis=2), tuple(c for name in names for c in LAYERS[name]), metadata)

@@ -35,7 +35,7 @@ class View(Model):
         Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"],
         hint("Tone map", "How radiance beyond white is brought onto the screen."),
     ] = "pbr_neutral"
-    aov: Literal["color", "albedo", "normal", "depth", "variance"] = "color"
+    aov: Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id"] = "color"
     max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
 
     def for_renderer(self) -> PictureView:

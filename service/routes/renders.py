@@ -42,7 +42,7 @@ class ImageQuery(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     format: Literal["png", "jpeg", "webp", "exr", "hdr", "npy"] = "png"
     bits: Bits = Bits.EIGHT
-    aov: Literal["color", "albedo", "normal", "depth", "variance"] = "color"
+    aov: Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id"] = "color"
     exposure: Annotated[float, Field(ge=-60, le=60)] = 0.0
     tone_map: Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"] = "pbr_neutral"
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from gpu import Picture, Renderer, Scene
 
 SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
-GUIDES = ("albedo", "normal", "depth")
+GUIDES = ("albedo", "normal", "depth", "shape_id", "material_id")
 PROGRESS_S = 0.1  # between two reports of how far it is
 NOISE_PAUSE = 20  # times what reading the noise meter took until the next reading, which so costs 5 % at most
 
