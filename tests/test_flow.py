@@ -96,6 +96,20 @@ async def test_a_view_replaces_the_want(renderer: Renderer) -> None:
 
 
 @flowing
+async def test_a_view_without_a_credit_makes_what_is_under_way_unwelcome(renderer: Renderer) -> None:
+    renderer.flow.view = View(max_fps=240)
+    renderer.flow.update(1)
+    assert renderer.deliver(1)
+    await asyncio.sleep(0.01)
+    late = renderer.frame(1)
+    assert renderer.deliver(1)
+    renderer.flow.look(View(format="rgba32f"))
+    assert not renderer.flow.welcome(late), "its pixels are encoded for another format"
+    renderer.flow.acknowledge(2)
+    assert renderer.wants[-1].view.encoding == "linear" and renderer.deliver(1)
+
+
+@flowing
 async def test_a_changed_view_survives_an_update(renderer: Renderer) -> None:
     renderer.flow.update(1)
     renderer.flow.look(View(exposure=2.0))

@@ -305,6 +305,19 @@ def test_a_view_keeps_what_it_does_not_name(client: Client) -> None:
     assert client.frame().mime == "image/png"
 
 
+def test_a_deep_png_holds_what_eight_bits_round(client: Client) -> None:
+    client.start()
+    client.finished()
+    client.say("view", format="png")
+    flat = np.asarray(Image.open(io.BytesIO(client.frame().image)), float)
+    client.say("view", bits=16)
+    deep = client.frame().image
+    assert deep[24] == 16, "the header's bit depth"
+    # Pillow reads the upper eight of sixteen bits.
+    apart = np.abs(np.asarray(Image.open(io.BytesIO(deep)).convert("RGBA"), float) - flat)
+    assert apart.max() <= 1 and apart.max() > 0
+
+
 def test_raw_frames_are_linear_and_never_exposed(client: Client) -> None:
     client.start(view=RAW)
     color = client.finished()[1].array()

@@ -47,6 +47,7 @@ class Flow:
 
     def look(self, view: View) -> None:
         self.view = view
+        self._serial += 1  # what was asked for before is encoded otherwise, and unwelcome
         if self.generation is not None:
             self._anyway, self._asked = True, False
             self._ask()

@@ -37,9 +37,11 @@ class View(Model):
     ] = "pbr_neutral"
     aov: Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id"] = "color"
     max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
+    bits: Annotated[Literal[8, 16], Field(description="Of a PNG's channels.")] = 8
 
     def for_renderer(self) -> PictureView:
-        encoding: Encoding = "linear" if self.format == "rgba32f" else "u1"
+        deep = self.format == "png" and self.bits == 16
+        encoding: Encoding = "linear" if self.format == "rgba32f" else "f4" if deep else "u1"
         return PictureView(self.aov, self.exposure, self.tone_map, encoding)
 
     def over(self, view: View) -> View:
@@ -110,7 +112,7 @@ def _encoded(frame: Frame, view: View) -> tuple[str, bytes]:
     if view.format == "rgba32f":
         return RAW, _rgba(frame.pixels).tobytes()
     quality = view.quality or (LAST_QUALITY if frame.last else QUALITY)
-    return images.MIME[view.format], images.encode(frame.pixels, view.format, quality=quality)
+    return images.MIME[view.format], images.encode(frame.pixels, view.format, bits=view.bits, quality=quality)
 
 
 def _rgba(pixels: np.ndarray) -> np.ndarray:
