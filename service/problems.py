@@ -1,11 +1,11 @@
 """What a caller did wrong, or what the service could not do, and how HTTP says so.
 
-    ServiceError
-        MalformedJson  InvalidDocument  AssetError            the body
-        Unauthorized  Forbidden                               who asks
-        NotFound  Conflict  Gone                              what is asked for
-        TooLarge  UnsupportedMedia                            how it is sent
-        TooManyRequests  Unavailable  Internal                the service
+ServiceError
+    MalformedJson  InvalidDocument  AssetError            the body
+    Unauthorized  Forbidden                               who asks
+    NotFound  Conflict  Gone                              what is asked for
+    TooLarge  UnsupportedMedia                            how it is sent
+    TooManyRequests  Unavailable  Internal                the service
 """
 
 from __future__ import annotations

@@ -17,8 +17,14 @@ GOOD: dict[str, Any] = {
     "environment": {"type": "constant", "radiance": 0.5},
     "lights": [
         {"type": "point", "position": [0, 3, 0], "intensity": 10},
-        {"type": "spot", "position": [0, 3, 1], "direction": [0, -1, 0], "intensity": 5, "inner_angle": 10,
-         "outer_angle": 20},
+        {
+            "type": "spot",
+            "position": [0, 3, 1],
+            "direction": [0, -1, 0],
+            "intensity": 5,
+            "inner_angle": 10,
+            "outer_angle": 20,
+        },
         {"type": "directional", "direction": [0, -1, 0], "irradiance": 1, "angular_diameter": 1},
     ],
     "materials": {"a": {"type": "diffuse", "albedo": 0.5}, "b": {"type": "disney"}, "x/y~z": {"type": "disney"}},

@@ -332,6 +332,24 @@ def cpu_ticks(pid: int) -> int:
     return int(fields[11]) + int(fields[12])
 
 
+def test_what_was_used_is_told(rendering: Any, arrays: Any) -> None:
+    async def test(engine: Engine) -> None:
+        ears, before = Ears(), dict(engine.statistics.gpu_s)
+        samples, loads = engine.statistics.samples, engine.statistics.setup_s.count
+        task = engine.open(ears, "render")
+        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(20)))
+        await ears.next(Done)
+        await asyncio.sleep(0.1)
+        used_s = engine.statistics.gpu_s["render"] - before.get("render", 0.0)
+        assert 0 < used_s < 20 and engine.statistics.gpu_s_of[task] == pytest.approx(used_s)
+        assert engine.statistics.samples - samples == 20 * 32 * 32
+        assert engine.statistics.setup_s.count == loads + 1 and engine.statistics.tasks >= 1
+        engine.drop(task)
+        assert task not in engine.statistics.gpu_s_of
+
+    rendering(test)
+
+
 def test_it_is_polite(rendering: Any) -> None:
     async def test(engine: Engine) -> None:
         nice = Path(f"/proc/{engine.process_id}/stat").read_text().rsplit(")", 1)[1].split()[16]

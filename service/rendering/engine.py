@@ -15,7 +15,8 @@ from typing import Any, Protocol
 
 from service.problems import Unavailable
 from service.rendering import link
-from service.rendering.messages import Drop, FromRenderer, Ready, ToRenderer, Unable, Update
+from service.rendering.messages import Drop, FromRenderer, Loaded, Ready, ToRenderer, Unable, Update, Usage
+from service.rendering.statistics import Kind, Statistics
 
 ROOT = Path(__file__).parents[2]
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
@@ -36,8 +37,11 @@ class Listener(Protocol):
 
 class Engine:
     def __init__(self, device: int | None = None) -> None:
+        self.statistics = Statistics()
         self._device = device
         self._listeners: dict[int, Listener] = {}
+        self._kinds: dict[int, Kind] = {}
+        self._lost_at: float | None = None
         self._numbers = itertools.count(1)
         self._ready: asyncio.Future[dict[str, Any]] | None = None
         self._process: subprocess.Popen[bytes] | None = None
@@ -87,15 +91,17 @@ class Engine:
         except TimeoutError:
             raise Unavailable("The renderer is starting.") from None
 
-    def open(self, listener: Listener) -> int:
+    def open(self, listener: Listener, kind: Kind = "stream") -> int:
         """The number of a new task, whose messages `listener` hears until `drop`. Raises Unavailable."""
         if self._link is None or self._closed:
             raise Unavailable(self._detail)
         task = next(self._numbers)
-        self._listeners[task] = listener
+        self._listeners[task], self._kinds[task] = listener, kind
         return task
 
     def drop(self, task: int) -> None:
+        self._kinds.pop(task, None)
+        self.statistics.gpu_s_of.pop(task, None)
         if self._listeners.pop(task, None) is not None and self._link is not None:
             self._link.send(Drop(task))
 
@@ -118,13 +124,36 @@ class Engine:
             log.info("renderer ready renderer=%s seconds=%.2f", message.info.get("renderer"), seconds)
             if self._ready is not None and not self._ready.done():
                 self._ready.set_result(message.info)
+            if self._lost_at is not None:
+                self.statistics.recovery_s.add(time.monotonic() - self._lost_at)
+                self._lost_at = None
         elif isinstance(message, Unable):
             self._detail = message.detail
             log.error("no renderer: %s", message.detail)
+        elif isinstance(message, Usage):
+            self._account(message)
         else:
+            if isinstance(message, Loaded):
+                self._count(message)
             listener = self._listeners.get(message.task)
             if listener is not None:
                 listener.heard(message)
+
+    def _account(self, usage: Usage) -> None:
+        statistics = self.statistics
+        statistics.samples += usage.samples
+        statistics.tasks = usage.tasks
+        for task, seconds in usage.gpu_s.items():
+            if task in self._listeners:
+                statistics.gpu_s_of[task] += seconds
+            statistics.gpu_s[self._kinds.get(task, "server")] += seconds
+
+    def _count(self, loaded: Loaded) -> None:
+        self.statistics.setup_s.add(loaded.setup_s)
+        if loaded.compile_ms:
+            self.statistics.compile_s.add(loaded.compile_ms / 1e3)
+        else:
+            self.statistics.kernels_found += 1
 
     def _lost(self) -> None:
         """The renderer's end of the link is closed."""
@@ -134,6 +163,8 @@ class Engine:
             return
         self._failures = 0 if was_ready else self._failures + 1
         log.error("renderer lost lived_s=%.1f failures=%d", lived_s, self._failures)
+        self.statistics.restarts["crashed"] += 1
+        self._lost_at = self._lost_at or time.monotonic()
         if was_ready:
             self._detail = "The renderer was lost."
             self._ready = asyncio.get_running_loop().create_future()

@@ -32,6 +32,7 @@ class Flow:
         self._anyway = False  # the view was changed and not seen yet
         self._answered = asyncio.Event()  # something of this generation was sent
         self._last_at = -1.0
+        self._updated_at = 0.0
         self._pace_s = 0.0
         self._timer: asyncio.TimerHandle | None = None
 
@@ -39,8 +40,14 @@ class Flow:
     def next_seq(self) -> int:
         return self._sent + 1
 
+    @property
+    def waited_s(self) -> float | None:
+        """How long the present generation has been waiting for its first frame; None: it was sent."""
+        return None if self._answered.is_set() else self._loop.time() - self._updated_at
+
     def update(self, generation: int) -> None:
         """An update was taken: frames of older generations are worth nothing any more."""
+        self._updated_at = self._loop.time()
         self.generation = generation
         self._answered.clear()
         self._ask()

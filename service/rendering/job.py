@@ -10,7 +10,7 @@ from typing import Any, Literal
 import numpy as np
 
 from service.pack import Packed
-from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocument, ServiceError, problem
+from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocument, ServiceError, answer, problem
 from service.quality import ResolvedSettings
 from service.rendering.engine import Engine
 from service.rendering.messages import (
@@ -59,7 +59,7 @@ class Job:
         if self._packed is None:
             return
         try:
-            self._task = self._engine.open(self)
+            self._task = self._engine.open(self, "render")
             arrays, self._packed = self._packed.arrays, None
             settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
             await self._engine.send_scene(Update(self._task, 1, arrays, settings, stop))
@@ -149,6 +149,7 @@ class Job:
 
     def _fail(self, error: ServiceError) -> None:
         self.state = "failed"
+        self._engine.statistics.errors[answer(error).type] += 1
         self._forget(error)
         self.finished.set()
 

@@ -182,6 +182,16 @@ class Done:
 
 
 @dataclass(frozen=True)
+class Usage:
+    """What was done since the last one: GPU seconds by task, samples of pixels; and what is held now."""
+
+    gpu_s: dict[int, float]
+    samples: int
+    tasks: int
+    task: int = 0  # of nobody in particular
+
+
+@dataclass(frozen=True)
 class Failed:
     """The task can't go on; an Update with a scene may revive it. `refused`: the scene asks for too much."""
 
@@ -193,4 +203,4 @@ class Failed:
 
 
 ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop
-FromRenderer = Ready | Unable | Loaded | Frame | Image | Progressed | Done | Failed
+FromRenderer = Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Done | Failed

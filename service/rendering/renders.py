@@ -36,6 +36,14 @@ class Renders:
             raise NotFound("There is no render of this id.")
         return self._jobs[id]
 
+    @property
+    def queued(self) -> int:
+        return len(self._running) - self.running
+
+    @property
+    def running(self) -> int:
+        return min(len(self._running), RUNNING)
+
     def all(self) -> list[Job]:
         return list(self._jobs.values())
 

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 from functools import partial
 from typing import Any, Protocol, cast
 
-from service.problems import Conflict, Internal, MalformedJson, ServiceError, problem
+from service.problems import Conflict, Internal, MalformedJson, ServiceError, answer, problem
 from service.rendering import protocol
 from service.rendering.engine import Engine
 from service.rendering.flow import Flow
@@ -177,10 +177,19 @@ class Stream:
         data = await encoding(lambda: protocol.frame_bytes(frame, view, seq))
         async with self._writing:
             if self._flow.welcome(frame):
+                self._count(data)
                 self._flow.sent(frame)
                 await self._socket.send_bytes(data)
 
+    def _count(self, data: bytes) -> None:
+        statistics = self._engine.statistics
+        statistics.frames += 1
+        statistics.frame_bytes += len(data)
+        if (waited_s := self._flow.waited_s) is not None:
+            statistics.first_frame_s.add(waited_s)
+
     def _refuse(self, error: ServiceError, generation: int | None) -> None:
+        self._engine.statistics.errors[answer(error).type] += 1
         self._post({"type": "error", "generation": generation, "problem": problem(error)})
 
     def _post(self, item: dict[str, Any] | Frame | _Closing) -> None:

@@ -34,7 +34,7 @@ class Warming:
         try:
             packed = await packing(lambda: self._reader.pack(self._reader.scene(self._document)))
             settings = await packing(partial(self._reader.settings, SETTINGS))
-            task = self._engine.open(self)
+            task = self._engine.open(self, "server")
         except ServiceError as error:
             log.warning("not warmed up: %s", error)
             return

@@ -27,19 +27,34 @@ class Camera(Model):
     vfov: Annotated[
         float,
         Field(gt=0, lt=180),
-        hint("Field of view", "Vertical angle; 40 is a short telephoto, 75 a wide angle.",
-             unit="degrees", widget="slider", soft=(5, 120)),
+        hint(
+            "Field of view",
+            "Vertical angle; 40 is a short telephoto, 75 a wide angle.",
+            unit="degrees",
+            widget="slider",
+            soft=(5, 120),
+        ),
     ] = 40.0
     aperture_radius: Annotated[
         Length,
-        hint("Aperture radius", "0 is a pinhole, sharp everywhere; larger blurs what is out of focus.",
-             unit="m", widget="slider", soft=0.2),
+        hint(
+            "Aperture radius",
+            "0 is a pinhole, sharp everywhere; larger blurs what is out of focus.",
+            unit="m",
+            widget="slider",
+            soft=0.2,
+        ),
     ] = 0.0
     focus_distance: Annotated[
         PositiveLength | None,
         OMITTABLE,
-        hint("Focus distance", "Along the axis to the plane that is sharp; without it, the target's.",
-             unit="m", widget="slider", soft=20),
+        hint(
+            "Focus distance",
+            "Along the axis to the plane that is sharp; without it, the target's.",
+            unit="m",
+            widget="slider",
+            soft=20,
+        ),
     ] = None
 
     @model_validator(mode="after")

@@ -14,8 +14,13 @@ from service.scene.numbers import BRIGHTEST, Degrees, Factor, Fraction
 class _Surroundings(Model):
     rotation: Annotated[
         Degrees,
-        hint("Rotation", "Turns the surroundings about the vertical, counter-clockwise seen from above.",
-             unit="degrees", widget="angle", soft=(-180, 180)),
+        hint(
+            "Rotation",
+            "Turns the surroundings about the vertical, counter-clockwise seen from above.",
+            unit="degrees",
+            widget="angle",
+            soft=(-180, 180),
+        ),
     ] = 0.0
     scale: Annotated[
         Factor,
@@ -33,8 +38,13 @@ class ConstantEnvironment(_Surroundings):
     type: Literal["constant"]
     radiance: Annotated[
         Radiometric,
-        hint("Radiance", "The same from everywhere: a white furnace, or the light of a closed overcast.",
-             unit="W/(m^2 sr)", widget="color", soft=4),
+        hint(
+            "Radiance",
+            "The same from everywhere: a white furnace, or the light of a closed overcast.",
+            unit="W/(m^2 sr)",
+            widget="color",
+            soft=4,
+        ),
     ]
 
     @model_validator(mode="after")
@@ -84,8 +94,13 @@ class SkyEnvironment(_Surroundings):
     ]
     sun_azimuth: Annotated[
         Degrees,
-        hint("Sun azimuth", "Where the sun stands: 0 is -Z, 90 is +X.", unit="degrees", widget="angle",
-             soft=(-180, 180)),
+        hint(
+            "Sun azimuth",
+            "Where the sun stands: 0 is -Z, 90 is +X.",
+            unit="degrees",
+            widget="angle",
+            soft=(-180, 180),
+        ),
     ]
     turbidity: Annotated[
         float,
@@ -94,8 +109,12 @@ class SkyEnvironment(_Surroundings):
     ] = 3.0
     ground_albedo: Annotated[
         Fraction,
-        hint("Ground albedo", "Share of light that the ground sends back, also into the sky: 0.3 is soil and grass.",
-             unit="", widget="slider"),
+        hint(
+            "Ground albedo",
+            "Share of light that the ground sends back, also into the sky: 0.3 is soil and grass.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.3
     sun: Annotated[bool, hint("Sun", "Off: the dome alone, as if the sun itself were hidden.")] = True
 

@@ -20,8 +20,13 @@ class PointLight(Model):
     position: Annotated[Point, hint("Position", "Where the light stands.", unit="m", widget="number")]
     intensity: Annotated[
         Radiometric,
-        hint("Intensity", "The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi).",
-             unit="W/sr", widget="color", soft=100),
+        hint(
+            "Intensity",
+            "The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi).",
+            unit="W/sr",
+            widget="color",
+            soft=100,
+        ),
     ]
 
 
@@ -37,13 +42,18 @@ class SpotLight(Model):
     ]
     inner_angle: Annotated[
         HalfAngle,
-        hint("Inner angle", "From the beam's axis to where the light begins to fade.",
-             unit="degrees", widget="angle"),
+        hint(
+            "Inner angle", "From the beam's axis to where the light begins to fade.", unit="degrees", widget="angle"
+        ),
     ]
     outer_angle: Annotated[
         HalfAngle,
-        hint("Outer angle", "From the beam's axis to where nothing is left; equal to the inner: a sharp edge.",
-             unit="degrees", widget="angle"),
+        hint(
+            "Outer angle",
+            "From the beam's axis to where nothing is left; equal to the inner: a sharp edge.",
+            unit="degrees",
+            widget="angle",
+        ),
     ]
 
     @model_validator(mode="after")
@@ -63,14 +73,24 @@ class DirectionalLight(Model):
     ]
     irradiance: Annotated[
         Radiometric,
-        hint("Irradiance", "On a surface that faces the light; the sun at noon gives about 1000.",
-             unit="W/m^2", widget="color", soft=10),
+        hint(
+            "Irradiance",
+            "On a surface that faces the light; the sun at noon gives about 1000.",
+            unit="W/m^2",
+            widget="color",
+            soft=10,
+        ),
     ]
     angular_diameter: Annotated[
         float,
         Field(ge=0, le=90),
-        hint("Angular diameter", "0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays.",
-             unit="degrees", widget="angle", soft=10),
+        hint(
+            "Angular diameter",
+            "0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays.",
+            unit="degrees",
+            widget="angle",
+            soft=10,
+        ),
     ] = 0.0
 
 

@@ -14,8 +14,13 @@ from service.scene.numbers import Degrees, Factor, Fraction, PositiveLength, Ref
 class _Surface(Model):
     emission: Annotated[
         Radiometric,
-        hint("Emission", "Radiance that leaves the front side: above 0 the shape is an area light.",
-             unit="W/(m^2 sr)", widget="color", soft=20),
+        hint(
+            "Emission",
+            "Radiance that leaves the front side: above 0 the shape is an area light.",
+            unit="W/(m^2 sr)",
+            widget="color",
+            soft=20,
+        ),
     ] = (0.0, 0.0, 0.0)
     emission_sides: Annotated[
         Literal["front", "both"],
@@ -23,14 +28,22 @@ class _Surface(Model):
     ] = "front"
     alpha: Annotated[
         Fraction,
-        hint("Alpha", "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
-             unit="", widget="slider"),
+        hint(
+            "Alpha",
+            "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            unit="",
+            widget="slider",
+        ),
     ] = 1.0
     alpha_cutoff: Annotated[
         Fraction | None,
         OMITTABLE,
-        hint("Alpha cutoff", "Where given, an alpha of at least this counts as 1, any other as 0.",
-             unit="", widget="slider"),
+        hint(
+            "Alpha cutoff",
+            "Where given, an alpha of at least this counts as 1, any other as 0.",
+            unit="",
+            widget="slider",
+        ),
     ] = None
 
 
@@ -40,8 +53,12 @@ class DiffuseMaterial(_Surface):
     type: Literal["diffuse"]
     albedo: Annotated[
         Reflectance,
-        hint("Albedo", "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
-             unit="", widget="color"),
+        hint(
+            "Albedo",
+            "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
+            unit="",
+            widget="color",
+        ),
     ]
 
 
@@ -51,38 +68,66 @@ class DisneyMaterial(_Surface):
     type: Literal["disney"]
     base_color: Annotated[
         Reflectance,
-        hint("Base colour", "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
-             unit="", widget="color"),
+        hint(
+            "Base colour",
+            "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+            unit="",
+            widget="color",
+        ),
     ] = (0.5, 0.5, 0.5)
     subsurface: Annotated[
         Fraction,
-        hint("Subsurface", "Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger).",
-             unit="", widget="slider"),
+        hint(
+            "Subsurface",
+            "Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger).",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     metallic: Annotated[
         Fraction,
-        hint("Metallic", "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
-             unit="", widget="slider"),
+        hint(
+            "Metallic",
+            "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     specular: Annotated[
         Fraction,
-        hint("Specular", "Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5.",
-             unit="", widget="slider"),
+        hint(
+            "Specular",
+            "Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.5
     specular_tint: Annotated[
         Fraction,
-        hint("Specular tint", "Tints the dielectric's reflection head-on to the base colour; grazing stays white.",
-             unit="", widget="slider"),
+        hint(
+            "Specular tint",
+            "Tints the dielectric's reflection head-on to the base colour; grazing stays white.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     roughness: Annotated[
         Fraction,
-        hint("Roughness", "0 is polished, 1 is matte; its square is the width of the highlight.",
-             unit="", widget="slider"),
+        hint(
+            "Roughness",
+            "0 is polished, 1 is matte; its square is the width of the highlight.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.5
     anisotropic: Annotated[
         Fraction,
-        hint("Anisotropic", "Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1.",
-             unit="", widget="slider"),
+        hint(
+            "Anisotropic",
+            "Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     sheen: Annotated[
         Fraction,
@@ -108,18 +153,30 @@ class MetalRoughMaterial(_Surface):
     type: Literal["metal_rough"]
     base_color: Annotated[
         Reflectance,
-        hint("Base colour", "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
-             unit="", widget="color"),
+        hint(
+            "Base colour",
+            "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+            unit="",
+            widget="color",
+        ),
     ]
     metallic: Annotated[
         Fraction,
-        hint("Metallic", "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
-             unit="", widget="slider"),
+        hint(
+            "Metallic",
+            "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+            unit="",
+            widget="slider",
+        ),
     ]
     roughness: Annotated[
         Fraction,
-        hint("Roughness", "0 is polished, 1 is matte; its square is the width of the highlight.",
-             unit="", widget="slider"),
+        hint(
+            "Roughness",
+            "0 is polished, 1 is matte; its square is the width of the highlight.",
+            unit="",
+            widget="slider",
+        ),
     ]
 
 
@@ -133,18 +190,32 @@ class BlinnPhongMaterial(_Surface):
     ]
     specular: Annotated[
         Reflectance,
-        hint("Specular", "Colour of the highlight; not normalised: a sharper one sends back less light.",
-             unit="", widget="color"),
+        hint(
+            "Specular",
+            "Colour of the highlight; not normalised: a sharper one sends back less light.",
+            unit="",
+            widget="color",
+        ),
     ]
     shininess: Annotated[
         Factor,
-        hint("Shininess", "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
-             unit="", widget="slider", soft=1000),
+        hint(
+            "Shininess",
+            "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
+            unit="",
+            widget="slider",
+            soft=1000,
+        ),
     ]
     ambient: Annotated[
         Radiometric,
-        hint("Ambient", "Radiance added wherever the surface is met; it lights nothing by being picked as a light.",
-             unit="W/(m^2 sr)", widget="color", soft=1),
+        hint(
+            "Ambient",
+            "Radiance added wherever the surface is met; it lights nothing by being picked as a light.",
+            unit="W/(m^2 sr)",
+            widget="color",
+            soft=1,
+        ),
     ] = (0.0, 0.0, 0.0)
 
 
@@ -154,52 +225,92 @@ class PrincipledMaterial(DisneyMaterial):
     type: Literal["principled"]  # type: ignore[assignment]
     transmission: Annotated[
         Fraction,
-        hint("Transmission", "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
-             unit="", widget="slider"),
+        hint(
+            "Transmission",
+            "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     ior: Annotated[
         RefractiveIndex | None,
         OMITTABLE,
-        hint("Index of refraction", "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
-             unit="", widget="slider", default=1.5),
+        hint(
+            "Index of refraction",
+            "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
+            unit="",
+            widget="slider",
+            default=1.5,
+        ),
     ] = None
     attenuation_color: Annotated[
         Reflectance,
-        hint("Attenuation colour", "What is left of white light after the attenuation distance inside.",
-             unit="", widget="color"),
+        hint(
+            "Attenuation colour",
+            "What is left of white light after the attenuation distance inside.",
+            unit="",
+            widget="color",
+        ),
     ] = (1.0, 1.0, 1.0)
     attenuation_distance: Annotated[
         PositiveLength | None,
         OMITTABLE,
-        hint("Attenuation distance", "How far inside light takes the attenuation colour; without it, clear.",
-             unit="m", widget="slider", soft=5),
+        hint(
+            "Attenuation distance",
+            "How far inside light takes the attenuation colour; without it, clear.",
+            unit="m",
+            widget="slider",
+            soft=5,
+        ),
     ] = None
     specular_color: Annotated[
         Reflectance,
-        hint("Specular colour", "Tints the dielectric's reflection head-on; grazing stays white.",
-             unit="", widget="color"),
+        hint(
+            "Specular colour",
+            "Tints the dielectric's reflection head-on; grazing stays white.",
+            unit="",
+            widget="color",
+        ),
     ] = (1.0, 1.0, 1.0)
     anisotropic_rotation: Annotated[
         Degrees,
-        hint("Anisotropic rotation", "Turns the stretch of the highlight, counter-clockwise from the tangent.",
-             unit="degrees", widget="angle", soft=(-180, 180)),
+        hint(
+            "Anisotropic rotation",
+            "Turns the stretch of the highlight, counter-clockwise from the tangent.",
+            unit="degrees",
+            widget="angle",
+            soft=(-180, 180),
+        ),
     ] = 0.0
     sheen_color: Annotated[
         Reflectance | None,
         OMITTABLE,
-        hint("Sheen colour", "Colour of the sheen, in place of white tinted by the sheen tint.",
-             unit="", widget="color"),
+        hint(
+            "Sheen colour",
+            "Colour of the sheen, in place of white tinted by the sheen tint.",
+            unit="",
+            widget="color",
+        ),
     ] = None
     sheen_roughness: Annotated[
         Fraction,
-        hint("Sheen roughness", "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
-             unit="", widget="slider"),
+        hint(
+            "Sheen roughness",
+            "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.5
     clearcoat_roughness: Annotated[
         Fraction | None,
         OMITTABLE,
-        hint("Clearcoat roughness", "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
-             unit="", widget="slider", default=0.03),
+        hint(
+            "Clearcoat roughness",
+            "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
+            unit="",
+            widget="slider",
+            default=0.03,
+        ),
     ] = None
 
 

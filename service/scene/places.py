@@ -62,5 +62,3 @@ def _below(kind: Any, step: int | str) -> Any:
         return kind.model_fields[str(step)].annotation if step in kind.model_fields else None
     arguments = get_args(kind) if get_origin(kind) in (list, dict) else ()
     return arguments[-1] if arguments else None
-
-

@@ -46,27 +46,49 @@ class Settings(Model):
         int | None,
         OMITTABLE,
         Field(ge=1, le=2**24),
-        hint("Samples", "Paths per pixel at which to stop; four times as many halve the noise.",
-             unit="", widget="number", soft=4096, default=BALANCED["max_samples"]),
+        hint(
+            "Samples",
+            "Paths per pixel at which to stop; four times as many halve the noise.",
+            unit="",
+            widget="number",
+            soft=4096,
+            default=BALANCED["max_samples"],
+        ),
     ] = None
     max_bounces: Annotated[
         int | None,
         OMITTABLE,
         Field(ge=0, le=1024),
-        hint("Bounces", "Scattering events on a path: 0 shows emission only, 1 direct light, more the light between.",
-             unit="", widget="slider", soft=32, default=BALANCED["max_bounces"]),
+        hint(
+            "Bounces",
+            "Scattering events on a path: 0 shows emission only, 1 direct light, more the light between.",
+            unit="",
+            widget="slider",
+            soft=32,
+            default=BALANCED["max_bounces"],
+        ),
     ] = None
     time_limit: Annotated[
         Amount | None,
         OMITTABLE,
-        hint("Time limit", "Stops after so long; with it and no samples given, nothing else stops it.",
-             unit="s", widget="number", soft=60),
+        hint(
+            "Time limit",
+            "Stops after so long; with it and no samples given, nothing else stops it.",
+            unit="s",
+            widget="number",
+            soft=60,
+        ),
     ] = None
     target_noise: Annotated[
         Amount | None,
         OMITTABLE,
-        hint("Target noise", "Stops when the estimated error is this share of the mean brightness; 0.01 looks clean.",
-             unit="", widget="number", soft=0.1),
+        hint(
+            "Target noise",
+            "Stops when the estimated error is this share of the mean brightness; 0.01 looks clean.",
+            unit="",
+            widget="number",
+            soft=0.1,
+        ),
     ] = None
     seed: Annotated[
         int,
@@ -93,22 +115,38 @@ class Settings(Model):
         int | None,
         OMITTABLE,
         Field(ge=0, le=1024),
-        hint("Roulette from", "Bounces before dim paths may end at random: changes noise and speed, not the mean.",
-             unit="", widget="slider", soft=32, default=BALANCED["roulette_depth"]),
+        hint(
+            "Roulette from",
+            "Bounces before dim paths may end at random: changes noise and speed, not the mean.",
+            unit="",
+            widget="slider",
+            soft=32,
+            default=BALANCED["roulette_depth"],
+        ),
     ] = None
     resolution_scale: Annotated[
         float | None,
         OMITTABLE,
         Field(gt=0, le=1),
-        hint("Resolution", "Factor on width and height.",
-             unit="", widget="slider", default=BALANCED["resolution_scale"]),
+        hint(
+            "Resolution",
+            "Factor on width and height.",
+            unit="",
+            widget="slider",
+            default=BALANCED["resolution_scale"],
+        ),
     ] = None
     adaptive: Annotated[NotYet, hint("Adaptive", "More samples where there is more noise: not built yet.")] = False
     clamp: Annotated[
         Annotated[float, Field(gt=0, le=BRIGHTEST)] | None,
         OMITTABLE,
-        hint("Clamp", "Bounds the radiance of indirect light: removes fireflies, and some light with them.",
-             unit="W/(m^2 sr)", widget="number", soft=100),
+        hint(
+            "Clamp",
+            "Bounds the radiance of indirect light: removes fireflies, and some light with them.",
+            unit="W/(m^2 sr)",
+            widget="number",
+            soft=100,
+        ),
     ] = None
     denoise: Annotated[NotYet, hint("Denoise", "Filters the finished picture: not built yet.")] = False
 

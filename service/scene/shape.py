@@ -85,24 +85,24 @@ class MeshShape(_Placed):
     asset: Annotated[
         str | None, Field(min_length=1), OMITTABLE, hint("File", "A mesh file: OBJ, PLY, STL or GLB.")
     ] = None
-    vertices: Annotated[
-        Points | None, OMITTABLE, hint("Vertices", "Rows of x, y, z.", unit="m", widget="number")
-    ] = None
+    vertices: Annotated[Points | None, OMITTABLE, hint("Vertices", "Rows of x, y, z.", unit="m", widget="number")] = (
+        None
+    )
     faces: Annotated[
         Triangles | None,
         OMITTABLE,
-        hint("Faces", "Rows of three vertex numbers, from 0, counter-clockwise seen from outside.",
-             unit="", widget="number"),
+        hint(
+            "Faces",
+            "Rows of three vertex numbers, from 0, counter-clockwise seen from outside.",
+            unit="",
+            widget="number",
+        ),
     ] = None
     normals: Annotated[
         Directions | None, OMITTABLE, hint("Normals", "One row per vertex.", unit="", widget="number")
     ] = None
-    smooth: Annotated[
-        bool, hint("Smooth", "Interpolates vertex normals; off shows the facets.")
-    ] = True
-    double_sided: Annotated[
-        bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")
-    ] = True
+    smooth: Annotated[bool, hint("Smooth", "Interpolates vertex normals; off shows the facets.")] = True
+    double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")] = True
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:

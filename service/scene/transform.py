@@ -23,13 +23,19 @@ class Transform(Model):
     translate: Annotated[Point, hint("Move", "Applied last.", unit="m", widget="number")] = (0.0, 0.0, 0.0)
     rotate: Annotated[
         Point,
-        hint("Rotate", "About X first, then Y, then Z; right-handed.",
-             unit="degrees", widget="angle", soft=(-180, 180)),
+        hint(
+            "Rotate", "About X first, then Y, then Z; right-handed.", unit="degrees", widget="angle", soft=(-180, 180)
+        ),
     ] = (0.0, 0.0, 0.0)
     scale: Annotated[
         ScaleFactors,
-        hint("Scale", "One factor, or one per axis; negative mirrors, zero is an error.",
-             unit="", widget="number", soft=(0.1, 10)),
+        hint(
+            "Scale",
+            "One factor, or one per axis; negative mirrors, zero is an error.",
+            unit="",
+            widget="number",
+            soft=(0.1, 10),
+        ),
     ] = (1.0, 1.0, 1.0)
 
     def matrix4(self) -> np.ndarray:

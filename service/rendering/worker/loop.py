@@ -5,15 +5,37 @@ from __future__ import annotations
 import logging
 import socket
 import time
+from collections import defaultdict
 from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 
 from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
 from service.rendering import link
-from service.rendering.messages import Drop, Failed, FromRenderer, Pause, Read, Resume, Stop, ToRenderer, Update, Want
+from service.rendering.messages import (
+    Drop,
+    Failed,
+    FromRenderer,
+    Pause,
+    Read,
+    Resume,
+    Stop,
+    ToRenderer,
+    Update,
+    Usage,
+    Want,
+)
 from service.rendering.scheduler import Scheduler
 from service.rendering.worker.task import Task
 
+REPORT_S = 0.25  # between two accounts of the GPU time that was used
+
 log = logging.getLogger(__name__)
+
+
+@dataclass
+class _Clock:
+    seconds: float = 0.0
 
 
 class Loop:
@@ -22,23 +44,48 @@ class Loop:
         self._renderer = renderer
         self._tasks: dict[int, Task] = {}
         self._scheduler = Scheduler()
+        self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
+        self._traced = 0
+        self._reported = 0.0
 
     def run(self) -> None:
         """Until the server is gone: raises link.Closed. Sleeps on the socket when there is nothing to do."""
         busy = False
         while True:
             for message in coalesced(self._pending(wait=not busy)):
-                self._take(message)
+                with self._charged(message.task):
+                    self._take(message)
             task = self._scheduler.choose(self._tasks.values())
             if task is not None:
-                began = time.perf_counter()
-                self._guard(task, task.step)
-                task.used_s += time.perf_counter() - began
+                with self._charged(task.number) as clock:
+                    self._guard(task, task.step)
+                task.used_s += clock.seconds
             for task in self._tasks.values():
-                began = time.perf_counter()
-                if self._guard(task, task.answer):
-                    task.used_s += time.perf_counter() - began
+                if task.want is None:
+                    continue
+                with self._charged(task.number) as clock:
+                    answered = self._guard(task, task.answer)
+                if answered:
+                    task.used_s += clock.seconds
             busy = any(task.ready for task in self._tasks.values())
+            self._account(at_once=not busy)
+
+    @contextmanager
+    def _charged(self, task: int) -> Iterator[_Clock]:
+        """Measures what is done inside, on the account of that task."""
+        clock, began = _Clock(), time.perf_counter()
+        yield clock
+        clock.seconds = time.perf_counter() - began
+        self._used_s[task] += clock.seconds
+
+    def _account(self, at_once: bool) -> None:
+        """Tells what was used, now and then; at once before there is nothing to do."""
+        now = time.monotonic()
+        if self._used_s and (at_once or now - self._reported >= REPORT_S):
+            traced = sum(task.traced for task in self._tasks.values())
+            self._send(Usage(dict(self._used_s), traced - self._traced, len(self._tasks)))
+            self._used_s.clear()
+            self._traced, self._reported = traced, now
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """What has come in by now; with `wait`, at least one message."""
@@ -68,6 +115,7 @@ class Loop:
         elif isinstance(message, Stop):
             self._guard(task, task.stop)
         elif isinstance(message, Drop):
+            self._traced -= task.traced
             self._tasks.pop(message.task).release()
 
     def _guard(self, task: Task, work: Callable[[], bool | None], read: Read | None = None) -> bool | None:

@@ -42,6 +42,7 @@ class Task:
         self.generation = 0
         self.used_s = 0.0
         self.want: Want | None = None
+        self.traced = 0  # samples of pixels
         self._renderer = renderer
         self._send = send
         self._scene: Scene | None = None
@@ -102,8 +103,10 @@ class Task:
         scale, picture = self._scale, self._ladder.picture(self._scale)
         cap = 1 if self.unseen or scale < 1.0 else self._cap()
         self._clock.start()
+        before = picture.samples
         picture.trace(FULL_S if self.unseen else SLICE_S, cap)
         self._clock.lap()
+        self.traced += (picture.samples - before) * picture.settings.width * picture.settings.height
         self._pixel_s = picture.cost_s or self._pixel_s
         if picture.samples:
             self._shown = scale

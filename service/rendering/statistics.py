@@ -1,0 +1,65 @@
+"""What the renderer and its clients have been through since the server began: plain counters, for whoever publishes.
+
+Everything is changed on the event loop and read there. A `Counter` is by label.
+"""
+
+from __future__ import annotations
+
+from bisect import bisect_left
+from collections import Counter, defaultdict
+from dataclasses import dataclass, field
+from itertools import accumulate
+from typing import Literal
+
+Kind = Literal["stream", "render", "server"]  # whose work: a stream's, REST's, the server's own
+
+SECONDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
+KEPT = 1000  # latest values of a distribution, for its quantiles
+
+
+@dataclass
+class Distribution:
+    """How often values were at most each of `bounds` (and above them all), how many, and their sum."""
+
+    bounds: tuple[float, ...] = SECONDS
+    counts: list[int] = field(default_factory=list)
+    count: int = 0
+    total: float = 0.0
+    latest: list[float] = field(default_factory=list)
+
+    def __post_init__(self) -> None:
+        self.counts = [0] * (len(self.bounds) + 1)
+
+    def add(self, value: float) -> None:
+        self.counts[bisect_left(self.bounds, value)] += 1
+        self.count += 1
+        self.total += value
+        self.latest.append(value)
+        del self.latest[:-KEPT]
+
+    def cumulative(self) -> list[tuple[float, int]]:
+        """(bound, how many values are at most that), as Prometheus has its buckets."""
+        return list(zip(self.bounds, accumulate(self.counts), strict=False))
+
+    def quantile(self, share: float) -> float | None:
+        """Of the latest values; None before the first."""
+        ordered = sorted(self.latest)
+        return ordered[min(int(share * len(ordered)), len(ordered) - 1)] if ordered else None
+
+
+@dataclass
+class Statistics:
+    restarts: Counter[str] = field(default_factory=Counter)  # of the renderer: by "crashed", "hung"
+    recovery_s: Distribution = field(default_factory=Distribution)  # from a renderer's loss to the next one ready
+    gpu_s: dict[Kind, float] = field(default_factory=lambda: defaultdict(float))
+    gpu_s_of: dict[int, float] = field(default_factory=lambda: defaultdict(float))  # by task, while it is there
+    samples: int = 0  # of pixels, traced
+    compile_s: Distribution = field(default_factory=Distribution)  # kernels that were not in memory
+    kernels_found: int = 0  # ... and loads that found theirs there
+    setup_s: Distribution = field(default_factory=Distribution)  # uploading and compiling, a load
+    first_frame_s: Distribution = field(default_factory=Distribution)  # from an update to its first frame
+    frames: int = 0
+    frame_bytes: int = 0
+    errors: Counter[str] = field(default_factory=Counter)  # told on streams and of failed renders, by problem type
+    tasks: int = 0  # that the renderer holds
+    gpu_bytes: int = 0  # what they hold there
