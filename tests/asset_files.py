@@ -81,19 +81,35 @@ def embedded(tree: dict[str, Any]) -> bytes:
     return json.dumps(tree | {"buffers": [{"byteLength": 84, "uri": uri}]}).encode()
 
 
-def ply(vertices: np.ndarray, faces: list[list[int]], order: str = "<") -> bytes:
-    """Binary in the byte order `<` or `>`, or text for `a`; a scalar stands before each face's list."""
-    names = {"<": b"binary_little_endian", ">": b"binary_big_endian", "a": b"ascii"}
+def ply(
+    vertices: np.ndarray,
+    faces: list[list[int]],
+    order: str = "<",
+    more: dict[str, np.ndarray] | None = None,
+    kind: str = "float",
+) -> bytes:
+    """Binary in the byte order `<` or `>`, or text for `a`; a scalar stands before each face's list.
+
+    `more`: columns by `st` or `rgb`, the latter of type `kind`.
+    """
+    encodings = {"<": "binary_little_endian", ">": "binary_big_endian", "a": "ascii"}
+    columns = [(name, "float", vertices[:, k]) for k, name in enumerate("xyz")]
+    for names, values in (more or {}).items():
+        long = {"r": "red", "g": "green", "b": "blue"}
+        columns += [(long.get(n, n), kind if n in long else "float", values[:, k]) for k, n in enumerate(names)]
     header = (
-        b"ply\nformat %s 1.0\ncomment made by hand\nelement vertex %d\n" % (names[order], len(vertices))
-        + b"property float x\nproperty float y\nproperty float z\n"
-        + b"element face %d\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n" % len(faces)
-    )
+        f"ply\nformat {encodings[order]} 1.0\ncomment made by hand\nelement vertex {len(vertices)}\n"
+        + "".join(f"property {kind} {name}\n" for name, kind, _ in columns)
+        + f"element face {len(faces)}\nproperty uchar flags\nproperty list uchar int vertex_indices\nend_header\n"
+    ).encode()
     if order == "a":
-        rows = [*(list(v) for v in vertices), *([7, len(f), *f] for f in faces)]
+        rows = [*zip(*(column.tolist() for _, _, column in columns), strict=True), *([7, len(f), *f] for f in faces)]
         return header + "\n".join(" ".join(map(str, row)) for row in rows).encode() + b"\n"
+    packed = np.zeros(len(vertices), [(n, order + {"float": "f4", "uchar": "u1"}[t]) for n, t, _ in columns])
+    for name, _, column in columns:
+        packed[name] = column
     body = b"".join(struct.pack(f"{order}BB{len(f)}i", 7, len(f), *f) for f in faces)
-    return header + vertices.astype(order + "f4").tobytes() + body
+    return header + packed.tobytes() + body
 
 
 def stl(triangles: np.ndarray) -> bytes:

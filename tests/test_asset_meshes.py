@@ -61,10 +61,45 @@ def test_obj_with_normals_on_some_faces(store: AssetStore) -> None:
 
 @pytest.mark.parametrize(
     "face",
-    [b"f -3 -2 -1", b"f 1/7 2/7 3/7", b"f\t1 \\\n 2  3  # three", b"f 1/ 2/ 3/", b"g a\nf 1 2 3 \r", b"f +1 +2 +3"],
+    [b"f -3 -2 -1", b"f\t1 \\\n 2  3  # three", b"f 1/ 2/ 3/", b"g a\nf 1 2 3 \r", b"f +1 +2 +3"],
 )
 def test_obj_ways_to_write_a_face(store: AssetStore, face: bytes) -> None:
     assert np.array_equal(triangles(mesh(store, OBJ[: OBJ.index(b"f")] + face, "m.obj")), [TRIANGLE])
+
+
+def test_obj_texture_coordinates_and_colours(store: AssetStore) -> None:
+    """Indexed apart from the vertices; three more numbers on every vertex are its colour."""
+    text = b"v 0 0 0 1 0 0\nv 1 0 0 0 1 0\nv 0 1 0 0 0 .5\nvt 0 0\nvt 1 .25\nvt .5\nf 1/1 2/2 3/3\nf 1/-1 3/-2 2/-3\n"
+    read = mesh(store, text, "m.obj")
+    assert read.uvs is not None and read.colors is not None and read.uvs_1 is None
+    assert read.uvs[read.faces].tolist() == [[[0, 0], [1, 0.25], [0.5, 0]], [[0.5, 0], [1, 0.25], [0, 0]]]
+    assert read.colors[read.faces][0].tolist() == [[1, 0, 0], [0, 1, 0], [0, 0, 0.5]]
+    assert np.array_equal(triangles(read), TRIANGLE[[[0, 1, 2], [0, 2, 1]]])
+
+
+def test_obj_where_every_index_counts_alike_keeps_the_file_s_vertices(store: AssetStore) -> None:
+    text = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nvt 1 0\nvt 0 1\nvn 0 0 1\nvn 0 0 1\nvn 0 0 1\nf 3/3/3 1/1/1 2/2/2\n"
+    read = mesh(store, text, "m.obj")
+    assert np.array_equal(read.vertices, TRIANGLE) and read.faces.tolist() == [[2, 0, 1]]
+    assert np.array_equal(read.uvs, TRIANGLE[:, :2]) and np.array_equal(read.normals, [[0, 0, 1]] * 3)
+
+
+def test_obj_without_some_texture_coordinates_says_so(store: AssetStore) -> None:
+    read = mesh(store, OBJ + b"vt 1 1\nf 1/1 2/1 3/1\n", "m.obj")
+    assert read.uvs is not None and read.uvs[read.faces].tolist() == [[[0, 0]] * 3, [[1, 1]] * 3]
+    assert read.warnings == ("3 corners have no texture coordinate; they take 0 0",)
+
+
+@pytest.mark.parametrize("order", ["<", ">", "a"])
+def test_ply_texture_coordinates_and_colours(store: AssetStore, order: str) -> None:
+    """Colours of whole numbers are sRGB, those of floats linear."""
+    uvs, bytes_ = TRIANGLE[:, :2] * 3, np.array([[255, 0, 188], [0, 55, 0], [1, 2, 3]])
+    for kind, colors in (("uchar", bytes_), ("float", bytes_ / 255)):
+        read = mesh(store, make.ply(TRIANGLE, [[0, 1, 2]], order, {"st": uvs, "rgb": colors}, kind), "m.ply")
+        assert read.uvs is not None and np.array_equal(read.uvs, uvs)
+        value = 188 / 255
+        expected = ((value + 0.055) / 1.055) ** 2.4 if kind == "uchar" else value
+        assert read.colors is not None and read.colors[0] == pytest.approx([1, 0, expected], rel=1e-6)
 
 
 @pytest.mark.parametrize("polygon", ["convex", "arrow", "arrow turned", "comb"])

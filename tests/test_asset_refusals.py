@@ -78,6 +78,8 @@ REFUSED: dict[str, tuple[str, bytes, str]] = {
         V3 + b"vn 0 0 1\nf 1//1 2//1 3//2\n",
         "line 5: normal 2 does not exist, there are 1",
     ),
+    "OBJ texture coordinate too large": ("m.obj", V3 + b"f 1/7 2/7 3/7", "line 4: texture coordinate 7"),
+    "OBJ texture coordinate of nan": ("m.obj", V3 + b"vt 0 nan\nf 1/1 2/1 3/1", "line 4: `vt` is not finite"),
     "OBJ words for numbers": ("m.obj", V3 + b"f 1 2 three\n", "line 4: not understood"),
     "OBJ fractional index": ("m.obj", V3 + b"f 1 2 2.5\n", "line 4: not understood"),
     "OBJ with nan": ("m.obj", OBJ.replace(b"v 1", b"v nan"), "line 2: `v` is not finite"),

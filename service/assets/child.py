@@ -14,8 +14,9 @@ import resource
 import signal
 import socket
 import sys
-from dataclasses import asdict
 from typing import Any
+
+import numpy as np
 
 from service.assets.data import AssetLimits, ImageData, MeshData
 from service.assets.errors import ParseError
@@ -115,7 +116,8 @@ def _parse(format: str, source: int, limits: AssetLimits) -> MeshData | ImageDat
 def _arrays(parsed: MeshData | ImageData) -> tuple[dict[str, Array], dict[str, Any]]:
     if isinstance(parsed, ImageData):
         return {"pixels": parsed.pixels}, {"is_8bit": parsed.is_8bit}
-    return {name: array for name, array in asdict(parsed).items() if array is not None}, {}
+    arrays = {name: array for name, array in vars(parsed).items() if isinstance(array, np.ndarray)}
+    return arrays, {"warnings": list(parsed.warnings)}
 
 
 if __name__ == "__main__":

@@ -19,6 +19,10 @@ class MeshData:
     vertices: Doubles  # (n, 3), finite
     faces: Indices  # (m, 3), in range, counter-clockwise from outside
     normals: Floats | None  # (n, 3), unit length; None where the file has none
+    uvs: Floats | None = None  # (n, 2), finite, v pointing up: of set 0
+    uvs_1: Floats | None = None  # the same of set 1
+    colors: Floats | None = None  # (n, 3), linear, 0..1
+    warnings: tuple[str, ...] = ()  # what is odd about it, for whoever made it
 
 
 @dataclass(frozen=True)

@@ -5,6 +5,8 @@ from collections import OrderedDict
 from collections.abc import Callable
 from concurrent.futures import Future
 
+import numpy as np
+
 from service.assets.data import AssetLimits, ImageData, MeshData
 from service.assets.errors import ParseError
 from service.assets.sandbox import Sandbox
@@ -73,7 +75,4 @@ def refused(name: str, error: ParseError) -> AssetError:
 
 
 def _bytes(parsed: Parsed) -> int:
-    if isinstance(parsed, ImageData):
-        return parsed.pixels.nbytes
-    normals = 0 if parsed.normals is None else parsed.normals.nbytes
-    return parsed.vertices.nbytes + parsed.faces.nbytes + normals
+    return sum(value.nbytes for value in vars(parsed).values() if isinstance(value, np.ndarray))

@@ -1,7 +1,7 @@
 """Wavefront OBJ -> triangles, strictly. Runs in the parsing child.
 
 Our own, and not trimesh's: that one drops a face or a normal it cannot read in silence, keeps indices beyond the
-vertices, and reorders. Lines, texture coordinates, materials and free-form statements are skipped.
+vertices, and reorders. Lines, materials and free-form statements are skipped.
 """
 
 import re
@@ -15,6 +15,7 @@ import numpy.typing as npt
 
 from service.assets.data import Doubles
 from service.assets.errors import ParseError
+from service.assets.parts import Parts
 from service.assets.polygons import Longs, triangulate
 
 NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
@@ -33,36 +34,66 @@ class Statements:
         return ParseError(f"line {self.lines[row]}: {what}: {_shown(self.rows[row])}")
 
 
-def read_obj(data: bytes) -> tuple[Doubles, Longs, Doubles | None]:
-    """Vertices as the file has them, or, where it gives normals, one for each pair of vertex and normal in use."""
+def read_obj(data: bytes) -> Parts:
+    """Vertices as the file has them, or, where it gives more, one for each set of indices that a corner has."""
     found, seen = _statements(data)
-    vertices, normals = _vectors(found["v"], "v"), _vectors(found["vn"], "vn")
+    vertices, colors = _vectors(found["v"], "v", 3)
     faces = found["f"]
     if not faces.rows:
         raise ParseError("it has no faces")
-    counts, corner_v, corner_n = _corners(faces)
+    counts, *corner = _corners(faces)
     row = np.repeat(np.arange(len(counts)), counts)
-    places = np.frombuffer(seen, np.int64).reshape(-1, 2)[row]
-    corner_v = _resolve(faces, row, corner_v, places[:, 0], len(vertices), "vertex", "vertices")
-    triangles = triangulate(vertices, corner_v, counts)
-    given = corner_n != 0
-    if not given.any():
-        return vertices, corner_v[triangles], None
-    corner_n[given] = _resolve(
-        faces, row[given], corner_n[given], places[given, 1], len(normals), "normal", "normals"
+    places = np.frombuffer(seen, np.int64).reshape(-1, 3)[row]
+    index = _resolve(faces, row, corner[0], places[:, 0], len(vertices), "vertex", "vertices")
+    triangles = triangulate(vertices, index, counts)
+    tables: list[Doubles | None] = [vertices, colors]
+    indices = [index, index]
+    for k, keyword, one, many, width in ((1, "vt", "texture coordinate", "texture coordinates", 2),
+                                         (2, "vn", "normal", "normals", 3)):  # fmt: skip
+        given = corner[k] != 0
+        if not given.any():
+            tables.append(None)
+            indices.append(corner[k])
+            continue
+        table = _vectors(found[keyword], keyword, width)[0]
+        corner[k][given] = _resolve(faces, row[given], corner[k][given], places[given, k], len(table), one, many)
+        corner[k][~given] = len(table)  # a row of zeros: a normal is computed
+        tables.append(np.concatenate([table, np.zeros((1, width))]))
+        indices.append(corner[k])
+    parts = _joined(tables, indices, triangles)
+    bare = int(np.count_nonzero(corner[1] == len(tables[2]) - 1)) if tables[2] is not None else 0
+    if bare:
+        parts.warnings.append(f"{bare} corners have no texture coordinate; they take 0 0")
+    return parts
+
+
+def _joined(tables: list[Doubles | None], indices: list[Longs], triangles: Longs) -> Parts:
+    """One vertex for each distinct set of indices; the file's own where they all count alike."""
+    vertices, colors, uvs, normals = tables
+    assert vertices is not None
+    index, first = indices[0], np.empty(0, np.int64)
+    others = [(place, table) for place, table in zip(indices[2:], tables[2:], strict=True) if table is not None]
+    if all(len(table) == len(vertices) + 1 and np.array_equal(index, place) for place, table in others):
+        n = len(vertices)
+        return Parts(vertices, index[triangles], normals=_first(normals, n), uvs=_first(uvs, n), colors=colors)
+    for place, _ in others:
+        mixed = index * (int(place.max()) + 1) + place
+        _, first, index = np.unique(mixed, return_index=True, return_inverse=True)
+    vertices, colors, uvs, normals = (
+        None if table is None else table[place[first]] for table, place in zip(tables, indices, strict=True)
     )
-    corner_n[~given] = len(normals)  # a row of zeros: to be computed
-    normals = np.concatenate([normals, np.zeros((1, 3))])
-    if len(normals) == len(vertices) + 1 and np.array_equal(corner_v, corner_n):
-        return vertices, corner_v[triangles], normals[:-1]
-    pairs, corner = np.unique(corner_v * len(normals) + corner_n, return_inverse=True)
-    return vertices[pairs // len(normals)], corner[triangles], normals[pairs % len(normals)]
+    assert vertices is not None
+    return Parts(vertices, index[triangles], normals=normals, uvs=uvs, colors=colors)
+
+
+def _first(table: Doubles | None, count: int) -> Doubles | None:
+    return None if table is None else table[:count]
 
 
 def _statements(data: bytes) -> tuple[dict[str, Statements], "array[int]"]:
-    """The statements that matter, and how many vertices and normals preceded each face: indices may count back."""
-    v, vn, f = Statements(), Statements(), Statements()
-    kinds, seen = {b"v": v, b"vn": vn, b"f": f}, array("q")
+    """The statements that matter, and how many rows of each preceded each face: indices may count back."""
+    v, vt, vn, f = Statements(), Statements(), Statements(), Statements()
+    kinds, seen = {b"v": v, b"vt": vt, b"vn": vn, b"f": f}, array("q")
     text = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\\\n", b" ")
     for number, line in enumerate(text.split(b"\n"), 1):
         words = line.split(None, 1)
@@ -72,28 +103,33 @@ def _statements(data: bytes) -> tuple[dict[str, Statements], "array[int]"]:
         kind.rows.append(rest.partition(b"#")[0] if b"#" in rest else rest)
         kind.lines.append(number)
         if kind is f:
-            seen.extend((len(v.rows), len(vn.rows)))
-    return {"v": v, "vn": vn, "f": f}, seen
+            seen.extend((len(v.rows), len(vt.rows), len(vn.rows)))
+    return {"v": v, "vt": vt, "vn": vn, "f": f}, seen
 
 
-def _vectors(found: Statements, keyword: str) -> Doubles:
-    """The first three numbers of each row; a weight or a colour may follow."""
+def _vectors(found: Statements, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
+    """The first numbers of each row; and where every row has six, as some write colours, the last three."""
     if not found.rows:
-        return np.empty((0, 3))
+        return np.empty((0, width)), None
     text = b"\n".join(found.rows)
     counts = _counts(text, _starts(np.frombuffer(text, np.uint8)))
-    if counts.min() < 3:
-        raise found.error(int(counts.argmin()), f"`{keyword}` needs three numbers")
+    # A texture coordinate of one number lies on v = 0.
+    least = 1 if keyword == "vt" else width
+    if counts.min() < least:
+        raise found.error(int(counts.argmin()), f"`{keyword}` needs {'a number' if least == 1 else 'three numbers'}")
     flat = _parse(text, np.float64, found, NUMBERS, int(counts.sum()))
-    vectors: Doubles = flat[(np.cumsum(counts) - counts)[:, None] + np.arange(3)]
+    starts = np.cumsum(counts) - counts
+    vectors: Doubles = flat[np.minimum(starts[:, None] + np.arange(width), len(flat) - 1)]
+    vectors[counts[:, None] <= np.arange(width)] = 0
+    colors = flat[starts[:, None] + np.arange(3, 6)] if keyword == "v" and (counts == 6).all() else None
     if not np.isfinite(vectors).all():
         row = int(np.flatnonzero(~np.isfinite(vectors).all(axis=1))[0])
         raise found.error(row, f"`{keyword}` is not finite")
-    return vectors
+    return vectors, colors
 
 
-def _corners(faces: Statements) -> tuple[Longs, Longs, Longs]:
-    """How many corners each face has, and the vertex and normal index of each corner as written, 0 where absent.
+def _corners(faces: Statements) -> tuple[Longs, Longs, Longs, Longs]:
+    """How many corners each face has, and each corner's v, vt and vn as written, 0 where absent.
 
     A corner is v, v/vt, v//vn or v/vt/vn: a number's place is told by the slashes before it in its corner.
     """
@@ -114,12 +150,12 @@ def _corners(faces: Statements) -> tuple[Longs, Longs, Longs]:
     for bad in (np.flatnonzero(slot > 2), np.flatnonzero(values == 0)):
         if len(bad):
             raise faces.error(int(row[owner[bad[0]]]), "corners are v, v/vt, v//vn or v/vt/vn, counted from 1")
-    v, vn = np.zeros(len(corners), np.int64), np.zeros(len(corners), np.int64)
-    v[owner[slot == 0]] = values[slot == 0]
-    vn[owner[slot == 2]] = values[slot == 2]
+    v, vt, vn = (np.zeros(len(corners), np.int64) for _ in range(3))
+    for k, index in enumerate((v, vt, vn)):
+        index[owner[slot == k]] = values[slot == k]
     if not v.all():
         raise faces.error(int(row[np.flatnonzero(v == 0)[0]]), "a corner lacks its vertex")
-    return counts, v, vn
+    return counts, v, vt, vn
 
 
 def _resolve(faces: Statements, row: Longs, index: Longs, before: Longs, have: int, one: str, many: str) -> Longs:

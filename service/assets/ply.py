@@ -12,8 +12,9 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles
+from service.assets.data import Doubles, Floats
 from service.assets.errors import ParseError
+from service.assets.parts import Parts, linear
 from service.assets.polygons import Longs, triangulate
 
 TYPES = {
@@ -24,6 +25,13 @@ TYPES = {
 HEADER_BYTES = 1 << 20
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 FACE_LISTS = ("vertex_indices", "vertex_index")
+# As Blender, pbrt, MeshLab and others write them; the second set is our own.
+UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
+UVS_1 = (("s1", "t1"),)
+COLORS = (("red", "green", "blue"), ("r", "g", "b"))
+
+
+Columns = dict[str, npt.NDArray[Any]]
 
 
 @dataclass
@@ -31,6 +39,7 @@ class Property:
     name: str
     dtype: str
     count: str | None = None  # the type of a list's length
+    declared: str = ""  # the header's type: the text's numbers are read as another
 
 
 @dataclass
@@ -57,10 +66,11 @@ def _count_of(p: Property) -> str:
     return f"count of {p.name}"
 
 
-def read_ply(data: bytes) -> tuple[Doubles, Longs, Doubles | None]:
+def read_ply(data: bytes) -> Parts:
     elements, encoding, start = _header(data)
     body = Body(data, start) if encoding != "ascii" else _text_as_binary(data, start, elements)
-    vertex: dict[str, npt.NDArray[np.generic]] = {}
+    vertex: Columns = {}
+    declared: dict[str, str] = {}
     counts = corners = np.empty(0, np.int64)
     for element in elements:
         if element.name == "face" and element.lists():
@@ -74,6 +84,7 @@ def read_ply(data: bytes) -> tuple[Doubles, Longs, Doubles | None]:
             rows = body.rows(element)
             if element.name == "vertex":
                 vertex = {p.name: rows[p.name] for p in element.properties}
+                declared = {p.name: p.declared for p in element.properties}
     if not {"x", "y", "z"} <= vertex.keys():
         raise ParseError("its header declares no vertices with x, y and z")
     vertices = _stack(vertex, ("x", "y", "z"))
@@ -85,12 +96,33 @@ def read_ply(data: bytes) -> tuple[Doubles, Longs, Doubles | None]:
         at = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
         face = int(np.searchsorted(np.cumsum(counts), at, "right"))
         raise ParseError(f"face {face} (counted from 0) names vertex {corners[at]}; there are {len(vertices)}")
-    normals = _stack(vertex, ("nx", "ny", "nz")) if {"nx", "ny", "nz"} <= vertex.keys() else None
-    return vertices, corners[triangulate(vertices, corners, counts)], normals
+    return Parts(
+        vertices,
+        corners[triangulate(vertices, corners, counts)],
+        _named(vertex, (("nx", "ny", "nz"),)),
+        _named(vertex, UVS),
+        _named(vertex, UVS_1),
+        _colors(vertex, declared),
+    )
 
 
-def _stack(columns: dict[str, npt.NDArray[np.generic]], names: tuple[str, ...]) -> Doubles:
-    return np.stack([columns[name] for name in names], axis=1).astype(np.float64)
+def _stack(columns: Columns, names: tuple[str, ...]) -> Doubles:
+    return np.stack([columns[name] for name in names], axis=1, dtype=np.float64)
+
+
+def _named(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> Floats | None:
+    names = next((names for names in choices if columns.keys() >= set(names)), None)
+    return None if names is None else np.stack([columns[name] for name in names], axis=1, dtype=np.float32)
+
+
+def _colors(columns: Columns, declared: dict[str, str]) -> Floats | None:
+    """Linear: whole numbers are sRGB, as in an image of 8 bits; floats are taken as they are."""
+    names = next((names for names in COLORS if columns.keys() >= set(names)), None)
+    if names is None:
+        return None
+    found = _stack(columns, names)
+    kind = declared[names[0]]
+    return found.astype(np.float32) if kind[0] == "f" else linear(found / np.iinfo(kind).max)
 
 
 def _header(data: bytes) -> tuple[list[Element], str, int]:
@@ -114,9 +146,9 @@ def _header(data: bytes) -> tuple[list[Element], str, int]:
             case ["element", name, length] if length.isascii() and length.isdigit() and len(length) < 16:
                 elements.append(Element(name, int(length)))
             case ["property", "list", count, dtype, name] if elements and count in TYPES and dtype in TYPES:
-                elements[-1].properties.append(Property(name, TYPES[dtype], TYPES[count]))
+                elements[-1].properties.append(Property(name, TYPES[dtype], TYPES[count], TYPES[dtype]))
             case ["property", dtype, name] if elements and dtype in TYPES:
-                elements[-1].properties.append(Property(name, TYPES[dtype]))
+                elements[-1].properties.append(Property(name, TYPES[dtype], declared=TYPES[dtype]))
             case [] | ["comment", *_] | ["obj_info", *_]:
                 pass
             case _:

@@ -177,4 +177,8 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData:
         os.close(fd)
     if "pixels" in arrays:
         return ImageData(arrays["pixels"], bool(reply["is_8bit"]))
-    return MeshData(arrays["vertices"], arrays["faces"], arrays.get("normals"))
+    get = arrays.get
+    return MeshData(
+        arrays["vertices"], arrays["faces"], get("normals"), get("uvs"), get("uvs_1"), get("colors"),
+        tuple(map(str, reply["warnings"])),
+    )  # fmt: skip
