@@ -12,6 +12,7 @@ from gpu.errors import (
 )
 from gpu.picture import Picture
 from gpu.renderer import Renderer
+from gpu.saved import Saved, picture_bytes, save, scene_bytes
 from gpu.scene import Scene
 from gpu.settings import AOVS, ESTIMATORS, FILTERS, SAMPLERS, TONE_MAPS, RenderSettings
 
@@ -31,8 +32,12 @@ __all__ = [
     "Picture",
     "RenderSettings",
     "Renderer",
+    "Saved",
     "Scene",
     "SceneArrays",
     "SceneTooLarge",
     "WrongThread",
+    "picture_bytes",
+    "save",
+    "scene_bytes",
 ]

@@ -7,7 +7,9 @@ import logging
 import threading
 from typing import Any
 
-from gpu.errors import ContextError
+import numpy as np
+
+from gpu.errors import ContextError, OutOfMemory
 
 log = logging.getLogger(__name__)
 _thread = threading.local()
@@ -58,6 +60,20 @@ def release(context: Any) -> None:
     use(context)
     context.release()
     _thread.current = None
+
+
+def allocate(context: Any, contents: np.ndarray | int) -> Any:
+    """A buffer with these bytes, or of so many. Raises OutOfMemory, which moderngl leaves to be asked for."""
+    size = contents if isinstance(contents, int) else contents.nbytes
+    context.error  # noqa: B018  # an older one is not this buffer's
+    try:
+        buffer = context.buffer(reserve=size) if isinstance(contents, int) else context.buffer(contents)
+    except Exception as error:  # moderngl.Error is not importable without its binary parts
+        raise OutOfMemory(f"the device has no {size / 2**20:.0f} MiB left") from error
+    if context.error == "GL_OUT_OF_MEMORY":
+        buffer.release()
+        raise OutOfMemory(f"the device has no {size / 2**20:.0f} MiB left")
+    return buffer
 
 
 def describe(context: Any) -> dict[str, Any]:

@@ -13,9 +13,10 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import display, features, filters, layout
-from gpu.errors import NothingRendered, OutOfMemory
+from gpu.errors import NothingRendered
 from gpu.layout import Slot
 from gpu.program import Kernels
+from gpu.saved import Saved
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
 
@@ -31,31 +32,30 @@ class Picture:
     """Accumulators and schedule of one scene at one size. Made by `Renderer.picture`."""
 
     def __init__(self, context: Any, kernels: Kernels, frame: Any, scene: Scene, settings: RenderSettings) -> None:
-        self._context, self._kernels, self._frame_buffer = context, kernels, frame
+        self.context, self._kernels, self._frame_buffer = context, kernels, frame
         self.scene, self.settings = scene, settings
         self._cost_s = 0.0  # seconds per sample of one pixel, measured; 0: unknown
         self.compile_ms = 0.0
         pixels = settings.width * settings.height
         self._stride = max(1, min(8, math.isqrt(max(1, pixels // _METER_PIXELS))))
         self._cells = (-(-settings.width // self._stride), -(-settings.height // self._stride))
-        self._main = self._allocate(pixels)
-        self._meter = self._allocate(self._cells[0] * self._cells[1])
+        self._main: dict[Slot, Any] = {}
+        self._meter: dict[Slot, Any] = {}
         self._guides: dict[Slot, Any] = {}
         self._ended = context.buffer(reserve=16)
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
         self._kernel: Any = None
-        self.reset()
-
-    def _allocate(self, pixels: int) -> dict[Slot, Any]:
-        out: dict[Slot, Any] = {}
         try:
-            for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
-                out[slot] = self._context.buffer(reserve=16 * pixels)
-        except Exception as error:
-            for buffer in out.values():
-                buffer.release()
-            raise OutOfMemory(f"the device has no {48 * pixels / 2**20:.0f} MiB left for this picture") from error
-        return out
+            self._allocate(self._main, pixels)
+            self._allocate(self._meter, self._cells[0] * self._cells[1])
+            self.reset()
+        except Exception:
+            self.release()
+            raise
+
+    def _allocate(self, out: dict[Slot, Any], pixels: int) -> None:
+        for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
+            out[slot] = contexts.allocate(self.context, 16 * pixels)
 
     def configure(self, settings: RenderSettings) -> None:
         """Other settings at the same size; starts again."""
@@ -66,12 +66,12 @@ class Picture:
 
     def reset(self) -> None:
         """Start again at zero samples, with the scene as it is now."""
-        contexts.use(self._context)
+        contexts.use(self.context)
         kernel = self._kernels.get("pathtrace.comp", self.scene.defines(self.settings))
         self.compile_ms += self._kernels.last_compile_ms
         if kernel is not self._kernel:
             self._kernel, self._cost_s = kernel, 0.0
-        for buffer in (*self._main.values(), *self._meter.values(), *self._guides.values(), self._ended):
+        for buffer in (*self.state, *self._guides.values()):
             buffer.clear()
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
         table[:, 0] = filters.inverse(self.settings.filter, features.FILTER_TABLE_SIZE)
@@ -80,6 +80,29 @@ class Picture:
         self._guide_samples = 0
         self._pass_samples = 0  # samples of the pass under way; 0: none is
         self._row, self._column = 0, 0  # where its next tile begins
+
+    @property
+    def state(self) -> list[Any]:
+        """The buffers that samples are added to."""
+        return [*self._main.values(), *self._meter.values(), self._ended]
+
+    @property
+    def under_way(self) -> tuple[int, int, int]:
+        """Of the pass under way: its samples (0: there is none), row and column of the next tile."""
+        return self._pass_samples, self._row, self._column
+
+    @property
+    def guided(self) -> bool:
+        """Holds AOVs of the first hit."""
+        return bool(self._guides)
+
+    def restore(self, saved: Saved) -> None:
+        """Go on where a picture of the same scene and settings was saved."""
+        contexts.use(self.context)
+        for buffer, data in zip(self.state, saved.buffers, strict=True):
+            buffer.write(data)
+        self.samples = saved.samples
+        self._pass_samples, self._row, self._column = saved.under_way
 
     @property
     def any_samples(self) -> bool:
@@ -92,14 +115,14 @@ class Picture:
 
     @property
     def warnings(self) -> list[str]:
-        contexts.use(self._context)
+        contexts.use(self.context)
         ended = int(np.frombuffer(self._ended.read(4), np.uint32)[0])
         return [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
 
     def trace(self, budget_s: float, max_samples: int) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
         start = time.perf_counter()
-        contexts.use(self._context)
+        contexts.use(self.context)
         self._bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
@@ -130,7 +153,7 @@ class Picture:
         x, y, width, height = self._tile()
         start = time.perf_counter()
         self._dispatch(self._main, (x, y), (width, height))
-        self._context.finish()
+        self.context.finish()
         cost = (time.perf_counter() - start) / (width * height * self._pass_samples)
         self._cost_s = cost if self._cost_s == 0 else 0.7 * self._cost_s + 0.3 * cost
         self._column = x + width
@@ -176,7 +199,7 @@ class Picture:
         self._kernel.run(-(-size[0] // 8), -(-size[1] // 8))
 
     def _need_samples(self) -> None:
-        contexts.use(self._context)
+        contexts.use(self.context)
         if self.samples == 0:
             raise NothingRendered("no sample is complete yet")
 
@@ -235,7 +258,7 @@ class Picture:
         size = (self.settings.width, self.settings.height)
         if not self._guides:
             for slot, pixel_bytes in ((Slot.ALBEDO, 16), (Slot.NORMAL, 16), (Slot.OUTPUT, 8)):
-                self._guides[slot] = self._context.buffer(reserve=pixel_bytes * size[0] * size[1])
+                self._guides[slot] = contexts.allocate(self.context, pixel_bytes * size[0] * size[1])
                 self._guides[slot].clear()
         if self._guide_samples < want:
             kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
@@ -245,7 +268,7 @@ class Picture:
         while self._guide_samples < want and time.perf_counter() - start < budget_s:
             self._frame_buffer.write(self._frame((0, 0), size, self._guide_samples, 1).tobytes())
             kernel.run(-(-size[0] // 8), -(-size[1] // 8))
-            self._context.finish()
+            self.context.finish()
             self._guide_samples += 1
         return self._guide_samples >= want
 
@@ -257,7 +280,7 @@ class Picture:
         """
         if self.samples < 2:
             return None
-        contexts.use(self._context)
+        contexts.use(self.context)
         weights = np.array([0.2126, 0.7152, 0.0722], np.float32)
         mean = self.read()[..., :3] @ weights
         at = display.meter_pixels(self._cells, self._stride, (self.settings.width, self.settings.height))
@@ -283,7 +306,7 @@ class Picture:
         floats = dtype == "f4"
         defines = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve", "OUTPUT_FLOAT": int(floats)}
         kernel = self._kernels.get("resolve.comp", defines)
-        output = self._context.buffer(reserve=(16 if floats else 4) * width * height)
+        output = self.context.buffer(reserve=(16 if floats else 4) * width * height)
         kernel["size"].value = (width, height)
         kernel["exposure"].value = 2.0**exposure
         self._main[Slot.SUM].bind_to_storage_buffer(int(Slot.SUM))
@@ -295,8 +318,7 @@ class Picture:
         return pixels
 
     def release(self) -> None:
-        contexts.use(self._context)
-        for buffer in (*self._main.values(), *self._meter.values(), *self._guides.values()):
+        contexts.use(self.context)
+        for buffer in (*self.state, *self._guides.values()):
             buffer.release()
-        self._ended.release()
         self._filter.release()

@@ -61,12 +61,22 @@ class Scene:
         self._raised: frozenset[str] = frozenset()
         self.arrays = arrays
         self._raise_flags()
-        self._buffers = {slot: self._upload(getattr(arrays, name)) for slot, name in _BUFFERS.items()}
-        self._texels, alias = self._upload_environment()
-        self._buffers[Slot.ENVIRONMENT_ALIAS] = self._upload(alias)
+        self._buffers: dict[Slot, Any] = {}
+        try:
+            self._upload_all()
+        except OutOfMemory:
+            for buffer in self._buffers.values():
+                buffer.release()
+            raise
         self._tables = upload_tables(context) if "HAS_PRINCIPLED" in self._raised else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
         log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
+
+    def _upload_all(self) -> None:
+        for slot, name in _BUFFERS.items():
+            self._buffers[slot] = self._upload(getattr(self.arrays, name))
+        self._texels, alias = self._upload_environment()
+        self._buffers[Slot.ENVIRONMENT_ALIAS] = self._upload(alias)
 
     def _raise_flags(self) -> None:
         raised = features.flags(self.arrays, self._editing)
@@ -75,10 +85,7 @@ class Scene:
     def _upload(self, array: np.ndarray) -> Any:
         # An empty binding still needs a buffer: llvmpipe reads it, masked, on the way past.
         data = np.ascontiguousarray(array).view(np.uint8).reshape(-1) if array.size else np.zeros(96, np.uint8)
-        try:
-            return self._context.buffer(data)
-        except Exception as error:
-            raise OutOfMemory(f"the device has no {data.nbytes / 2**20:.0f} MiB left for this scene") from error
+        return contexts.allocate(self._context, data)
 
     def _upload_environment(self) -> tuple[Any, np.ndarray]:
         e = self.arrays.environment

@@ -1,0 +1,75 @@
+"""A picture that was saved and restored goes on as if nothing had been; memory that is not there is refused."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import OutOfMemory, Picture, Renderer, RenderSettings, picture_bytes, save, scene_bytes
+from gpu import context as contexts
+from gpu import saved as saving
+from service.pack import pack
+from service.scene import parse_scene
+from tests.rendering import Images, document, picture
+
+SCENE = document(
+    [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}],
+    environment={"type": "constant", "radiance": 0.5},
+)
+
+
+def saved(picture: Picture) -> tuple[Any, int]:
+    """What was saved, and in how many steps."""
+    steps: Generator[None, None, Any] = save(picture)
+    count = 0
+    while True:
+        try:
+            next(steps)
+            count += 1
+        except StopIteration as end:
+            return end.value, count
+
+
+@pytest.mark.parametrize("tiles", [0, 1])
+def test_it_goes_on_to_the_same_bits(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, tiles: int) -> None:
+    monkeypatch.setattr(saving, "PIECE_BYTES", 5000)
+    whole = picture(gpu, SCENE, 9)
+    half = picture(gpu, SCENE, 4)
+    for _ in range(tiles):  # in the middle of a pass
+        half._pass_samples = half._choose_pass()
+        half._cost_s = 1.0  # so dear that a tile is a part of the picture
+        half._slice()
+    state, steps = saved(half)
+    assert state.samples == 4 and steps > 3 * 32 * 32 * 16 // 5000
+    half.release()
+    again = gpu.picture(half.scene, half.settings)
+    again.restore(state)
+    assert again.samples == 4 and again.noise() is not None
+    again.trace(60.0, 9)
+    for aov in ("color", "variance", "albedo"):
+        assert np.array_equal(again.read(aov), whole.read(aov))
+    assert again.noise() == whole.noise() and again.guided
+    for made in (whole, again):
+        made.release()
+
+
+def test_what_it_takes(gpu: Renderer) -> None:
+    small, large = RenderSettings(64, 64), RenderSettings(512, 512)
+    assert picture_bytes(large) - picture_bytes(small) == 48 * (512 * 512 - 64 * 64)
+    assert picture_bytes(large, guided=True) > picture_bytes(large)
+    arrays = pack(parse_scene(SCENE), Images()).arrays
+    assert scene_bytes(arrays) >= arrays.materials.nbytes + arrays.spheres.nbytes
+
+
+def test_memory_that_is_not_there(gpu: Renderer) -> None:
+    with pytest.raises(OutOfMemory, match="MiB"):
+        contexts.allocate(gpu._context, 1 << 50)
+    assert gpu._context.error == "GL_NO_ERROR"
+    arrays = pack(parse_scene(SCENE), Images()).arrays
+    scene = gpu.load(arrays)
+    with pytest.raises(OutOfMemory, match="MiB"):
+        gpu.picture(scene, RenderSettings(1 << 24, 1 << 14))
+    scene.release()
