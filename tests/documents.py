@@ -51,7 +51,10 @@ def cube_data():
 
 
 def picture(pixels, is_8bit=False):
-    return ImageData(pixels=np.asarray(pixels, np.float32), is_8bit=is_8bit)
+    """From numbers 0..1, or from radiance."""
+    if is_8bit:
+        return ImageData(np.rint(np.multiply(pixels, 255)).astype(np.uint8))
+    return ImageData(np.asarray(pixels, np.float32))
 
 
 def sphere(**fields):

@@ -19,7 +19,7 @@ class Images:
         self._images = images
 
     def image(self, ref: str) -> ImageData:
-        return ImageData(pixels=self._images[ref], is_8bit=False)
+        return ImageData(self._images[ref])
 
     def mesh(self, ref: str) -> Any:
         raise KeyError(ref)

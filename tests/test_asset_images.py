@@ -25,8 +25,8 @@ def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
 
 def image_of(store: AssetStore, data: bytes) -> tuple[np.ndarray, bool]:
     read = store.image(store.add(data).id)
-    assert read.pixels.dtype == np.float32
-    return read.pixels, read.is_8bit
+    scale = np.float32(255 if read.is_8bit else 1)
+    return np.divide(read.pixels, scale, dtype=np.float32), read.is_8bit
 
 
 def test_exr_as_stored_negative_values_too(store: AssetStore) -> None:

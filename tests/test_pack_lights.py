@@ -168,8 +168,8 @@ def test_image_environment_is_taken_as_it_is():
 
 
 def test_eight_bits_are_decoded_from_srgb():
-    texels = sky_of(np.full((1, 2, 3), [0.0, 0.02, 0.5]), is_8bit=True).arrays.environment.texels
-    np.testing.assert_allclose(texels[0, 0], [0, 0.02 / 12.92, 0.21404114], rtol=1e-5)
+    texels = sky_of(np.full((1, 2, 3), [0.0, 5 / 255, 128 / 255]), is_8bit=True).arrays.environment.texels
+    np.testing.assert_allclose(texels[0, 0], [0, 5 / 255 / 12.92, 0.21586050], rtol=1e-5)
 
 
 def test_texels_out_of_range_are_clamped_with_a_warning():

@@ -39,6 +39,7 @@ def test_defaults() -> None:
         "type": "disney", "base_color": (0.5, 0.5, 0.5), "subsurface": 0, "metallic": 0, "specular": 0.5,
         "specular_tint": 0, "roughness": 0.5, "anisotropic": 0, "sheen": 0, "sheen_tint": 0.5, "clearcoat": 0,
         "clearcoat_gloss": 1, "emission": (0, 0, 0), "emission_sides": "front", "alpha": 1, "alpha_cutoff": None,
+        "normal_map": None,
     }  # fmt: skip
     mesh = scene({"type": "mesh", "asset": "bunny.obj", "material": "a"}).shapes[0]
     assert isinstance(mesh, MeshShape) and mesh.smooth and mesh.double_sided and mesh.transform is None

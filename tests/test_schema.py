@@ -67,8 +67,9 @@ def test_numbers_carry_what_a_control_needs(name: str, prop: dict[str, Any]) -> 
     assert prop["x-widget"] in WIDGETS and prop["x-unit"] in UNITS
     if prop["x-widget"] not in ("slider", "angle"):
         return
-    low = prop.get("x-soft-minimum", prop.get("minimum", prop.get("exclusiveMinimum")))
-    high = prop.get("x-soft-maximum", prop.get("maximum", prop.get("exclusiveMaximum")))
+    number = next(form for form in prop.get("anyOf", [prop]) if is_numeric(form))  # the others: texture, other forms
+    low = prop.get("x-soft-minimum", number.get("minimum", number.get("exclusiveMinimum")))
+    high = prop.get("x-soft-maximum", number.get("maximum", number.get("exclusiveMaximum")))
     assert low is not None and high is not None and low < high <= 1024, "no slider can be so long"
     if isinstance(prop.get("default"), float):
         assert low <= prop["default"] <= high
@@ -77,21 +78,25 @@ def test_numbers_carry_what_a_control_needs(name: str, prop: dict[str, Any]) -> 
 def test_material_forms_begin_with_what_is_their_own() -> None:
     disney = list(models()["DisneyMaterial"]["properties"])
     assert disney[:2] == ["type", "base_color"]
-    assert disney[-4:] == ["emission", "emission_sides", "alpha", "alpha_cutoff"]
+    assert disney[-5:] == ["emission", "emission_sides", "alpha", "alpha_cutoff", "normal_map"]
     assert {"subsurface", "metallic", "specular", "specular_tint", "roughness", "anisotropic", "sheen", "sheen_tint",
             "clearcoat", "clearcoat_gloss"} <= set(disney)  # fmt: skip
 
 
 def test_colours_have_three_forms() -> None:
     forms = models()["DiffuseMaterial"]["properties"]["albedo"]["anyOf"]
-    assert [form["type"] for form in forms] == ["array", "number", "string"]
+    assert [form["type"] for form in forms[:3]] == ["array", "number", "string"]
     assert forms[1]["minimum"] == 0 and forms[1]["maximum"] == 1
 
 
-def test_what_is_not_built_is_absent() -> None:
-    text = json.dumps(WHOLE)
-    for name in ("texture", "normal_map"):
-        assert f'"{name}"' not in text
+def test_every_colour_and_number_of_a_material_may_be_a_texture() -> None:
+    for name, model in models().items():
+        if not name.endswith("Material"):
+            continue
+        for field, prop in model["properties"].items():
+            if is_numeric(prop) and field != "alpha_cutoff":  # a threshold is one number
+                reference = "ColorTexture" if prop["x-widget"] == "color" else "ScalarTexture"
+                assert prop["anyOf"][-1] == {"$ref": f"#/$defs/{reference}"}, (name, field)
 
 
 SMALLEST = {

@@ -115,7 +115,7 @@ def _parse(format: str, source: int, limits: AssetLimits) -> MeshData | ImageDat
 
 def _arrays(parsed: MeshData | ImageData) -> tuple[dict[str, Array], dict[str, Any]]:
     if isinstance(parsed, ImageData):
-        return {"pixels": parsed.pixels}, {"is_8bit": parsed.is_8bit}
+        return {"pixels": parsed.pixels}, {}
     arrays = {name: array for name, array in vars(parsed).items() if isinstance(array, np.ndarray)}
     return arrays, {"warnings": list(parsed.warnings)}
 

@@ -29,8 +29,12 @@ class MeshData:
 class ImageData:
     """Texels as stored, row 0 at the top of the image; nothing is decoded from sRGB. The array is read-only."""
 
-    pixels: Floats  # (height, width, 1 | 3 | 4), finite; 8- and 16-bit integers became 0..1
-    is_8bit: bool
+    pixels: npt.NDArray[np.float32] | npt.NDArray[np.uint8]  # (height, width, 1 | 3 | 4), finite; 16 bits became 0..1
+
+    @property
+    def is_8bit(self) -> bool:
+        """Whether the texels are bytes as the file has them, not floats."""
+        return self.pixels.dtype == np.uint8
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""Image files -> float32 texels. Runs in the parsing child."""
+"""Image files -> texels, bytes or float32. Runs in the parsing child."""
 
 import io
 import re
@@ -34,11 +34,13 @@ def parse_image(format: str, data: bytes, path: str, limits: AssetLimits) -> Ima
     if not data.startswith(SIGNATURES[format]):
         raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
     is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
-    pixels = _pillow(format, data, limits) if is_8bit else _openimageio(format, data, path, limits)
-    if not is_8bit and not np.isfinite(pixels).all():
+    if is_8bit:
+        return ImageData(np.ascontiguousarray(_pillow(format, data, limits)))
+    pixels = _openimageio(format, data, path, limits)
+    if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
         raise ParseError(f"the texel at x={x}, y={y} is not finite: {pixels[y, x].tolist()}")
-    return ImageData(np.ascontiguousarray(pixels, np.float32), is_8bit)
+    return ImageData(np.ascontiguousarray(pixels, np.float32))
 
 
 def check_size(width: int, height: int, limits: AssetLimits) -> None:
@@ -46,7 +48,7 @@ def check_size(width: int, height: int, limits: AssetLimits) -> None:
         raise ParseError(f"{width} x {height} texels; 1 to {limits.max_texels} are allowed")
 
 
-def _pillow(format: str, data: bytes, limits: AssetLimits) -> Floats:
+def _pillow(format: str, data: bytes, limits: AssetLimits) -> npt.NDArray[np.uint8]:
     from PIL import Image, UnidentifiedImageError
 
     Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
@@ -61,9 +63,7 @@ def _pillow(format: str, data: bytes, limits: AssetLimits) -> Floats:
     grey = image.mode in ("1", "L")
     transparent = image.mode in ("LA", "PA", "La", "RGBa", "RGBA") or "transparency" in image.info
     converted = image.convert("RGBA" if transparent else "L" if grey else "RGB")
-    texels = np.asarray(converted).reshape(converted.height, converted.width, -1)
-    scaled: Floats = np.divide(texels, 255, dtype=np.float32)
-    return scaled
+    return np.asarray(converted).reshape(converted.height, converted.width, -1)
 
 
 def _openimageio(format: str, data: bytes, path: str, limits: AssetLimits) -> Floats:

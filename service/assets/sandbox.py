@@ -176,7 +176,7 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData:
     finally:
         os.close(fd)
     if "pixels" in arrays:
-        return ImageData(arrays["pixels"], bool(reply["is_8bit"]))
+        return ImageData(arrays["pixels"])
     get = arrays.get
     return MeshData(
         arrays["vertices"], arrays["faces"], get("normals"), get("uvs"), get("uvs_1"), get("colors"),

@@ -17,7 +17,7 @@ import numpy.typing as npt
 MESSAGE_BYTES = 65536
 ALIGNMENT = 64
 SEALS = fcntl.F_SEAL_SEAL | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE
-DTYPES = ("<f4", "<f8", "<i4")
+DTYPES = ("|u1", "<f4", "<f8", "<i4")
 
 Array = npt.NDArray[Any]
 

@@ -17,9 +17,12 @@ from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
 from service.pack.sky import Sky, make_sky, sky_key
 from service.pack.values import pack_camera, pack_materials, pack_turn
+from service.problems import FieldError, InvalidDocument
 from service.scene import Scene
 from service.scene.environment import Environment
+from service.scene.mistakes import escaped
 from service.scene.numbers import BRIGHTEST
+from service.scene.texture import references
 
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1
 
@@ -42,6 +45,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
 
     Raises InvalidDocument, its pointers from the scene's root. Slow where there is geometry: not for an event loop.
     """
+    _refuse_textures(scene)
     materials = pack_materials(scene)
     emissive = np.any(materials["emission"] > 0, axis=1)
     built = _geometry(scene, emissive, assets, cache, limits)
@@ -91,6 +95,12 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         origin=built.origin,
     )
     return Packed(arrays, warnings)
+
+
+def _refuse_textures(scene: Scene) -> None:
+    places = [f"/materials/{escaped(key)}/{field}" for key, m in scene.materials.items() for field in references(m)]
+    if places:
+        raise InvalidDocument([FieldError(place, "textures cannot be rendered yet") for place in places])
 
 
 def _geometry(

@@ -20,6 +20,7 @@ from gpu.sky import SunDisk, bake, sun_disk
 from service.assets import Assets, ImageData
 from service.pack.cache import lasting
 from service.problems import AssetError, FieldError, InvalidDocument
+from service.scene.color import LINEAR_OF_BYTE
 from service.scene.environment import (
     ConstantEnvironment,
     CubeFaces,
@@ -135,10 +136,7 @@ def _linear(image: ImageData) -> np.ndarray:
     pixels: np.ndarray = image.pixels[..., :3]
     if pixels.shape[2] == 1:
         pixels = np.repeat(pixels, 3, axis=2)
-    if not image.is_8bit:
-        return pixels
-    steep = ((pixels + np.float32(0.055)) / np.float32(1.055)) ** np.float32(2.4)
-    return np.where(pixels <= 0.04045, pixels / np.float32(12.92), steep)
+    return np.asarray(LINEAR_OF_BYTE, np.float32)[pixels] if image.is_8bit else pixels
 
 
 def _clamped(texels: np.ndarray, pointer: str) -> tuple[np.ndarray, tuple[str, ...]]:

@@ -12,6 +12,7 @@ from service.scene.camera import Camera
 from service.scene.environment import Environment, SkyEnvironment
 from service.scene.material import Material
 from service.scene.numbers import Vec3
+from service.scene.texture import ScalarTexture
 
 # What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color"}
@@ -58,6 +59,8 @@ def pack_materials(scene: Scene) -> np.ndarray:
 
 def opacity(material: Material) -> float:
     """The chance that a ray meets the surface."""
+    if isinstance(material.alpha, ScalarTexture):
+        return 1.0
     if material.alpha_cutoff is None:
         return material.alpha
     return 1.0 if material.alpha >= material.alpha_cutoff else 0.0

@@ -27,13 +27,16 @@ from service.scene.schema import schema
 from service.scene.settings import Limits, Settings, parse_settings
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
 from service.scene.text import load_json
+from service.scene.texture import CheckerTexture, ColorTexture, ImageTexture, NormalTexture, ScalarTexture, Texture
 from service.scene.transform import MatrixTransform, Transform
 
 __all__ = [
     "BlinnPhongMaterial",
     "BoxShape",
     "Camera",
+    "CheckerTexture",
     "Color",
+    "ColorTexture",
     "ConstantEnvironment",
     "CubemapEnvironment",
     "DiffuseMaterial",
@@ -41,21 +44,25 @@ __all__ = [
     "DisneyMaterial",
     "Environment",
     "ImageEnvironment",
+    "ImageTexture",
     "Light",
     "Limits",
     "Material",
     "MatrixTransform",
     "MeshShape",
     "MetalRoughMaterial",
+    "NormalTexture",
     "PointLight",
     "PrincipledMaterial",
     "QuadShape",
+    "ScalarTexture",
     "Scene",
     "Settings",
     "Shape",
     "SkyEnvironment",
     "SphereShape",
     "SpotLight",
+    "Texture",
     "Transform",
     "Vec3",
     "load_json",

@@ -56,4 +56,5 @@ def _schema(high: float) -> WithJsonSchema:
 
 
 Reflectance = Annotated[Color, PlainValidator(color(1)), _schema(1)]
+Factors = Annotated[Color, PlainValidator(color(BRIGHTEST)), _schema(BRIGHTEST)]
 Radiometric = Annotated[Color, PlainValidator(color(BRIGHTEST)), _schema(BRIGHTEST)]

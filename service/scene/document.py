@@ -14,9 +14,10 @@ from service.scene.camera import Camera
 from service.scene.environment import Environment
 from service.scene.light import Light
 from service.scene.material import Material
-from service.scene.mistakes import MOST, among, mistakes
+from service.scene.mistakes import MOST, among, escaped, mistakes
 from service.scene.numbers import described
 from service.scene.shape import Shape
+from service.scene.texture import Texture
 
 
 def _version(value: Any) -> Any:
@@ -34,6 +35,9 @@ class Scene(Model):
         Environment | None, OMITTABLE, hint("Environment", "What surrounds the scene; without one it is black.")
     ] = None
     lights: Annotated[list[Light], hint("Lights", "Lights that are no shapes.")] = Field(default_factory=list)
+    textures: Annotated[dict[str, Texture], hint("Textures", "By names of your choice.")] = Field(
+        default_factory=dict
+    )
     materials: Annotated[dict[str, Material], hint("Materials", "By names of your choice.")]
     shapes: Annotated[list[Shape], hint("Shapes", "Each made of one of the materials.")]
 
@@ -52,13 +56,32 @@ def parse_scene(document: Any, pointer: str = "") -> Scene:
 
 
 def _dangling(document: Any) -> Iterator[FieldError]:
-    """Shapes whose material is not there; looked for in the raw document, so that other mistakes don't hide them."""
-    materials, shapes = (document.get(key) if isinstance(document, dict) else None for key in ("materials", "shapes"))
-    if not isinstance(materials, dict) or not isinstance(shapes, list):
+    """Names of what is not there; looked for in the raw document, so that other mistakes don't hide them."""
+    if not isinstance(document, dict):
         return
+    materials, shapes, textures = (document.get(key) for key in ("materials", "shapes", "textures"))
+    if isinstance(materials, dict):
+        if isinstance(textures, dict) or "textures" not in document:
+            yield from _textureless(materials, textures or {})
+        if isinstance(shapes, list):
+            yield from _immaterial(shapes, materials)
+
+
+def _immaterial(shapes: list[Any], materials: dict[str, Any]) -> Iterator[FieldError]:
     for i, shape in enumerate(shapes):
         name = shape.get("material") if isinstance(shape, dict) else None
         if isinstance(name, str) and name not in materials:
             yield FieldError(
                 f"/shapes/{i}/material", f"there is no material named {name[:80]!r}; the scene has {among(materials)}"
             )
+
+
+def _textureless(materials: dict[str, Any], textures: dict[str, Any]) -> Iterator[FieldError]:
+    for key, material in materials.items():
+        for field, value in material.items() if isinstance(material, dict) else ():
+            name = value.get("texture") if isinstance(value, dict) else None
+            if isinstance(name, str) and name not in textures:
+                yield FieldError(
+                    f"/materials/{escaped(key)}/{escaped(field)}/texture",
+                    f"there is no texture named {name[:80]!r}; the scene has {among(textures)}",
+                )

@@ -7,13 +7,22 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.scene.base import OMITTABLE, Model, hint
-from service.scene.color import Radiometric, Reflectance
-from service.scene.numbers import Degrees, Factor, Fraction, PositiveLength, RefractiveIndex
+from service.scene.numbers import Fraction
+from service.scene.texture import (
+    AnyDegrees,
+    AnyFactor,
+    AnyFraction,
+    AnyIndex,
+    AnyLength,
+    AnyRadiometric,
+    AnyReflectance,
+    NormalTexture,
+)
 
 
 class _Surface(Model):
     emission: Annotated[
-        Radiometric,
+        AnyRadiometric,
         hint(
             "Emission",
             "Radiance that leaves the front side: above 0 the shape is an area light.",
@@ -27,7 +36,7 @@ class _Surface(Model):
         hint("Emitting sides", "Whether the emission leaves the outward side only, or the inward side as well."),
     ] = "front"
     alpha: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Alpha",
             "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
@@ -45,6 +54,11 @@ class _Surface(Model):
             widget="slider",
         ),
     ] = None
+    normal_map: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint("Normal map", "Bends the surface's normal without moving the surface."),
+    ] = None
 
 
 class DiffuseMaterial(_Surface):
@@ -52,7 +66,7 @@ class DiffuseMaterial(_Surface):
 
     type: Literal["diffuse"]
     albedo: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint(
             "Albedo",
             "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
@@ -67,7 +81,7 @@ class DisneyMaterial(_Surface):
 
     type: Literal["disney"]
     base_color: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint(
             "Base colour",
             "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
@@ -76,7 +90,7 @@ class DisneyMaterial(_Surface):
         ),
     ] = (0.5, 0.5, 0.5)
     subsurface: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Subsurface",
             "Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger).",
@@ -85,7 +99,7 @@ class DisneyMaterial(_Surface):
         ),
     ] = 0.0
     metallic: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Metallic",
             "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
@@ -94,7 +108,7 @@ class DisneyMaterial(_Surface):
         ),
     ] = 0.0
     specular: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Specular",
             "Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5.",
@@ -103,7 +117,7 @@ class DisneyMaterial(_Surface):
         ),
     ] = 0.5
     specular_tint: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Specular tint",
             "Tints the dielectric's reflection head-on to the base colour; grazing stays white.",
@@ -112,7 +126,7 @@ class DisneyMaterial(_Surface):
         ),
     ] = 0.0
     roughness: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Roughness",
             "0 is polished, 1 is matte; its square is the width of the highlight.",
@@ -121,7 +135,7 @@ class DisneyMaterial(_Surface):
         ),
     ] = 0.5
     anisotropic: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Anisotropic",
             "Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1.",
@@ -130,19 +144,19 @@ class DisneyMaterial(_Surface):
         ),
     ] = 0.0
     sheen: Annotated[
-        Fraction,
+        AnyFraction,
         hint("Sheen", "Extra light at grazing angles, for cloth.", unit="", widget="slider"),
     ] = 0.0
     sheen_tint: Annotated[
-        Fraction,
+        AnyFraction,
         hint("Sheen tint", "Tints the sheen from white to the base colour.", unit="", widget="slider"),
     ] = 0.5
     clearcoat: Annotated[
-        Fraction,
+        AnyFraction,
         hint("Clearcoat", "A second, thin layer of lacquer with an index of 1.5.", unit="", widget="slider"),
     ] = 0.0
     clearcoat_gloss: Annotated[
-        Fraction,
+        AnyFraction,
         hint("Clearcoat gloss", "1 is a gloss lacquer, 0 a satin one.", unit="", widget="slider"),
     ] = 1.0
 
@@ -152,7 +166,7 @@ class MetalRoughMaterial(_Surface):
 
     type: Literal["metal_rough"]
     base_color: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint(
             "Base colour",
             "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
@@ -161,7 +175,7 @@ class MetalRoughMaterial(_Surface):
         ),
     ]
     metallic: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Metallic",
             "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
@@ -170,7 +184,7 @@ class MetalRoughMaterial(_Surface):
         ),
     ]
     roughness: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Roughness",
             "0 is polished, 1 is matte; its square is the width of the highlight.",
@@ -185,11 +199,11 @@ class BlinnPhongMaterial(_Surface):
 
     type: Literal["blinn_phong"]
     diffuse: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint("Diffuse", "Share of light that is sent back equally in all directions.", unit="", widget="color"),
     ]
     specular: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint(
             "Specular",
             "Colour of the highlight; not normalised: a sharper one sends back less light.",
@@ -198,7 +212,7 @@ class BlinnPhongMaterial(_Surface):
         ),
     ]
     shininess: Annotated[
-        Factor,
+        AnyFactor,
         hint(
             "Shininess",
             "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
@@ -208,7 +222,7 @@ class BlinnPhongMaterial(_Surface):
         ),
     ]
     ambient: Annotated[
-        Radiometric,
+        AnyRadiometric,
         hint(
             "Ambient",
             "Radiance added wherever the surface is met; it lights nothing by being picked as a light.",
@@ -224,7 +238,7 @@ class PrincipledMaterial(DisneyMaterial):
 
     type: Literal["principled"]  # type: ignore[assignment]
     transmission: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Transmission",
             "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
@@ -233,7 +247,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = 0.0
     ior: Annotated[
-        RefractiveIndex | None,
+        AnyIndex | None,
         OMITTABLE,
         hint(
             "Index of refraction",
@@ -244,7 +258,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = None
     attenuation_color: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint(
             "Attenuation colour",
             "What is left of white light after the attenuation distance inside.",
@@ -253,7 +267,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = (1.0, 1.0, 1.0)
     attenuation_distance: Annotated[
-        PositiveLength | None,
+        AnyLength | None,
         OMITTABLE,
         hint(
             "Attenuation distance",
@@ -264,7 +278,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = None
     specular_color: Annotated[
-        Reflectance,
+        AnyReflectance,
         hint(
             "Specular colour",
             "Tints the dielectric's reflection head-on; grazing stays white.",
@@ -273,7 +287,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = (1.0, 1.0, 1.0)
     anisotropic_rotation: Annotated[
-        Degrees,
+        AnyDegrees,
         hint(
             "Anisotropic rotation",
             "Turns the stretch of the highlight, counter-clockwise from the tangent.",
@@ -283,7 +297,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = 0.0
     sheen_color: Annotated[
-        Reflectance | None,
+        AnyReflectance | None,
         OMITTABLE,
         hint(
             "Sheen colour",
@@ -293,7 +307,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = None
     sheen_roughness: Annotated[
-        Fraction,
+        AnyFraction,
         hint(
             "Sheen roughness",
             "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
@@ -302,7 +316,7 @@ class PrincipledMaterial(DisneyMaterial):
         ),
     ] = 0.5
     clearcoat_roughness: Annotated[
-        Fraction | None,
+        AnyFraction | None,
         OMITTABLE,
         hint(
             "Clearcoat roughness",
@@ -311,6 +325,11 @@ class PrincipledMaterial(DisneyMaterial):
             widget="slider",
             default=0.03,
         ),
+    ] = None
+    clearcoat_normal_map: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint("Coat normal map", "The coat's own; without it the coat is smooth over whatever is under it."),
     ] = None
 
 

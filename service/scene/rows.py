@@ -1,4 +1,4 @@
-"""Long arrays of rows of three numbers, checked by numpy: 100 000 of them take tens of milliseconds."""
+"""Long arrays of rows of numbers, checked by numpy: 100 000 of them take tens of milliseconds."""
 
 from __future__ import annotations
 
@@ -15,15 +15,18 @@ from service.scene.numbers import LARGEST, described, is_number, vector_schema
 LARGEST_INDEX = 2**31 - 1
 
 
-def _rows(value: Any, low: float, high: float, example: str) -> np.ndarray:
-    """(n, 3) float64, read-only. Refuses with the pointer of the first bad row."""
+WORDS = {2: "two", 3: "three", 4: "four"}
+
+
+def _rows(value: Any, low: float, high: float, example: str, width: int = 3) -> np.ndarray:
+    """(n, width) float64, read-only. Refuses with the pointer of the first bad row."""
     bounds = f"between {low:.10g} and {high:.10g}"
     if not isinstance(value, list | tuple | np.ndarray):
         raise refusal(f"must be an array of rows like {example}, not {described(value)}")
     if len(value) == 0:
         raise refusal(f"must not be empty: it holds rows like {example}")
     if not isinstance(value, np.ndarray):
-        _check_kinds(value, example)
+        _check_kinds(value, example, width)
     try:
         array = np.array(value, np.float64)
     except (OverflowError, ValueError):  # a whole number beyond float64
@@ -37,26 +40,26 @@ def _rows(value: Any, low: float, high: float, example: str) -> np.ndarray:
     return array
 
 
-def _check_kinds(rows: Any, example: str) -> None:
+def _check_kinds(rows: Any, example: str, width: int) -> None:
     # Sets of types: one pass in C each, and a fault is searched for only where there is one.
     good = (
         set(map(type, rows)) <= {list, tuple}
-        and set(map(len, rows)) == {3}
+        and set(map(len, rows)) == {width}
         and set(map(type, chain.from_iterable(rows))) <= {int, float}
     )
     if not good:
-        i, row = next((i, row) for i, row in enumerate(rows) if not _is_row(row))
-        raise refusal(f"must be three numbers like {example}, not {_row_described(row)}", at=f"/{i}")
+        i, row = next((i, row) for i, row in enumerate(rows) if not _is_row(row, width))
+        raise refusal(f"must be {WORDS[width]} numbers like {example}, not {_row_described(row, width)}", at=f"/{i}")
 
 
-def _is_row(row: object) -> bool:
-    return isinstance(row, list | tuple) and len(row) == 3 and all(map(is_number, row))
+def _is_row(row: object, width: int) -> bool:
+    return isinstance(row, list | tuple) and len(row) == width and all(map(is_number, row))
 
 
-def _row_described(row: object) -> str:
+def _row_described(row: object, width: int) -> str:
     if not isinstance(row, list | tuple):
         return described(row)
-    if len(row) != 3:
+    if len(row) != width:
         return str(len(row))
     return f"with {described(next(x for x in row if not is_number(x)))}"
 
@@ -71,6 +74,16 @@ def _directions(value: Any) -> np.ndarray:
     if not lengths.all():
         raise refusal("must not be zero: a direction has a length", at=f"/{int(np.argmin(lengths))}")
     return array
+
+
+def _coordinates(value: Any) -> np.ndarray:
+    return _rows(value, -LARGEST, LARGEST, "[0.5, 1]", 2)
+
+
+def _colors(value: Any) -> np.ndarray:
+    rows = isinstance(value, list | tuple) and len(value) > 0
+    opaque = not rows or not isinstance(value[0], list | tuple) or len(value[0]) != 4
+    return _rows(value, 0, 1, "[0.5, 0.25, 1]" if opaque else "[0.5, 0.25, 1, 1]", 3 if opaque else 4)
 
 
 def _indices(value: Any) -> np.ndarray:
@@ -98,7 +111,16 @@ def _type(validate: Callable[[Any], np.ndarray], row: dict[str, Any]) -> Any:
 
 
 _INDEX_ROW = {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 3, "maxItems": 3}
+_UV_ROW = {
+    "type": "array",
+    "items": {"type": "number", "minimum": -LARGEST, "maximum": LARGEST},
+    "minItems": 2,
+    "maxItems": 2,
+}
+_COLOR_ROW = {"type": "array", "items": {"type": "number", "minimum": 0, "maximum": 1}, "minItems": 3, "maxItems": 4}
 
 Points = _type(_points, vector_schema())
 Directions = _type(_directions, vector_schema())
 Triangles = _type(_indices, _INDEX_ROW)
+Coordinates = _type(_coordinates, _UV_ROW)
+Colors = _type(_colors, _COLOR_ROW)

@@ -6,11 +6,12 @@ from typing import Any
 
 from pydantic import BaseModel
 from pydantic.json_schema import GenerateJsonSchema
-from pydantic_core.core_schema import ModelSchema, WithDefaultSchema
+from pydantic_core.core_schema import ModelSchema, TaggedUnionSchema, WithDefaultSchema
 
 from service.scene.base import field_names
 from service.scene.document import Scene
 from service.scene.settings import Settings
+from service.scene.texture import REFERENCE_TAG, VALUE_TAG
 
 
 class _Schema(GenerateJsonSchema):
@@ -18,6 +19,14 @@ class _Schema(GenerateJsonSchema):
         described = super().model_schema(schema)
         described["properties"] = {name: described["properties"][name] for name in field_names(schema["cls"])}
         return described
+
+    def tagged_union_schema(self, schema: TaggedUnionSchema) -> dict[str, Any]:
+        """A value or a reference to a texture as one flat list of forms."""
+        described = super().tagged_union_schema(schema)
+        if set(schema["choices"]) != {VALUE_TAG, REFERENCE_TAG}:
+            return described
+        forms = [form for choice in described["oneOf"] for form in choice.get("anyOf", [choice])]
+        return {"anyOf": forms}
 
     def default_schema(self, schema: WithDefaultSchema) -> dict[str, Any]:
         """Without `default: null`: that field may be left out, but null is no value for it."""

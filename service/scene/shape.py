@@ -10,7 +10,7 @@ from pydantic import ConfigDict, Field, model_validator
 
 from service.scene.base import OMITTABLE, Model, hint, refusal
 from service.scene.numbers import Point, PositiveLength
-from service.scene.rows import Directions, Points, Triangles, first_beyond
+from service.scene.rows import Colors, Coordinates, Directions, Points, Triangles, first_beyond
 from service.scene.transform import AnyTransform
 
 # The sine between a quad's edges below which its float32 normal is noise: the spacing of float32 near 1.
@@ -101,13 +101,28 @@ class MeshShape(_Placed):
     normals: Annotated[
         Directions | None, OMITTABLE, hint("Normals", "One row per vertex.", unit="", widget="number")
     ] = None
+    uvs: Annotated[
+        Coordinates | None,
+        OMITTABLE,
+        hint("Texture coordinates", "One row of u and v per vertex; v points up.", unit="", widget="number"),
+    ] = None
+    colors: Annotated[
+        Colors | None,
+        OMITTABLE,
+        hint(
+            "Vertex colours",
+            "One row per vertex, linear, perhaps with alpha; they multiply the material's.",
+            unit="",
+            widget="number",
+        ),
+    ] = None
     smooth: Annotated[bool, hint("Smooth", "Interpolates vertex normals; off shows the facets.")] = True
     double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")] = True
 
     @model_validator(mode="after")
     def _is_whole(self) -> Self:
         if self.asset is not None:
-            for name in ("vertices", "faces", "normals"):
+            for name in ("vertices", "faces", "normals", "uvs", "colors"):
                 if getattr(self, name) is not None:
                     raise refusal(f"a mesh has an asset or {name}, not both", at=f"/{name}")
             return self
@@ -116,7 +131,11 @@ class MeshShape(_Placed):
         if self.vertices is None or self.faces is None:
             missing = "vertices" if self.vertices is None else "faces"
             raise refusal("is required: a mesh without asset has vertices and faces", at=f"/{missing}")
-        _check_numbers(self.vertices, self.faces, self.normals)
+        _check_numbers(self.vertices, self.faces)
+        for name in ("normals", "uvs", "colors"):
+            rows, count = getattr(self, name), len(self.vertices)
+            if rows is not None and len(rows) != count:
+                raise refusal(f"has {len(rows)} rows for {count} vertices: must be one per vertex", at=f"/{name}")
         return self
 
     def __eq__(self, other: Any) -> bool:
@@ -126,14 +145,11 @@ class MeshShape(_Placed):
         return all(_equal(getattr(self, name), getattr(other, name)) for name in MeshShape.model_fields)
 
 
-def _check_numbers(vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None) -> None:
-    count = len(vertices)
-    beyond = first_beyond(faces, count)
+def _check_numbers(vertices: np.ndarray, faces: np.ndarray) -> None:
+    beyond = first_beyond(faces, len(vertices))
     if beyond is not None:
-        row = faces[beyond].tolist()
-        raise refusal(f"{row} names a vertex that is not there: the last is {count - 1}", at=f"/faces/{beyond}")
-    if normals is not None and len(normals) != count:
-        raise refusal(f"has {len(normals)} rows for {count} vertices: must be one per vertex", at="/normals")
+        row, last = faces[beyond].tolist(), len(vertices) - 1
+        raise refusal(f"{row} names a vertex that is not there: the last is {last}", at=f"/faces/{beyond}")
 
 
 def _equal(a: Any, b: Any) -> bool:

@@ -1,0 +1,163 @@
+"""Pictures on surfaces: textures by name, and the references to them that materials hold."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema
+
+from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.color import Factors, Radiometric, Reflectance
+from service.scene.numbers import (
+    LARGEST,
+    Degrees,
+    Factor,
+    Fraction,
+    PositiveLength,
+    RefractiveIndex,
+    check_number,
+    described,
+)
+
+Vec2 = tuple[float, float]
+Channel = Literal["r", "g", "b", "a"]
+
+
+def _pair(value: Any) -> Vec2:
+    if not isinstance(value, list | tuple):
+        raise refusal(f"must be two numbers like [1, 1], not {described(value)}")
+    if len(value) != 2:
+        raise refusal(f"must be two numbers like [1, 1], not {len(value)}")
+    return check_number(value[0], -LARGEST, LARGEST, "u"), check_number(value[1], -LARGEST, LARGEST, "v")
+
+
+_PAIR = {
+    "type": "array",
+    "items": {"type": "number", "minimum": -LARGEST, "maximum": LARGEST},
+    "minItems": 2,
+    "maxItems": 2,
+}
+Pair = Annotated[Vec2, PlainValidator(_pair), WithJsonSchema(_PAIR)]
+
+
+class ImageTexture(Model):
+    """An image file; row 0 is v = 1, texel centres lie at (i + .5) / n."""
+
+    asset: Annotated[str, Field(min_length=1), hint("Image", "PNG, JPEG, WebP, EXR or Radiance HDR.")]
+    color_space: Annotated[
+        Literal["srgb", "linear"] | None,
+        OMITTABLE,
+        hint("Colour space", "Without it 8-bit images in colours are sRGB, all others linear; alpha always is."),
+    ] = None
+    wrap: Annotated[
+        Literal["repeat", "clamp", "mirror"], hint("Wrap", "What lies outside of the image, in both directions.")
+    ] = "repeat"
+    scale: Annotated[
+        Pair, hint("Scale", "Factors on u and v, applied first: 2 shows the image twice.", unit="", widget="number")
+    ] = (1.0, 1.0)
+    rotation: Annotated[
+        Degrees,
+        hint("Rotation", "Turns u and v counter-clockwise about their origin, after the scale.",
+             unit="degrees", widget="angle", soft=(-180, 180)),
+    ] = 0.0
+    offset: Annotated[Pair, hint("Offset", "Added to u and v last.", unit="", widget="number")] = (0.0, 0.0)
+    uv: Annotated[
+        int, Field(ge=0, le=1), hint("uv set", "Of a mesh's two sets of coordinates.", unit="", widget="number")
+    ] = 0
+
+
+class CheckerTexture(Model):
+    """Two colours by turns: the first where floor(u scale_u) + floor(v scale_v) is even."""
+
+    type: Literal["checker"]
+    a: Annotated[Radiometric, hint("First", "Of the square at u = v = 0.", unit="", widget="color", soft=1)]
+    b: Annotated[Radiometric, hint("Second", "Of its neighbours.", unit="", widget="color", soft=1)]
+    scale: Annotated[
+        Pair, hint("Scale", "How many squares along u and v.", unit="", widget="number")
+    ] = (8.0, 8.0)
+
+
+def _kind(value: Any) -> str:
+    has_type = "type" in value if isinstance(value, dict) else isinstance(value, CheckerTexture)
+    return CHECKER_TAG if has_type else IMAGE_TAG
+
+
+IMAGE_TAG, CHECKER_TAG = "<image>", "<checker>"
+
+Texture = Annotated[
+    Annotated[ImageTexture, Tag(IMAGE_TAG)] | Annotated[CheckerTexture, Tag(CHECKER_TAG)], Discriminator(_kind)
+]
+
+
+class _Reference(Model):
+    texture: Annotated[str, hint("Texture", "The name of one of the scene's textures.")]
+
+
+class ScalarTexture(_Reference):
+    """One channel of a texture in place of a number."""
+
+    channel: Annotated[Channel, hint("Channel", "Which of the texture's channels is read.")] = "r"
+    factor: Annotated[
+        Factor, hint("Factor", "Multiplies the texture; the product keeps to the parameter's range.",
+                     unit="", widget="slider", soft=1)
+    ] = 1.0  # fmt: skip
+
+
+class ColorTexture(_Reference):
+    """A texture in place of a colour."""
+
+    channel: Annotated[
+        Channel | None, OMITTABLE, hint("Channel", "Read as a grey; without it, the colour.")
+    ] = None
+    factor: Annotated[
+        Factors, hint("Factor", "Multiplies the decoded texture; the product keeps to the parameter's range.",
+                      unit="", widget="color", soft=1)
+    ] = (1.0, 1.0, 1.0)  # fmt: skip
+
+
+class NormalTexture(_Reference):
+    """A normal map: red along growing u, green along growing v, blue outwards."""
+
+    scale: Annotated[
+        Factor, hint("Strength", "Multiplies red and green: 0 is flat, 1 as the map has it.",
+                     unit="", widget="slider", soft=2)
+    ] = 1.0  # fmt: skip
+
+
+VALUE_TAG, REFERENCE_TAG = "<value>", "<reference>"
+
+
+def _form(value: Any) -> str:
+    return REFERENCE_TAG if isinstance(value, dict | _Reference) else VALUE_TAG
+
+
+AnyFraction = Annotated[
+    Annotated[Fraction, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+AnyFactor = Annotated[
+    Annotated[Factor, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+AnyDegrees = Annotated[
+    Annotated[Degrees, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+AnyLength = Annotated[
+    Annotated[PositiveLength, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+AnyIndex = Annotated[
+    Annotated[RefractiveIndex, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+AnyReflectance = Annotated[
+    Annotated[Reflectance, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+AnyRadiometric = Annotated[
+    Annotated[Radiometric, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+]
+
+Reference = ScalarTexture | ColorTexture | NormalTexture
+
+
+def references(material: Model) -> dict[str, Reference]:
+    """A material's references to textures, by the name of the field."""
+    found = ((name, getattr(material, name)) for name in type(material).model_fields)
+    return {name: value for name, value in found if isinstance(value, _Reference)}  # type: ignore[misc]
+
