@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import secrets
+import time
 from typing import Any, Literal
 
 import numpy as np
@@ -37,11 +38,23 @@ PICTURE_BYTES = 112  # the renderer's accumulators, a pixel: three vec4, two mor
 class Job:
     """Runs on the event loop. Finished, it holds its picture in the renderer until `release`."""
 
-    def __init__(self, engine: Engine, packed: Packed, settings: ResolvedSettings, setup_s: float) -> None:
+    def __init__(
+        self,
+        engine: Engine,
+        packed: Packed,
+        settings: ResolvedSettings,
+        setup_s: float,
+        owner: str = "",
+        document: bytes = b"",
+    ) -> None:
+        """`owner` may ask for it, others may not; `document` is the scene as `reading.folded` gave it."""
         self.id = secrets.token_urlsafe(ID_BYTES)
+        self.owner = owner
+        self.document = document
+        self.ended_at = 0.0  # by the monotonic clock, once it is finished
         self.state: State = "queued"
         self.finished = asyncio.Event()
-        self.bytes = settings.render_width * settings.render_height * PICTURE_BYTES + weight(packed)
+        self.bytes = settings.render_width * settings.render_height * PICTURE_BYTES + weight(packed) + len(document)
         self._engine = engine
         self._packed: Packed | None = packed
         self._settings = settings
@@ -68,6 +81,7 @@ class Job:
         except ServiceError as error:
             self._fail(error)
         await self.finished.wait()
+        self.ended_at = time.monotonic()
 
     def cancel(self) -> None:
         """Stops at once; the image so far stays."""
@@ -83,6 +97,10 @@ class Job:
         if self._task is not None:
             self._engine.drop(self._task)
             self._task = None
+
+    @property
+    def settings(self) -> ResolvedSettings:
+        return self._settings
 
     def status(self) -> dict[str, Any]:
         progress = self._progress

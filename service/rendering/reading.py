@@ -2,8 +2,11 @@
 
 from __future__ import annotations
 
+import json
+import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
+from dataclasses import dataclass
 from typing import Any
 
 from pydantic import Field, TypeAdapter
@@ -27,6 +30,15 @@ class _Request(Model):
 _REQUEST = TypeAdapter(_Request)
 
 
+@dataclass(frozen=True)
+class Order:
+    """A whole request, understood; `document` is its scene as it was written, folded."""
+
+    settings: ResolvedSettings
+    packed: Packed
+    document: bytes
+
+
 class Reader:
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
@@ -34,11 +46,11 @@ class Reader:
         self._config = config
         self._assets = assets
 
-    def request(self, body: bytes) -> tuple[ResolvedSettings, Packed]:
+    def request(self, body: bytes) -> Order:
         """A whole `{scene, settings}`."""
         request = validated(_REQUEST, load_json(body), "")
         scene, settings = self.both(request.scene, request.settings)
-        return settings, self.pack(scene)
+        return Order(settings, self.pack(scene), folded(request.scene))
 
     def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
         """Both documents, or the mistakes of both."""
@@ -66,6 +78,15 @@ class Reader:
 
 def stop_rule(settings: ResolvedSettings) -> StopRule:
     return StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
+
+
+def folded(document: Any) -> bytes:
+    """JSON in few bytes, for what is seldom looked at and may hold a mesh."""
+    return zlib.compress(json.dumps(document, separators=(",", ":")).encode(), 1)
+
+
+def unfolded(data: bytes) -> Any:
+    return json.loads(zlib.decompress(data))
 
 
 def weight(packed: Packed) -> int:

@@ -1,40 +1,70 @@
-"""All renders asked for over REST: some run, some wait, the newest finished ones are kept."""
+"""All renders asked for over REST: some run, some wait, finished ones are kept for a while. Each has its owner."""
 
 from __future__ import annotations
 
 import asyncio
-from collections import OrderedDict
+import time
+from collections import Counter, OrderedDict
+from dataclasses import dataclass
 
-from service.problems import Gone, NotFound
+from service.problems import Gone, NotFound, TooManyRequests, Unavailable
 from service.rendering.job import Job
 
-RUNNING = 8  # at once; the others wait in line, for each holds its scene and its picture on the GPU
-KEPT = 64  # finished ones ...
-KEPT_BYTES = 1 << 30  # ... and what their pictures and scenes may hold
 REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
+RETRY_S = 5  # when to ask again where there is no room
+
+
+@dataclass(frozen=True)
+class Bounds:
+    """How many render at once, and what is kept of those that have ended."""
+
+    running: int = 8  # the others wait in line, for each holds its scene and its picture on the GPU
+    waiting: int = 256
+    each: int = 64  # running and waiting, of one owner
+    kept: int = 64  # ended, of one owner ...
+    kept_bytes: int = 1 << 30  # ... what the pictures and scenes of all of them may hold ...
+    kept_s: float = 3600.0  # ... and for how long
 
 
 class Renders:
-    def __init__(self) -> None:
+    """An owner is a text that the caller chooses; who is not the owner of a render does not hear that it exists."""
+
+    def __init__(self, bounds: Bounds | None = None) -> None:
+        self._bounds = bounds or Bounds()
         self._jobs: dict[str, Job] = {}
-        self._gone: OrderedDict[str, None] = OrderedDict()
-        self._room = asyncio.Semaphore(RUNNING)
+        self._gone: OrderedDict[str, str] = OrderedDict()  # the owners of forgotten ones
+        self._room = asyncio.Semaphore(self._bounds.running)
         self._running: dict[asyncio.Task[None], Job] = {}
 
     def submit(self, job: Job, listed: bool = True) -> None:
-        """Has it run when its turn comes; a job that is not `listed` is its owner's to release."""
+        """Has it run when its turn comes; a job that is not `listed` is its owner's to release.
+
+        Raises TooManyRequests where its owner has as many under way as one may have, Unavailable where the queue is
+        full.
+        """
+        self.admit(job.owner)
         if listed:
             self._jobs[job.id] = job
         task = asyncio.get_running_loop().create_task(self._run(job))
         self._running[task] = job
         task.add_done_callback(self._running.pop)
 
-    def get(self, id: str) -> Job:
-        if id in self._gone:
-            raise Gone("This render was finished long ago; its image made room for newer ones.")
-        if id not in self._jobs:
+    def admit(self, owner: str) -> None:
+        """Raises what `submit` would raise, before the work of reading a scene is done."""
+        own = sum(job.owner == owner for job in self._running.values())
+        if own >= self._bounds.each:
+            detail = f"{own} renders of yours are under way: no more than {self._bounds.each} (SUNBOX_MAX_JOBS)"
+            raise TooManyRequests(detail, RETRY_S)
+        if self.queued >= self._bounds.waiting:
+            raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
+
+    def get(self, id: str, owner: str = "") -> Job:
+        if self._gone.get(id) == owner:
+            raise Gone("This render ended long ago, and made room for newer ones.")
+        job = self._jobs.get(id)
+        if job is None or job.owner != owner:
             raise NotFound("There is no render of this id.")
-        return self._jobs[id]
+        return job
 
     @property
     def queued(self) -> int:
@@ -42,10 +72,14 @@ class Renders:
 
     @property
     def running(self) -> int:
-        return min(len(self._running), RUNNING)
+        return min(len(self._running), self._bounds.running)
 
-    def all(self) -> list[Job]:
-        return list(self._jobs.values())
+    @property
+    def kept(self) -> int:
+        return sum(job.finished.is_set() for job in self._jobs.values())
+
+    def all(self, owner: str = "") -> list[Job]:
+        return [job for job in self._jobs.values() if job.owner == owner]
 
     def close(self) -> None:
         for job in self._running.values():
@@ -55,15 +89,29 @@ class Renders:
         async with self._room:
             await job.run()
         self._evict()
+        # Only so that memory is given back when nobody comes any more.
+        asyncio.get_running_loop().call_later(self._bounds.kept_s + 1, self._evict)
 
     def _evict(self) -> None:
-        finished = [job for job in self._jobs.values() if job.finished.is_set()]
-        held = sum(job.bytes for job in finished)
-        while finished[1:] and (len(finished) > KEPT or held > KEPT_BYTES):
-            job = finished.pop(0)
-            held -= job.bytes
-            job.release()
-            del self._jobs[job.id]
-            self._gone[job.id] = None
+        ended = [job for job in self._jobs.values() if job.finished.is_set()]
+        now = time.monotonic()
+        for job in [job for job in ended if now - job.ended_at >= self._bounds.kept_s]:
+            self._forget(job, ended)
+        counts = Counter(job.owner for job in ended)
+        for owner, count in counts.items():
+            for job in [job for job in ended if job.owner == owner][: max(0, count - self._bounds.kept)]:
+                self._forget(job, ended)
+        while ended[1:] and sum(job.bytes for job in ended) > self._bounds.kept_bytes:
+            held: Counter[str] = Counter()
+            for job in ended:
+                held[job.owner] += job.bytes
+            most = held.most_common(1)[0][0]  # one owner's pictures do not push out another's few
+            self._forget(next(job for job in ended if job.owner == most), ended)
+
+    def _forget(self, job: Job, ended: list[Job]) -> None:
+        ended.remove(job)
+        job.release()
+        del self._jobs[job.id]
+        self._gone[job.id] = job.owner
         while len(self._gone) > REMEMBERED:
             self._gone.popitem(last=False)

@@ -109,8 +109,9 @@ async def _job(request: Request) -> Job:
     own: House = house(request)
     body = await request.body()
     await own.engine.ready(STARTING_S)
-    settings, packed = await packing(partial(own.reader.request, body))
-    return Job(own.engine, packed, settings, time.monotonic() - began)
+    order = await packing(partial(own.reader.request, body))
+    setup_s = time.monotonic() - began
+    return Job(own.engine, order.packed, order.settings, setup_s, document=order.document)
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:
