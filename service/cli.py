@@ -55,17 +55,17 @@ def _serve(command: argparse.ArgumentParser) -> None:
 
 def _render(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
-    add("input", metavar="INPUT", help="a scene's JSON document")
+    add("input", metavar="INPUT", help="a scene's JSON document, or a PNG or EXR that Sunbox made of one")
     add("-o", "--output", required=True, metavar="OUT", help="the picture: .png, .exr, .hdr or .npy")
     spp = "samples per pixel: the setting max_samples"
     add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
     add("--seed", dest="set", action="append", type=_setting("seed"), metavar="N", help="the setting seed")
     add("--set", action="append", metavar="KEY=VALUE", help="any setting; its value in JSON or a bare word")
     aovs = "albedo, normal, depth, variance, shape_id or material_id instead of color; all: each a layer of an .exr"
-    add("--aov", metavar="NAME", default="color", help=aovs)
-    add("--exposure", metavar="STOPS", default="0", help="for .png (default: 0)")
+    add("--aov", metavar="NAME", help=aovs)
+    add("--exposure", metavar="STOPS", help="for .png (default: 0)")
     curves = "for .png: linear, exponential, reinhard, aces, agx or pbr_neutral (default)"
-    add("--tone-map", metavar="NAME", default="pbr_neutral", help=curves)
+    add("--tone-map", metavar="NAME", help=curves)
     add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
     _asset_root(command)
 

@@ -58,6 +58,12 @@ class ResolvedSettings:
         """What each knob became, as JSON; null is "no such limit"."""
         return asdict(self)
 
+    def again(self, samples: int) -> dict[str, Any]:
+        """Settings, as JSON, with which a picture that has `samples` samples comes out the same another time."""
+        most = self.max_samples if self.adaptive else samples
+        stop = {"max_samples": most, "time_limit": None, "target_noise": None}
+        return {name: value for name, value in (self.document() | stop).items() if value is not None}
+
 
 def resolve(settings: Settings) -> ResolvedSettings:
     knobs = dict(PRESETS[settings.quality])

@@ -19,6 +19,7 @@ LAYERS = [
     {"service.config"},
     {"service.scene", "service.images"},
     {"service.quality", "service.presets", "service.assets"},
+    {"service.recipe"},
     {"service.pack"},
     {"service.rendering"},
     {"service.guard", "service.routes"},

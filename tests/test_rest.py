@@ -236,7 +236,7 @@ def test_bad_bodies(http: httpx.Client, address: str, body: bytes, status: int, 
             "/scene/materials/ball/albedo",
         ),
         ({"environment": {"type": "image", "asset": "sha256:" + "0" * 64}}, "/scene/environment/asset"),
-        ({"textures": {}}, "/scene/textures"),
+        ({"fog": {}}, "/scene/fog"),
     ],
 )
 def test_bad_scenes(http: httpx.Client, change: dict[str, Any], pointer: str) -> None:

@@ -1,6 +1,7 @@
 """Assets of a scene on disk: paths relative to its file, for the command line only."""
 
 import errno
+import hashlib
 import os
 import stat
 from pathlib import Path
@@ -36,6 +37,19 @@ class FileAssets:
         if ref.startswith("sha256:"):
             return self._store(ref).image(ref)
         return as_image(self._load(ref), repr(ref))
+
+    def read(self, ref: str) -> bytes:
+        """The bytes of a file. Raises AssetError."""
+        fd = _open(self._find(ref), ref)
+        with open(fd, "rb") as file:
+            return file.read()
+
+    def keep(self, ref: str) -> None:
+        """Copies a file into the store. Raises AssetError, Unavailable."""
+        data, parsed = self.read(ref), self._load(ref)
+        # Under the id that the store will ask for: a file is parsed once.
+        self._loader.load("sha256:" + hashlib.sha256(data).hexdigest(), lambda: parsed)
+        self._store(ref).add(data, filename=ref)
 
     def close(self) -> None:
         """Ends the parser, unless it is the fallback's."""

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -11,8 +12,10 @@ from service.commands import BadInput, files
 from service.problems import InvalidDocument, MalformedJson, ServiceError
 
 if TYPE_CHECKING:
+    from service.commands.assets import SourceAssets
     from service.config import Config
     from service.pack import Packed
+    from service.recipe import PictureView
     from service.scene import Scene, Settings
 
 SHOWN_ERRORS = 8  # a mesh of NaN has a mistake in every line
@@ -31,42 +34,82 @@ def refusals(place: str = "") -> Iterator[None]:
         raise BadInput(f"{place}{error}") from None
 
 
-def read_scene(path: Path) -> Scene:
+@dataclass(frozen=True)
+class Source:
+    """A scene from a file. Of a picture that Sunbox made also the settings and the view that it was made with."""
+
+    path: Path
+    document: Any
+    scene: Scene
+    settings: dict[str, Any] = field(default_factory=dict)
+    view: PictureView | None = None
+    assets: dict[str, str] = field(default_factory=dict)  # names of files by the id that the document uses
+    pointer: str = ""  # to the scene, from the root of what was read
+
+
+def read_source(path: Path) -> Source:
+    """The scene that a document, or the metadata of a PNG or EXR, describes."""
     data = files.read(path)
+    from service.images.metadata import EXR_MAGIC, PNG_MAGIC, read_metadata
     from service.scene import load_json, parse_scene
 
+    if data.startswith((PNG_MAGIC, EXR_MAGIC)):
+        from service import recipe
+
+        metadata = read_metadata(data)
+        if metadata is None:
+            raise BadInput(f"{path}: is a picture without a scene in its metadata: Sunbox did not make it")
+        with refusals():
+            made = recipe.read(metadata)
+            scene = parse_scene(made.scene, "/scene")
+        return Source(path, made.scene, scene, made.settings, made.view, made.assets, "/scene")
     with refusals(f"{path}: "):
         document = load_json(data)
     with refusals():
-        return parse_scene(document)
+        return Source(path, document, parse_scene(document))
 
 
-def read_settings(assignments: Sequence[str], config: Config) -> Settings:
-    """Settings from `key=value` texts, the last of a key counting; a value is JSON or else a bare word."""
+def read_settings(assignments: Sequence[str], config: Config, base: dict[str, Any] | None = None) -> Settings:
+    """Settings from `key=value` texts, the last of a key counting; a value is JSON or else a bare word.
+
+    `base` says what is not given; another quality's knobs are not among that.
+    """
+    from service.quality import PRESETS
     from service.scene import parse_settings
 
-    document = {}
+    document: dict[str, Any] = {}
     for text in assignments:
         key, equals, value = text.partition("=")
         if not equals or not key:
             raise BadInput(f"--set {text!r}: write it as key=value")
         document[key] = _value(value)
+    knobs = PRESETS["balanced"] if "quality" in document else {}
+    document = {key: value for key, value in (base or {}).items() if key not in knobs} | document
     with refusals("setting "):
         return parse_settings(document, limits=config)
 
 
-def pack_scene(path: Path, scene: Scene, roots: Sequence[str], config: Config) -> Packed:
-    """The scene as arrays, its assets looked up beside the file, in `roots`, and by sha256 in the data folder."""
+@contextmanager
+def source_assets(source: Source, roots: Sequence[str], config: Config) -> Iterator[SourceAssets]:
+    """Where the scene's assets are: beside its file, in `roots`, and by sha256 in the data folder."""
     from service.assets import AssetStore, FileAssets
-    from service.pack import pack
+    from service.commands.assets import SourceAssets
 
     folders = [Path(root) for root in roots]
     for folder in folders:
         if not folder.is_dir():
             raise BadInput(f"--asset-root {str(folder)!r}: is not a folder")
     uploaded = AssetStore(config.data_dir, config, _builtin_assets)
-    with refusals(), closing(uploaded), FileAssets(path.parent, folders, uploaded) as assets:
-        return pack(scene, assets, limits=config)
+    with closing(uploaded), FileAssets(source.path.parent, folders, uploaded) as assets:
+        yield SourceAssets(assets, uploaded, source.assets)
+
+
+def pack_scene(source: Source, assets: SourceAssets, config: Config) -> Packed:
+    """The scene as arrays."""
+    from service.pack import pack
+
+    with refusals(source.pointer):
+        return pack(source.scene, assets, limits=config)
 
 
 def _builtin_assets() -> dict[str, bytes]:

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.commands import Failed
 from service.commands.configuration import configuration
-from service.commands.documents import pack_scene, read_scene
+from service.commands.documents import pack_scene, read_source, source_assets
 
 if TYPE_CHECKING:
     from service.pack import Packed
@@ -22,10 +22,10 @@ def run(arguments: argparse.Namespace) -> int:
     rows = [("sunbox", metadata.version("sunbox"))]
     config = configuration()
     if arguments.scene:
-        source = Path(arguments.scene)
-        scene = read_scene(source)
-        packed = pack_scene(source, scene, arguments.asset_root, config)
-        rows += [("scene", str(source)), *contents(scene, packed)]
+        source = read_source(Path(arguments.scene))
+        with source_assets(source, arguments.asset_root, config) as assets:
+            packed = pack_scene(source, assets, config)
+        rows += [("scene", str(source.path)), *contents(source.scene, packed)]
     from gpu import GpuError, Renderer
 
     try:

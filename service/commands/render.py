@@ -12,70 +12,100 @@ import sys
 import time
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from service.commands import BadInput, Failed, files
 from service.commands.configuration import configuration
-from service.commands.documents import pack_scene, read_scene, read_settings
+from service.commands.documents import pack_scene, read_settings, read_source, refusals, source_assets
 
 if TYPE_CHECKING:
-    from service.commands.tracing import Interrupt, Tracing
+    from service.commands.tracing import Tracing
+    from service.recipe import PictureView
     from service.rendering.messages import Encoding
 
 FORMATS = ("png", "exr", "hdr", "npy")
+REPEATABLE = ("png", "exr")  # carry in their metadata what they were made from
 AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_id")
 TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
 
 
 @dataclass(frozen=True)
 class Output:
-    """What to write where; `aov` may be "all"."""
+    """What to write where."""
 
     path: Path
     format: str
-    aov: str
-    exposure: float
-    tone_map: str
+    view: PictureView
 
 
 def run(arguments: argparse.Namespace) -> int:
     began = time.perf_counter()
-    output = _output(arguments)
+    path, format, exposure = _arguments(arguments)
     stats = files.writable(Path(arguments.stats)) if arguments.stats else None
     config = configuration()
-    source = Path(arguments.input)
-    chosen = read_settings(arguments.set or [], config)
-    scene = read_scene(source)
-    packed = pack_scene(source, scene, arguments.asset_root, config)
-    from gpu import GpuError, Renderer
-    from service.commands.tracing import Interrupt, Tracing
-    from service.quality import resolve
+    given = read_settings(arguments.set or [], config)
+    source = read_source(Path(arguments.input))
+    output = Output(path, format, _view(arguments, format, exposure, source.view))
+    chosen = read_settings(arguments.set or [], config, source.settings) if source.settings else given
+    with source_assets(source, arguments.asset_root, config) as assets:
+        packed = pack_scene(source, assets, config)
+        with refusals():
+            document, names = assets.by_id(source.document) if format in REPEATABLE else (None, {})
+        from gpu import GpuError, Renderer
+        from service.commands.tracing import Interrupt, Tracing
+        from service.quality import resolve
 
-    interrupt = Interrupt()
-    try:
-        with interrupt.watch(), Renderer(config.device) as renderer:
-            _render(Tracing(renderer, packed, resolve(chosen)), output, stats, began, interrupt)
-    except GpuError as error:
-        raise Failed(str(error)) from None
+        interrupt = Interrupt()
+        try:
+            with interrupt.watch(), Renderer(config.device) as renderer:
+                tracing = Tracing(renderer, packed, resolve(chosen))
+                setup_s = time.perf_counter() - began
+                tracing.run(interrupt)
+                files.write(output.path, _encode(tracing, output, document, names))
+        except GpuError as error:
+            raise Failed(str(error)) from None
+        if stats:
+            files.write(stats, (json.dumps(tracing.status(setup_s), indent=1) + "\n").encode())
+        for warning in tracing.warnings:
+            print(f"warning: {warning}", file=sys.stderr)
+        if format in REPEATABLE:
+            assets.keep(source.document)
     return 128 + interrupt.signal if interrupt.signal is not None else 0
 
 
-def _output(arguments: argparse.Namespace) -> Output:
+def _arguments(arguments: argparse.Namespace) -> tuple[Path, str, float | None]:
+    """Where to write, in which format, and the exposure where one is given."""
     path = Path(arguments.output)
     format = path.suffix.lower().removeprefix(".")
     if format not in FORMATS:
         raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join('.' + f for f in FORMATS)}")
-    _choose("--aov", arguments.aov, (*AOVS, "all"))
+    if arguments.aov is not None:
+        _choose("--aov", arguments.aov, (*AOVS, "all"))
     if arguments.aov == "all" and format != "exr":
         raise BadInput("--aov all: only an .exr file holds more than one; name one of " + ", ".join(AOVS))
-    _choose("--tone-map", arguments.tone_map, TONE_MAPS)
-    try:
-        exposure = float(arguments.exposure)
-    except ValueError:
-        exposure = math.nan
-    if not -60 <= exposure <= 60:
-        raise BadInput(f"--exposure {arguments.exposure!r}: must be a number of stops from -60 to 60")
-    return Output(files.writable(path), format, arguments.aov, exposure, arguments.tone_map)
+    if arguments.tone_map is not None:
+        _choose("--tone-map", arguments.tone_map, TONE_MAPS)
+    exposure = None
+    if arguments.exposure is not None:
+        try:
+            exposure = float(arguments.exposure)
+        except ValueError:
+            exposure = math.nan
+        if not -60 <= exposure <= 60:
+            raise BadInput(f"--exposure {arguments.exposure!r}: must be a number of stops from -60 to 60")
+    return files.writable(path), format, exposure
+
+
+def _view(
+    arguments: argparse.Namespace, format: str, exposure: float | None, before: PictureView | None
+) -> PictureView:
+    """As given; what is not, as the picture had it that is made again."""
+    from service.recipe import PictureView
+
+    options = {"aov": arguments.aov, "exposure": exposure, "tone_map": arguments.tone_map}
+    given = {name: value for name, value in options.items() if value is not None}
+    view = (before or PictureView()).model_copy(update=given)
+    return view.model_copy(update={"aov": "color"}) if view.aov == "all" and format != "exr" else view
 
 
 def _choose(option: str, value: str, known: tuple[str, ...]) -> None:
@@ -83,23 +113,15 @@ def _choose(option: str, value: str, known: tuple[str, ...]) -> None:
         raise BadInput(f"{option} {value!r}: is not one of {', '.join(known)}")
 
 
-def _render(tracing: Tracing, output: Output, stats: Path | None, began: float, interrupt: Interrupt) -> None:
-    setup_s = time.perf_counter() - began
-    tracing.run(interrupt)
-    files.write(output.path, _encode(tracing, output))
-    if stats:
-        files.write(stats, (json.dumps(tracing.status(setup_s), indent=1) + "\n").encode())
-    for warning in tracing.warnings:
-        print(f"warning: {warning}", file=sys.stderr)
-
-
-def _encode(tracing: Tracing, output: Output) -> bytes:
-    from service import images
+def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, str]) -> bytes:
+    from service import images, recipe
     from service.rendering.messages import View
 
-    made_from = {"settings": tracing.settings.document(), "samples": tracing.progress.samples}
-    if output.aov == "all":
+    view, made_from = output.view, None
+    if output.format in REPEATABLE:
+        made_from = recipe.write(document, tracing.settings, tracing.progress.samples, view, names)
+    if view.aov == "all":
         return images.encode_layers({aov: tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}, made_from)
-    encoding: Encoding = "u1" if output.format == "png" else "linear"
-    pixels = tracing.pixels(View(output.aov, output.exposure, output.tone_map, encoding))
-    return images.encode(pixels, output.format, metadata=made_from)
+    encoding: Encoding = "linear" if output.format != "png" else "f4" if view.bits == 16 else "u1"
+    pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding))
+    return images.encode(pixels, output.format, bits=view.bits, metadata=made_from)

@@ -13,7 +13,7 @@ import numpy.typing as npt
 
 from service.images.metadata import KEY, png_with_text, read_metadata
 
-__all__ = ["MIME", "encode", "encode_layers", "read_metadata"]
+__all__ = ["LAYERS", "MIME", "encode", "encode_layers", "read_metadata"]
 
 MIME = {
     "png": "image/png",

@@ -9,7 +9,8 @@ from typing import Any
 KEY = "sunbox"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 EXR_MAGIC = b"\x76\x2f\x31\x01"
-TEXT_BYTES = 64 << 20  # of one inflated text chunk: a few kilobytes can claim gigabytes
+LONG_TEXT = 4096  # what image viewers still show whole
+TEXT_BYTES = 256 << 20  # of one inflated text chunk: a few kilobytes can claim gigabytes
 
 
 def read_metadata(data: bytes) -> dict[str, Any] | None:
@@ -44,8 +45,10 @@ def exr_attributes(data: bytes) -> dict[str, bytes]:
 
 
 def png_with_text(png: bytes, text: str) -> bytes:
-    """The PNG with a tEXt chunk after its header; the text must be ASCII."""
-    body = b"tEXt" + KEY.encode() + b"\0" + text.encode("ascii")
+    """The PNG with a text chunk after its header, deflated where it is long; the text must be ASCII."""
+    data = text.encode("ascii")
+    long = len(data) > LONG_TEXT
+    body = b"zTXt" + KEY.encode() + b"\0\0" + zlib.compress(data) if long else b"tEXt" + KEY.encode() + b"\0" + data
     chunk = struct.pack(">I", len(body) - 4) + body + struct.pack(">I", zlib.crc32(body))
     header = len(PNG_MAGIC) + 25  # IHDR is always 25 bytes long
     return png[:header] + chunk + png[header:]

@@ -5,17 +5,20 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import time
+from dataclasses import replace
 from enum import IntEnum
 from functools import partial
 from typing import Annotated, Any, Literal
 
+import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from service import images
+from service import images, recipe
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.rendering.job import Job
 from service.rendering.messages import Encoding, View
+from service.rendering.reading import unfolded
 from service.rendering.threads import encoding, packing
 from service.routes.house import STARTING_S, House, house
 
@@ -42,13 +45,15 @@ class ImageQuery(BaseModel):
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     format: Literal["png", "jpeg", "webp", "exr", "hdr", "npy"] = "png"
     bits: Bits = Bits.EIGHT
-    aov: Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id"] = "color"
+    aov: recipe.Aov = "color"
     exposure: Annotated[float, Field(ge=-60, le=60)] = 0.0
     tone_map: Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"] = "pbr_neutral"
 
     def view(self) -> View:
         if self.bits == Bits.SIXTEEN and self.format != "png":
             raise InvalidDocument([FieldError("/bits", f"16 is for png; a {self.format} file has its own")])
+        if self.aov == "all" and self.format != "exr":
+            raise InvalidDocument([FieldError("/aov", "all is for exr: no other format holds more than one")])
         encoding: Encoding = "linear" if self.format not in DISPLAYED else "f4" if self.bits == Bits.SIXTEEN else "u1"
         return View(self.aov, self.exposure, self.tone_map, encoding)
 
@@ -129,9 +134,24 @@ async def _disconnected(request: Request) -> None:
 
 
 async def _image(job: Job, query: ImageQuery, view: View) -> Response:
-    pixels, progress = await job.image(view)
-    if progress.samples == 0:
-        raise Conflict("There is no sample yet.")
-    metadata = {"settings": job.status()["settings"], "samples": progress.samples}
-    data = await encoding(partial(images.encode, pixels, query.format, bits=int(query.bits), metadata=metadata))
+    aovs = list(images.LAYERS) if query.aov == "all" else [query.aov]
+    layers: dict[str, np.ndarray] = {}
+    samples = 0
+    for aov in aovs:
+        layers[aov], progress = await job.image(replace(view, aov=aov))
+        samples = samples or progress.samples
+        if samples == 0:
+            raise Conflict("There is no sample yet.")
+    data = await encoding(partial(_encoded, layers, query, job, samples))
     return Response(data, media_type=images.MIME[query.format], headers={"cache-control": "no-store"})
+
+
+def _encoded(layers: dict[str, np.ndarray], query: ImageQuery, job: Job, samples: int) -> bytes:
+    bits: Literal[8, 16] = 16 if query.bits == Bits.SIXTEEN else 8
+    made_from = None
+    if query.format in ("png", "exr"):
+        view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
+        made_from = recipe.write(unfolded(job.document), job.settings, samples, view)
+    if query.aov == "all":
+        return images.encode_layers(layers, made_from)
+    return images.encode(layers[query.aov], query.format, bits=bits, metadata=made_from)

@@ -1,0 +1,76 @@
+"""The assets of a scene that the command line renders, and their ids: a picture names them by nothing else."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+from typing import Any
+
+from service import recipe
+from service.assets import AssetStore, FileAssets, ImageData, MeshData
+from service.problems import AssetError, NotFound, ServiceError
+
+log = logging.getLogger(__name__)
+
+
+class SourceAssets:
+    """Files by path and uploads by id. `names` leads from ids to files that may still lie where they lay."""
+
+    def __init__(self, found: FileAssets, store: AssetStore, names: dict[str, str]) -> None:
+        self._found = found
+        self._store = store
+        self._names = names
+
+    def mesh(self, ref: str) -> MeshData:
+        """Raises AssetError."""
+        return self._found.mesh(self._where(ref))
+
+    def image(self, ref: str) -> ImageData:
+        """Raises AssetError."""
+        return self._found.image(self._where(ref))
+
+    def keep(self, scene: Any) -> None:
+        """Copies the files that a document refers to into the data folder: a picture of it can be made again.
+
+        Without room there, only beside these files it can.
+        """
+        for ref in recipe.references(scene):
+            if not ref.startswith("sha256:"):
+                try:
+                    self._found.keep(ref)
+                except ServiceError as error:
+                    log.warning("asset not kept ref=%s error=%s", ref, error)
+
+    def by_id(self, scene: Any) -> tuple[Any, dict[str, str]]:
+        """The document with ids in the place of paths, and the paths by id."""
+        names = dict(self._names)
+
+        def identified(ref: str) -> str:
+            if ref.startswith("sha256:"):
+                return ref
+            id = _id(self._found.read(ref))
+            names[id] = ref
+            return id
+
+        return recipe.renamed(scene, identified), names
+
+    def _where(self, ref: str) -> str:
+        """The reference itself, or the path of the very file that it names where the data folder has it no more."""
+        if ref not in self._names:
+            return ref
+        try:
+            self._store.info(ref)
+            return ref
+        except (NotFound, AssetError):
+            pass
+        name = self._names[ref]
+        try:
+            if _id(self._found.read(name)) == ref:
+                return name
+        except AssetError:
+            pass
+        raise AssetError(f"{name!r} as it was then ({ref[:19]}...) is not here; --asset-root DIR says where to look")
+
+
+def _id(data: bytes) -> str:
+    return "sha256:" + hashlib.sha256(data).hexdigest()
