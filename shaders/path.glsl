@@ -44,6 +44,25 @@ vec3 path_disks(vec3 d, float pdf) {
 }
 #endif
 
+#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+// What arrives from infinity along d, weighed against finding it by direct sampling; `pdf` is the density of d. Disks
+// are not for the camera to see.
+vec3 path_outside(vec3 d, float pdf, bool scattered) {
+    vec3 arriving = vec3(0.0);
+#if HAS_ENVIRONMENT
+    vec4 l = environment_radiance(d);
+    arriving = l.rgb;
+#if ESTIMATOR == ESTIMATOR_MIS
+    arriving *= path_weight(pdf, l.a * frame.environment_probability);
+#endif
+#endif
+#if HAS_SUN_DISKS
+    if (scattered) arriving += path_disks(d, pdf);
+#endif
+    return arriving;
+}
+#endif
+
 // Emission towards the side the ray came from: the outward one, unless the material has both shine.
 vec3 path_emission(Point at, vec3 d) {
 #if HAS_EMISSION_BOTH
@@ -101,9 +120,15 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     if (alive) {
         result = Radiance(path_emission(at, d) + path_ambient(at), 1.0);
     }
+#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+    // A path leaves the scene once at most: what arrives from there is asked for once, when all its neighbours ended.
+    bool left = false;
+    float left_pdf = PATH_CERTAIN;
+#endif
 #if HAS_ENVIRONMENT
-    else if (frame.environment_background != 0u) {
-        result = Radiance(environment_radiance(d).rgb, 1.0);
+    if (!alive && frame.environment_background != 0u) {
+        result.alpha = 1.0;
+        left = true;
     }
 #endif
     alive = alive && frame.max_bounces > 0u;
@@ -231,41 +256,29 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             throughput *= exp(-fog * n.t);
 #endif
 #if ESTIMATOR != ESTIMATOR_LIGHT || HAS_PRINCIPLED
-            vec3 arriving = vec3(0.0);
-            float pdf_light = 0.0;
-#if HAS_EMISSION
-            if (met && at.light != NONE) {
-                arriving = path_emission(at, d);
-                pdf_light = lights_pdf(at.light, n, at, from, d);
-            }
+            float found_pdf = next.pdf;
+#if HAS_PRINCIPLED
+            if (picked.specular) found_pdf = PATH_CERTAIN;
 #endif
-#if HAS_ENVIRONMENT
-            if (!met) {
-                vec4 l = environment_radiance(d);
-                arriving = l.rgb;
-                pdf_light = l.a * frame.environment_probability;
-            }
-#endif
-#if HAS_PRINCIPLED && ESTIMATOR == ESTIMATOR_MIS
-            if (!picked.specular) arriving *= path_weight(next.pdf, pdf_light);
-#elif HAS_PRINCIPLED && ESTIMATOR == ESTIMATOR_LIGHT
-            if (!picked.specular) arriving = vec3(0.0);
-#elif ESTIMATOR == ESTIMATOR_MIS
-            arriving *= path_weight(next.pdf, pdf_light);
-#endif
-#if HAS_SUN_DISKS
-#if HAS_PRINCIPLED && ESTIMATOR == ESTIMATOR_LIGHT
-            if (!met && picked.specular) arriving += path_disks(d, PATH_CERTAIN);
-#elif HAS_PRINCIPLED
-            if (!met) arriving += path_disks(d, picked.specular ? PATH_CERTAIN : next.pdf);
+#if ESTIMATOR == ESTIMATOR_LIGHT
+            bool counts = picked.specular;
 #else
-            if (!met) arriving += path_disks(d, next.pdf);
+            bool counts = true;
 #endif
+#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+            left = alive && !met && counts;
+            left_pdf = found_pdf;
+#endif
+#if HAS_EMISSION
+            vec3 arriving = path_emission(at, d);
+#if ESTIMATOR == ESTIMATOR_MIS
+            if (at.light != NONE) arriving *= path_weight(found_pdf, lights_pdf(at.light, n, at, from, d));
 #endif
 #if HAS_TRANSMISSION
-            arriving *= met ? dense : max(dense, 1.0);
+            arriving *= dense;
 #endif
-            if (alive) result.color += path_clamp(throughput * arriving, bounce > 1u);
+            if (alive && met && counts) result.color += path_clamp(throughput * arriving, bounce > 1u);
+#endif
 #endif
 #if HAS_AMBIENT
             vec3 ambient = path_ambient(at);
@@ -277,5 +290,12 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             alive = alive && met;
         } while (alive && bounce < frame.max_bounces);
     }
+#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+    vec3 arriving = path_outside(d, left_pdf, bounce > 0u);
+#if HAS_TRANSMISSION
+    arriving *= max(dense, 1.0);
+#endif
+    if (left) result.color += path_clamp(throughput * arriving, bounce > 1u);
+#endif
     return result;
 }
