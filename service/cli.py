@@ -82,10 +82,17 @@ def _asset_root(command: argparse.ArgumentParser) -> None:
 
 def _bench(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
-    add("what", nargs="?", choices=["speed"], default="speed", help="paths per second, compile times, latencies")
+    add(
+        "what",
+        nargs="?",
+        choices=["speed", "peers"],
+        default="speed",
+        help="speed (default): paths per second, compile times, latencies; peers: error at equal time beside Mitsuba",
+    )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
     add("--mesh", metavar="FILE", help="measure this mesh instead of the generated one")
+    add("--mitsuba", metavar="PYTHON", help="peers: an interpreter that can import mitsuba")
     add("--environment", metavar="FILE", help="light the scenes with this HDR image instead of the generated one")
 
 

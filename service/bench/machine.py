@@ -14,7 +14,7 @@ ROOT = Path(__file__).parents[2]
 def describe(renderer: dict[str, Any]) -> dict[str, Any]:
     """Processor, cores, driver and commit; `renderer` is Renderer.info."""
     return {
-        "processor": _processor(),
+        "processor": processor(),
         "cores": len(os.sched_getaffinity(0)),
         "system": platform.platform(),
         "python": platform.python_version(),
@@ -38,7 +38,7 @@ def _git(*arguments: str) -> str | None:
     return answer.stdout.strip() if answer.returncode == 0 else None
 
 
-def _processor() -> str:
+def processor() -> str:
     for line in Path("/proc/cpuinfo").read_text().splitlines():
         if line.startswith("model name"):
             return line.split(":", 1)[1].strip()

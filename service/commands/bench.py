@@ -1,9 +1,10 @@
-"""`sunbox bench speed`: measures and prints a table; `-o` keeps the figures as JSON."""
+"""`sunbox bench speed | peers`: measures and prints a table; `-o` keeps the figures as JSON."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import subprocess
 import sys
 from pathlib import Path
 
@@ -13,6 +14,10 @@ from service.commands import BadInput, Failed, files
 def run(arguments: argparse.Namespace) -> int:
     if arguments.runs < 1:
         raise BadInput(f"--runs {arguments.runs}: at least one is needed")
+    return _peers(arguments) if arguments.what == "peers" else _speed(arguments)
+
+
+def _speed(arguments: argparse.Namespace) -> int:
     given = [Path(name) if name else None for name in (arguments.mesh, arguments.environment)]
     for path in filter(None, given):
         files.read(path)
@@ -25,6 +30,23 @@ def run(arguments: argparse.Namespace) -> int:
     except GpuError as error:
         raise Failed(str(error)) from None
     print(speed.table(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    return 0
+
+
+def _peers(arguments: argparse.Namespace) -> int:
+    if not arguments.mitsuba:
+        raise BadInput("--mitsuba PYTHON: name an interpreter that can import mitsuba")
+    output = _output(arguments.output)
+    from service.bench import peers
+
+    try:
+        options = peers.Options(Path(arguments.mitsuba), arguments.runs)
+        document = peers.measure(options, lambda what: print(what, file=sys.stderr))
+    except (OSError, subprocess.CalledProcessError) as error:
+        raise Failed(f"a renderer could not be run: {error}") from None
+    print(peers.table(document["scenes"]))
     if output:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     return 0
