@@ -24,6 +24,7 @@ _SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another cli
 _PASS_S = 0.2  # samples per pass aim at this, once there are some
 _MAX_SAMPLES_A_PASS = 256
 _GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
+_GUIDE_PIXELS = 1 << 16  # traced at once for them: 25 ms on llvmpipe in a large mesh
 _METER_PIXELS = 4096  # the noise meter looks at about so many pixels
 IDS = ("shape_id", "material_id")
 
@@ -77,7 +78,7 @@ class Picture:
         table[:, 0] = filters.inverse(self.settings.filter, features.FILTER_TABLE_SIZE)
         self._filter.write(table)
         self.samples = 0
-        self._guide_samples = 0
+        self._guide_samples, self._guide_row = 0, 0
         self._pass_samples = 0  # samples of the pass under way; 0: none is
         self._row, self._column = 0, 0  # where its next tile begins
 
@@ -231,14 +232,20 @@ class Picture:
 
     def _read_guide(self, aov: str) -> np.ndarray:
         self.trace_guides()
+        if aov != "depth":
+            return self._mean_guide(Slot.ALBEDO if aov == "albedo" else Slot.NORMAL)
         albedo, normal = (self._vectors(self._guides[s]) for s in (Slot.ALBEDO, Slot.NORMAL))
-        n = np.float32(self._guide_samples)
-        if aov == "albedo":
-            return albedo[..., :3] / n
-        if aov == "normal":
-            return normal[..., :3] / n
         hits = albedo[..., 3:]
         return np.where(hits > 0, normal[..., 3:] / np.maximum(hits, 1), 0).astype(np.float32)
+
+    def _mean_guide(self, slot: Slot) -> np.ndarray:
+        mean: np.ndarray = self._vectors(self._guides[slot])[..., :3] / np.float32(self._guide_samples)
+        return mean
+
+    def guides(self, most: int) -> tuple[np.ndarray, np.ndarray]:
+        """Albedo and normal of the first hit over exactly min(samples, most) samples, whatever was read before."""
+        self.trace_guides(most=most)
+        return self._mean_guide(Slot.ALBEDO), self._mean_guide(Slot.NORMAL)
 
     def _read_id(self, aov: str) -> np.ndarray:
         self.trace_guides()
@@ -246,30 +253,38 @@ class Picture:
         ids: np.ndarray = met.reshape(self.settings.height, self.settings.width, 2)[..., IDS.index(aov), None]
         return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
 
-    def trace_guides(self, budget_s: float = math.inf) -> bool:
+    def trace_guides(self, budget_s: float = math.inf, most: int | None = None) -> bool:
         """Trace the AOVs of the first hit for about `budget_s` seconds; whether they are all there.
 
-        They are traced when first asked for, over the camera rays of the picture's first 256 samples at most.
-        `read` traces what is still missing.
+        They are traced when first asked for, over the camera rays of the picture's first 256 samples at most, or over
+        the first `most` and no others. `read` traces what is still missing.
         """
         self._need_samples()
         start = time.perf_counter()
-        want = min(self.samples, _GUIDE_SAMPLES)
-        size = (self.settings.width, self.settings.height)
+        want = min(self.samples, most or _GUIDE_SAMPLES)
+        width, height = self.settings.width, self.settings.height
         if not self._guides:
             for slot, pixel_bytes in ((Slot.ALBEDO, 16), (Slot.NORMAL, 16), (Slot.OUTPUT, 8)):
-                self._guides[slot] = contexts.allocate(self.context, pixel_bytes * size[0] * size[1])
+                self._guides[slot] = contexts.allocate(self.context, pixel_bytes * width * height)
                 self._guides[slot].clear()
+        if most is not None and (self._guide_samples, self._guide_row) > (want, 0):
+            for buffer in self._guides.values():
+                buffer.clear()
+            self._guide_samples, self._guide_row = 0, 0
         if self._guide_samples < want:
             kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
             self._bind()
             for slot, buffer in self._guides.items():
                 buffer.bind_to_storage_buffer(int(slot))
+        rows = max(8, _GUIDE_PIXELS // width // 8 * 8)
         while self._guide_samples < want and time.perf_counter() - start < budget_s:
-            self._frame_buffer.write(self._frame((0, 0), size, self._guide_samples, 1).tobytes())
+            size = (width, min(rows, height - self._guide_row))
+            self._frame_buffer.write(self._frame((0, self._guide_row), size, self._guide_samples, 1).tobytes())
             kernel.run(-(-size[0] // 8), -(-size[1] // 8))
             self.context.finish()
-            self._guide_samples += 1
+            self._guide_row += size[1]
+            if self._guide_row >= height:
+                self._guide_samples, self._guide_row = self._guide_samples + 1, 0
         return self._guide_samples >= want
 
     def noise(self) -> float | None:
@@ -293,11 +308,17 @@ class Picture:
         return float(np.sqrt(0.5 * np.mean(difference**2)))
 
     def display(
-        self, aov: str = "color", exposure: float = 0.0, tone_map: str = "pbr_neutral", dtype: str = "u1"
+        self,
+        aov: str = "color",
+        exposure: float = 0.0,
+        tone_map: str = "pbr_neutral",
+        dtype: str = "u1",
+        color: np.ndarray | None = None,
     ) -> np.ndarray:
         """Display-encoded (height, width, 4), straight alpha: uint8, or float32 in 0..1 with dtype "f4".
 
-        Colour: exposed (stops), tone-mapped, sRGB. Other AOVs: see `display.encode`.
+        Colour: exposed (stops), tone-mapped, sRGB; `color` in the place of the picture's own, as `read` gives it.
+        Other AOVs: see `display.encode`.
         """
         self._need_samples()
         if aov != "color":
@@ -309,12 +330,15 @@ class Picture:
         output = self.context.buffer(reserve=(16 if floats else 4) * width * height)
         kernel["size"].value = (width, height)
         kernel["exposure"].value = 2.0**exposure
-        self._main[Slot.SUM].bind_to_storage_buffer(int(Slot.SUM))
-        self._main[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.MOMENTS))
+        own = [] if color is None else [self.context.buffer(a.tobytes()) for a in (color, np.ones_like(color))]
+        sums, counts = own or (self._main[Slot.SUM], self._main[Slot.MOMENTS])
+        sums.bind_to_storage_buffer(int(Slot.SUM))
+        counts.bind_to_storage_buffer(int(Slot.MOMENTS))
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
         kernel.run(-(-width // 8), -(-height // 8))
         pixels = np.frombuffer(output.read(), np.float32 if floats else np.uint8).reshape(height, width, 4)
-        output.release()
+        for buffer in (output, *own):
+            buffer.release()
         return pixels
 
     def release(self) -> None:

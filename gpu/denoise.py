@@ -1,0 +1,67 @@
+"""Open Image Denoise over pixels that were read back. Runs without GL, on the processor, off the render loop.
+
+Attila Afra, "Intel Open Image Denoise" 2.5; a network trained on noisy renderings. It is biased: `sunbox bench
+tradeoff` says by how much. It gives the same bits for the same pixels on the same processor.
+"""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+
+GUIDE_SAMPLES = 16  # of the first hit's albedo and normal; 256 give the same error to three digits
+SMALLEST = 16  # pixels a side; smaller pictures are mostly the network's own padding: 1 x 1 came out 6 x too dark
+# Times the picture's typical radiance: what is brighter stays as it was rendered. The network's curve ends at 65504,
+# and beyond that it invents (1e20 came out as 3.5e20).
+BRIGHTEST = 1e4
+_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+@cache
+def missing() -> str | None:
+    """Why nothing can be denoised here; None where it can. Loads the library."""
+    try:
+        import pyoidn
+
+        pyoidn.denoise(np.ones((SMALLEST, SMALLEST, 3), np.float32), hdr=True)
+    except (ImportError, OSError, RuntimeError) as error:
+        return f"Open Image Denoise (pyoidn) cannot be loaded: {error}"
+    return None
+
+
+def denoise(color: np.ndarray, albedo: np.ndarray, normal: np.ndarray, fine: bool = True) -> np.ndarray:
+    """The picture without its noise: `color` (height, width, 4) linear float32, premultiplied; alpha stays as it is.
+
+    `albedo` 0..1 and `normal` -1..1, (height, width, 3), are averages over the first hits. `fine` takes twice as long
+    and errs less. Finite and non-negative where `color` is; black and tiny pictures come back as they are. Raises
+    RuntimeError where the library fails.
+    """
+    height, width = color.shape[:2]
+    alpha = color[..., 3:]
+    seen = np.divide(color[..., :3], alpha, out=np.zeros_like(color[..., :3]), where=alpha > 0)
+    typical = _typical(seen)
+    if typical == 0 or min(height, width) < SMALLEST:
+        return color
+    import pyoidn
+
+    with np.errstate(over="ignore"):  # what becomes infinite is kept as it was
+        relative = (seen / np.float64(typical)).astype(np.float32)  # the library's own exposure fails below 1e-10
+    smooth = pyoidn.denoise(
+        np.minimum(relative, np.float32(BRIGHTEST)),
+        np.clip(albedo, 0, 1).astype(np.float32),
+        np.clip(normal, -1, 1).astype(np.float32),
+        hdr=True,
+        quality="high" if fine else "fast",
+    )
+    keep = (relative.max(axis=2, keepdims=True) >= BRIGHTEST) | ~np.isfinite(smooth).all(axis=2, keepdims=True)
+    out = color.copy()
+    out[..., :3] = np.where(keep, color[..., :3], (np.maximum(smooth, 0) * typical).astype(np.float32) * alpha)
+    return out
+
+
+def _typical(radiance: np.ndarray) -> float:
+    """Geometric mean of the luminances that are not 0; 0 for a black picture."""
+    luminance = radiance.astype(np.float64) @ _LUMINANCE
+    lit = luminance[luminance > 0]
+    return float(np.exp(np.log(lit).mean())) if lit.size else 0.0
