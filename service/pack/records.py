@@ -37,7 +37,9 @@ def quads(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     records["area"] = area
     records["dual_u"] = np.cross(v, normal) / area[:, None]
     records["dual_v"] = np.cross(normal, u) / area[:, None]
-    records["u_length"], records["v_length"] = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+    # Between opposite sides: 1 over the length of the dual, without what a sheared quad's area has lost.
+    records["u_length"] = area / np.linalg.norm(v, axis=1)
+    records["v_length"] = area / np.linalg.norm(u, axis=1)
     corners4 = np.stack([corner, corner + u, corner + v, corner + u + v])
     return records, (corners4.min(axis=0), corners4.max(axis=0))
 

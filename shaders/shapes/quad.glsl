@@ -1,10 +1,12 @@
-// Parallelogram: hit in (0, t_max), or t_max.
+// Parallelogram: hit in (0, t_max), or t_max. It reaches beyond its edges by the rounding of a hit, so that no ray
+// slips out between two that share an edge: whichever is met less obliquely has the hit inside that bound.
 float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
     vec3 w = q.origin - o;
     float t = dot(w, q.normal) / dot(d, q.normal); // parallel: infinite or NaN, refused below
     vec3 p = t * d - w;
     float a = dot(p, q.dual_u), b = dot(p, q.dual_v);
-    bool inside = a >= 0.0 && a <= 1.0 && b >= 0.0 && b <= 1.0;
+    float slack = gamma_error(8.0) * (abs(t) + max_component(abs(w)));
+    bool inside = max(q.u_length * (abs(a - 0.5) - 0.5), q.v_length * (abs(b - 0.5) - 0.5)) <= slack;
     return inside && t > 0.0 && t < t_max ? t : t_max;
 }
 
@@ -13,6 +15,11 @@ Point quad_point(Quad q, vec3 p, uint id) {
     vec3 w = p - q.origin;
     r.p = p - dot(w, q.normal) * q.normal; // onto the plane: what is left is the rounding of this line
     r.error = gamma_error(8.0) * (abs(q.origin) + abs(w) + abs(p));
+    // Off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
+    vec2 uv = vec2(dot(w, q.dual_u), dot(w, q.dual_v));
+    vec2 edge = min(vec2(0.5), max_component(r.error) / vec2(q.u_length, q.v_length));
+    vec2 by = clamp(uv, edge, 1.0 - edge) - uv;
+    r.p += by.x * q.u + by.y * q.v;
     r.ng = q.normal;
     r.ns = q.normal;
     r.tangent = q.u;

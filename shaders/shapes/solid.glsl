@@ -9,12 +9,15 @@ mat3 solid_axes(Solid s) {
     return mat3(x, y, z) / dot(s.row_x, x);
 }
 
+vec3 solid_error(Solid s, mat3 axes) {
+    return gamma_error(16.0) * (abs(s.center) + abs(axes[0]) + abs(axes[1]) + abs(axes[2]));
+}
+
 Point solid_point(Solid s, vec3 q, vec3 n) {
     Point r;
     mat3 axes = solid_axes(s);
     r.p = s.center + axes * q;
-    vec3 reach = abs(axes[0]) + abs(axes[1]) + abs(axes[2]);
-    r.error = gamma_error(16.0) * (abs(s.center) + reach);
+    r.error = solid_error(s, axes);
     r.ng = normalize(n.x * s.row_x + n.y * s.row_y + n.z * s.row_z); // inverse transpose
     r.ns = r.ng;
     r.material = s.material;
@@ -63,7 +66,12 @@ Point box_point(Solid s, vec3 p) {
     vec3 a = abs(q);
     float m = max(a.x, max(a.y, a.z));
     vec3 n = a.x == m ? vec3(sign(q.x), 0.0, 0.0) : a.y == m ? vec3(0.0, sign(q.y), 0.0) : vec3(0.0, 0.0, sign(q.z));
-    q = mix(q, n, notEqual(n, vec3(0.0))); // exactly on the face
+    // Exactly on the face, and off its edges by the error of the point: else a ray that leaves a corner inside could
+    // begin behind the other wall.
+    vec3 error = solid_error(s, solid_axes(s));
+    vec3 edge = vec3(dot(abs(s.row_x), error), dot(abs(s.row_y), error), dot(abs(s.row_z), error));
+    vec3 room = max(vec3(0.0), 1.0 - edge);
+    q = mix(clamp(q, -room, room), n, notEqual(n, vec3(0.0)));
     Point r = solid_point(s, q, n);
 #if HAS_ANISOTROPIC
     // u to the right seen from outside: faces of x along -z or +z, of y along +x, of z along +x or -x.

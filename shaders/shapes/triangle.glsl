@@ -58,11 +58,17 @@ vec3 triangle_decode(uint bits) {
 
 Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     Point r;
-    float b0 = 1.0 - uv.x - uv.y;
-    r.p = b0 * tri.v0 + uv.x * tri.v1 + uv.y * tri.v2;
+    vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, across = cross(e1, e2);
+    float twice_area = length(across);
+    r.ng = across / twice_area;
     r.error = gamma_error(7.0) * (abs(tri.v0) + abs(tri.v1) + abs(tri.v2));
-    vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0;
-    r.ng = normalize(cross(e1, e2));
+    // Off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
+    vec3 edge = vec3(length(e2 - e1), length(e2), length(e1)) * (max_component(r.error) / twice_area);
+    vec3 b = max(vec3(1.0 - uv.x - uv.y, uv), min(edge, vec3(1.0 / 3.0)));
+    b /= b.x + b.y + b.z;
+    float b0 = b.x;
+    uv = b.yz;
+    r.p = b0 * tri.v0 + uv.x * tri.v1 + uv.y * tri.v2;
     r.ns = r.ng;
     r.tangent = e1;
 #if HAS_SMOOTH_NORMALS
