@@ -197,8 +197,8 @@ class Quad(Record):
     material: u32
     normal: vec3  # unit, outward: along cross(u, v), against it where a transform mirrors
     light: u32
-    dual_u: vec3  # dot(p - origin, dual_u) is p's coordinate along u, 0..1 inside
-    u_length: f32  # between the sides where that coordinate is 0 and 1: |u| of a rectangle
+    dual_u: vec3  # unit, across v in the plane: dot(p - origin, dual_u) is 0..u_length inside
+    u_length: f32  # between those two sides: |u| of a rectangle
     dual_v: vec3
     v_length: f32
     u: vec3

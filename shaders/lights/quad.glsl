@@ -21,8 +21,8 @@ QuadView quad_light_view(Quad q, vec3 p) {
     // In units of the edges' sum: products of six lengths below stay in range, or leave it for the area's sake.
     float unit = 1.0 / (q.u_length + q.v_length);
     float lu = q.u_length * unit, lv = q.v_length * unit;
-    w.x0 = dot(o, q.dual_u) * lu;
-    w.y0 = dot(o, q.dual_v) * lv;
+    w.x0 = dot(o, q.dual_u) * unit;
+    w.y0 = dot(o, q.dual_v) * unit;
     w.x1 = w.x0 + lu;
     w.y1 = w.y0 + lv;
     w.z = abs(dot(o, q.normal)) * unit;
@@ -34,7 +34,7 @@ QuadView quad_light_view(Quad q, vec3 p) {
     float d1 = l.x * l.y * l.z + ab * l.z + ac * l.y + bc * l.x;
     float d2 = l.x * l.z * l.w + ac * l.w + ad * l.z + cd * l.x;
     float s = 2.0 * sampling_angle(h * (d1 + d2), d1 * d2 - h * h);
-    bool rectangle = abs(dot(q.dual_u, q.dual_v)) * q.u_length * q.v_length <= 1e-5;
+    bool rectangle = abs(dot(q.dual_u, q.dual_v)) <= 1e-5;
     w.s = rectangle && s >= QUAD_LIGHT_LEAST ? s : 0.0;
     w.a = l.x;
     w.d = l.w;

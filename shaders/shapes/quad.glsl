@@ -5,8 +5,8 @@ float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
     float t = dot(w, q.normal) / dot(d, q.normal); // parallel: infinite or NaN, refused below
     vec3 p = t * d - w;
     float a = dot(p, q.dual_u), b = dot(p, q.dual_v);
-    float slack = gamma_error(8.0) * (abs(t) + max_component(abs(w)));
-    bool inside = max(q.u_length * (abs(a - 0.5) - 0.5), q.v_length * (abs(b - 0.5) - 0.5)) <= slack;
+    float slack = gamma_error(8.0) * (2.0 * t + q.u_length + q.v_length);
+    bool inside = min(min(a, q.u_length - a), min(b, q.v_length - b)) >= -slack;
     return inside && t > 0.0 && t < t_max ? t : t_max;
 }
 
@@ -16,10 +16,10 @@ Point quad_point(Quad q, vec3 p, uint id) {
     r.p = p - dot(w, q.normal) * q.normal; // onto the plane: what is left is the rounding of this line
     r.error = gamma_error(8.0) * (abs(q.origin) + abs(w) + abs(p));
     // Off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
-    vec2 uv = vec2(dot(w, q.dual_u), dot(w, q.dual_v));
-    vec2 edge = min(vec2(0.5), max_component(r.error) / vec2(q.u_length, q.v_length));
-    vec2 by = clamp(uv, edge, 1.0 - edge) - uv;
-    r.p += by.x * q.u + by.y * q.v;
+    vec2 at = vec2(dot(w, q.dual_u), dot(w, q.dual_v)), size = vec2(q.u_length, q.v_length);
+    vec2 edge = min(vec2(max_component(r.error)), 0.5 * size);
+    vec2 by = clamp(at, edge, size - edge) - at;
+    r.p += by.x * q.dual_u + by.y * q.dual_v;
     r.ng = q.normal;
     r.ns = q.normal;
     r.tangent = q.u;
