@@ -10,10 +10,12 @@ import signal
 import socket
 import sys
 import threading
-from collections.abc import AsyncIterator, Iterator
+import time
+from collections.abc import AsyncIterator, Iterable, Iterator
 from contextlib import asynccontextmanager
 from importlib import metadata
 from pathlib import Path
+from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -36,6 +38,8 @@ from service.routes.house import House
 WEB = Path(__file__).parents[1] / "web"
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 PING_S = 15.0  # proxies cut connections that are idle for a minute
+STUCK_S = 10.0  # for the last bytes of a closed connection
+TICKS = 50  # of uvicorn, ten a second: how often closed connections are looked at
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
 
@@ -92,6 +96,22 @@ def run(config: Config) -> int:
     return 0
 
 
+class Stuck:
+    """Ends connections that were closed but never close: a vanished client takes not even the last bytes."""
+
+    def __init__(self) -> None:
+        self._since: dict[Any, float] = {}
+
+    def abort(self, connections: Iterable[Any]) -> None:
+        """To be called now and then with what is connected."""
+        now = time.monotonic()
+        closing = [connection for connection in connections if connection.transport.is_closing()]
+        self._since = {connection: self._since.get(connection, now) for connection in closing}
+        for connection, since in self._since.items():
+            if now - since >= STUCK_S and since < now:
+                connection.transport.abort()
+
+
 class _Server(uvicorn.Server):
     """Says where it is once it answers; ends by closing its clients as going away, with exit code 0."""
 
@@ -99,6 +119,12 @@ class _Server(uvicorn.Server):
         super().__init__(config)
         self._house = house
         self._address = address
+        self._stuck = Stuck()
+
+    async def on_tick(self, counter: int) -> bool:
+        if counter % TICKS == 0:
+            self._stuck.abort(self.server_state.connections)
+        return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         await super().startup(sockets)

@@ -34,6 +34,7 @@ class Config(BaseSettings):
         16_000_000, ge=1, le=2**24, description="Most triangles of a scene; at most 2^24 (float32 counts no further)."
     )
     max_body: int = Field(256 * 2**20, ge=1, description="Most bytes of a request's body, as decompressed.")
+    max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
     data_dir: Path = Field(
         default_factory=_default_data_dir, description="Folder for assets and caches (default: ~/.cache/sunbox)."
     )

@@ -94,8 +94,9 @@ class Picture:
 class Client:
     """The other end of the stream. Acknowledges what it receives unless told otherwise."""
 
-    def __init__(self, url: str, origin: str | None = None) -> None:
+    def __init__(self, url: str, origin: str | None = None, session: str | None = None) -> None:
         address = url.replace("http://", "ws://") + "/v1/stream"
+        address += "" if session is None else f"?session={session}"
         offered = None if origin is None else Origin(origin)
         self.socket = connect(address, subprotocols=[Subprotocol("sunbox.v1")], max_size=None, origin=offered)
         self.acknowledges = True

@@ -22,6 +22,7 @@ class Renderer:
     def __init__(self) -> None:
         self.wants: list[Want] = []
         self.flow = Flow(7, self.wants.append)
+        self.flow.attach()
 
     def frame(self, generation: int, elapsed_s: float = 0.0) -> Frame:
         """An answer to the last want."""
@@ -54,14 +55,14 @@ def flowing(test: Callable[[Renderer], Awaitable[None]]) -> Callable[[], None]:
 async def test_nothing_is_asked_for_before_a_start(renderer: Renderer) -> None:
     renderer.flow.look(View(exposure=1.0))
     assert not renderer.wants
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     assert renderer.wants[0].view.exposure == 1.0
 
 
 @flowing
 async def test_two_credits(renderer: Renderer) -> None:
     renderer.flow.view = View(max_fps=240)
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     assert renderer.deliver(1)
     await asyncio.sleep(0.01)
     assert len(renderer.wants) == 2 and renderer.deliver(1)
@@ -76,8 +77,8 @@ async def test_two_credits(renderer: Renderer) -> None:
 
 @flowing
 async def test_an_old_generation_is_not_welcome(renderer: Renderer) -> None:
-    renderer.flow.update(1)
-    renderer.flow.update(2)
+    renderer.flow.update(1, 0.0)
+    renderer.flow.update(2, 0.0)
     assert len(renderer.wants) == 1, "the renderer answers the one want with what is newest"
     assert not renderer.deliver(1)
     assert len(renderer.wants) == 2 and renderer.deliver(2)
@@ -85,7 +86,7 @@ async def test_an_old_generation_is_not_welcome(renderer: Renderer) -> None:
 
 @flowing
 async def test_a_view_replaces_the_want(renderer: Renderer) -> None:
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     old = renderer.frame(1)
     renderer.flow.look(View(exposure=2.0))
     assert renderer.wants[-1].anyway and renderer.wants[-1].view.exposure == 2.0
@@ -98,7 +99,7 @@ async def test_a_view_replaces_the_want(renderer: Renderer) -> None:
 @flowing
 async def test_a_view_without_a_credit_makes_what_is_under_way_unwelcome(renderer: Renderer) -> None:
     renderer.flow.view = View(max_fps=240)
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     assert renderer.deliver(1)
     await asyncio.sleep(0.01)
     late = renderer.frame(1)
@@ -111,16 +112,16 @@ async def test_a_view_without_a_credit_makes_what_is_under_way_unwelcome(rendere
 
 @flowing
 async def test_a_changed_view_survives_an_update(renderer: Renderer) -> None:
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     renderer.flow.look(View(exposure=2.0))
-    renderer.flow.update(2)
+    renderer.flow.update(2, 0.0)
     assert not renderer.deliver(1)
     assert renderer.wants[-1].anyway and renderer.deliver(2)
 
 
 @flowing
 async def test_pace_slows_but_not_for_what_was_just_asked_for(renderer: Renderer) -> None:
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     renderer.deliver(1, elapsed_s=100.0)
     await asyncio.sleep(0.1)
     assert len(renderer.wants) == 1, "a picture of 100 s changes little in .1 s"
@@ -128,7 +129,7 @@ async def test_pace_slows_but_not_for_what_was_just_asked_for(renderer: Renderer
     assert len(renderer.wants) == 2
     renderer.deliver(1, elapsed_s=100.0)
     renderer.flow.acknowledge(1)
-    renderer.flow.update(2)
+    renderer.flow.update(2, 0.0)
     assert len(renderer.wants) == 3
 
 
@@ -136,17 +137,17 @@ async def test_pace_slows_but_not_for_what_was_just_asked_for(renderer: Renderer
 async def test_an_update_waits_for_its_predecessors_frame(renderer: Renderer) -> None:
     loop = asyncio.get_running_loop()
     await renderer.flow.settled()  # nothing was started: no wait
-    renderer.flow.update(1)
+    renderer.flow.update(1, 0.0)
     began = loop.time()
     loop.call_later(0.05, renderer.deliver, 1)
     await renderer.flow.settled()
     assert 0.04 < loop.time() - began < PATIENCE_S
-    renderer.flow.update(2)
+    renderer.flow.update(2, 0.0)
     began = loop.time()
     await renderer.flow.settled()
     assert loop.time() - began >= 0.9 * PATIENCE_S, "a frame that doesn't come is not waited for"
     assert renderer.deliver(2)
-    renderer.flow.update(3)
+    renderer.flow.update(3, 0.0)
     began = loop.time()
     await renderer.flow.settled()
     assert loop.time() - began < 0.05, "without a credit no frame can come"

@@ -42,6 +42,7 @@ def test_hello_says_what_info_says(server: Server) -> None:
     with stream.socket:
         hello = stream.hear()
         assert isinstance(hello, dict) and hello.pop("type") == "hello"
+        assert len(hello.pop("session")) >= 32
         assert hello == server.http.get("/v1/info").json()
         assert stream.socket.subprotocol == "sunbox.v1"
 

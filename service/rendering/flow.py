@@ -28,6 +28,7 @@ class Flow:
         self._sent = 0  # the last frame's `seq`
         self._unacknowledged: set[int] = set()
         self._serial = 0  # of the last want
+        self._here = False  # somebody looks
         self._asked = False  # a frame is wanted, or on its way out
         self._anyway = False  # the view was changed and not seen yet
         self._answered = asyncio.Event()  # something of this generation was sent
@@ -45,9 +46,9 @@ class Flow:
         """How long the present generation has been waiting for its first frame; None: it was sent."""
         return None if self._answered.is_set() else self._loop.time() - self._updated_at
 
-    def update(self, generation: int) -> None:
-        """An update was taken: frames of older generations are worth nothing any more."""
-        self._updated_at = self._loop.time()
+    def update(self, generation: int, since: float) -> None:
+        """An update was taken that came at the loop's time `since`: older generations are worth nothing any more."""
+        self._updated_at = since
         self.generation = generation
         self._answered.clear()
         self._ask()
@@ -87,13 +88,27 @@ class Flow:
             self._answered.set()
         self._ask()
 
+    def detach(self) -> None:
+        """Nobody is there to take a frame; one that is on its way out is none."""
+        self._here = False
+        self._serial += 1
+        self._unacknowledged.clear()
+        self._asked = False
+
+    def attach(self) -> None:
+        """Somebody is there, who has seen nothing yet."""
+        self._here = True
+        if self.generation is not None:
+            self._anyway, self._asked = True, False
+            self._ask()
+
     def fail(self) -> None:
         """No frame of this generation will come."""
         self._answered.set()
 
     async def settled(self) -> None:
         """Returns when the present generation has been seen, or can't be, or takes too long."""
-        if self.generation is not None and len(self._unacknowledged) < CREDITS:
+        if self._here and self.generation is not None and len(self._unacknowledged) < CREDITS:
             try:
                 await asyncio.wait_for(self._answered.wait(), PATIENCE_S)
             except TimeoutError:
@@ -104,7 +119,7 @@ class Flow:
             self._timer.cancel()
 
     def _ask(self) -> None:
-        if self._asked or self.generation is None or len(self._unacknowledged) >= CREDITS:
+        if not self._here or self._asked or self.generation is None or len(self._unacknowledged) >= CREDITS:
             return
         if self._timer is not None:
             self._timer.cancel()

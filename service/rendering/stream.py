@@ -1,4 +1,4 @@
-"""One client at the stream: its messages in order, its frames, its errors. Knows of its socket only that it sends."""
+"""One client's stream: its messages in order, its frames, its errors. It outlives its connections."""
 
 from __future__ import annotations
 
@@ -19,12 +19,14 @@ from service.rendering.job import error_of
 from service.rendering.live import Live
 from service.rendering.messages import Done, Failed, Frame, FromRenderer, Pause, Resume, Stop, Update
 from service.rendering.reading import Reader
-from service.rendering.threads import encoding, packing
+from service.rendering.threads import Lane, encoding
 from service.scene import load_json
 
-LOST = 4500  # close code
+TAKEN_UP, LOST = 4409, 4500  # close codes
 WAITING = 64  # messages to take, or to send; more of them wait in the network
 SMALL = 16 * 1024  # characters of JSON that are parsed faster than a thread is woken
+STALLED_S = 30.0  # a client that takes nothing for so long is gone: its network may never say so
+CLOSING_S = 1.0  # for one that reads slowly to be told why
 
 log = logging.getLogger(__name__)
 
@@ -41,30 +43,51 @@ class Socket(Protocol):
 
 
 @dataclass(frozen=True)
-class _Closing:
+class Closing:
     code: int
     reason: str
 
 
-class Stream:
-    """`hear` takes what the client says; `run` works until it is cancelled or has closed the socket."""
+class Attendance:
+    """One connection's time at a stream."""
 
-    def __init__(self, engine: Engine, reader: Reader, socket: Socket) -> None:
+    def __init__(self, socket: Socket) -> None:
+        self.socket = socket
+        self.over: asyncio.Future[Closing] = asyncio.get_running_loop().create_future()
+
+    def end(self, closing: Closing) -> None:
+        if not self.over.done():
+            self.over.set_result(closing)
+
+
+class Stream:
+    """`hear` takes what the client says, `attend` sends it what there is; `run` works until it is cancelled."""
+
+    def __init__(self, engine: Engine, reader: Reader) -> None:
+        self.ended: Closing | None = None  # for good, and why
         self._engine = engine
-        self._socket = socket
         self._task = engine.open(self)
         self._flow = Flow(self._task, engine.send)
         self._live = Live(reader, self._task)
+        self._lane = Lane("stream")  # what this client asks to be parsed and packed waits for nobody else's
+        self._paused = False  # by the client
+        self._done: dict[str, Any] | None = None  # what was said last of the present generation
+        self._attendance: Attendance | None = None
         self._inbox: deque[protocol.Message | ServiceError] = deque()
-        self._outbox: deque[dict[str, Any] | Frame | _Closing] = deque()
+        self._outbox: deque[dict[str, Any] | Frame] = deque()
+        self._speaking = False  # something of the outbox is being sent
         self._stirred = asyncio.Event()  # one of them has changed
         # Held while a frame goes out and while an update is taken: a slow client gets no old frame after its update.
         self._writing = asyncio.Lock()
 
+    @property
+    def attended(self) -> bool:
+        return self._attendance is not None
+
     async def hear(self, text: str | None) -> None:
         """Takes one message; None stands for what is no text. Waits while too many are still to be dealt with."""
         try:
-            message: protocol.Message | ServiceError = await _parsed(text)
+            message: protocol.Message | ServiceError = await self._parsed(text)
             if isinstance(message, protocol.Ack):  # it is about frames, not about the picture, and may overtake
                 self._flow.acknowledge(message.seq)
                 return
@@ -76,18 +99,63 @@ class Stream:
             await self._stirring()
 
     async def run(self) -> None:
-        handling = asyncio.create_task(self._handle_all())
-        sending = asyncio.create_task(self._send_all())
+        """Deals with what was heard; its end is the stream's."""
         try:
-            done, _ = await asyncio.wait({handling, sending}, return_when=asyncio.FIRST_COMPLETED)
-            for task in done:
-                task.result()
+            await self._handle_all()
         finally:
-            handling.cancel()
-            sending.cancel()
             self._flow.close()
             self._engine.drop(self._task)
-            await asyncio.gather(handling, sending, return_exceptions=True)
+            self._lane.close()
+
+    def attach(self, socket: Socket) -> Attendance:
+        """From now on this connection is the client's; one that was is told so and closed."""
+        if self._attendance is not None:
+            self._attendance.end(Closing(TAKEN_UP, "This session was taken up by another connection."))
+            self._leave()
+        self._attendance = Attendance(socket)
+        if self.ended is not None:
+            self._attendance.end(self.ended)
+        if self._done is not None:  # perhaps it was lost on its way to the connection before
+            self._outbox = deque(said for said in self._outbox if said is not self._done)
+            self._post(self._done)
+        self._flow.attach()
+        if not self._paused:
+            self._engine.send(Resume(self._task))
+        return self._attendance
+
+    async def attend(self, attendance: Attendance) -> None:
+        """Sends what there is until it is cancelled, or has closed the connection and said why."""
+        sending = asyncio.create_task(self._send_all(attendance.socket))
+        try:
+            either: set[asyncio.Future[Any]] = {sending, attendance.over}
+            await asyncio.wait(either, return_when=asyncio.FIRST_COMPLETED)
+            if sending.done():
+                sending.result()
+            else:
+                closing = attendance.over.result()
+                if closing is self.ended:  # what is still to be said is: why
+                    await asyncio.wait({asyncio.ensure_future(self._said()), sending}, timeout=CLOSING_S)
+                await _stopped(sending)
+                await asyncio.wait_for(attendance.socket.close(closing.code, closing.reason), CLOSING_S)
+        except TimeoutError:
+            return  # it takes nothing: the network's end of it is the server's business
+        finally:
+            await _stopped(sending)
+            if self._attendance is attendance:
+                self._leave()
+
+    def _leave(self) -> None:
+        """Nobody looks: the render rests until somebody does."""
+        self._attendance = None
+        self._outbox = deque(item for item in self._outbox if not isinstance(item, Frame))
+        self._flow.detach()
+        self._engine.send(Pause(self._task))
+
+    def end(self, code: int, reason: str) -> None:
+        """For good: who attends is told, and who comes later too."""
+        self.ended = Closing(code, reason)
+        if self._attendance is not None:
+            self._attendance.end(self.ended)
 
     def heard(self, message: FromRenderer) -> None:
         if isinstance(message, Frame):
@@ -97,7 +165,8 @@ class Stream:
             if message.generation == self._flow.generation:
                 progress = message.progress
                 said = {"generation": message.generation, "reason": message.reason}
-                self._post({"type": "done", **said, "samples": progress.samples, "noise": progress.noise})
+                self._done = {"type": "done", **said, "samples": progress.samples, "noise": progress.noise}
+                self._post(self._done)
         elif isinstance(message, Failed):
             self._live.forget()
             self._flow.fail()
@@ -105,7 +174,7 @@ class Stream:
 
     def lost(self, detail: str) -> None:
         self._refuse(Internal(detail), self._flow.generation)
-        self._post(_Closing(LOST, detail))
+        self.end(LOST, detail)
 
     async def _handle_all(self) -> None:
         while True:
@@ -123,9 +192,10 @@ class Stream:
 
     async def _take(self, message: Edit) -> None:
         """Takes an update and those that follow it at once; of these only the last need be seen."""
+        began = asyncio.get_running_loop().time()
         while True:
             try:
-                await self._tell(await packing(partial(self._live.take, message)))
+                await self._tell(await self._lane.run(partial(self._live.take, message)), began)
                 if isinstance(message, protocol.Start) and message.view is not None:
                     self._flow.look(message.view.over(self._flow.view))
             except ServiceError as error:
@@ -135,19 +205,22 @@ class Stream:
             message = cast(Edit, self._inbox.popleft())
         self._stir()
         try:
-            await self._tell(await packing(self._live.settle))
+            await self._tell(await self._lane.run(self._live.settle), began)
         except ServiceError as error:
             self._refuse(error, message.generation)
 
-    async def _tell(self, update: Update | None) -> None:
+    async def _tell(self, update: Update | None, began: float) -> None:
         if update is None:
             return
         if update.scene is not None:
             await self._engine.send_scene(update)
         else:
             self._engine.send(update)
+        if not self.attended:  # its task may not have been there to be paused
+            self._engine.send(Pause(self._task))
         async with self._writing:
-            self._flow.update(update.generation)
+            self._done = None
+            self._flow.update(update.generation, began)
 
     def _obey(self, message: protocol.Message) -> None:
         if isinstance(message, protocol.ViewMessage):
@@ -157,29 +230,34 @@ class Stream:
         elif self._live.version is None:
             self._refuse(Conflict(f"Nothing was started yet: send start before {message.type}."), None)
         else:
-            self._engine.send(ORDERS[message.type](self._task))
+            if message.type in ("pause", "resume"):
+                self._paused = message.type == "pause"
+            if message.type != "resume" or self.attended:
+                self._engine.send(ORDERS[message.type](self._task))
 
-    async def _send_all(self) -> None:
+    async def _send_all(self, socket: Socket) -> None:
+        """Raises TimeoutError when the client takes nothing any more."""
         while True:
             while not self._outbox:
                 await self._stirring()
-            item = self._outbox.popleft()
-            self._stir()
-            if isinstance(item, Frame):
-                await self._send_frame(item)
-            elif isinstance(item, _Closing):
-                return await self._socket.close(item.code, item.reason)
-            else:
-                await self._socket.send_text(json.dumps(item, allow_nan=False))
+            item, self._speaking = self._outbox.popleft(), True
+            try:
+                if isinstance(item, Frame):
+                    await self._send_frame(socket, item)
+                else:
+                    await asyncio.wait_for(socket.send_text(json.dumps(item, allow_nan=False)), STALLED_S)
+            finally:
+                self._speaking = False
+                self._stir()
 
-    async def _send_frame(self, frame: Frame) -> None:
+    async def _send_frame(self, socket: Socket, frame: Frame) -> None:
         view, seq = self._flow.view, self._flow.next_seq
         data = await encoding(lambda: protocol.frame_bytes(frame, view, seq))
         async with self._writing:
             if self._flow.welcome(frame):
                 self._count(data)
                 self._flow.sent(frame)
-                await self._socket.send_bytes(data)
+                await asyncio.wait_for(socket.send_bytes(data), STALLED_S)
 
     def _count(self, data: bytes) -> None:
         statistics = self._engine.statistics
@@ -192,7 +270,7 @@ class Stream:
         self._engine.statistics.errors[answer(error).type] += 1
         self._post({"type": "error", "generation": generation, "problem": problem(error)})
 
-    def _post(self, item: dict[str, Any] | Frame | _Closing) -> None:
+    def _post(self, item: dict[str, Any] | Frame) -> None:
         self._outbox.append(item)
         self._stir()
 
@@ -203,9 +281,17 @@ class Stream:
         self._stirred.clear()
         await self._stirred.wait()
 
+    async def _said(self) -> None:
+        while self._outbox or self._speaking:
+            await self._stirring()
 
-async def _parsed(text: str | None) -> protocol.Message:
-    if text is None:
-        raise MalformedJson("A message is JSON text, not bytes.")
-    document = load_json(text) if len(text) < SMALL else await packing(partial(load_json, text))
-    return protocol.parse(document)
+    async def _parsed(self, text: str | None) -> protocol.Message:
+        if text is None:
+            raise MalformedJson("A message is JSON text, not bytes.")
+        document = load_json(text) if len(text) < SMALL else await self._lane.run(partial(load_json, text))
+        return protocol.parse(document)
+
+
+async def _stopped(task: asyncio.Task[None]) -> None:
+    task.cancel()
+    await asyncio.gather(task, return_exceptions=True)

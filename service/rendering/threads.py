@@ -3,14 +3,36 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
+NICENESS = 5  # of what packs scenes, beside the event loop and the encoders; the renderer is at 10
+
 T = TypeVar("T")
 
-_PACKING = ThreadPoolExecutor(2, "packing")  # parsing and packing scenes: seconds for the largest
+
+def _yield_to_others() -> None:
+    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)  # Linux: of this thread alone
+
+
+_PACKING = ThreadPoolExecutor(2, "packing", _yield_to_others)  # parsing and packing scenes: seconds for the largest
 _ENCODING = ThreadPoolExecutor(2, "encoding")  # pictures to JPEG and the like: milliseconds, and somebody looks
+
+
+class Lane:
+    """A thread for one client's parsing and packing, begun at its first work: whoever asks for much waits alone."""
+
+    def __init__(self, name: str) -> None:
+        self._threads = ThreadPoolExecutor(1, name, _yield_to_others)
+
+    async def run(self, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+
+    def close(self) -> None:
+        self._threads.shutdown(wait=False, cancel_futures=True)
 
 
 async def packing(work: Callable[[], T]) -> T:

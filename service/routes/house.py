@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 import asyncio
+import time
 from dataclasses import dataclass, field
 from importlib import metadata
 from typing import Any
 
 from starlette.requests import HTTPConnection
-from starlette.websockets import WebSocket
 
 from service.assets import AssetStore
 from service.config import Config
@@ -17,10 +17,10 @@ from service.quality import PRESETS
 from service.rendering.engine import Engine
 from service.rendering.reading import Reader
 from service.rendering.renders import Renders
+from service.rendering.sessions import Sessions
 
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
-GOING_AWAY = 1001  # close code
-FAREWELL_S = 1.0  # for a client that reads slowly to be told
+FAREWELL_S = 2.0  # for a client that reads slowly to be told
 
 
 @dataclass
@@ -30,7 +30,10 @@ class House:
     reader: Reader
     engine: Engine
     renders: Renders = field(default_factory=Renders)
-    sockets: set[WebSocket] = field(default_factory=set)  # of the open streams
+    sessions: Sessions = field(init=False)
+
+    def __post_init__(self) -> None:
+        self.sessions = Sessions(self.engine, self.reader, self.config.max_clients)
 
     async def info(self) -> dict[str, Any]:
         """What GET /v1/info says. Waits for a renderer that is being started; null when there is none."""
@@ -46,6 +49,7 @@ class House:
                 "max_pixels": config.max_pixels,
                 "max_triangles": config.max_triangles,
                 "max_body": config.max_body,
+                "max_clients": config.max_clients,
             },
             "quality": PRESETS,
         }
@@ -53,9 +57,10 @@ class House:
     async def farewell(self) -> None:
         """Tells everybody that the server ends: closes streams, cancels renders, so that who waits gets an answer."""
         self.renders.close()
-        sockets, self.sockets = self.sockets, set()
-        closing = (socket.close(GOING_AWAY, "The server is shutting down.") for socket in sockets)
-        await asyncio.gather(*(asyncio.wait_for(close, FAREWELL_S) for close in closing), return_exceptions=True)
+        self.sessions.close("The server is shutting down.")
+        until = time.monotonic() + FAREWELL_S
+        while self.sessions.attended and time.monotonic() < until:
+            await asyncio.sleep(0.01)
 
 
 def house(connection: HTTPConnection) -> House:

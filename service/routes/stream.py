@@ -8,48 +8,52 @@ import json
 from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from starlette.websockets import WebSocketState
 
-from service.problems import Unavailable
-from service.rendering.stream import LOST, Stream
+from service.problems import NotFound, ServiceError, TooManyRequests
+from service.rendering.stream import LOST, Attendance, Stream
 from service.routes.house import house
 
 router = APIRouter()
 
 SUBPROTOCOL = "sunbox.v1"
+CLOSE_CODES: dict[type[ServiceError], int] = {NotFound: 4404, TooManyRequests: 4429}
+REASON_CHARACTERS = 100  # a close frame holds 123 bytes of it
 
 
 @router.websocket("/v1/stream")
 async def stream(socket: WebSocket) -> None:
     own = house(socket)
     await socket.accept(SUBPROTOCOL if SUBPROTOCOL in socket.scope["subprotocols"] else None)
-    own.sockets.add(socket)
     try:
         info = await own.info()
-        await socket.send_text(json.dumps({"type": "hello", **info}))
         try:
-            client = Stream(own.engine, own.reader, socket)
-        except Unavailable as error:
-            return await socket.close(LOST, error.detail[:100])
-        await _until_closed(socket, client)
+            session = own.sessions.enter(socket.query_params.get("session"))
+        except ServiceError as error:
+            code = CLOSE_CODES.get(type(error), LOST)
+            return await socket.close(code, error.detail[:REASON_CHARACTERS])
+        try:
+            await socket.send_text(json.dumps({"type": "hello", "session": session.id, **info}))
+            await _until_closed(socket, session.stream)
+        finally:
+            own.sessions.leave(session)
     except WebSocketDisconnect:
         return
-    except RuntimeError:  # of Starlette, for what was to be sent when the server had just said farewell
+    except RuntimeError:  # of Starlette, for what was to be sent when the connection had just been closed
         if socket.application_state is not WebSocketState.DISCONNECTED:
             raise
-    finally:
-        own.sockets.discard(socket)
 
 
 async def _until_closed(socket: WebSocket, client: Stream) -> None:
-    running = asyncio.create_task(client.run())
+    attendance: Attendance = client.attach(socket)
+    attending = asyncio.create_task(client.attend(attendance))
     listening = asyncio.create_task(_listen(socket, client))
     try:
-        done, _ = await asyncio.wait({running, listening}, return_when=asyncio.FIRST_COMPLETED)
+        done, _ = await asyncio.wait({attending, listening}, return_when=asyncio.FIRST_COMPLETED)
         for task in done:
             task.result()
     finally:
-        running.cancel()
+        attending.cancel()
         listening.cancel()
-        await asyncio.gather(running, listening, return_exceptions=True)
+        await asyncio.gather(attending, listening, return_exceptions=True)
 
 
 async def _listen(socket: WebSocket, client: Stream) -> None:

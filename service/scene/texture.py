@@ -57,8 +57,13 @@ class ImageTexture(Model):
     ] = (1.0, 1.0)
     rotation: Annotated[
         Degrees,
-        hint("Rotation", "Turns u and v counter-clockwise about their origin, after the scale.",
-             unit="degrees", widget="angle", soft=(-180, 180)),
+        hint(
+            "Rotation",
+            "Turns u and v counter-clockwise about their origin, after the scale.",
+            unit="degrees",
+            widget="angle",
+            soft=(-180, 180),
+        ),
     ] = 0.0
     offset: Annotated[Pair, hint("Offset", "Added to u and v last.", unit="", widget="number")] = (0.0, 0.0)
     uv: Annotated[
@@ -72,9 +77,7 @@ class CheckerTexture(Model):
     type: Literal["checker"]
     a: Annotated[Radiometric, hint("First", "Of the square at u = v = 0.", unit="", widget="color", soft=1)]
     b: Annotated[Radiometric, hint("Second", "Of its neighbours.", unit="", widget="color", soft=1)]
-    scale: Annotated[
-        Pair, hint("Scale", "How many squares along u and v.", unit="", widget="number")
-    ] = (8.0, 8.0)
+    scale: Annotated[Pair, hint("Scale", "How many squares along u and v.", unit="", widget="number")] = (8.0, 8.0)
 
 
 def _kind(value: Any) -> str:
@@ -106,9 +109,7 @@ class ScalarTexture(_Reference):
 class ColorTexture(_Reference):
     """A texture in place of a colour."""
 
-    channel: Annotated[
-        Channel | None, OMITTABLE, hint("Channel", "Read as a grey; without it, the colour.")
-    ] = None
+    channel: Annotated[Channel | None, OMITTABLE, hint("Channel", "Read as a grey; without it, the colour.")] = None
     factor: Annotated[
         Factors, hint("Factor", "Multiplies the decoded texture; the product keeps to the parameter's range.",
                       unit="", widget="color", soft=1)
@@ -160,4 +161,3 @@ def references(material: Model) -> dict[str, Reference]:
     """A material's references to textures, by the name of the field."""
     found = ((name, getattr(material, name)) for name in type(material).model_fields)
     return {name: value for name, value in found if isinstance(value, _Reference)}  # type: ignore[misc]
-

@@ -1,0 +1,91 @@
+"""Streams and who attends to them: a client whose connection dropped takes its own up again, and nobody else's."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import secrets
+
+from service.problems import NotFound, TooManyRequests
+from service.rendering.engine import Engine
+from service.rendering.reading import Reader
+from service.rendering.stream import Stream
+
+ID_BYTES = 32  # 256 bits: nobody guesses one
+KEPT_S = 60.0  # of the contract: how long a session waits for its client to come back
+GOING_AWAY = 1001  # close code
+
+log = logging.getLogger(__name__)
+
+
+class Session:
+    def __init__(self, stream: Stream) -> None:
+        self.id = secrets.token_urlsafe(ID_BYTES)
+        self.stream = stream
+        self.connections = 0  # being served; while one takes another's place there are two
+        self.running = asyncio.create_task(stream.run())
+        self.timer: asyncio.TimerHandle | None = None
+
+
+class Sessions:
+    def __init__(self, engine: Engine, reader: Reader, most: int) -> None:
+        self._engine = engine
+        self._reader = reader
+        self._most = most
+        self._kept: dict[str, Session] = {}  # the longest left first, among those that are left
+
+    @property
+    def attended(self) -> int:
+        return sum(session.connections > 0 for session in self._kept.values())
+
+    @property
+    def waiting(self) -> int:
+        """Sessions whose clients may come back."""
+        return len(self._kept) - self.attended
+
+    def enter(self, id: str | None) -> Session:
+        """A new session, or the one of that id; `leave` ends what this begins.
+
+        Raises NotFound when it is gone, TooManyRequests when there is no room, Unavailable without a renderer.
+        """
+        session = self._kept.get(id) if id is not None else None
+        if id is not None and session is None:
+            raise NotFound("This session is gone: start anew.")
+        if (session is None or not session.connections) and self.attended >= self._most:
+            raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
+        if session is None:
+            session = Session(Stream(self._engine, self._reader))
+            self._kept[session.id] = session
+        if session.timer is not None:
+            session.timer.cancel()
+            session.timer = None
+        session.connections += 1
+        return session
+
+    def leave(self, session: Session) -> None:
+        """The connection is over; the session waits for another, unless the stream has ended."""
+        session.connections -= 1
+        if session.connections or session.id not in self._kept:
+            return
+        if session.stream.ended is not None:
+            self._end(session)
+            return
+        session.timer = asyncio.get_running_loop().call_later(KEPT_S, self._end, session)
+        self._kept[session.id] = self._kept.pop(session.id)
+        if self.waiting > self._most:  # who comes and goes all the time must not fill the renderer's memory
+            self._end(next(kept for kept in self._kept.values() if not kept.connections))
+
+    def close(self, reason: str) -> None:
+        """Ends them all; who attends is told that the server goes away."""
+        for session in list(self._kept.values()):
+            session.stream.end(GOING_AWAY, reason)
+            if not session.connections:
+                self._end(session)
+
+    def _end(self, session: Session) -> None:
+        if self._kept.pop(session.id, None) is None:
+            return
+        if session.timer is not None:
+            session.timer.cancel()
+        session.running.cancel()
+        log.info("session ended sessions=%d", len(self._kept))

@@ -1,0 +1,173 @@
+"""Connections that drop, come back, are taken up elsewhere or refused, against a real server."""
+
+from __future__ import annotations
+
+import asyncio
+import time
+from typing import Any
+
+import pytest
+from websockets.exceptions import ConnectionClosed
+
+from service import app
+from service.problems import NotFound, TooManyRequests
+from service.rendering import sessions
+from service.rendering.engine import Engine
+from service.rendering.sessions import Sessions
+from tests.serving import ENDLESS, SMALL, Client, Picture, Server
+
+
+def entered(server: Server, session: str | None = None) -> tuple[Client, str]:
+    """A stream that has said hello, and its session."""
+    client = Client(server.url, session=session)
+    hello, _ = client.until("hello")
+    return client, hello["session"]
+
+
+def closed_with(client: Client) -> int:
+    with client.socket, pytest.raises(ConnectionClosed) as closed:
+        client.until("never")
+    assert closed.value.rcvd is not None
+    return closed.value.rcvd.code
+
+
+def pictures(heard: list[Any]) -> list[Picture]:
+    return [message for message in heard if isinstance(message, Picture)]
+
+
+def test_a_dropped_connection_is_taken_up_with_its_samples(server: Server) -> None:
+    first, session = entered(server)
+    first.acknowledges = False
+    first.start(settings={**ENDLESS, "width": 64, "height": 64})
+    frames = [first.frame(), first.frame()]
+    first.socket.socket.close()  # no farewell
+    time.sleep(1.0)
+    second, again = entered(server, session)
+    with second.socket:
+        assert again == session
+        taken = second.frame()
+        assert taken.generation == 1 and taken.seq == frames[-1].seq + 1 and taken.samples >= frames[-1].samples
+        more = [second.frame() for _ in range(4)]  # the old frames' credits are free
+        assert more[-1].samples > taken.samples and more[-1].seq == taken.seq + 4
+        rendered_s, passed_s = more[-1].elapsed_s - frames[-1].elapsed_s, more[-1].at - frames[-1].at
+        assert rendered_s < passed_s - 0.4, "it was not paused meanwhile"
+        second.say("update", generation=2, settings={"seed": 1})
+        assert second.frame(generation=2)
+
+
+def test_a_picture_that_rests_rests_on(server: Server) -> None:
+    """Done is said again, and what the client has paused stays so."""
+    first, session = entered(server)
+    with first.socket:
+        first.start()
+        done, _ = first.finished()
+    second, _ = entered(server, session)
+    with second.socket:
+        assert second.finished()[0] == done
+        second.say("update", generation=2, settings=ENDLESS)
+        second.frame(generation=2)
+        second.say("pause")
+        second.say("ping")
+        second.until("pong")
+    third, _ = entered(server, session)
+    with third.socket:
+        samples = third.frame().samples
+        assert not third.silence(0.3)
+        third.say("resume")
+        assert third.frame().samples > samples
+
+
+def test_taken_up_elsewhere(server: Server) -> None:
+    first, session = entered(server)
+    first.start(settings=ENDLESS)
+    first.frame()
+    second, _ = entered(server, session)
+    with second.socket:
+        assert closed_with(first) == 4409
+        assert second.frame().generation == 1
+        second.say("update", generation=2, settings={"seed": 1})
+        assert second.frame(generation=2)
+
+
+@pytest.mark.parametrize("session", ["", "x" * 43])
+def test_a_session_that_is_gone(server: Server, session: str) -> None:
+    assert closed_with(Client(server.url, session=session)) == 4404
+
+
+def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Without a renderer: who is let in, and what is forgotten when."""
+    monkeypatch.setattr(sessions, "KEPT_S", 0.05)
+
+    async def test() -> None:
+        engine: Any = Engine()
+        engine.open = lambda listener: 1
+        kept = Sessions(engine, None, most=2)  # type: ignore[arg-type]
+        one, two = kept.enter(None), kept.enter(None)
+        assert one.id != two.id and kept.attended == 2
+        with pytest.raises(TooManyRequests):
+            kept.enter(None)
+        assert kept.enter(one.id) is one  # takes a place that is its own
+        kept.leave(one)
+        kept.leave(one)
+        assert (kept.attended, kept.waiting) == (1, 1)
+        others = [kept.enter(None)]
+        with pytest.raises(TooManyRequests):
+            kept.enter(one.id)
+        for session in others:
+            kept.leave(session)
+        for _ in range(5):  # coming and going leaves no more sessions than clients
+            kept.leave(kept.enter(None))
+        assert (kept.attended, kept.waiting) == (1, 2)
+        await asyncio.sleep(0.2)
+        assert (kept.attended, kept.waiting) == (1, 0)
+        with pytest.raises(NotFound):
+            kept.enter(one.id)
+        assert one.running.cancelled()
+        kept.close("Good night.")
+        assert two.stream.ended is not None and two.stream.ended.code == 1001
+        kept.leave(two)
+        assert kept.attended == kept.waiting == 0
+        await asyncio.sleep(0)
+
+    asyncio.run(test())
+
+
+class Stuck:
+    """A connection whose client has vanished: what it was sent last never leaves, so it never closes."""
+
+    def __init__(self, closing: bool) -> None:
+        self.transport = self
+        self.closing, self.aborted = closing, False
+
+    def is_closing(self) -> bool:
+        return self.closing
+
+    def abort(self) -> None:
+        self.aborted = True
+
+
+def test_vanished_clients_are_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(app, "STUCK_S", 0.0)
+    gone, there = Stuck(closing=True), Stuck(closing=False)
+    stuck = app.Stuck()
+    stuck.abort([gone, there])
+    assert not gone.aborted, "it may have just begun to close"
+    stuck.abort([gone, there])
+    assert gone.aborted and not there.aborted
+
+
+def test_too_many_clients_and_going_away(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> None:
+    server = Server(tmp_path_factory.mktemp("small"), SUNBOX_MAX_CLIENTS="1")
+    server.wait()
+    first, session = entered(server)
+    assert server.http.get("/v1/info").json()["limits"]["max_clients"] == 1
+    assert closed_with(Client(server.url)) == 4429
+    second, _ = entered(server, session)  # its own place
+    assert closed_with(first) == 4409
+    second.start(settings={**SMALL, "max_samples": 1 << 24})
+    second.frame()
+    began = time.monotonic()
+    server.process.terminate()
+    assert closed_with(second) == 1001
+    assert server.process.wait(15) == 0 and time.monotonic() - began < 15
+    server.http.close()
