@@ -76,6 +76,11 @@ def allocate(context: Any, contents: np.ndarray | int) -> Any:
     return buffer
 
 
+def storage_block_bytes(context: Any) -> int:
+    """The most of a buffer that a kernel may see at once."""
+    return int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
+
+
 def describe(context: Any) -> dict[str, Any]:
     """Renderer, version and vendor as the driver says them; `software`: it runs on the CPU."""
     info = context.info

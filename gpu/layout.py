@@ -302,6 +302,7 @@ class Frame(Record):
     environment_sun_cap: f32  # 1 - cos of its angular radius
     environment_sun_radiance: vec3
     environment_sun_share: f32  # of the environment's samples
+    slot_first: u32  # the pixel at the beginning of the bound part of the accumulators
     sun_first: u32  # among the lights: directional ones with a disk stand side by side
     sun_count: u32
 

@@ -19,13 +19,13 @@ from gpu.program import Kernels
 from gpu.saved import Saved
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
+from gpu.tiles import Tile, Tiles
 
-_SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
-_PASS_S = 0.2  # samples per pass aim at this, once there are some
-_MAX_SAMPLES_A_PASS = 256
 _GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
 _GUIDE_PIXELS = 1 << 16  # traced at once for them: 25 ms on llvmpipe in a large mesh
 _METER_PIXELS = 4096  # the noise meter looks at about so many pixels
+_LINE = 1024  # pixels that resolve.comp takes for a row
+_ALIGNED = 32  # pixels: a multiple of it is, at 8 bytes or 16, where a binding may begin on any driver
 IDS = ("shape_id", "material_id")
 
 
@@ -35,7 +35,6 @@ class Picture:
     def __init__(self, context: Any, kernels: Kernels, frame: Any, scene: Scene, settings: RenderSettings) -> None:
         self.context, self._kernels, self._frame_buffer = context, kernels, frame
         self.scene, self.settings = scene, settings
-        self._cost_s = 0.0  # seconds per sample of one pixel, measured; 0: unknown
         self.compile_ms = 0.0
         pixels = settings.width * settings.height
         self._stride = max(1, min(8, math.isqrt(max(1, pixels // _METER_PIXELS))))
@@ -46,6 +45,8 @@ class Picture:
         self._ended = context.buffer(reserve=16)
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
         self._kernel: Any = None
+        self._most_pixels = contexts.storage_block_bytes(context) // 16 // _ALIGNED * _ALIGNED - _ALIGNED
+        self._cut()
         try:
             self._allocate(self._main, pixels)
             self._allocate(self._meter, self._cells[0] * self._cells[1])
@@ -70,8 +71,9 @@ class Picture:
         contexts.use(self.context)
         kernel = self._kernels.get("pathtrace.comp", self.scene.defines(self.settings))
         self.compile_ms += self._kernels.last_compile_ms
-        if kernel is not self._kernel:
-            self._kernel, self._cost_s = kernel, 0.0
+        if kernel is not self._kernel or self._tiles.max_bounces != self.settings.max_bounces:
+            self._kernel = kernel
+            self._cut()
         for buffer in (*self.state, *self._guides.values()):
             buffer.clear()
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
@@ -80,7 +82,12 @@ class Picture:
         self.samples = 0
         self._guide_samples, self._guide_row = 0, 0
         self._pass_samples = 0  # samples of the pass under way; 0: none is
-        self._row, self._column = 0, 0  # where its next tile begins
+        self._row, self._column = 0, 0  # where its next tile begins; rows beyond the picture are the meter's
+
+    def _cut(self) -> None:
+        s = self.settings
+        self._tiles = Tiles(s.width, s.height, self._most_pixels, s.max_bounces)
+        self._meter_tiles = Tiles(*self._cells, self._most_pixels, s.max_bounces)
 
     @property
     def state(self) -> list[Any]:
@@ -112,7 +119,7 @@ class Picture:
     @property
     def cost_s(self) -> float:
         """Seconds per sample of one pixel, as measured so far; 0 before the first slice."""
-        return self._cost_s
+        return self._tiles.cost_s
 
     @property
     def warnings(self) -> list[str]:
@@ -127,42 +134,27 @@ class Picture:
         self._bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
-                self._pass_samples = min(self._choose_pass(), max_samples - self.samples)
+                self._pass_samples = min(self._tiles.pass_samples(self.samples), max_samples - self.samples)
             self._slice()
             if time.perf_counter() - start >= budget_s:
                 break
         return time.perf_counter() - start
 
-    def _choose_pass(self) -> int:
-        if self.samples == 0 or self._cost_s == 0:
-            return 1
-        whole_s = self._cost_s * self.settings.width * self.settings.height
-        return max(1, min(int(_PASS_S / whole_s), self.samples, _MAX_SAMPLES_A_PASS))
-
-    def _tile(self) -> tuple[int, int, int, int]:
-        """x, y, width, height of the next tile: full rows where they fit, else part of one band of 16 rows."""
-        width, height = self.settings.width, self.settings.height
-        rate = (self._cost_s or 2e-7) * self._pass_samples
-        pixels = max(256.0, _SLICE_S / rate)
-        if self._column == 0 and pixels >= 16 * width:
-            rows = min(int(pixels // width) // 8 * 8, height - self._row)
-            return 0, self._row, width, max(rows, 1)
-        columns = max(16, int(pixels / 16) // 8 * 8)
-        return self._column, self._row, min(columns, width - self._column), min(16, height - self._row)
-
     def _slice(self) -> None:
-        x, y, width, height = self._tile()
+        """The next tile of the pass: of the picture, then of the meter."""
+        height = self.settings.height
+        metering = self._row >= height
+        tiles = self._meter_tiles if metering else self._tiles
+        tile = tiles.tile(self._row - height if metering else self._row, self._column, self._pass_samples)
         start = time.perf_counter()
-        self._dispatch(self._main, (x, y), (width, height))
+        self._dispatch(tile, metering)
         self.context.finish()
-        cost = (time.perf_counter() - start) / (width * height * self._pass_samples)
-        self._cost_s = cost if self._cost_s == 0 else 0.7 * self._cost_s + 0.3 * cost
-        self._column = x + width
-        if self._column >= self.settings.width:
-            self._column, self._row = 0, y + height
-        if self._row >= self.settings.height:
+        tiles.took(tile, self._pass_samples, time.perf_counter() - start)
+        self._column = tile[0] + tile[2]
+        if self._column >= tiles.size[0]:
+            self._column, self._row = 0, self._row + tile[3]
+        if self._row >= height + self._cells[1]:
             self._row = 0
-            self._dispatch(self._meter, (0, 0), self._cells, stride=self._stride, replicate=1)
             self.samples += self._pass_samples
             self._pass_samples = 0
 
@@ -184,20 +176,26 @@ class Picture:
         self._frame_buffer.bind_to_uniform_block(layout.FRAME_BLOCK)
         self._filter.bind_to_uniform_block(layout.FILTER_BLOCK)
 
-    def _dispatch(
-        self,
-        buffers: dict[Slot, Any],
-        tile: tuple[int, int],
-        size: tuple[int, int],
-        stride: int = 1,
-        replicate: int = 0,
-    ) -> None:
-        frame = self._frame(tile, size, self.samples, self._pass_samples)
-        frame["pixel_stride"], frame["replicate"] = stride, replicate
-        self._frame_buffer.write(frame.tobytes())
+    def _bind_part(self, buffers: dict[Slot, Any], tile: Tile, width: int) -> int:
+        """Binds the part of each buffer that a tile touches, as a driver may bind no more than 128 MiB; its first
+        pixel."""
+        x, y, columns, rows = tile
+        first = (y * width + x) // _ALIGNED * _ALIGNED
+        count = (y + rows - 1) * width + x + columns - first
         for slot, buffer in buffers.items():
-            buffer.bind_to_storage_buffer(int(slot))
-        self._kernel.run(-(-size[0] // 8), -(-size[1] // 8))
+            pixel_bytes = 8 if slot == Slot.OUTPUT else 16
+            buffer.bind_to_storage_buffer(int(slot), offset=first * pixel_bytes, size=count * pixel_bytes)
+        return first
+
+    def _dispatch(self, tile: Tile, metering: bool) -> None:
+        frame = self._frame(tile[:2], tile[2:], self.samples, self._pass_samples)
+        if metering:
+            frame["pixel_stride"], frame["replicate"] = self._stride, 1
+            frame["slot_first"] = self._bind_part(self._meter, tile, self._cells[0])
+        else:
+            frame["slot_first"] = self._bind_part(self._main, tile, self.settings.width)
+        self._frame_buffer.write(frame.tobytes())
+        self._kernel.run(-(-tile[2] // 8), -(-tile[3] // 8))
 
     def _need_samples(self) -> None:
         contexts.use(self.context)
@@ -274,12 +272,12 @@ class Picture:
         if self._guide_samples < want:
             kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
             self._bind()
-            for slot, buffer in self._guides.items():
-                buffer.bind_to_storage_buffer(int(slot))
-        rows = max(8, _GUIDE_PIXELS // width // 8 * 8)
+        rows = max(1 if width > _GUIDE_PIXELS else 8, _GUIDE_PIXELS // width // 8 * 8)
         while self._guide_samples < want and time.perf_counter() - start < budget_s:
             size = (width, min(rows, height - self._guide_row))
-            self._frame_buffer.write(self._frame((0, self._guide_row), size, self._guide_samples, 1).tobytes())
+            frame = self._frame((0, self._guide_row), size, self._guide_samples, 1)
+            frame["slot_first"] = self._bind_part(self._guides, (0, self._guide_row, *size), width)
+            self._frame_buffer.write(frame.tobytes())
             kernel.run(-(-size[0] // 8), -(-size[1] // 8))
             self.context.finish()
             self._guide_row += size[1]
@@ -325,21 +323,27 @@ class Picture:
             return display.encode(aov, self.read(aov), dtype)
         width, height = self.settings.width, self.settings.height
         floats = dtype == "f4"
-        defines = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve", "OUTPUT_FLOAT": int(floats)}
+        defines = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve"}
+        defines |= {"OUTPUT_FLOAT": int(floats), "LINE": _LINE}
         kernel = self._kernels.get("resolve.comp", defines)
-        output = self.context.buffer(reserve=(16 if floats else 4) * width * height)
-        kernel["size"].value = (width, height)
         kernel["exposure"].value = 2.0**exposure
         own = [] if color is None else [self.context.buffer(a.tobytes()) for a in (color, np.ones_like(color))]
         sums, counts = own or (self._main[Slot.SUM], self._main[Slot.MOMENTS])
-        sums.bind_to_storage_buffer(int(Slot.SUM))
-        counts.bind_to_storage_buffer(int(Slot.MOMENTS))
-        output.bind_to_storage_buffer(int(Slot.OUTPUT))
-        kernel.run(-(-width // 8), -(-height // 8))
-        pixels = np.frombuffer(output.read(), np.float32 if floats else np.uint8).reshape(height, width, 4)
-        for buffer in (output, *own):
+        parts = []
+        for first in range(0, width * height, self._most_pixels):  # no more than a driver binds at once
+            count = min(self._most_pixels, width * height - first)
+            output = contexts.allocate(self.context, (16 if floats else 4) * count)
+            for slot, source in ((Slot.SUM, sums), (Slot.MOMENTS, counts)):
+                source.bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
+            output.bind_to_storage_buffer(int(Slot.OUTPUT))
+            kernel["count"].value = count
+            kernel.run(_LINE // 8, -(-count // (8 * _LINE)))
+            parts.append(output.read())
+            output.release()
+        for buffer in own:
             buffer.release()
-        return pixels
+        pixels = np.frombuffer(b"".join(parts), np.float32 if floats else np.uint8)
+        return pixels.reshape(height, width, 4)
 
     def release(self) -> None:
         contexts.use(self.context)

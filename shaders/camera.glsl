@@ -24,6 +24,6 @@ bool camera_pixel(out uvec2 pixel, out uint slot) {
     bool there = g.x < frame.tile_size.x && g.y < frame.tile_size.y && cell.x < cells.x && cell.y < cells.y;
     uint h = stride > 1u ? sobol_hash(cell.x ^ sobol_hash(cell.y)) : 0u;
     pixel = min(cell * stride + uvec2(h % stride, (h >> 8u) % stride), frame.resolution - 1u);
-    slot = cell.y * cells.x + cell.x;
+    slot = cell.y * cells.x + cell.x - frame.slot_first;
     return there;
 }

@@ -15,7 +15,7 @@ layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 pixe
 #else
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 #endif
-uniform uvec2 size;
+uniform uint count; // of the pixels that are bound, whatever rows they stand in
 uniform float exposure; // factor
 
 vec3 resolve_srgb(vec3 c) { // IEC 61966-2-1
@@ -24,8 +24,8 @@ vec3 resolve_srgb(vec3 c) { // IEC 61966-2-1
 
 void main() {
     uvec2 g = gl_GlobalInvocationID.xy;
-    if (g.x >= size.x || g.y >= size.y) return;
-    uint slot = g.y * size.x + g.x;
+    uint slot = g.y * uint(LINE) + g.x;
+    if (slot >= count) return;
     vec4 sum = sums[slot];
     float n = moments[slot].w;
     vec4 mean = n > 0.0 ? sum / n : vec4(0.0);

@@ -57,4 +57,4 @@ def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
     everything = features.defines(frozenset(features.FLAGS))
     for entry in ("pathtrace.comp", "guides.comp"):
         Source(entry, everything)  # raises where a name in #if is not defined
-    Source("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0})
+    Source("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0, "LINE": 1024})

@@ -39,8 +39,8 @@ def test_it_goes_on_to_the_same_bits(gpu: Renderer, monkeypatch: pytest.MonkeyPa
     whole = picture(gpu, SCENE, 9)
     half = picture(gpu, SCENE, 4)
     for _ in range(tiles):  # in the middle of a pass
-        half._pass_samples = half._choose_pass()
-        half._cost_s = 1.0  # so dear that a tile is a part of the picture
+        half._pass_samples = half._tiles.pass_samples(half.samples)
+        half._tiles.took((0, 0, 32, 32), 1, 1024.0)  # so dear that a tile is a part of the picture
         half._slice()
     state, steps = saved(half)
     assert state.samples == 4 and steps > 3 * 32 * 32 * 16 // 5000

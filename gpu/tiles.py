@@ -1,0 +1,65 @@
+"""How a pass over a picture is cut: by what each band of rows has cost, so that slices take about as long everywhere.
+
+Runs without GL.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
+PASS_S = 0.2  # samples per pass aim at this, once there are some
+MAX_SAMPLES_A_PASS = 256
+BAND = 16  # rows
+_LEAST = 8  # columns of a tile, a work group's: no smaller piece is cheaper
+_GUESS_S = 2e-7  # of a sample of a pixel, before any was measured
+_USUAL_BOUNCES = 16  # of more, a path that nobody has seen yet may cost as much more than those seen
+
+Tile = tuple[int, int, int, int]  # x, y, width, height
+
+
+class Tiles:
+    """Tiles of `width` x `height` pixels in order. No more than `most` pixels lie between a tile's first and last."""
+
+    def __init__(self, width: int, height: int, most: int, max_bounces: int = 0) -> None:
+        self.size, self.max_bounces = (width, height), max_bounces
+        self._band = BAND if BAND * width <= most else max(1, most // width)
+        self._most_rows = max(self._band, most // width // self._band * self._band)
+        self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
+        self._caution = max(1.0, max_bounces / _USUAL_BOUNCES)
+        self._rates = np.zeros(-(-height // self._band))  # s per sample of a pixel, by band; 0: unknown
+        self.cost_s = 0.0  # the same of late; 0: unknown
+
+    def tile(self, row: int, column: int, samples: int) -> Tile:
+        """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
+        width, height = self.size
+        first = row // self._band
+        guess = (self.cost_s or _GUESS_S) * self._caution
+        pixels = SLICE_S / samples / (self._rates[first] or guess)
+        rows = min(self._band, height - row)
+        if column == 0 and pixels >= self._band * width:
+            left = SLICE_S / samples / (self._band * width) - self._rates[first]
+            for rate in self._rates[first + 1 :]:
+                left -= rate or guess
+                if left < 0 or rows + self._band > self._most_rows:
+                    break
+                rows += self._band
+            return 0, row, width, min(rows, height - row)
+        columns = int(min(max(pixels / self._band, _LEAST), width)) // _LEAST * _LEAST
+        return column, row, min(max(columns, _LEAST), self._most_columns, width - column), rows
+
+    def took(self, tile: Tile, samples: int, seconds: float) -> None:
+        """What a tile has cost: a dearer one counts at once, a cheaper one bit by bit."""
+        _, y, width, height = tile
+        rate = seconds / (width * height * samples)
+        self.cost_s = rate if self.cost_s == 0 else 0.7 * self.cost_s + 0.3 * rate
+        bands = self._rates[y // self._band : -(-(y + height) // self._band)]
+        bands[:] = np.where(bands == 0, rate, np.maximum(rate, 0.7 * bands + 0.3 * rate))
+
+    def pass_samples(self, samples: int) -> int:
+        """How many samples of every pixel to take at once after `samples`: the smallest tile shall fit a slice."""
+        if samples == 0 or self.cost_s == 0:
+            return 1
+        width, height = self.size
+        most = min(PASS_S / (self.cost_s * width * height), SLICE_S / (self._rates.max() * _LEAST * self._band))
+        return max(1, min(int(most), samples, MAX_SAMPLES_A_PASS))

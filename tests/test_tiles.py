@@ -1,0 +1,79 @@
+"""A picture is cut by cost, and bound in parts: neither shows in a bit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpu import Renderer
+from gpu import context as contexts
+from gpu.tiles import SLICE_S, Tiles
+from tests.extremes.scenes import everything
+from tests.rendering import picture
+
+SIZES = [(1, 1), (8, 8), (33, 17), (512, 512), (1000, 3), (3, 1000), (4096, 4096), (1 << 24, 1), (1, 1 << 24)]
+
+
+@pytest.mark.parametrize("size", SIZES)
+@pytest.mark.parametrize("most", [1 << 30, (128 << 20) // 16 - 32])
+@pytest.mark.parametrize("cost_s", [1e-9, 1e-6, 1e-2])
+def test_tiles_cover_every_pixel_once(size: tuple[int, int], most: int, cost_s: float) -> None:
+    tiles = Tiles(*size, most)
+    row = column = covered = 0
+    while row < size[1] and covered < 1 << 20:  # of the large ones a part
+        x, y, width, height = tile = tiles.tile(row, column, 1)
+        assert (x, y) == (column, row) and width > 0 and height > 0
+        assert x + width <= size[0] and y + height <= size[1]
+        assert (height - 1) * size[0] + width <= most
+        tiles.took(tile, 1, cost_s * width * height)
+        covered += width * height
+        column = x + width
+        if column == size[0]:
+            column, row = 0, y + height
+    assert covered == size[0] * size[1] or covered >= 1 << 20
+
+
+def test_a_dear_band_gets_small_tiles_and_its_cheap_neighbours_large_ones() -> None:
+    tiles = Tiles(512, 512, 1 << 30)
+    for band in range(32):
+        rate = 1e-4 if band == 20 else 1e-8
+        tiles.took((0, 16 * band, 512, 16), 1, rate * 512 * 16)
+    for _ in range(20):  # what is late is cheap
+        tiles.took((0, 0, 512, 16), 1, 1e-8 * 512 * 16)
+    assert tiles.tile(0, 0, 1) == (0, 0, 512, 320)  # up to the dear one
+    _, _, width, height = tiles.tile(320, 0, 1)
+    assert width * height * 1e-4 < 2 * SLICE_S
+    assert tiles.pass_samples(1000) == 1
+
+
+def test_paths_that_may_be_long_begin_with_small_tiles() -> None:
+    assert np.prod(Tiles(512, 512, 1 << 30, 1024).tile(0, 0, 1)[2:]) <= 1024
+    assert np.prod(Tiles(512, 512, 1 << 30, 8).tile(0, 0, 1)[2:]) > 16_000
+
+
+@pytest.mark.parametrize("limit", [32 << 10, 100_000])
+def test_a_picture_of_many_parts_is_the_same(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, limit: int) -> None:
+    """As on a driver that binds no more; llvmpipe drops what is written outside of a bound part."""
+    whole = picture(gpu, everything(), 3, width=150, height=90)
+    monkeypatch.setattr(contexts, "storage_block_bytes", lambda _: limit)
+    parts = picture(gpu, everything(), 3, width=150, height=90)
+    for aov in ("color", "variance", "albedo", "normal", "depth", "shape_id", "material_id"):
+        assert np.array_equal(parts.read(aov), whole.read(aov)), aov
+    assert np.array_equal(parts.display(), whole.display())
+    assert np.array_equal(parts.display(dtype="f4"), whole.display(dtype="f4"))
+    assert parts.noise() == whole.noise()
+    for made in (whole, parts):
+        made.release()
+        made.scene.release()
+
+
+def test_sixteen_megapixels(gpu: Renderer) -> None:
+    """Accumulators of 256 MiB each, where a kernel may see 128 MiB at once: every pixel gets its sample."""
+    sky = {"type": "constant", "radiance": 0.5}
+    scene = {"version": 1, "camera": {"position": [0, 0, 4], "target": [0, 0, 0]}, "environment": sky,
+             "materials": {}, "shapes": []}  # fmt: skip
+    made = picture(gpu, scene, 1, width=4096, height=4096)
+    assert (made.read() == np.float32([0.5, 0.5, 0.5, 1])).all()
+    assert (made.display()[..., 3] == 255).all()
+    made.release()
+    made.scene.release()
