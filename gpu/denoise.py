@@ -7,6 +7,7 @@ tradeoff` says by how much. It gives the same bits for the same pixels on the sa
 from __future__ import annotations
 
 from functools import cache
+from importlib import metadata, util
 
 import numpy as np
 
@@ -16,6 +17,13 @@ SMALLEST = 16  # pixels a side; smaller pictures are mostly the network's own pa
 # and beyond that it invents (1e20 came out as 3.5e20).
 BRIGHTEST = 1e4
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+
+
+def version() -> str | None:
+    """Of the library, as far as can be told without loading it; None where it is not installed."""
+    if util.find_spec("pyoidn") is None:
+        return None
+    return f"Open Image Denoise (pyoidn {metadata.version('pyoidn')})"
 
 
 @cache

@@ -86,7 +86,7 @@ def test_scene_mistake_names_its_pointer(
         (["--set", "samples=9"], "/samples"),
         (["--set", "target_noise=nan"], "/target_noise"),
         (["--set", "estimator=bdpt"], "/estimator"),
-        (["--set", "denoise=true"], "/denoise"),
+        (["--set", "denoise=1"], "/denoise"),
         (["--set", "width"], "key=value"),
         (["--spp", "-4"], "/max_samples"),
         (["--seed", "1.5"], "/seed"),

@@ -155,7 +155,7 @@ def test_size_may_change(client: Client) -> None:
         ({"scene": {"camera": {"position": [0, 0, float("nan")]}}}, "/scene/camera/position"),
         ({"scene": {"shapes": [{"type": "mesh", "asset": UNKNOWN, "material": "ball"}]}}, "/scene/shapes/0/asset"),
         ({"settings": {"width": 0}}, "/settings/width"),
-        ({"settings": {"denoise": True}}, "/settings/denoise"),
+        ({"settings": {"denoise": 1}}, "/settings/denoise"),
         ({"scenery": {}}, "/scenery"),
     ],
 )

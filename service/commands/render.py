@@ -62,6 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
                 setup_s = time.perf_counter() - began
                 tracing.run(interrupt)
                 files.write(output.path, _encode(tracing, output, document, names))
+                tracing.close()
         except GpuError as error:
             raise Failed(str(error)) from None
         if stats:

@@ -24,6 +24,7 @@ from service.rendering.messages import (
     Update,
     View,
 )
+from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.task import Task
 
 if TYPE_CHECKING:
@@ -32,6 +33,7 @@ if TYPE_CHECKING:
     from service.quality import ResolvedSettings
 
 NUMBER = 1  # of the only task
+SIGNAL_S = 0.1  # how long a signal may go unnoticed while the denoiser works
 
 
 class Interrupt:
@@ -63,28 +65,41 @@ class Tracing:
         self._line = ProgressLine()
         self._reason: str | None = None
         self._pixels: np.ndarray | None = None
+        self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
-        self._task = Task(renderer, NUMBER, self._hear)
-        self._task.update(Update(NUMBER, 1, scene=packed.arrays, settings=settings.for_gpu(), stop=stop))
+        self._denoiser = Denoiser()
+        self._task = Task(renderer, NUMBER, self._hear, self._denoiser)
+        update = Update(NUMBER, 1, packed.arrays, settings.for_gpu(), stop, denoise=settings.denoise)
+        self._task.update(update)
 
     def run(self, interrupt: Interrupt) -> None:
         """Returns when the first limit is reached, or soon after a signal."""
-        while self._task.ready:
+        while self._reason is None:
             if interrupt.signal is None:
-                self._task.step()
+                self._go_on()
             else:
                 self._task.stop()
         self._line.close()
 
     def pixels(self, view: View) -> np.ndarray:
         """The picture so far. Raises Failed before its first sample."""
-        self._pixels = None
+        self._pixels, self._answered = None, False
         self._task.read(Read(NUMBER, 1, view))
-        while self._pixels is None and self._task.ready:
-            self._task.step()  # the AOVs of the first hit are traced when asked for
+        while not self._answered:
+            self._go_on()  # the AOVs of the first hit are traced when asked for, the picture is denoised
         if self._pixels is None:
             raise Failed("stopped before the first sample: there is no picture yet")
         return self._pixels
+
+    def close(self) -> None:
+        self._denoiser.close()
+
+    def _go_on(self) -> None:
+        if self._task.ready:
+            self._task.step()
+        else:
+            self._denoiser.sleep(timeout_s=SIGNAL_S)
+        self._denoiser.hear()
 
     def status(self, setup_s: float) -> dict[str, Any]:
         """What GET /v1/renders/{id} says of a render at its end."""
@@ -102,7 +117,7 @@ class Tracing:
 
     def _hear(self, message: FromRenderer) -> None:
         if isinstance(message, Image):
-            self._pixels = message.pixels
+            self._pixels, self._answered = message.pixels, True
         elif isinstance(message, Progressed):
             if self._line.due():
                 self._line.show(message.progress)

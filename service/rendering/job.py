@@ -32,7 +32,7 @@ from service.rendering.reading import stop_rule, weight
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 
 ID_BYTES = 16  # 128 bits: nobody guesses one
-PICTURE_BYTES = 112  # the renderer's accumulators, a pixel: three vec4, two more with the AOVs, and the noise meter's
+PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
 
 
 class Job:
@@ -75,7 +75,8 @@ class Job:
             self._task = self._engine.open(self, "render")
             arrays, self._packed = self._packed.arrays, None
             settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
-            await self._engine.send_scene(Update(self._task, 1, arrays, settings, stop))
+            update = Update(self._task, 1, arrays, settings, stop, denoise=self._settings.denoise)
+            await self._engine.send_scene(update)
             if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
                 self._engine.send(Stop(self._task))
         except ServiceError as error:

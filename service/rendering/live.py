@@ -94,6 +94,8 @@ class Live:
             update = replace(update, settings=new.settings.for_gpu())
         if old is None or stop_rule(old.settings) != stop_rule(new.settings):
             update = replace(update, stop=stop_rule(new.settings))
+        if old is None or old.settings.denoise != new.settings.denoise:
+            update = replace(update, denoise=new.settings.denoise)
         touched = change(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
             arrays = self._reader.pack(new.scene, self._cache).arrays

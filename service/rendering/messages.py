@@ -46,7 +46,7 @@ class Update:
     """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
 
     `scene` is a gpu.SceneArrays, `settings` the arguments of gpu.RenderSettings; `camera`, `materials` and
-    `environment` are those of `Scene.edit`. Any of them starts accumulation again, `stop` alone doesn't.
+    `environment` are those of `Scene.edit`. Any of them starts accumulation again, `stop` and `denoise` don't.
     """
 
     task: int
@@ -57,6 +57,7 @@ class Update:
     camera: Any = None
     materials: np.ndarray | None = None
     environment: tuple[float, float] | None = None
+    denoise: bool | None = None
     interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
 
     @property
@@ -71,8 +72,10 @@ class Update:
     def then(self, later: Update) -> Update:
         """This update and a later one of the same task as one."""
         if later.scene is not None:  # a whole scene: the edits before it are in it
-            return replace(later, settings=later.settings or self.settings, stop=later.stop or self.stop)
-        names = ("settings", "stop", "camera", "materials", "environment")
+            denoise = self.denoise if later.denoise is None else later.denoise
+            settings, stop = later.settings or self.settings, later.stop or self.stop
+            return replace(later, settings=settings, stop=stop, denoise=denoise)
+        names = ("settings", "stop", "denoise", "camera", "materials", "environment")
         values = {name: getattr(later, name) for name in names if getattr(later, name) is not None}
         return replace(self, generation=later.generation, **values)
 
@@ -153,6 +156,7 @@ class Frame:
     progress: Progress
     scale: float
     last: bool
+    denoised: bool = False
 
 
 @dataclass(frozen=True)
@@ -163,6 +167,7 @@ class Image:
     serial: int
     pixels: np.ndarray | None
     progress: Progress
+    denoised: bool = False
 
 
 @dataclass(frozen=True)

@@ -104,6 +104,8 @@ def frame_bytes(frame: Frame, view: View, seq: int) -> bytes:
         "eta_s": progress.eta_s,
         "scale": frame.scale,
     }
+    if frame.denoised:
+        header["denoised"] = True
     text = json.dumps(header, separators=(",", ":")).encode()
     return b"".join((struct.pack("<I", len(text)), text, body))
 

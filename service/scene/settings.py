@@ -148,7 +148,10 @@ class Settings(Model):
             soft=100,
         ),
     ] = None
-    denoise: Annotated[NotYet, hint("Denoise", "Filters the finished picture: not built yet.")] = False
+    denoise: Annotated[
+        bool,
+        hint("Denoise", "Filters noise out of the picture while there is much of it; what is shown is then biased."),
+    ] = False
 
 
 _SETTINGS = TypeAdapter(Settings)

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import argparse
-import ctypes
 import logging
 import os
 import signal
@@ -11,9 +10,9 @@ import socket
 
 from service.rendering import link
 from service.rendering.messages import Ready, Unable
+from service.rendering.worker.lifeline import end_with
 
 NICENESS = 10  # the server's event loop and the encoders come first; llvmpipe's threads inherit it
-PR_SET_PDEATHSIG = 1
 
 log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
 
@@ -26,7 +25,7 @@ def main() -> int:
     parser.add_argument("--server", type=int, required=True, help="its process id")
     arguments = parser.parse_args()
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C reaches the server, which ends this process in good order
-    if not _end_with(arguments.server):
+    if not end_with(arguments.server):
         return 0
     os.nice(NICENESS)
     logging.basicConfig(level=arguments.log_level, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
@@ -38,7 +37,7 @@ def main() -> int:
 
 
 def _serve(end: socket.socket, device: int | None) -> int:
-    from gpu import GpuError, Renderer
+    from gpu import GpuError, Renderer, denoise
     from service.rendering.worker.loop import Loop
 
     try:
@@ -46,16 +45,10 @@ def _serve(end: socket.socket, device: int | None) -> int:
     except GpuError as error:
         link.send(end, Unable(str(error)))
         return 1
-    link.send(end, Ready(renderer.info))
+    link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
     Loop(end, renderer).run()
     return 0
-
-
-def _end_with(server: int) -> bool:
-    """Has the kernel kill this process when the server dies, however it dies; False when it is dead already."""
-    ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
-    return os.getppid() == server
 
 
 if __name__ == "__main__":

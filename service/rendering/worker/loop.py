@@ -26,6 +26,7 @@ from service.rendering.messages import (
     Want,
 )
 from service.rendering.scheduler import Scheduler
+from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.task import Task
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
@@ -44,17 +45,19 @@ class Loop:
         self._renderer = renderer
         self._tasks: dict[int, Task] = {}
         self._scheduler = Scheduler()
+        self._denoiser = Denoiser()
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = 0
         self._reported = 0.0
 
     def run(self) -> None:
-        """Until the server is gone: raises link.Closed. Sleeps on the socket when there is nothing to do."""
+        """Until the server is gone: raises link.Closed. Sleeps on its sockets when there is nothing to do."""
         busy = False
         while True:
             for message in coalesced(self._pending(wait=not busy)):
                 with self._charged(message.task):
                     self._take(message)
+            self._denoiser.hear()
             task = self._scheduler.choose(self._tasks.values())
             if task is not None:
                 with self._charged(task.number) as clock:
@@ -88,11 +91,12 @@ class Loop:
             self._traced, self._reported = traced, now
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
-        """What has come in by now; with `wait`, at least one message."""
+        """What has come in by now; with `wait`, as soon as there is anything, or a picture was denoised."""
+        if wait:
+            self._denoiser.sleep(self._end)
         try:
             while True:
-                yield link.receive(self._end, wait)
-                wait = False
+                yield link.receive(self._end)
         except BlockingIOError:
             return
 
@@ -100,7 +104,7 @@ class Loop:
         task = self._tasks.get(message.task)
         if isinstance(message, Update):
             if task is None:
-                task = self._tasks[message.task] = Task(self._renderer, message.task, self._send)
+                task = self._tasks[message.task] = Task(self._renderer, message.task, self._send, self._denoiser)
             self._guard(task, lambda: task.update(message))
         elif task is None:
             return  # dropped, and the server had not heard of it when it sent this

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpu import RenderSettings
+from gpu.denoise import GUIDE_SAMPLES
 from service.rendering.messages import (
     Done,
     Frame,
@@ -24,7 +25,9 @@ from service.rendering.messages import (
     View,
     Want,
 )
+from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.ladder import FULL_S, Ladder
+from service.rendering.worker.smoothing import Smooth, Smoothing
 from service.rendering.worker.stopping import MAX_SAMPLES, Clock, eta_s, late, reached
 
 if TYPE_CHECKING:
@@ -37,7 +40,9 @@ NOISE_PAUSE = 20  # times what reading the noise meter took until the next readi
 
 
 class Task:
-    def __init__(self, renderer: Renderer, number: int, send: Callable[[FromRenderer], None]) -> None:
+    def __init__(
+        self, renderer: Renderer, number: int, send: Callable[[FromRenderer], None], denoiser: Denoiser
+    ) -> None:
         self.number = number
         self.generation = 0
         self.used_s = 0.0
@@ -56,6 +61,10 @@ class Task:
         self._served: tuple[object, ...] = ()
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
+        self._smoothing = Smoothing(denoiser, yields=bool(renderer.info["software"]))
+        self._smooth_reads: list[Read] = []  # waiting for the denoised picture
+        self._smoothed = False  # the denoiser has spoken, and who waits for that is to be told
+        self._owes_done = False  # ended, and to be said when the denoised picture is there
         self._reported = 0.0
         self._scale = 1.0  # of what is traced
         self._shown: float | None = None  # the scale of what there is to see
@@ -65,7 +74,9 @@ class Task:
     def ready(self) -> bool:
         if self._ladder is None:
             return False
-        return self._guided is not None or (self._reason is None and (self.unseen or not self._paused))
+        if self._guided is not None or self._smoothed or self._smooth_due:
+            return True
+        return self._reason is None and (self.unseen or not (self._paused or self._smoothing.holds))
 
     @property
     def unseen(self) -> bool:
@@ -75,6 +86,8 @@ class Task:
         began = time.monotonic()
         self.generation = update.generation
         self._stop = update.stop or self._stop
+        if update.denoise is not None:
+            self._smoothing.wanted = update.denoise
         if update.settings is not None:
             self._settings = RenderSettings(**update.settings)
         if update.scene is not None:
@@ -89,16 +102,16 @@ class Task:
                 self._ladder.configure(self._settings)
             elif update.edits:
                 self._ladder.reset()
-        self._reason = None
+        self._reason, self._owes_done = None, False
         if update.restarts:
             self._restart()
         if update.scene is not None or update.settings is not None:
-            setup_s, warnings = time.monotonic() - began, list(self._full.warnings)
+            setup_s, warnings = time.monotonic() - began, self._warnings()
             self._send(Loaded(self.number, self.generation, setup_s, self._full.compile_ms, warnings))
 
     def step(self) -> None:
         """Traces a slice, and ends the render when that was the last."""
-        if self._ladder is None or self._trace_guides() or self._end_if_reached():
+        if self._ladder is None or self._smooth() or self._trace_guides() or self._end_if_reached():
             return
         scale, picture = self._scale, self._ladder.picture(self._scale)
         cap = 1 if self.unseen or scale < 1.0 else self._cap()
@@ -127,23 +140,86 @@ class Task:
         picture = self._ladder.picture(shown)
         if self._needs_guides(picture, want.view):
             return False
-        content = (self.generation, shown, picture.samples, self._reason)
+        smooth = None
+        if shown == 1.0 and self._smoothing.covers(want.view.aov, self._noise):
+            smooth = self._smooth_frame()
+            if smooth is None and self._holds_frame(want):
+                return False
+        progress = smooth.progress if smooth else self.progress(scale=shown)
+        whole = smooth is None or smooth is self._smoothing.has(picture.samples)
+        content = (self.generation, shown, progress.samples, self._reason, smooth is not None and smooth.fine)
         if content == self._served and not want.anyway:
             return False
-        pixels = _pixels_of(picture, want.view)
-        progress = self.progress(scale=shown)
-        last = self._reason is not None
+        pixels = _pixels_of(picture, want.view, smooth)
+        last = self._reason is not None and whole
         self._served, self.want = content, None
-        self._send(Frame(self.number, want.serial, self.generation, pixels, progress, shown, last))
+        denoised = smooth is not None
+        self._send(Frame(self.number, want.serial, self.generation, pixels, progress, shown, last, denoised))
         return True
+
+    def _smooth_frame(self) -> Smooth | None:
+        """The newest denoised picture, unless the client has seen more samples than are in it."""
+        latest, seen = self._smoothing.latest, self._served[:2] == (self.generation, 1.0)
+        if latest is None or (seen and latest.progress.samples < int(str(self._served[2]))):
+            return None
+        return latest
+
+    def _holds_frame(self, want: Want) -> bool:
+        """Whether the client has something to look at until the denoised picture comes, which can't be long."""
+        return self._smoothing.under_way and self._served[:1] == (self.generation,) and not want.anyway
 
     def read(self, read: Read) -> None:
         full = self._full if self._ladder and self._full.samples else None
         if full is not None and self._needs_guides(full, read.view):
             self._reads.append(read)
             return
-        pixels = _pixels_of(full, read.view) if full else None
-        self._send(Image(self.number, read.serial, pixels, self.progress()))
+        smooth = None
+        if full is not None and self._smoothing.covers(read.view.aov, self._measured_noise(fresh=True)):
+            smooth = self._smoothing.has(full.samples)
+            if smooth is None:
+                self._smooth_reads.append(read)
+                return
+        self._give(read, full, smooth)
+
+    def _give(self, read: Read, full: Picture | None, smooth: Smooth | None) -> None:
+        pixels = _pixels_of(full, read.view, smooth) if full else None
+        progress = smooth.progress if smooth else self.progress()
+        self._send(Image(self.number, read.serial, pixels, progress, smooth is not None))
+
+    @property
+    def _smooth_due(self) -> bool:
+        """Whether somebody waits for the picture to be denoised, and it can be."""
+        if self._ladder is None or self._shown != 1.0 or not self._smoothing.wanted:
+            return False
+        want = self.want if self._interactive else None
+        watched = want is not None and self._smoothing.covers(want.view.aov, self._noise)
+        if not (watched or self._owes_done or self._smooth_reads):
+            return False
+        return self._smoothing.due(self._full.samples, fine=self._smooth_finely)
+
+    @property
+    def _smooth_finely(self) -> bool:
+        return self._reason is not None or bool(self._smooth_reads)
+
+    def _smooth(self) -> bool:
+        """A slice of what denoising needs on this side, where any is due."""
+        if self._smoothed:
+            self._smoothed = False
+            reads, self._smooth_reads = self._smooth_reads, []
+            for read in reads:
+                self._give(read, self._full, None if self._smoothing.warning else self._smoothing.latest)
+            if self._owes_done:
+                self._finish()
+            return True
+        if not self._smooth_due:
+            return False
+        if self._full.trace_guides(SLICE_S, GUIDE_SAMPLES):
+            self._measured_noise(fresh=True)
+            self._smoothing.begin(self._full, self.progress(), self._smooth_finely, self._hear_smoothed)
+        return True
+
+    def _hear_smoothed(self) -> None:
+        self._smoothed = True
 
     def _needs_guides(self, picture: Picture, view: View) -> bool:
         if view.aov not in GUIDES or picture.trace_guides(0.0):
@@ -177,7 +253,10 @@ class Task:
         ladder, scene = self._ladder, self._scene
         self._ladder = self._scene = self._guided = None
         self._shown = None
-        reads, self._reads = self._reads, []
+        reads = self._reads + self._smooth_reads
+        self._reads, self._smooth_reads = [], []
+        self._smoothing.restart()
+        self._owes_done = self._smoothed = False
         for read in reads:
             self.read(read)
         if ladder is not None:
@@ -209,6 +288,8 @@ class Task:
 
     def _restart(self) -> None:
         self._guided = None
+        self._smoothing.restart()
+        self._smoothed = False
         self._clock = Clock()
         self._shown = None
         self._scale = self._ladder.first(self._pixel_s) if self._ladder and self._interactive else 1.0
@@ -248,12 +329,23 @@ class Task:
     def _end(self, reason: Reason) -> None:
         self._clock.pause()
         self._reason = reason
-        warnings: list[str] = []
         if self._ladder is not None:
             self._measured_noise(fresh=True)
-            warnings = list(self._full.warnings)
+            wanted = self._smoothing.covers("color", self._noise) and self._shown == 1.0 and reason != "stopped"
+            self._owes_done = wanted and self._smoothing.has(self._full.samples) is None
+        if not self._owes_done:
+            self._finish()
+
+    def _finish(self) -> None:
+        """Says that it has ended, after the last frame."""
+        self._owes_done = False
         self.answer()
-        self._send(Done(self.number, self.generation, reason, self.progress(), warnings))
+        assert self._reason is not None
+        self._send(Done(self.number, self.generation, self._reason, self.progress(), self._warnings()))
+
+    def _warnings(self) -> list[str]:
+        warnings = list(self._full.warnings) if self._ladder is not None else []
+        return warnings + ([self._smoothing.warning] if self._smoothing.warning else [])
 
     def _report(self) -> None:
         now = time.monotonic()
@@ -262,7 +354,8 @@ class Task:
             self._send(Progressed(self.number, self.generation, self.progress()))
 
 
-def _pixels_of(picture: Picture, view: View) -> np.ndarray:
+def _pixels_of(picture: Picture, view: View, smooth: Smooth | None) -> np.ndarray:
+    color = smooth.pixels if smooth else None
     if view.encoding == "linear":
-        return picture.read(view.aov)
-    return picture.display(view.aov, view.exposure, view.tone_map, view.encoding)
+        return picture.read(view.aov) if color is None else color
+    return picture.display(view.aov, view.exposure, view.tone_map, view.encoding, color)

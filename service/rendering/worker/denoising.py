@@ -1,0 +1,51 @@
+"""The helper process that denoises: `python -m service.rendering.worker.denoising DESCRIPTOR --parent PID`.
+
+A process of its own, so that neither the denoiser's seconds nor its misfortunes are the render loop's, and at the
+lowest priority, so that nobody's first frame waits for it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import select
+import socket
+
+from service.rendering import link
+from service.rendering.worker.denoiser import Delivery, Order
+from service.rendering.worker.lifeline import end_with
+
+NICENESS = 19  # the renderer is at 10: where both want the processor, this one gets an eighth of it
+IDLE_S = 60.0  # then it ends, and gives back what the library holds (some 200 MB)
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m service.rendering.worker.denoising")
+    parser.add_argument("descriptor", type=int)
+    parser.add_argument("--parent", type=int, required=True)
+    arguments = parser.parse_args()
+    if not end_with(arguments.parent):
+        return 0
+    os.nice(NICENESS)
+    with socket.socket(fileno=arguments.descriptor) as end:
+        try:
+            while select.select([end], [], [], IDLE_S)[0]:
+                link.send(end, deliver(link.receive(end, wait=True)))
+        except link.Closed:
+            pass
+    return 0
+
+
+def deliver(order: Order) -> Delivery:
+    from gpu import denoise
+
+    if (detail := denoise.missing()) is not None:
+        return Delivery(None, detail, missing=True)
+    try:
+        return Delivery(denoise.denoise(order.color, order.albedo, order.normal, order.fine))
+    except (RuntimeError, MemoryError) as error:
+        return Delivery(None, f"Open Image Denoise failed: {error}")
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())
