@@ -1,4 +1,4 @@
-"""The command line: `sunbox serve | render | info | bench`.
+"""The command line: `sunbox serve | render | import | info | bench`.
 
 Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
 Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
@@ -42,6 +42,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _serve(commands.add_parser("serve", help="serve the editor and the API"))
     _render(commands.add_parser("render", help="render a scene to a file"))
+    _import(commands.add_parser("import", help="turn a glTF model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
     _bench(commands.add_parser("bench", help="measure"))
     return top
@@ -55,7 +56,7 @@ def _serve(command: argparse.ArgumentParser) -> None:
 
 def _render(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
-    add("input", metavar="INPUT", help="a scene's JSON document, or a PNG or EXR that Sunbox made of one")
+    add("input", metavar="INPUT", help="a scene's JSON, a glTF model, or a PNG or EXR that Sunbox made")
     add("-o", "--output", required=True, metavar="OUT", help="the picture: .png, .exr, .hdr or .npy")
     spp = "samples per pixel: the setting max_samples"
     add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
@@ -71,13 +72,20 @@ def _render(command: argparse.ArgumentParser) -> None:
 
 
 def _info(command: argparse.ArgumentParser) -> None:
-    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON document")
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF model")
     _asset_root(command)
 
 
 def _asset_root(command: argparse.ArgumentParser) -> None:
     text = "a folder that assets may come from besides the scene's own; may be given again"
     command.add_argument("--asset-root", action="append", default=[], metavar="DIR", help=text)
+
+
+def _import(command: argparse.ArgumentParser) -> None:
+    command.add_argument("model", metavar="MODEL", help="a .glb, or a .gltf with its files beside it")
+    text = "the scene; its meshes and images go into a folder beside it, named like it and ending in .assets"
+    command.add_argument("-o", "--output", required=True, metavar="SCENE.json", help=text)
+    _asset_root(command)
 
 
 def _bench(command: argparse.ArgumentParser) -> None:

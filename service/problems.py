@@ -54,7 +54,14 @@ class InvalidDocument(ServiceError):
 
 
 class AssetError(ServiceError):
-    """An asset that is missing, unreadable or not what its use asks for; whoever knows the field adds the pointer."""
+    """An asset that is missing, unreadable or not what its use asks for; whoever knows the field adds the pointer.
+
+    `place` is a pointer into the asset's own JSON, where it has one.
+    """
+
+    def __init__(self, detail: str = "", place: str = "") -> None:
+        super().__init__(detail)
+        self.place = place
 
 
 class Unauthorized(ServiceError):
@@ -152,6 +159,8 @@ def problem(error: Exception) -> dict[str, Any]:
     }
     if isinstance(error, InvalidDocument):
         body["errors"] = [{"pointer": e.pointer, "detail": e.detail} for e in error.errors]
+    elif isinstance(error, AssetError) and error.place:
+        body["errors"] = [{"pointer": error.place, "detail": error.detail}]
     return body
 
 

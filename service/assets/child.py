@@ -8,6 +8,7 @@ import contextlib
 import ctypes
 import fcntl
 import importlib
+import json
 import mmap
 import os
 import resource
@@ -18,8 +19,9 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import AssetLimits, ImageData, MeshData
+from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile
 from service.assets.errors import ParseError
+from service.assets.gltf.scene import read_scene
 from service.assets.wire import Array, publish, receive, send
 
 CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
@@ -73,12 +75,12 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         # A signal when the parent hangs up, whose default is to end: also in the middle of a library's loop.
         fcntl.fcntl(link, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
-        parsed = _parse(request["format"], source, limits)
+        parsed = _parse(request["format"], source, limits, request["whole"])
         arrays, facts = _arrays(parsed)
         fd, table = publish(arrays)
         return {"arrays": table, **facts}, fd
     except ParseError as error:
-        return {"error": str(error)[:2000]}, -1
+        return {"error": error.detail[:2000], "pointer": error.pointer[:1000]}, -1
     except MemoryError:
         return {"error": f"reading it takes more than the {request['memory'] >> 20} MiB allowed"}, -1
     except Exception as error:
@@ -101,19 +103,28 @@ def _bound(limits: AssetLimits, memory: int) -> None:
     _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime + limits.seconds) + 1)
 
 
-def _parse(format: str, source: int, limits: AssetLimits) -> MeshData | ImageData:
+def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
+    """`whole`: of a file that is a scene not its triangles only."""
     from service.assets.image import SIGNATURES, parse_image
     from service.assets.mesh import parse_mesh
 
-    data = os.pread(source, os.fstat(source).st_size, 0)
-    if not data:
+    size = os.fstat(source).st_size
+    if not size:
         raise ParseError("the file is empty")
+    data = os.pread(source, size, 0)
+    if whole:
+        return read_scene(data, limits)
     if format in SIGNATURES:
         return parse_image(format, data, f"/proc/self/fd/{source}", limits)
     return parse_mesh(format, data, limits)
 
 
-def _arrays(parsed: MeshData | ImageData) -> tuple[dict[str, Array], dict[str, Any]]:
+def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Array], dict[str, Any]]:
+    if isinstance(parsed, SceneFile):
+        parts = [(len(p.data), p.pointer, p.vertices, p.triangles) for p in parsed.parts]
+        told = json.dumps(vars(parsed) | {"parts": parts}).encode()
+        files = np.concatenate([np.frombuffer(part.data, np.uint8) for part in parsed.parts])
+        return {"scene": np.frombuffer(told, np.uint8), "files": files}, {}
     if isinstance(parsed, ImageData):
         return {"pixels": parsed.pixels}, {}
     arrays = {name: array for name, array in vars(parsed).items() if isinstance(array, np.ndarray)}

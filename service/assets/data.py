@@ -1,7 +1,7 @@
 """What the asset room hands out, and its limits. Imports nothing of the service."""
 
 from dataclasses import dataclass
-from typing import Literal, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
 import numpy.typing as npt
@@ -9,7 +9,7 @@ import numpy.typing as npt
 Floats = npt.NDArray[np.float32]
 Doubles = npt.NDArray[np.float64]
 Indices = npt.NDArray[np.int32]
-Kind = Literal["mesh", "image"]
+Kind = Literal["mesh", "image", "scene"]
 
 
 @dataclass(frozen=True)
@@ -38,8 +38,36 @@ class ImageData:
 
 
 @dataclass(frozen=True)
+class ScenePart:
+    """A file of its own, made of a part of a scene's: a mesh as PLY, or an image as it was (then without counts)."""
+
+    data: bytes | memoryview
+    pointer: str  # where it came from
+    vertices: int | None = None
+    triangles: int | None = None
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """A file that is a whole scene. `document` refers to `parts[k]` as "part:k".
+
+    Without lights of its own it has no environment: whoever knows a default one adds it.
+    """
+
+    document: dict[str, Any]
+    parts: list[ScenePart]
+    warnings: list[dict[str, str]]  # what it asks for and does not get: [{pointer, detail}]
+    triangles: int
+    lit: bool
+
+
+@dataclass(frozen=True)
 class AssetInfo:
-    """What an upload is answered with; a mesh has no width and an image no triangles: those are None."""
+    """What an upload is answered with; a mesh has no width and an image no triangles: those are None.
+
+    `warnings`, `[{pointer, detail}]`, say what is odd about it, or what a scene asks for and does not get; a pointer
+    is into the file's own JSON.
+    """
 
     id: str
     kind: Kind
@@ -50,6 +78,7 @@ class AssetInfo:
     channels: int | None = None
     vertices: int | None = None
     triangles: int | None = None
+    warnings: list[dict[str, str]] | None = None
 
 
 @dataclass(frozen=True)

@@ -71,7 +71,7 @@ def as_image(parsed: Parsed, name: str) -> ImageData:
 
 
 def refused(name: str, error: ParseError) -> AssetError:
-    return AssetError(f"{name}: {error}")
+    return AssetError(f"{name}: {error}", error.pointer)
 
 
 def _bytes(parsed: Parsed) -> int:

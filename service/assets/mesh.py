@@ -46,9 +46,9 @@ def _ply(data: bytes, limits: AssetLimits) -> Parts:
 
 
 def _gltf(data: bytes, limits: AssetLimits) -> Parts:
-    from service.assets.gltf import read_gltf
+    from service.assets.gltf.whole import read_whole
 
-    return Parts(*read_gltf(data, limits))
+    return read_whole(data, limits)
 
 
 def _stl(data: bytes, limits: AssetLimits) -> Parts:

@@ -1,5 +1,6 @@
 """Parsing in a bounded process beside the service: a file can cost no more than its limits, whatever is in it."""
 
+import json
 import logging
 import os
 import select
@@ -13,10 +14,10 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from service.assets.data import AssetLimits, ImageData, MeshData
+from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
 from service.assets.errors import ParseError
 from service.assets.sniff import KINDS
-from service.assets.wire import adopt, memory, receive, send
+from service.assets.wire import Array, adopt, memory, receive, send
 
 log = logging.getLogger(__name__)
 
@@ -56,16 +57,30 @@ class Sandbox:
         self._give_back(child)
 
     def parse(self, format: str, source: bytes | int) -> MeshData | ImageData:
-        """`format` is a key of KINDS; `source` the bytes or an open file. Raises ParseError."""
+        """`format` is a key of KINDS; `source` the bytes or an open file. Of a scene all its triangles as one mesh.
+
+        Raises ParseError.
+        """
+        parsed = self._bounded(format, source, False)
+        assert not isinstance(parsed, SceneFile)
+        return parsed
+
+    def parse_scene(self, format: str, source: bytes | int) -> SceneFile:
+        """Raises ParseError."""
+        parsed = self._bounded(format, source, True)
+        assert isinstance(parsed, SceneFile)
+        return parsed
+
+    def _bounded(self, format: str, source: bytes | int, whole: bool) -> MeshData | ImageData | SceneFile:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
             with self._turn:
-                return self._parse(format, fd)
+                return self._parse(format, fd, whole)
         finally:
             if isinstance(source, bytes):
                 os.close(fd)
 
-    def _parse(self, format: str, fd: int) -> MeshData | ImageData:
+    def _parse(self, format: str, fd: int, whole: bool) -> MeshData | ImageData | SceneFile:
         size = os.fstat(fd).st_size
         if size > self.limits.max_file:
             raise ParseError(f"{size} bytes; {self.limits.max_file} are allowed")
@@ -74,7 +89,7 @@ class Sandbox:
         else:
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
-        request = {"format": format, "memory": BASE_BYTES + worst, "limits": asdict(limits)}
+        request = {"format": format, "whole": whole, "memory": BASE_BYTES + worst, "limits": asdict(limits)}
         child = self._take()
         try:
             reply, result = child.ask(request, fd, limits)
@@ -168,17 +183,27 @@ class _Child:
         self.link.close()
 
 
-def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData:
+def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
     if "error" in reply:
-        raise ParseError(str(reply["error"]))
+        raise ParseError(str(reply["error"]), str(reply.get("pointer", "")))
     try:
         arrays = adopt(fd, reply["arrays"])
     finally:
         os.close(fd)
     if "pixels" in arrays:
         return ImageData(arrays["pixels"])
+    if "scene" in arrays:
+        return _scene(arrays["scene"], arrays["files"])
     get = arrays.get
     return MeshData(
         arrays["vertices"], arrays["faces"], get("normals"), get("uvs"), get("uvs_1"), get("colors"),
         tuple(map(str, reply["warnings"])),
     )  # fmt: skip
+
+
+def _scene(text: Array, files: Array) -> SceneFile:
+    told, view, parts, at = json.loads(text.tobytes()), files.data, [], 0
+    for size, pointer, vertices, triangles in told["parts"]:
+        parts.append(ScenePart(view[at : at + size], str(pointer), vertices, triangles))
+        at += size
+    return SceneFile(told["document"], parts, told["warnings"], int(told["triangles"]), bool(told["lit"]))

@@ -6,13 +6,15 @@ import logging
 import os
 import re
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Protocol
 
-from service.assets.data import AssetInfo, AssetLimits, ImageData, MeshData
+from service.assets.data import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
 from service.assets.errors import ParseError
+from service.assets.importing import Imported, take_apart
 from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
 from service.assets.sniff import KINDS, sniff
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
@@ -20,6 +22,7 @@ from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 log = logging.getLogger(__name__)
 
 ID = re.compile(r"sha256:[0-9a-f]{64}")
+SCENE = ".scene.json"  # of an asset that is one: its document
 FORMATS = "OBJ, PLY, STL, glTF and GLB meshes; EXR, Radiance HDR, PNG, JPEG and WebP images"
 
 
@@ -58,16 +61,26 @@ class AssetStore:
         format = sniff(data, content_type, filename)
         if format is None:
             raise UnsupportedMedia(f"this is none of the formats known: {FORMATS}")
-        info = _describe(id, format, len(data), self._parse(id, format, lambda: data))
-        try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            self._write(self._path(id), data)
-            self._write(self._path(id, ".json"), json.dumps(asdict(info)).encode())
-        except OSError as error:
-            log.error("asset not stored id=%s error=%s", id, error)
-            raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
-        log.info("asset stored id=%s format=%s bytes=%d", id, format, len(data))
+        if KINDS[format] == "scene":
+            info = self._import(id, format, data)
+        else:
+            info = _describe(id, format, len(data), self._parse(id, format, lambda: data))
+        self._store(info, data)
         return info
+
+    def scene(self, id: str) -> Imported:
+        """A glTF file as a document whose references are assets here. Raises NotFound, AssetError, Unavailable."""
+        info = self.info(id)
+        if info.kind != "scene":
+            raise NotFound(f"{id[:100]} is no scene: it is {'an image' if info.kind == 'image' else 'a mesh'}")
+        try:
+            imported = Imported(**json.loads(self._path(id, SCENE).read_bytes()))
+            if all(self._known(reference) for reference in imported.references()):
+                return imported
+        except (OSError, ValueError, TypeError):
+            pass  # nothing of it is lost: the file itself is still here
+        self._import(id, info.format, self.read(id))
+        return Imported(**json.loads(self._path(id, SCENE).read_bytes()))
 
     def read(self, id: str) -> bytes:
         """Raises NotFound."""
@@ -98,6 +111,44 @@ class AssetStore:
 
     def close(self) -> None:
         self.loader.close()
+
+    def _import(self, id: str, format: str, data: bytes) -> AssetInfo:
+        """Stores the parts of a scene and its document, not the file itself."""
+        try:
+            file = self.loader.sandbox.parse_scene(format, data)
+        except ParseError as error:
+            raise refused(f"the {format.upper()} file", error) from None
+        imported = take_apart(file, self._keep)
+        with self._storing(id):
+            self._write(self._path(id, SCENE), json.dumps(asdict(imported)).encode())
+        warnings = imported.warnings or None
+        return AssetInfo(id, "scene", format, len(data), triangles=file.triangles, warnings=warnings)
+
+    def _keep(self, part: ScenePart) -> str:
+        """The id of a part of a scene, stored as an asset of its own."""
+        id = "sha256:" + hashlib.sha256(part.data).hexdigest()
+        if self._known(id) is None:
+            data = bytes(part.data)
+            if part.triangles is None:
+                return self.add(data).id
+            info = AssetInfo(id, "mesh", "ply", len(data), vertices=part.vertices, triangles=part.triangles)
+            self._store(info, data)
+        return id
+
+    def _store(self, info: AssetInfo, data: bytes) -> None:
+        with self._storing(info.id):
+            self._write(self._path(info.id), data)
+            self._write(self._path(info.id, ".json"), json.dumps(asdict(info)).encode())
+        log.info("asset stored id=%s format=%s bytes=%d", info.id, info.format, info.bytes)
+
+    @contextmanager
+    def _storing(self, id: str) -> Iterator[None]:
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            yield
+        except OSError as error:
+            log.error("asset not stored id=%s error=%s", id, error)
+            raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
 
     def _load(self, ref: str) -> Parsed:
         if not ID.fullmatch(ref):
@@ -161,4 +212,7 @@ def _describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
     if isinstance(parsed, ImageData):
         height, width, channels = parsed.pixels.shape
         return AssetInfo(id, KINDS[format], format, size, width=width, height=height, channels=channels)
-    return AssetInfo(id, KINDS[format], format, size, vertices=len(parsed.vertices), triangles=len(parsed.faces))
+    warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
+    return AssetInfo(
+        id, KINDS[format], format, size, vertices=len(parsed.vertices), triangles=len(parsed.faces), warnings=warnings
+    )  # fmt: skip

@@ -12,6 +12,7 @@ from service.commands import BadInput, files
 from service.problems import InvalidDocument, MalformedJson, ServiceError
 
 if TYPE_CHECKING:
+    from service.assets import AssetStore
     from service.commands.assets import SourceAssets
     from service.config import Config
     from service.pack import Packed
@@ -45,11 +46,16 @@ class Source:
     view: PictureView | None = None
     assets: dict[str, str] = field(default_factory=dict)  # names of files by the id that the document uses
     pointer: str = ""  # to the scene, from the root of what was read
+    store: AssetStore | None = None  # a model's, with what it was taken apart into
 
 
-def read_source(path: Path) -> Source:
-    """The scene that a document, or the metadata of a PNG or EXR, describes."""
+def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
+    """The scene that a document, a glTF model, or the metadata of a PNG or EXR describes."""
     data = files.read(path)
+    from service.commands.models import is_model
+
+    if is_model(data):
+        return _model(path, data, roots, config)
     from service.images.metadata import EXR_MAGIC, PNG_MAGIC, read_metadata
     from service.scene import load_json, parse_scene
 
@@ -67,6 +73,22 @@ def read_source(path: Path) -> Source:
         document = load_json(data)
     with refusals():
         return Source(path, document, parse_scene(document))
+
+
+def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Source:
+    from service import presets
+    from service.assets import AssetStore, FileAssets
+    from service.commands.models import import_model
+    from service.scene import parse_scene
+
+    store = AssetStore(config.data_dir, config, presets.builtin_assets)
+    try:
+        with refusals(), FileAssets(path.parent, asset_folders(roots), store) as files_:
+            document = import_model(path, data, store, files_).scene(presets.default_environment())
+            return Source(path, document, parse_scene(document), store=store)
+    except BaseException:
+        store.close()
+        raise
 
 
 def read_settings(assignments: Sequence[str], config: Config, base: dict[str, Any] | None = None) -> Settings:
@@ -95,13 +117,17 @@ def source_assets(source: Source, roots: Sequence[str], config: Config) -> Itera
     from service.assets import AssetStore, FileAssets
     from service.commands.assets import SourceAssets
 
+    uploaded = source.store or AssetStore(config.data_dir, config, _builtin_assets)
+    with closing(uploaded), FileAssets(source.path.parent, asset_folders(roots), uploaded) as assets:
+        yield SourceAssets(assets, uploaded, source.assets)
+
+
+def asset_folders(roots: Sequence[str]) -> list[Path]:
     folders = [Path(root) for root in roots]
     for folder in folders:
         if not folder.is_dir():
             raise BadInput(f"--asset-root {str(folder)!r}: is not a folder")
-    uploaded = AssetStore(config.data_dir, config, _builtin_assets)
-    with closing(uploaded), FileAssets(source.path.parent, folders, uploaded) as assets:
-        yield SourceAssets(assets, uploaded, source.assets)
+    return folders
 
 
 def pack_scene(source: Source, assets: SourceAssets, config: Config) -> Packed:

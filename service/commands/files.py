@@ -46,5 +46,13 @@ def write(path: Path, data: bytes) -> None:
         raise Failed(f"{str(path)!r}: cannot be written: {_reason(error)}") from None
 
 
+def make_folder(path: Path) -> None:
+    """Raises Failed."""
+    try:
+        path.mkdir(exist_ok=True)
+    except OSError as error:
+        raise Failed(f"{str(path)!r}: cannot be made: {_reason(error)}") from None
+
+
 def _reason(error: Exception) -> str:
     return (getattr(error, "strerror", None) or str(error)).lower()

@@ -22,7 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
     rows = [("sunbox", metadata.version("sunbox"))]
     config = configuration()
     if arguments.scene:
-        source = read_source(Path(arguments.scene))
+        source = read_source(Path(arguments.scene), arguments.asset_root, config)
         with source_assets(source, arguments.asset_root, config) as assets:
             packed = pack_scene(source, assets, config)
         rows += [("scene", str(source.path)), *contents(source.scene, packed)]

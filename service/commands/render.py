@@ -44,7 +44,7 @@ def run(arguments: argparse.Namespace) -> int:
     stats = files.writable(Path(arguments.stats)) if arguments.stats else None
     config = configuration()
     given = read_settings(arguments.set or [], config)
-    source = read_source(Path(arguments.input))
+    source = read_source(Path(arguments.input), arguments.asset_root, config)
     output = Output(path, format, _view(arguments, format, exposure, source.view))
     chosen = read_settings(arguments.set or [], config, source.settings) if source.settings else given
     with source_assets(source, arguments.asset_root, config) as assets:

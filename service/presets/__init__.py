@@ -38,6 +38,12 @@ def get(kind: str, name: str) -> dict[str, Any]:
     return document
 
 
+def default_environment() -> dict[str, Any]:
+    """What lights a scene that brings no light of its own."""
+    found: dict[str, Any] = get("scenes", DEFAULT_SCENE)["environment"]
+    return found
+
+
 @cache
 def builtin_assets() -> dict[str, bytes]:
     """Bytes by id, `sha256:` and 64 hexadecimal digits: the same on every call and machine."""

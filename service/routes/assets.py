@@ -2,26 +2,46 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
+from fastapi.responses import JSONResponse
 
+from service import presets
 from service.rendering.threads import packing
 from service.routes.house import house
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
 FOREVER = "public, max-age=31536000, immutable"  # an id is the hash of what it names
+HEADER_BYTES = 4096  # proxies refuse headers not much longer
 BODY = {"requestBody": {"required": True, "content": {"application/octet-stream": {}}}}
 
 
-@router.post("", status_code=201, summary="Upload a mesh or an image", openapi_extra=BODY)
+@router.post("", status_code=201, summary="Upload a mesh, an image or a glTF scene", openapi_extra=BODY)
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     data = await request.body()
     kind = request.headers.get("content-type")
     info = await packing(lambda: house(request).assets.add(data, kind, filename))
     return {name: value for name, value in asdict(info).items() if value is not None}
+
+
+@router.get("/{id}/scene", summary="A glTF file as a scene document")
+async def scene(request: Request, id: str) -> Response:
+    """Its references are assets here. What the file asks for and does not get is told in the answer to its upload
+    (`warnings`), and here in the header `Sunbox-Warnings`: as much of that list as has room, as JSON."""
+    imported = await packing(lambda: house(request).assets.scene(id))
+    document = imported.scene(presets.default_environment())
+    headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
+    return JSONResponse(document, headers=headers)
+
+
+def _fitting(warnings: list[dict[str, str]]) -> str:
+    while len(text := json.dumps(warnings)) > HEADER_BYTES:
+        warnings = warnings[: len(warnings) * 2 // 3]
+    return text
 
 
 @router.get("/{id}", summary="The bytes", response_class=Response)

@@ -1,0 +1,34 @@
+"""KHR_draco_mesh_compression, through Google's library."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from service.assets.gltf.accessors import normalised
+from service.assets.gltf.file import Array, GltfFile
+from service.assets.gltf.place import Place
+from service.assets.polygons import Longs
+
+
+def decode(file: GltfFile, extension: Place, attributes: Place) -> tuple[dict[str, Array], Longs]:
+    """Rows by the name of the attribute, and triangles (m, 3). The library raises ValueError on nonsense."""
+    import DracoPy
+
+    data, _ = file.view(extension)
+    try:
+        decoded = DracoPy.decode(data.tobytes())
+    except Exception as error:
+        raise extension.error("bufferView", f"holds no Draco mesh that can be read ({str(error)[:100]})") from None
+    faces = getattr(decoded, "faces", None)
+    if faces is None or not len(faces):
+        raise extension.error("bufferView", "holds Draco data without triangles")
+    found = {one["unique_id"]: np.asarray(one["data"]) for one in decoded.attributes}
+    ids, rows = extension.need("attributes"), {}
+    for name in ids.value:
+        number = ids.whole(name)
+        if number not in found:
+            raise ids.error(name, f"is {number}; the Draco data have {sorted(found)}")
+        row = found[number].reshape(len(found[number]), -1)
+        described = file.follow(attributes, name, "accessors") if name in attributes else None
+        rows[name] = normalised(row) if described and described.flag("normalized") else row
+    return rows, np.asarray(faces, np.int64).reshape(-1, 3)

@@ -1,0 +1,147 @@
+"""A glTF file as JSON and bytes, every length checked against the bytes that are there."""
+
+from __future__ import annotations
+
+import base64
+import binascii
+import json
+import struct
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from service.assets.data import AssetLimits
+from service.assets.errors import ParseError
+from service.assets.gltf.place import Place, shown, whole
+
+JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
+# What this reader does something about. KNOWN ones may be required; an OPTIONAL one changes nothing that is seen.
+KNOWN = {
+    "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_materials_volume", "KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_instancing",
+    "EXT_texture_webp",
+}  # fmt: skip
+OPTIONAL = {"KHR_xmp", "KHR_xmp_json_ld"}
+MOST_ITEMS = 1 << 20  # of one kind; the time to look at them all is bounded, and a stranger's file may list anything
+
+Array = npt.NDArray[Any]
+Bytes = npt.NDArray[np.uint8]
+
+
+class GltfFile:
+    """`root` is the JSON. Raises ParseError wherever the file refers to what it does not hold."""
+
+    def __init__(self, data: bytes | memoryview, limits: AssetLimits) -> None:
+        self.limits = limits
+        view = memoryview(data)
+        binary = bytes(view[:4]) == b"glTF"
+        text, self._binary = _chunks(view) if binary else (view, None)
+        self.root = _root(bytes(text), binary)
+        self._buffers: dict[int, Bytes] = {}
+        version = self.root.need("asset").text("version")
+        if not version.startswith("2."):
+            raise ParseError(f"glTF 2.0 is read, this is version {shown(version)}", "/asset/version")
+        for k, name in enumerate(self.root.list("extensionsRequired")):
+            if name not in KNOWN | OPTIONAL:
+                detail = f"the file requires {shown(name)}, which is not supported"
+                raise ParseError(detail, f"/extensionsRequired/{k}")
+
+    def count(self, kind: str) -> int:
+        return len(self.root.list(kind))
+
+    def item(self, kind: str, index: Any, pointer: str) -> Place:
+        """The item that the value at `pointer` refers to."""
+        items = self.root.list(kind)
+        k = whole(index, pointer)
+        if k >= len(items):
+            raise ParseError(f"refers to /{kind}/{k}, and there are {len(items)}", pointer)
+        return Place(items[k], f"/{kind}/{k}")
+
+    def follow(self, place: Place, name: str, kind: str) -> Place:
+        """The item that a place's member refers to."""
+        return self.item(kind, place.value.get(name), place.at(name))
+
+    def view(self, place: Place, name: str = "bufferView") -> tuple[Bytes, Place]:
+        """The bytes of the buffer view that a place refers to."""
+        view = self.follow(place, name, "bufferViews")
+        return self.range(view, view), view
+
+    def range(self, source: Place, named: Place) -> Bytes:
+        """The bytes from `byteOffset` on, `byteLength` of them, of the buffer that `source` names."""
+        buffer = self._buffer(source)
+        start, length = source.whole("byteOffset", 0), source.whole("byteLength")
+        if start + length > len(buffer):
+            raise named.error("byteLength", f"ends at byte {start + length} of a buffer of {len(buffer)}")
+        return buffer[start : start + length]
+
+    def image(self, place: Place) -> bytes:
+        """The bytes of an image as it is stored."""
+        if "bufferView" in place:
+            return self.view(place)[0].tobytes()
+        return embedded(place).tobytes()
+
+    def _buffer(self, source: Place) -> Bytes:
+        place = self.follow(source, "buffer", "buffers")
+        index = source.whole("buffer")
+        if index not in self._buffers:
+            length = place.whole("byteLength")
+            binary = self._binary if index == 0 and "uri" not in place else None
+            data = embedded(place) if binary is None else np.frombuffer(binary, np.uint8)
+            if length > len(data):
+                raise place.error("byteLength", f"promises {length} bytes and has {len(data)}: the file is cut off")
+            self._buffers[index] = data
+        return self._buffers[index]
+
+
+def embedded(place: Place) -> Bytes:
+    """What a `data:` URI holds."""
+    uri = place.text("uri")
+    if not uri:
+        raise place.error("uri", "is missing: these bytes are nowhere")
+    head, comma, body = uri.partition(",")
+    if not head.startswith("data:") or not comma or not head.endswith(";base64"):
+        raise place.error(
+            "uri", f"names another file, {shown(uri)}; only what the file itself holds is read here: save it as GLB"
+        )
+    try:
+        return np.frombuffer(base64.b64decode(body), np.uint8)
+    except (ValueError, binascii.Error) as error:
+        raise place.error("uri", f"is not base64: {error}") from None
+
+
+def _root(text: bytes, binary: bool) -> Place:
+    what = "its JSON" if binary else "neither a GLB, which begins with `glTF`, nor JSON"
+    try:
+        tree = json.loads(text.rstrip(b"\0"))
+    except (ValueError, RecursionError) as error:
+        raise ParseError(f"not a glTF file: {what}: {str(error)[:200]}") from None
+    if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
+        raise ParseError("not a glTF file: its JSON has no `asset`")
+    for kind, items in tree.items():
+        if isinstance(items, list) and len(items) > MOST_ITEMS:
+            raise ParseError(f"has {len(items)} items; {MOST_ITEMS} are allowed", f"/{kind[:60]}")
+    return Place(tree, "")
+
+
+def _chunks(data: memoryview) -> tuple[memoryview, memoryview | None]:
+    """The JSON and the binary chunk of a GLB."""
+    if len(data) < 20:
+        raise ParseError("the file is cut off: it is shorter than a GLB's header")
+    version, length, at = *struct.unpack_from("<II", data, 4), 12
+    if version != 2:
+        raise ParseError(f"glTF 2.0 is read, this GLB is version {version}")
+    if length > len(data):
+        raise ParseError(f"the file is cut off: its header promises {length} bytes, there are {len(data)}")
+    chunks: dict[int, memoryview] = {}
+    while at + 8 <= length:
+        size, kind = struct.unpack_from("<II", data, at)
+        if at + 8 + size > length:
+            raise ParseError(f"the chunk at byte {at} promises {size} bytes, {length - at - 8} are left")
+        chunks.setdefault(kind, data[at + 8 : at + 8 + size])
+        at += 8 + size
+    if JSON_CHUNK not in chunks:
+        raise ParseError("this GLB has no JSON chunk")
+    return chunks[JSON_CHUNK], chunks.get(BINARY_CHUNK)

@@ -1,0 +1,161 @@
+"""The KHR_materials_* extensions that add to metal and roughness, as parameters of `principled`."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING, Any
+
+from service.assets.gltf.place import Place
+from service.assets.gltf.textures import factor
+
+if TYPE_CHECKING:
+    from service.assets.gltf.materials import Reading
+
+DEFAULT_IOR, LARGEST_IOR = 1.5, 4.0
+COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
+
+
+def add(read: Reading, document: dict[str, Any]) -> None:
+    ior = _ior(read)
+    transmission = read.place.extension("KHR_materials_transmission")
+    through = transmission.number("transmissionFactor", 0, 0, 1) if transmission else 0.0
+    clear = transmission is not None and through > 0
+    if ior != DEFAULT_IOR:
+        document["ior"] = ior
+    _specular(read, document, ior, clear)
+    _sheen(read, document)
+    _anisotropy(read, document)
+    _clearcoat(read, document)
+    if transmission is not None and clear:
+        document["transmission"] = read.scalar(transmission, "transmissionTexture", through, "r")
+        _volume(read, document, ior)
+
+
+def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[str, Any]:
+    info = owner.object(name)
+    if info is None:
+        return {}
+    texture = read.textures.use(info, "linear", read.sets)
+    if texture is None:
+        return {}
+    scale = info.number("scale", 1)
+    return {parameter: {"texture": texture} | ({"scale": scale} if scale != 1 else {})}
+
+
+def _ior(read: Reading) -> float:
+    extension = read.place.extension("KHR_materials_ior")
+    ior = extension.number("ior", DEFAULT_IOR, 0) if extension else DEFAULT_IOR
+    if extension and not 1 <= ior <= LARGEST_IOR:
+        nearest = 1.0 if 0 < ior < 1 else LARGEST_IOR  # 0 asks for full reflection
+        read.notes.add(extension.at("ior"), f"{ior:g} is not had: {nearest:g} is, of 1 to {LARGEST_IOR:g}")
+        return nearest
+    return ior
+
+
+def _specular(read: Reading, document: dict[str, Any], ior: float, clear: bool) -> None:
+    """The reflectance head-on, F0 = ((ior - 1) / (ior + 1))^2 weight colour, becomes an index and a tint."""
+    extension = read.place.extension("KHR_materials_specular")
+    if extension is None:
+        return
+    weight = extension.number("specularFactor", 1, 0, 1)
+    color = extension.color("specularColorFactor", (1.0, 1.0, 1.0))
+    strength = max(color)
+    tint = tuple(value / strength for value in color) if strength else (1.0, 1.0, 1.0)
+    document["specular_color"] = read.color(extension, "specularColorTexture", tint)
+    if document["specular_color"] == 1:
+        del document["specular_color"]
+    textured = "specularTexture" in extension
+    share = weight * strength
+    if share == 1 and not textured:
+        return
+    if clear:
+        read.notes.add(extension.at("specularFactor"), "is not had beside transmission: the index alone reflects")
+        return
+    f0 = ((ior - 1) / (ior + 1)) ** 2 * share
+    if 0 < weight < 1 or textured:
+        read.notes.add(extension.at("specularFactor"), "lowers the reflection head-on; grazing stays as it is")
+    document.pop("ior", None)
+    if textured:
+        if f0 > 0.08:
+            read.notes.add(extension.at("specularFactor"), f"F0 of {f0:.3g} under a texture is lowered to 0.08")
+        document["specular"] = read.scalar(extension, "specularTexture", min(f0 / 0.08, 1.0), "a")
+        return
+    root = math.sqrt(min(f0, 1.0))
+    eta = (1 + root) / (1 - root) if root < 0.6 else LARGEST_IOR
+    if eta >= LARGEST_IOR:
+        read.notes.add(extension.at("specularColorFactor"), f"F0 of {f0:.3g} is lowered to 0.36, an index of 4")
+    document["ior"] = min(max(eta, 1.0), LARGEST_IOR)
+
+
+def _sheen(read: Reading, document: dict[str, Any]) -> None:
+    extension = read.place.extension("KHR_materials_sheen")
+    if extension is None:
+        return
+    color = tuple(min(value, 1.0) for value in extension.color("sheenColorFactor", (0.0, 0.0, 0.0)))
+    if not max(color):
+        return
+    document["sheen"] = 1.0
+    document["sheen_color"] = read.color(extension, "sheenColorTexture", color)
+    roughness = extension.number("sheenRoughnessFactor", 0, 0, 1)
+    document["sheen_roughness"] = read.scalar(extension, "sheenRoughnessTexture", roughness, "a")
+
+
+def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
+    """glTF stretches along the tangent only: alpha_t = mix(r^2, 1, strength^2), alpha_b = r^2; ours both ways."""
+    extension = read.place.extension("KHR_materials_anisotropy")
+    strength = extension.number("anisotropyStrength", 0, 0, 1) if extension else 0.0
+    if extension is None or not strength:
+        return
+    rotation = extension.number("anisotropyRotation", 0)
+    if rotation:
+        document["anisotropic_rotation"] = math.degrees(rotation)
+    roughness = document["roughness"]
+    if "anisotropyTexture" in extension:
+        read.notes.add(extension.at("anisotropyTexture"), "gives the strength (blue); its directions are not read")
+    if "anisotropyTexture" in extension or isinstance(roughness, dict):
+        read.notes.add(extension.pointer, "stretches the highlight along and across under a texture")
+        document["anisotropic"] = read.scalar(extension, "anisotropyTexture", strength * strength, "b")
+        return
+    along = roughness**2 + (1 - roughness**2) * strength**2
+    across = max(roughness**2, 1e-4)
+    document["anisotropic"] = min((1 - across / along) / 0.9, 1.0)
+    document["roughness"] = min((along * across) ** 0.25, 1.0)
+
+
+def _clearcoat(read: Reading, document: dict[str, Any]) -> None:
+    extension = read.place.extension("KHR_materials_clearcoat")
+    weight = extension.number("clearcoatFactor", 0, 0, 1) if extension else 0.0
+    if extension is None or not weight:
+        return
+    document["clearcoat"] = read.scalar(extension, "clearcoatTexture", weight, "r")
+    roughness = extension.number("clearcoatRoughnessFactor", 0, 0, 1)
+    document["clearcoat_roughness"] = read.scalar(extension, "clearcoatRoughnessTexture", roughness, "g")
+    document.update(normal_map(read, extension, "clearcoatNormalTexture", "clearcoat_normal_map"))
+
+
+def _volume(read: Reading, document: dict[str, Any], ior: float) -> None:
+    volume = read.place.extension("KHR_materials_volume")
+    if volume is not None and volume.number("thicknessFactor", 0, 0) > 0:
+        if "thicknessTexture" in volume:
+            read.notes.add(volume.at("thicknessTexture"), "is not used: rays go through the geometry itself")
+        if "attenuationDistance" in volume:
+            document["attenuation_distance"] = volume.number("attenuationDistance", 1, 1e-9, 1e9)
+            document["attenuation_color"] = factor(
+                tuple(min(value, 1.0) for value in volume.color("attenuationColor", (1.0, 1.0, 1.0)))
+            )
+        return
+    # A thin wall bends nothing: an index of 1 lets light straight through, and a coat does the reflecting.
+    extension = read.place.extension("KHR_materials_transmission")
+    where = extension.pointer if extension else read.place.pointer
+    if document.get("roughness") != 0:
+        read.notes.add(where, "a thin wall (no thickness) shows what is behind it unblurred")
+    document["ior"] = 1.0
+    document.pop("specular", None)
+    if "clearcoat" in document:
+        read.notes.add(where, "a thin wall under a coat reflects by the coat alone")
+        return
+    f0 = ((ior - 1) / (ior + 1)) ** 2
+    document["clearcoat"] = min(f0 / COAT_F0, 1.0)
+    document["clearcoat_roughness"] = document["roughness"]
+    if "normal_map" in document:
+        document["clearcoat_normal_map"] = document["normal_map"]

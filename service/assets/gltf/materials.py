@@ -1,0 +1,132 @@
+"""glTF's materials as the contract's `principled`, or as bare emission where they are unlit."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from service.assets.gltf import layers
+from service.assets.gltf.file import GltfFile
+from service.assets.gltf.notes import Notes
+from service.assets.gltf.place import Place
+from service.assets.gltf.specular_glossiness import converted
+from service.assets.gltf.textures import ColorSpace, Textures, factor, unique
+
+WHITE = (1.0, 1.0, 1.0)
+
+
+class Reading:
+    """One material for meshes that have these uv sets."""
+
+    def __init__(self, place: Place, textures: Textures, sets: tuple[bool, ...], notes: Notes) -> None:
+        self.place, self.textures, self.sets, self.notes = place, textures, sets, notes
+
+    def texture(self, owner: Place | None, name: str, space: ColorSpace) -> str | None:
+        return self.textures.use(owner.object(name), space, self.sets) if owner else None
+
+    def color(self, owner: Place, name: str, values: tuple[float, ...]) -> Any:
+        """A colour, or the texture that it multiplies."""
+        texture = self.texture(owner, name, "srgb")
+        return factor(values) if texture is None else {"texture": texture, "factor": factor(values)}
+
+    def scalar(self, owner: Place, name: str, value: float, channel: str) -> Any:
+        texture = self.texture(owner, name, "linear")
+        return value if texture is None else {"texture": texture, "channel": channel, "factor": value}
+
+
+class Materials:
+    """`documents` by name, as far as they were asked for."""
+
+    def __init__(self, file: GltfFile, textures: Textures, notes: Notes) -> None:
+        self.file, self.textures, self.notes = file, textures, notes
+        self.documents: dict[str, dict[str, Any]] = {}
+        self._names: dict[tuple[Any, ...], str] = {}
+
+    def name(self, primitive: Place, sets: tuple[bool, ...]) -> tuple[str, Place]:
+        """The document's name for a primitive's material, and the material."""
+        given = "material" in primitive
+        place = self.file.follow(primitive, "material", "materials") if given else Place({}, "")  # all defaults
+        read = Reading(place, self.textures, sets, self.notes)
+        key = place.pointer, sets
+        if key not in self._names:
+            document = self._document(read)
+            same = [n for (pointer, _), n in self._names.items() if pointer == place.pointer]
+            found = next((name for name in same if self.documents[name] == document), None)
+            if found is None:
+                found = unique(place.text("name") or place.pointer[1:].replace("/", " ") or "default", self.documents)
+                self.documents[found] = document
+            self._names[key] = found
+        return self._names[key], place
+
+    def _document(self, read: Reading) -> dict[str, Any]:
+        place = read.place
+        if "occlusionTexture" in place:
+            self.notes.add(place.at("occlusionTexture"), "is not used: light that corners lose is traced")
+        glossy = place.extension("KHR_materials_pbrSpecularGlossiness")
+        if place.extension("KHR_materials_unlit") is not None:
+            document = self._unlit(read)
+        elif glossy is not None:
+            document = converted(read, glossy) | self._emission(read) | self._normal(read)
+        else:
+            document = self._rough(read)
+        self._alpha(read, document, glossy)
+        return document
+
+    def _rough(self, read: Reading) -> dict[str, Any]:
+        place = read.place
+        rough = place.object("pbrMetallicRoughness") or Place({}, place.at("pbrMetallicRoughness"))
+        base = rough.color("baseColorFactor", (1.0,) * 4)
+        metallic, roughness = rough.number("metallicFactor", 1, 0, 1), rough.number("roughnessFactor", 1, 0, 1)
+        document: dict[str, Any] = {
+            "type": "principled",
+            "base_color": read.color(rough, "baseColorTexture", base[:3]),
+            "metallic": read.scalar(rough, "metallicRoughnessTexture", metallic, "b"),
+            "roughness": read.scalar(rough, "metallicRoughnessTexture", roughness, "g"),
+        }
+        document |= self._emission(read) | self._normal(read)
+        layers.add(read, document)
+        return document
+
+    def _unlit(self, read: Reading) -> dict[str, Any]:
+        """As it is: its colour is radiance, and nothing is reflected."""
+        rough = read.place.object("pbrMetallicRoughness") or Place({}, read.place.at("pbrMetallicRoughness"))
+        base = rough.color("baseColorFactor", (1.0,) * 4)
+        document = {"type": "diffuse", "albedo": 0.0, "emission": read.color(rough, "baseColorTexture", base[:3])}
+        if read.place.flag("doubleSided"):
+            document["emission_sides"] = "both"
+        return document
+
+    def _emission(self, read: Reading) -> dict[str, Any]:
+        place = read.place
+        strength = place.extension("KHR_materials_emissive_strength")
+        scale = strength.number("emissiveStrength", 1, 0) if strength else 1.0
+        r, g, b = (scale * value for value in place.color("emissiveFactor", (0.0, 0.0, 0.0)))
+        if not max(r, g, b):
+            return {}
+        sides = {"emission_sides": "both"} if place.flag("doubleSided") else {}
+        return {"emission": read.color(place, "emissiveTexture", (r, g, b)), **sides}
+
+    def _normal(self, read: Reading) -> dict[str, Any]:
+        return layers.normal_map(read, read.place, "normalTexture", "normal_map")
+
+    def _alpha(self, read: Reading, document: dict[str, Any], glossy: Place | None) -> None:
+        place = read.place
+        mode = place.text("alphaMode", "OPAQUE")
+        if mode not in ("OPAQUE", "MASK", "BLEND"):
+            raise place.error("alphaMode", f"must be OPAQUE, MASK or BLEND, not {mode[:40]!r}")
+        if mode == "OPAQUE":
+            return
+        owner, color, texture = glossy, "diffuseFactor", "diffuseTexture"
+        if owner is None:
+            owner, color, texture = place.object("pbrMetallicRoughness"), "baseColorFactor", "baseColorTexture"
+        if owner is not None:
+            alpha = min(owner.color(color, (1.0,) * 4)[3], 1.0)
+            image = read.texture(owner, texture, "srgb")
+            value = alpha if image is None else {"texture": image, "channel": "a", "factor": alpha}
+            if value != 1:
+                document["alpha"] = value
+        if mode == "MASK":
+            cutoff = place.number("alphaCutoff", 0.5, 0)
+            if cutoff > 1:
+                document["alpha"] = 0.0
+            else:
+                document["alpha_cutoff"] = cutoff

@@ -1,0 +1,120 @@
+"""A JSON object of a file and where it stands, so that every mistake is named by its pointer."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+from service.assets.errors import ParseError
+
+LARGEST_WHOLE = 1 << 53  # JSON's numbers are exact up to here
+
+
+class Place:
+    """Everything read through it has the type that was asked for. Raises ParseError."""
+
+    def __init__(self, value: Any, pointer: str) -> None:
+        if not isinstance(value, dict):
+            raise ParseError(f"must be an object, not {shown(value)}", pointer)
+        self.value: dict[str, Any] = value
+        self.pointer = pointer
+
+    def __contains__(self, name: str) -> bool:
+        return name in self.value
+
+    def at(self, name: str | int) -> str:
+        return f"{self.pointer}/{escaped(name)}"
+
+    def error(self, name: str | int, detail: str) -> ParseError:
+        return ParseError(detail, self.at(name))
+
+    def object(self, name: str) -> Place | None:
+        return Place(self.value[name], self.at(name)) if name in self.value else None
+
+    def need(self, name: str) -> Place:
+        found = self.object(name)
+        if found is None:
+            raise self.error(name, "is missing")
+        return found
+
+    def list(self, name: str) -> list[Any]:
+        found = self.value.get(name, [])
+        if not isinstance(found, list):
+            raise self.error(name, f"must be an array, not {shown(found)}")
+        return found
+
+    def objects(self, name: str) -> Iterator[Place]:
+        for k, one in enumerate(self.list(name)):
+            yield Place(one, f"{self.at(name)}/{k}")
+
+    def extension(self, name: str) -> Place | None:
+        held = self.object("extensions")
+        return held.object(name) if held else None
+
+    def whole(self, name: str, default: int | None = None, low: int = 0) -> int:
+        return whole(self.value.get(name, default), self.at(name), low)
+
+    def number(self, name: str, default: float, low: float = -math.inf, high: float = math.inf) -> float:
+        value = number(self.value.get(name, default), self.at(name))
+        if not low <= value <= high:
+            limits = f"at least {low:g}" if high == math.inf else f"from {low:g} to {high:g}"
+            raise self.error(name, f"must be {limits}, not {value:g}")
+        return value
+
+    def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """As many as the default has."""
+        found = self.value.get(name, default)
+        if not isinstance(found, list | tuple) or len(found) != len(default):
+            raise self.error(name, f"must be {len(default)} numbers, not {shown(found)}")
+        return tuple(number(one, f"{self.at(name)}/{k}") for k, one in enumerate(found))
+
+    def color(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Numbers none of which is negative."""
+        found = self.numbers(name, default)
+        if min(found) < 0:
+            raise self.error(name, f"must not be negative: {shown(list(found))}")
+        return found
+
+    def flag(self, name: str) -> bool:
+        found = self.value.get(name, False)
+        if type(found) is not bool:
+            raise self.error(name, f"must be true or false, not {shown(found)}")
+        return found
+
+    def text(self, name: str, default: str = "") -> str:
+        found = self.value.get(name, default)
+        if not isinstance(found, str):
+            raise self.error(name, f"must be a string, not {shown(found)}")
+        return found
+
+
+def escaped(name: str | int) -> str:
+    """For a pointer [RFC 6901]."""
+    return str(name).replace("~", "~0").replace("/", "~1")
+
+
+def whole(value: Any, pointer: str, low: int = 0) -> int:
+    if value is None:
+        raise ParseError("is missing", pointer)
+    if isinstance(value, float) and value.is_integer() and abs(value) < LARGEST_WHOLE:
+        value = int(value)  # 3.0: JSON doesn't tell them apart
+    if type(value) is not int or not low <= value < LARGEST_WHOLE:
+        raise ParseError(f"must be a whole number of at least {low}, not {shown(value)}", pointer)
+    return value
+
+
+def number(value: Any, pointer: str) -> float:
+    if type(value) not in (int, float) or not abs(value) < 1e308:
+        raise ParseError(f"must be a finite number, not {shown(value)}", pointer)
+    return float(value)
+
+
+def shown(value: Any) -> str:
+    """A value for a message: short, whatever it is."""
+    if isinstance(value, dict):
+        return "an object"
+    if isinstance(value, list) and len(value) > 16:
+        return f"an array of {len(value)}"
+    text = "null" if value is None else repr(value)
+    return text if len(text) <= 60 else text[:60] + "…"

@@ -1,0 +1,166 @@
+"""A primitive's triangles, whatever its mode, with what its vertices carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from service.assets.data import Doubles, Floats
+from service.assets.gltf import accessors, draco
+from service.assets.gltf.file import Array, GltfFile
+from service.assets.gltf.notes import Notes
+from service.assets.gltf.place import Place
+from service.assets.polygons import Longs
+
+MODES = ("POINTS", "LINES", "LINE_LOOP", "LINE_STRIP", "TRIANGLES", "TRIANGLE_STRIP", "TRIANGLE_FAN")
+TRIANGLES, STRIP, FAN = 4, 5, 6
+UV_SETS = 2
+MOST_SETS = 16  # of four joints each
+
+
+@dataclass(frozen=True)
+class Primitive:
+    """Rows of its vertices (n, ...) and its triangles (m, 3). v of `uvs` points down, as in the file."""
+
+    vertices: Array  # (n, 3) floating
+    faces: Longs
+    normals: Array | None = None
+    uvs: tuple[Floats | None, ...] = (None,) * UV_SETS
+    colors: Floats | None = None  # (n, 3 or 4)
+    joints: tuple[Array, ...] = ()  # (n, 4) each
+    weights: tuple[Floats, ...] = ()
+    kept: Longs | None = None  # which of the file's vertices these are; None: all
+
+    def moved(self, world: Doubles) -> Primitive:
+        """Under a 4x4 matrix. Outward stays outward: a mirroring one turns the triangles round."""
+        linear = world[:3, :3]
+        mirrored = np.linalg.det(linear) < 0
+        normals = self.normals
+        if normals is not None:
+            normals = normals @ (-cofactors(linear) if mirrored else cofactors(linear)).T
+        return replace(
+            self,
+            vertices=self.vertices @ linear.T + world[:3, 3],
+            faces=self.faces[:, ::-1] if mirrored else self.faces,
+            normals=normals,
+        )
+
+    def compact(self) -> Primitive:
+        """Without the vertices that no triangle names: files share one buffer among many primitives."""
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces.reshape(-1)] = True
+        if used.all():
+            return self
+        number = np.cumsum(used) - 1
+
+        def kept(rows: Array | None) -> Array | None:
+            return None if rows is None else rows[used]
+
+        return replace(
+            self,
+            vertices=self.vertices[used],
+            faces=number[self.faces],
+            normals=kept(self.normals),
+            uvs=tuple(map(kept, self.uvs)),
+            colors=kept(self.colors),
+            joints=tuple(rows[used] for rows in self.joints),
+            weights=tuple(rows[used] for rows in self.weights),
+            kept=np.flatnonzero(used),
+        )
+
+
+def cofactors(linear: Doubles) -> Doubles:
+    """(..., 3, 3): takes normals along, up to a factor whose sign is the determinant's."""
+    columns = [np.cross(linear[..., k - 2], linear[..., k - 1]) for k in range(3)]
+    return np.stack(columns, axis=-1)
+
+
+def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | None:
+    """None, and noted, where it has no area: points and lines."""
+    mode, attributes = place.whole("mode", TRIANGLES), place.need("attributes")
+    if mode >= len(MODES):
+        raise place.error("mode", f"must be from 0 to {len(MODES) - 1}, not {mode}")
+    if mode < TRIANGLES:
+        notes.add(place.pointer, f"{MODES[mode]} have no area: left out")
+        return None
+    if "POSITION" not in attributes:
+        notes.add(place.pointer, "has no POSITION: left out")
+        return None
+    compressed = place.extension("KHR_draco_mesh_compression")
+    packed, faces = draco.decode(file, compressed, attributes) if compressed else ({}, None)
+    rows = _rows(file, attributes, packed, notes)
+    vertices = _floating(rows["POSITION"])
+    for name, row in rows.items():
+        if len(row) != len(vertices):
+            raise attributes.error(name, f"has {len(row)} items for {len(vertices)} vertices")
+    if faces is not None:
+        mode, indices = TRIANGLES, faces.reshape(-1)
+    elif "indices" in place:
+        indices = accessors.indices(file, place).astype(np.int64)
+    else:
+        indices = np.arange(len(vertices))
+    faces = _triangles(mode, indices, len(vertices), place, notes)
+    if not len(faces):
+        notes.add(place.pointer, "has no triangles: left out")
+        return None
+    sets = sum(f"JOINTS_{k}" in rows and f"WEIGHTS_{k}" in rows for k in range(len(rows)))
+    return Primitive(
+        vertices,
+        faces,
+        _floating(rows["NORMAL"]) if "NORMAL" in rows else None,
+        tuple(_texcoord(rows.get(f"TEXCOORD_{k}")) for k in range(UV_SETS)),
+        _unit(rows["COLOR_0"]) if "COLOR_0" in rows else None,
+        tuple(rows[f"JOINTS_{k}"] for k in range(sets)),
+        tuple(_unit(rows[f"WEIGHTS_{k}"]) for k in range(sets)),
+    ).compact()
+
+
+TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4"),
+         "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",)}  # fmt: skip
+
+
+def _rows(file: GltfFile, attributes: Place, packed: dict[str, Array], notes: Notes) -> dict[str, Array]:
+    """What is used of the attributes, `packed` ones taken from there."""
+    found = {}
+    for name in attributes.value:
+        kind, _, number = name.partition("_")
+        if kind not in TYPES or (number and not (number.isascii() and number.isdigit())):
+            continue  # TANGENT, and a program's own
+        if number and int(number[:4]) >= {"TEXCOORD": UV_SETS, "COLOR": 1}.get(kind, MOST_SETS):
+            notes.add(attributes.at(name), "is not read: there are two sets of uv and one of colours")
+            continue
+        if name not in packed:
+            found[name] = accessors.read(file, attributes, name, *TYPES[kind])
+        elif packed[name].shape[1] in [accessors.WIDTHS[one] for one in TYPES[kind]]:
+            found[name] = packed[name]
+        else:
+            raise attributes.error(name, f"has {packed[name].shape[1]} numbers an item in the Draco data")
+    return found
+
+
+def _texcoord(rows: Array | None) -> Floats | None:
+    """As they are: KHR_mesh_quantization lets them be integers that are no fractions."""
+    return None if rows is None else rows.astype(np.float32, copy=False)
+
+
+def _floating(rows: Array) -> Array:
+    return rows if rows.dtype.kind == "f" else rows.astype(np.float32)
+
+
+def _unit(rows: Array) -> Floats:
+    """float32; an integer type is normalised: the specification allows no other meaning."""
+    return accessors.normalised(rows).astype(np.float32, copy=False)
+
+
+def _triangles(mode: int, indices: Longs, vertices: int, place: Place, notes: Notes) -> Longs:
+    if len(indices) and not 0 <= indices.min() <= indices.max() < vertices:
+        raise place.error("indices", f"name vertex {indices.max()} where there are {vertices}")
+    k = np.arange(max(len(indices) - 2, 0))
+    if mode == STRIP:
+        return indices[np.stack([k, k + 1 + k % 2, k + 2 - k % 2], axis=1)]
+    if mode == FAN:
+        return indices[np.stack([k + 1, k + 2, 0 * k], axis=1)]
+    if len(indices) % 3:
+        notes.add(place.pointer, f"its {len(indices)} indices are no whole triangles: the last are left out")
+    return indices[: len(indices) // 3 * 3].reshape(-1, 3)

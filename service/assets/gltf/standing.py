@@ -1,0 +1,115 @@
+"""Lights and the camera of a file."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from service.assets.data import Doubles
+from service.assets.gltf.file import GltfFile
+from service.assets.gltf.nodes import Node
+from service.assets.gltf.notes import Notes
+from service.assets.gltf.place import Place
+
+Bounds = tuple[Doubles, Doubles]
+FRAMED_VFOV = 35.0  # degrees
+FLAT = 0.15  # of the greatest extent: a wall is looked at from the front, a floor from above
+MARGIN = 1.06
+
+
+def lights(file: GltfFile, nodes: list[Node], notes: Notes) -> list[dict[str, Any]]:
+    """KHR_lights_punctual: a candela is taken as a watt per steradian, a lux as a watt per square metre."""
+    found = []
+    for node in nodes:
+        used = node.place.extension("KHR_lights_punctual")
+        if used is None:
+            continue
+        held = file.root.extension("KHR_lights_punctual")
+        listed = held.list("lights") if held else []
+        index = used.whole("light")
+        if held is None or index >= len(listed):
+            raise used.error("light", f"refers to light {index} of {len(listed)}")
+        found.append(_light(Place(listed[index], f"{held.at('lights')}/{index}"), node, notes))
+    return found
+
+
+def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
+    kind = place.text("type")
+    r, g, b = (place.number("intensity", 1, 0) * value for value in place.color("color", (1.0, 1.0, 1.0)))
+    position, direction = node.world[:3, 3].tolist(), _axis(node, 2, -1)
+    if kind == "directional":
+        return {"type": "directional", "direction": direction, "irradiance": [r, g, b]}
+    if "range" in place:
+        notes.add(place.at("range"), "is not used: light falls off as 1/d^2 and never ends")
+    if kind == "point":
+        return {"type": "point", "position": position, "intensity": [r, g, b]}
+    if kind != "spot":
+        raise place.error("type", f"must be point, spot or directional, not {kind[:40]!r}")
+    spot = place.object("spot") or Place({}, place.at("spot"))
+    inner = spot.number("innerConeAngle", 0, 0, math.pi / 2)
+    outer = spot.number("outerConeAngle", math.pi / 4, inner, math.pi / 2 + 1e-6)
+    notes.add(spot.pointer, "the edge fades as a smoothstep of the cosine, not as its square")
+    return {
+        "type": "spot",
+        "position": position,
+        "direction": direction,
+        "intensity": [r, g, b],
+        "inner_angle": math.degrees(inner),
+        "outer_angle": min(math.degrees(outer), 90.0),
+    }
+
+
+def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> dict[str, Any]:
+    """The first camera of the scene; a framed one where there is none with a perspective."""
+    chosen: dict[str, Any] | None = None
+    for node in nodes:
+        if "camera" not in node.place:
+            continue
+        place = file.follow(node.place, "camera", "cameras")
+        if chosen is not None:
+            notes.add(node.place.at("camera"), "is not used: the scene's first camera is")
+        elif place.text("type") == "perspective":
+            chosen = _perspective(place.need("perspective"), node, bounds)
+        else:
+            notes.add(place.pointer, "an orthographic camera is not had: one in perspective is framed instead")
+    return chosen or framed(bounds)
+
+
+def _perspective(place: Place, node: Node, bounds: Bounds) -> dict[str, Any]:
+    position, forward = node.world[:3, 3], np.array(_axis(node, 2, -1))
+    # As far as what it looks at, so that turning about the target turns about the model.
+    distance = float((sum(bounds) / 2 - position) @ forward)
+    size = float(np.linalg.norm(bounds[1] - bounds[0]))
+    target = position + forward * (distance if distance > 0.01 * size else max(size, 1.0))
+    vfov = math.degrees(place.number("yfov", math.radians(FRAMED_VFOV), 1e-6, math.pi - 1e-6))
+    return {"position": position.tolist(), "target": target.tolist(), "up": _axis(node, 1, 1), "vfov": vfov}
+
+
+def framed(bounds: Bounds) -> dict[str, Any]:
+    """Everything in a square picture, seen from the front a little from the side and above."""
+    low, high = bounds
+    extent = high - low
+    azimuth, elevation = 30.0, 15.0
+    if extent[2] < FLAT * extent.max():
+        azimuth, elevation = 0.0, 0.0
+    elif extent[1] < FLAT * extent.max():
+        elevation = 40.0
+    a, e = math.radians(azimuth), math.radians(elevation)
+    back = np.array([math.sin(a) * math.cos(e), math.sin(e), math.cos(a) * math.cos(e)])
+    right = np.array([math.cos(a), 0, -math.sin(a)])
+    axes = np.stack([right, np.cross(back, right), back])
+    middle = (low + high) / 2
+    corners = (np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3) - middle) @ axes.T
+    slope = math.tan(math.radians(FRAMED_VFOV / 2)) / MARGIN
+    distance = float((np.abs(corners[:, :2]).max(axis=1) / slope + corners[:, 2]).max()) or 1.0
+    return {"position": (middle + back * distance).tolist(), "target": middle.tolist(), "vfov": FRAMED_VFOV}
+
+
+def _axis(node: Node, axis: int, sign: int) -> list[float]:
+    """A direction of the node in the world, of length one; the world's own where its scale leaves none."""
+    direction = sign * node.world[:3, axis]
+    length = float(np.linalg.norm(direction))
+    unit = direction / length if length > 0 else sign * np.eye(3)[axis]
+    return [float(value) for value in unit]

@@ -1,0 +1,142 @@
+"""Textures: images, samplers and KHR_texture_transform, as the contract's `textures`."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any, Literal
+
+from service.assets.gltf.file import GltfFile
+from service.assets.gltf.notes import Notes
+from service.assets.gltf.place import Place, number
+from service.assets.gltf.primitives import UV_SETS
+from service.assets.sniff import sniff
+
+ColorSpace = Literal["srgb", "linear"]
+WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
+NEAREST = (9728, 9984, 9986)
+READ = ("png", "jpeg", "webp")
+
+
+@dataclass
+class Textures:
+    """`keep` takes an image's bytes and place, and gives the reference that the document holds."""
+
+    file: GltfFile
+    notes: Notes
+    keep: Callable[[bytes, str], str]
+    documents: dict[str, dict[str, Any]] = field(default_factory=dict)
+    made: dict[tuple[str, str], list[str]] = field(default_factory=dict)  # references to images of our own
+    _names: dict[tuple[Any, ...], str] = field(default_factory=dict)
+    _kept: dict[str, str] = field(default_factory=dict)
+
+    def use(self, info: Place | None, space: ColorSpace, sets: tuple[bool, ...]) -> str | None:
+        """The name of a texture. None, and noted, where it can't be had; `sets`: the uv sets that the mesh has."""
+        if info is None:
+            return None
+        texture = self.file.follow(info, "index", "textures")
+        image = self.image(texture)
+        placing = self._placing(info)
+        uv = placing.get("uv", 0)
+        if image is None:
+            return None
+        if uv >= UV_SETS:
+            self.notes.add(info.at("texCoord"), f"TEXCOORD_{uv} is not read, only 0 and 1: the texture is left out")
+            return None
+        if not sets[uv]:
+            self.notes.add(info.pointer, f"a mesh with this material has no TEXCOORD_{uv}: there it goes untextured")
+            return None
+        return self.add(image, {"color_space": space, "wrap": self._wrap(texture), **placing}, texture)
+
+    def add(self, image: str, settings: dict[str, Any], named: Place) -> str:
+        """The name of a texture with these settings; the same ones get the same name."""
+        key = image, repr(sorted(settings.items()))
+        if key not in self._names:
+            self._names[key] = self._name(named)
+            self.documents[self._names[key]] = {"asset": image, **settings}
+        return self._names[key]
+
+    def source(self, texture: Place) -> Place | None:
+        """The texture's image. None, and noted, where it is in a format that is not read."""
+        webp = texture.extension("EXT_texture_webp")
+        for owner in (webp, texture):
+            if owner is not None and "source" in owner:
+                return self.file.follow(owner, "source", "images")
+        other = texture.object("extensions")
+        which = f" ({', '.join(other.value)[:80]})" if other else ""
+        self.notes.add(texture.pointer, f"has no image in PNG, JPEG or WebP{which}: the texture is left out")
+        return None
+
+    def image(self, texture: Place) -> str | None:
+        """The reference to a texture's image."""
+        place = self.source(texture)
+        if place is None:
+            return None
+        if place.pointer not in self._kept:
+            data = self.file.image(place)
+            if sniff(data) not in READ:
+                at = "bufferView" if "bufferView" in place else "uri"
+                raise place.error(at, f"is no PNG, JPEG or WebP image: it begins with {data[:12]!r}")
+            self._kept[place.pointer] = self.keep(data, place.pointer)
+        return self._kept[place.pointer]
+
+    def _wrap(self, texture: Place) -> str:
+        if "sampler" not in texture:
+            return "repeat"
+        sampler = self.file.follow(texture, "sampler", "samplers")
+        found = []
+        for name in ("wrapS", "wrapT"):
+            mode = sampler.whole(name, 10497)
+            if mode not in WRAPS:
+                raise sampler.error(name, f"must be one of {', '.join(map(str, WRAPS))}, not {mode}")
+            found.append(WRAPS[mode])
+        if found[0] != found[1]:
+            self.notes.add(sampler.at("wrapT"), f"{found[1]} is not had beside {found[0]} in u, which both take")
+        if sampler.whole("magFilter", 9729) in NEAREST:
+            self.notes.add(sampler.at("magFilter"), "nearest texels are not had: bilinear is")
+        return found[0]
+
+    def _placing(self, info: Place) -> dict[str, Any]:
+        """Scale, rotation, offset and uv set of a texture info, where they are not the defaults.
+
+        glTF's v points down, ours up: with F(u, v) = (u, 1 - v), uv' = o + R S uv becomes F(o + R S F(uv)), whose
+        rotation is the opposite.
+        """
+        transform = info.extension("KHR_texture_transform")
+        uv = info.whole("texCoord", 0)
+        if transform is None:
+            return {"uv": uv} if uv else {}
+        uv = transform.whole("texCoord", uv)
+        turn = transform.number("rotation", 0.0)
+        x, y = transform.numbers("offset", (0.0, 0.0))
+        sx, sy = transform.numbers("scale", (1.0, 1.0))
+        c, s = math.cos(turn), math.sin(turn)
+        # The specification's matrix in u to the right and v down: (c, s; -s, c).
+        placing = {
+            "scale": [sx, sy],
+            "rotation": math.degrees(turn),
+            "offset": [x + s * sy, 1 - y - c * sy],
+            "uv": uv,
+        }
+        defaults = {"scale": [1, 1], "rotation": 0, "offset": [0, 0], "uv": 0}
+        return {name: value for name, value in placing.items() if value != defaults[name]}
+
+    def _name(self, texture: Place) -> str:
+        source = self.source(texture)
+        named = (source.text("name") if source else "") or texture.text("name")
+        return unique(named or texture.pointer[1:].replace("/", " "), self.documents)
+
+
+def unique(base: str, taken: dict[str, Any]) -> str:
+    """A name not yet taken: the base, or the base and a number."""
+    base = base[:80]
+    name, k = base, 2
+    while name in taken:
+        name, k = f"{base} {k}", k + 1
+    return name
+
+
+def factor(values: tuple[float, ...]) -> Any:
+    """As a document has it: one number where all are the same."""
+    return values[0] if len(set(values)) == 1 else [number(one, "") for one in values]

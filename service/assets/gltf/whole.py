@@ -1,0 +1,68 @@
+"""All meshes of a file's scene as one: what `{type: "mesh", asset}` shows of a glTF file."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from service.assets.data import AssetLimits
+from service.assets.errors import ParseError
+from service.assets.gltf.file import Array, GltfFile
+from service.assets.gltf.nodes import Nodes, instances
+from service.assets.gltf.notes import Notes
+from service.assets.gltf.pose import Skin, morphed, weights
+from service.assets.gltf.primitives import UV_SETS, Primitive, read_primitive
+from service.assets.parts import Parts
+
+
+def read_whole(data: bytes | memoryview, limits: AssetLimits) -> Parts:
+    """Raises ParseError."""
+    file, notes = GltfFile(data, limits), Notes()
+    nodes, read, parts, triangles = Nodes(file), dict[str, Primitive | None](), list[Primitive](), 0
+    for node in nodes.shown:
+        if "mesh" not in node.place:
+            continue
+        mesh = file.follow(node.place, "mesh", "meshes")
+        morph = weights(node.place, mesh)
+        skin = Skin(file, file.follow(node.place, "skin", "skins"), nodes) if "skin" in node.place else None
+        for place in mesh.objects("primitives"):
+            if place.pointer not in read:
+                read[place.pointer] = read_primitive(file, place, notes)
+            primitive = read[place.pointer]
+            if primitive is None:
+                continue
+            primitive = morphed(file, primitive, place, morph) if morph else primitive
+            for world in [np.eye(4)] if skin else instances(file, node):
+                triangles += len(primitive.faces)
+                if triangles > limits.max_triangles:  # before the memory is taken: one mesh may stand in many nodes
+                    raise ParseError(f"its nodes hold more than the {limits.max_triangles} triangles allowed")
+                parts.append(skin.posed(primitive, place) if skin else primitive.moved(world))
+    if not parts:
+        raise ParseError("its scene has no triangles")
+    return _joined(parts, [f"{note['pointer']}: {note['detail']}" for note in notes.document()])
+
+
+def _joined(parts: list[Primitive], warnings: list[str]) -> Parts:
+    first = np.cumsum([0, *(len(p.vertices) for p in parts)])
+    uvs = [_rows([p.uvs[k] for p in parts], parts, 2) for k in range(UV_SETS)]
+    for rows in uvs:
+        if rows is not None:
+            rows[:, 1] = 1 - rows[:, 1]  # glTF's v points down
+    return Parts(
+        np.concatenate([p.vertices for p in parts]),
+        np.concatenate([p.faces + at for p, at in zip(parts, first, strict=False)]),
+        _rows([p.normals for p in parts], parts, 3),
+        uvs[0],
+        uvs[1],
+        _rows([None if p.colors is None else p.colors[:, :3] for p in parts], parts, 3, 1.0),
+        warnings,
+    )
+
+
+def _rows(columns: list[Array | None], parts: list[Primitive], width: int, missing: float = 0.0) -> Array | None:
+    """None where no part has them; a part without gets `missing`: normals of zero are computed from the triangles."""
+    if all(column is None for column in columns):
+        return None
+    return np.concatenate([
+        np.full((len(p.vertices), width), missing, np.float32) if column is None else column
+        for column, p in zip(columns, parts, strict=True)
+    ])  # fmt: skip

@@ -1,0 +1,59 @@
+"""A scene's file taken apart: what it holds becomes assets of their own, and the document refers to them."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+from service.assets.data import SceneFile, ScenePart
+from service.problems import AssetError, InvalidDocument
+from service.scene import parse_scene
+
+PART = re.compile(r"part:(\d+)")
+
+
+@dataclass(frozen=True)
+class Imported:
+    """A valid document but for the environment that it may lack, and what the file asks for and does not get."""
+
+    document: dict[str, Any]
+    warnings: list[dict[str, str]]
+    lit: bool  # has lights of its own
+
+    def scene(self, environment: dict[str, Any]) -> dict[str, Any]:
+        """The document; under `environment` where the file has no light."""
+        return self.document if self.lit else {**self.document, "environment": environment}
+
+    def references(self) -> set[str]:
+        """The assets that the document needs."""
+        held = [*self.document["shapes"], *self.document.get("textures", {}).values()]
+        return {one["asset"] for one in held}
+
+
+def take_apart(file: SceneFile, keep: Callable[[ScenePart], str]) -> Imported:
+    """`keep` stores a part and gives its id. Raises AssetError, and what `keep` raises."""
+    ids: list[str] = []
+    for part in file.parts:
+        try:
+            ids.append(keep(part))
+        except AssetError as error:
+            raise AssetError(f"{part.pointer}: {error.detail}", part.pointer) from None
+
+    def renamed(one: dict[str, Any]) -> dict[str, Any]:
+        found = PART.fullmatch(str(one.get("asset")))
+        if found is None or int(found[1]) >= len(ids):
+            raise AssetError("its parts can't be told apart")
+        return {**one, "asset": ids[int(found[1])]}
+
+    document = {
+        **file.document,
+        "textures": {name: renamed(one) for name, one in file.document.get("textures", {}).items()},
+        "shapes": [renamed(one) for one in file.document["shapes"]],
+    }
+    try:
+        parse_scene(document)
+    except InvalidDocument as error:
+        raise AssetError(f"as a scene it has a mistake at {error.errors[0]}") from None
+    return Imported(document, file.warnings, file.lit)

@@ -1,0 +1,49 @@
+"""`sunbox import MODEL -o SCENE.json`: a glTF model as a document, its meshes and images in files beside it."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import tempfile
+from contextlib import closing
+from pathlib import Path
+
+from service.commands import BadInput, files
+from service.commands.configuration import configuration
+from service.commands.documents import asset_folders, refusals
+
+
+def run(arguments: argparse.Namespace) -> int:
+    source = Path(arguments.model)
+    target = files.writable(Path(arguments.output))
+    config = configuration()
+    data = files.read(source)
+    from service import presets, recipe
+    from service.assets import AssetStore, FileAssets
+    from service.commands.models import import_model, is_model
+
+    if not is_model(data):
+        raise BadInput(f"{str(source)!r}: is no glTF model, neither a GLB nor JSON with an `asset`")
+    folder = target.with_suffix(".assets")
+    with (
+        tempfile.TemporaryDirectory(prefix="sunbox-") as scratch,
+        closing(AssetStore(Path(scratch), config, presets.builtin_assets)) as store,
+        FileAssets(source.parent, asset_folders(arguments.asset_root), store) as beside,
+        refusals(),
+    ):
+        document = import_model(source, data, store, beside).scene(presets.default_environment())
+        builtin = presets.builtin_assets().keys()
+        files.make_folder(folder)
+
+        def written(id: str) -> str:
+            """Under a name that tells its content: importing again changes only what changed."""
+            if id in builtin:
+                return id
+            name = f"{id.removeprefix('sha256:')[:16]}.{store.info(id).format}"
+            files.write(folder / name, store.read(id))
+            return f"{folder.name}/{name}"
+
+        named = {ref: written(ref) for ref in recipe.references(document)}
+        document = recipe.renamed(document, named.__getitem__)
+    files.write(target, (json.dumps(document, indent=1) + "\n").encode())
+    return 0

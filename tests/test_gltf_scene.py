@@ -1,0 +1,268 @@
+"""glTF files as scene documents: what stands where, under which light, seen by which camera."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.assets import AssetStore, MeshData
+from service.assets.importing import Imported
+from service.problems import AssetError
+from service.scene import parse_scene
+from tests.gltf_files import QUAD, QUAD_FACES, QUAD_UVS, Gltf
+
+HALF = math.sqrt(0.5)
+
+
+@pytest.fixture(scope="module")
+def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
+    store = AssetStore(tmp_path_factory.mktemp("data"))
+    yield store
+    store.close()
+
+
+def imported(store: AssetStore, file: Gltf) -> Imported:
+    info = store.add(file.glb())
+    assert info.kind == "scene"
+    found = store.scene(info.id)
+    assert (info.warnings or []) == found.warnings
+    parse_scene(found.document)
+    return found
+
+
+def corners(store: AssetStore, shape: dict[str, Any]) -> np.ndarray:
+    """(m, 3, 3) in the world."""
+    mesh = store.mesh(shape["asset"])
+    matrix = np.reshape(shape.get("transform", {"matrix": np.eye(4)})["matrix"], (4, 4))
+    return (mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])[mesh.faces]
+
+
+def noted(found: Imported) -> dict[str, str]:
+    return {warning["pointer"]: warning["detail"] for warning in found.warnings}
+
+
+def test_nodes_share_their_mesh_and_mirror(store: AssetStore) -> None:
+    file = Gltf()
+    mesh = file.mesh()
+    child = file.node(False, mesh=mesh, rotation=[0, HALF, 0, HALF])
+    file.node(mesh=mesh, children=[child], translation=[1, 2, 3], scale=[-2, 1, 1])
+    first, second = imported(store, file).document["shapes"]
+    assert first["asset"] == second["asset"] and first["asset"].startswith("sha256:")
+    mirrored = QUAD * [-2, 1, 1] + [1, 2, 3]
+    assert np.allclose(corners(store, first), mirrored[QUAD_FACES.reshape(-1, 3)])
+    turned = np.stack([0 * QUAD[:, 0], QUAD[:, 1], -QUAD[:, 0]], axis=1) * [-2, 1, 1] + [1, 2, 3]
+    assert np.allclose(corners(store, second), turned[QUAD_FACES.reshape(-1, 3)], atol=1e-6)
+
+
+def test_a_mesh_carries_uv_upwards_normals_and_colours(store: AssetStore) -> None:
+    normals, colors = np.tile(np.array([0, 0, 2], "<f4"), (4, 1)), np.array([[255, 128, 0, 255]] * 4, np.uint8)
+    file, second = Gltf(), QUAD_UVS[::-1] * np.float32(0.5)
+    rows = {"POSITION": QUAD, "NORMAL": normals, "TEXCOORD_0": QUAD_UVS, "TEXCOORD_1": second, "COLOR_0": colors}
+    primitive = file.primitive(rows)
+    file.tree["accessors"][primitive["attributes"]["COLOR_0"]]["normalized"] = True
+    file.node(mesh=file.mesh(primitive))
+    (shape,) = imported(store, file).document["shapes"]
+    mesh = store.mesh(shape["asset"])
+    assert np.array_equal(mesh.normals, [[0, 0, 1]] * 4) and "smooth" not in shape
+    assert np.allclose(mesh.uvs, QUAD_UVS * [1, -1] + [0, 1]) and np.allclose(mesh.uvs_1, second * [1, -1] + [0, 1])
+    assert mesh.colors is not None and np.allclose(mesh.colors, [[1, 128 / 255, 0]] * 4)  # linear, not sRGB
+
+
+def test_without_normals_triangles_are_flat(store: AssetStore) -> None:
+    file = Gltf()
+    file.node(mesh=file.mesh())
+    (shape,) = imported(store, file).document["shapes"]
+    assert shape["smooth"] is False and shape["double_sided"] is False
+
+
+@pytest.mark.parametrize(
+    ("mode", "indices", "expected"),
+    [
+        (4, QUAD_FACES, [[0, 1, 2], [0, 2, 3]]),
+        (4, None, [[0, 1, 2]]),
+        (5, np.array([0, 1, 3, 2], np.uint8), [[0, 1, 3], [1, 2, 3]]),
+        (6, np.array([0, 1, 2, 3], "<u4"), [[1, 2, 0], [2, 3, 0]]),
+        (6, None, [[1, 2, 0], [2, 3, 0]]),
+    ],
+)
+def test_primitives_with_area(store: AssetStore, mode: int, indices: Any, expected: list[list[int]]) -> None:
+    file = Gltf()
+    rows = {"POSITION": QUAD[:3] if mode == 4 and indices is None else QUAD}
+    file.node(mesh=file.mesh(file.primitive(rows, indices, mode=mode), file.primitive(rows, None, mode=1)))
+    found = imported(store, file)
+    (shape,) = found.document["shapes"]
+    assert np.array_equal(corners(store, shape), QUAD[expected])
+    assert "no area" in noted(found)["/meshes/0/primitives/1"]
+
+
+def test_primitives_of_one_buffer_take_only_their_vertices(store: AssetStore) -> None:
+    file = Gltf()
+    position = file.accessor(QUAD)
+    halves = [
+        {"attributes": {"POSITION": position}, "indices": file.accessor(faces)} for faces in np.split(QUAD_FACES, 2)
+    ]
+    file.node(mesh=file.mesh(*halves))
+    shapes = imported(store, file).document["shapes"]
+    assert [len(store.mesh(shape["asset"]).vertices) for shape in shapes] == [3, 3]
+    assert np.array_equal(np.concatenate([corners(store, s) for s in shapes]), QUAD[QUAD_FACES.reshape(-1, 3)])
+
+
+def test_quantised_positions(store: AssetStore) -> None:
+    """KHR_mesh_quantization: whole numbers that a node's scale makes metres."""
+    file = Gltf()
+    file.tree["extensionsRequired"] = ["KHR_mesh_quantization"]
+    rows = {"POSITION": np.append((QUAD * 100).astype("<i2"), np.zeros((4, 1), "<i2"), axis=1)[:, :3].copy()}
+    file.node(mesh=file.mesh(file.primitive(rows)), scale=[0.01, 0.01, 0.01])
+    (shape,) = imported(store, file).document["shapes"]
+    assert np.allclose(corners(store, shape), QUAD[QUAD_FACES.reshape(-1, 3)])
+
+
+def test_morph_targets_by_the_weights_of_the_file(store: AssetStore) -> None:
+    """The node's weights go before the mesh's; a mesh of two nodes takes two shapes."""
+    file = Gltf()
+    target = {"POSITION": file.accessor(np.tile(np.array([0, 0, 4], "<f4"), (4, 1)))}
+    mesh = file.mesh(file.primitive(targets=[target]), weights=[0.5])
+    file.node(mesh=mesh)
+    file.node(mesh=mesh, weights=[0.0])
+    file.node(mesh=mesh, weights=[1.0])
+    heights = [corners(store, shape)[0, 0, 2] for shape in imported(store, file).document["shapes"]]
+    assert heights == [2, 0, 4]
+
+
+def test_a_skin_stands_as_its_joints_do(store: AssetStore) -> None:
+    """The mesh's own node does not move it; each vertex follows its joints by their shares."""
+    file = Gltf()
+    joints = [file.node(translation=[0, 0, 5]), file.node(translation=[0, 10, 0])]
+    bound = np.stack([np.eye(4), np.eye(4)]).astype("<f4")
+    bound[1, 3, :3] = [0, -10, 0]  # columns first
+    shares = np.array([[1, 0, 0, 0], [1, 0, 0, 0], [0, 1, 0, 0], [0.5, 0.5, 0, 0]], "<f4")
+    rows = {"POSITION": QUAD, "JOINTS_0": np.tile(np.array([0, 1, 0, 0], np.uint8), (4, 1)), "WEIGHTS_0": shares}
+    skin = file.add("skins", {"joints": joints, "inverseBindMatrices": file.accessor(bound.reshape(2, 16))})
+    file.node(mesh=file.mesh(file.primitive(rows)), skin=skin, translation=[100, 0, 0])
+    (shape,) = imported(store, file).document["shapes"]
+    expected = QUAD + np.array([[0, 0, 5], [0, 0, 5], [0, 0, 0], [0, 0, 2.5]])
+    assert np.allclose(corners(store, shape), expected[QUAD_FACES.reshape(-1, 3)])
+
+
+def test_gpu_instances(store: AssetStore) -> None:
+    file = Gltf()
+    moves = np.array([[0, 0, 0], [5, 0, 0], [0, 5, 0]], "<f4")
+    extension = {"attributes": {"TRANSLATION": file.accessor(moves)}}
+    file.node(mesh=file.mesh(), extensions={"EXT_mesh_gpu_instancing": extension}, translation=[1, 0, 0])
+    shapes = imported(store, file).document["shapes"]
+    assert np.allclose([corners(store, shape)[0, 0] for shape in shapes], moves + QUAD[0] + [1, 0, 0])
+
+
+def test_a_flat_transform_is_left_out_and_told(store: AssetStore) -> None:
+    file = Gltf()
+    mesh = file.mesh()
+    file.node(mesh=mesh)
+    file.node(mesh=mesh, scale=[1, 0, 1])
+    found = imported(store, file)
+    assert len(found.document["shapes"]) == 1 and "flat" in noted(found)["/nodes/1"]
+
+
+def test_the_first_camera(store: AssetStore) -> None:
+    file = Gltf()
+    file.node(mesh=file.mesh())
+    lens = {"type": "perspective", "perspective": {"yfov": 0.7, "znear": 0.1}}
+    file.node(camera=file.add("cameras", lens), translation=[4, 0, 0], rotation=[0, HALF, 0, HALF])
+    file.node(camera=file.add("cameras", lens))
+    found = imported(store, file)
+    camera = found.document["camera"]
+    assert camera["position"] == [4, 0, 0] and camera["vfov"] == pytest.approx(math.degrees(0.7))
+    assert np.allclose(camera["target"], [0, 0, 0], atol=1e-6) and np.allclose(camera["up"], [0, 1, 0])
+    assert "first camera" in noted(found)["/nodes/2/camera"]
+
+
+def test_an_orthographic_camera_is_framed_instead(store: AssetStore) -> None:
+    file = Gltf()
+    file.node(mesh=file.mesh())
+    lens = {"type": "orthographic", "orthographic": {"xmag": 1, "ymag": 1, "znear": 0, "zfar": 1}}
+    file.node(camera=file.add("cameras", lens))
+    found = imported(store, file)
+    assert "orthographic" in noted(found)["/cameras/0"] and found.document["camera"]["target"] == [0, 0, 0]
+
+
+@pytest.mark.parametrize("scale", [[1, 1, 1], [5, 1, 3], [1, 5, 0.001], [3, 2, 1000]])
+def test_a_framed_camera_sees_everything_and_fills_the_picture(store: AssetStore, scale: list[float]) -> None:
+    file = Gltf()
+    box = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], "<f4") + np.float32([7, 8, 9])
+    file.node(mesh=file.mesh(file.primitive({"POSITION": box}, np.arange(6, dtype=np.uint8))), scale=scale)
+    file.node(mesh=file.mesh(file.primitive({"POSITION": box}, np.array([5, 6, 7], np.uint8))), scale=scale)
+    camera = imported(store, file).document["camera"]
+    back = np.subtract(camera["position"], camera["target"])
+    back /= np.linalg.norm(back)
+    right = np.cross([0, 1, 0], back)
+    right /= np.linalg.norm(right)
+    seen = (box * scale - camera["position"]) @ np.stack([right, np.cross(back, right), -back]).T
+    assert seen[:, 2].min() > 0
+    extent = np.abs(seen[:, :2] / seen[:, 2:]).max() / math.tan(math.radians(camera["vfov"] / 2))
+    assert 0.85 < extent < 1
+
+
+def test_lights(store: AssetStore) -> None:
+    """A candela is a watt per steradian; the spot's other falloff is listed, and its angles are half-angles."""
+    file = Gltf()
+    file.node(mesh=file.mesh())
+    lights = [
+        {"type": "point", "color": [1, 0.5, 0], "intensity": 10, "range": 3},
+        {"type": "directional", "intensity": 2},
+        {"type": "spot", "spot": {"innerConeAngle": 0.1, "outerConeAngle": 0.2}},
+    ]
+    file.tree["extensions"] = {"KHR_lights_punctual": {"lights": lights}}
+    for k in range(3):
+        # Turned about x: the -z that lights shine along becomes -y.
+        turn = [-HALF, 0, 0, HALF]
+        file.node(extensions={"KHR_lights_punctual": {"light": k}}, translation=[0, 3, 0], rotation=turn)
+    found = imported(store, file)
+    point, sun, spot = found.document["lights"]
+    assert point == {"type": "point", "position": [0, 3, 0], "intensity": [10, 5, 0]}
+    assert sun["irradiance"] == [2, 2, 2] and np.allclose(sun["direction"], [0, -1, 0])
+    assert (spot["inner_angle"], spot["outer_angle"]) == pytest.approx((math.degrees(0.1), math.degrees(0.2)))
+    assert spot["intensity"] == [1, 1, 1]
+    assert {"/extensions/KHR_lights_punctual/lights/0/range", "/extensions/KHR_lights_punctual/lights/2/spot"} <= set(
+        noted(found)
+    )
+    assert "environment" not in found.scene({"type": "constant", "radiance": 1})
+
+
+def test_without_lights_there_is_the_default_environment(store: AssetStore) -> None:
+    file = Gltf()
+    file.node(mesh=file.mesh())
+    environment = {"type": "constant", "radiance": 1}
+    assert imported(store, file).scene(environment)["environment"] == environment
+
+
+def test_what_is_not_had_is_listed_with_its_place(store: AssetStore) -> None:
+    file = Gltf().of({"extensions": {"KHR_materials_iridescence": {"iridescenceFactor": 1}, "EXT_a/b": {}}})
+    file.add("animations", {"channels": [], "samplers": []})
+    file.tree["extensionsUsed"] = ["KHR_materials_iridescence"]
+    places = noted(imported(store, file))
+    assert {"/materials/0/extensions/KHR_materials_iridescence", "/materials/0/extensions/EXT_a~1b"} <= set(places)
+    assert "/animations" in places
+
+
+def test_a_document_outlives_its_parts(store: AssetStore) -> None:
+    """They are made again from the file where they are gone."""
+    file = Gltf()
+    file.node(mesh=file.mesh(), translation=[3, 3, 3])
+    info = store.add(file.glb())
+    before = store.scene(info.id).document
+    for path in store._folder.glob(before["shapes"][0]["asset"].removeprefix("sha256:") + "*"):
+        path.unlink()
+    assert store.scene(info.id).document == before
+    assert isinstance(store.mesh(before["shapes"][0]["asset"]), MeshData)
+
+
+def test_a_broken_image_is_named(store: AssetStore) -> None:
+    file = Gltf()
+    image = file.add("images", {"bufferView": file.view(b"\x89PNG\r\n\x1a\n" + bytes(50))})
+    file.of({"pbrMetallicRoughness": {"baseColorTexture": {"index": file.add("textures", {"source": image})}}})
+    with pytest.raises(AssetError, match=r"^/images/0: ") as refusal:
+        store.add(file.glb())
+    assert refusal.value.place == "/images/0"
