@@ -44,17 +44,17 @@ class GltfFile:
         version = self.root.need("asset").text("version")
         if not version.startswith("2."):
             raise ParseError(f"glTF 2.0 is read, this is version {shown(version)}", "/asset/version")
-        for k, name in enumerate(self.root.list("extensionsRequired")):
+        for k, name in enumerate(self.root.array("extensionsRequired")):
             if name not in KNOWN | OPTIONAL:
                 detail = f"the file requires {shown(name)}, which is not supported"
                 raise ParseError(detail, f"/extensionsRequired/{k}")
 
     def count(self, kind: str) -> int:
-        return len(self.root.list(kind))
+        return len(self.root.array(kind))
 
     def item(self, kind: str, index: Any, pointer: str) -> Place:
         """The item that the value at `pointer` refers to."""
-        items = self.root.list(kind)
+        items = self.root.array(kind)
         k = whole(index, pointer)
         if k >= len(items):
             raise ParseError(f"refers to /{kind}/{k}, and there are {len(items)}", pointer)

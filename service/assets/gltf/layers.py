@@ -38,7 +38,10 @@ def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[s
     texture = read.textures.use(info, "linear", read.sets)
     if texture is None:
         return {}
-    scale = info.number("scale", 1)
+    scale = info.number("scale", 1, -1e6, 1e6)
+    if scale < 0:
+        read.notes.add(info.at("scale"), "a negative scale is not had: the map is left out")
+        return {}
     return {parameter: {"texture": texture} | ({"scale": scale} if scale != 1 else {})}
 
 
@@ -106,7 +109,7 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
     strength = extension.number("anisotropyStrength", 0, 0, 1) if extension else 0.0
     if extension is None or not strength:
         return
-    rotation = extension.number("anisotropyRotation", 0)
+    rotation = extension.number("anisotropyRotation", 0, -1e6, 1e6)
     if rotation:
         document["anisotropic_rotation"] = math.degrees(rotation)
     roughness = document["roughness"]

@@ -99,11 +99,11 @@ class Materials:
         place = read.place
         strength = place.extension("KHR_materials_emissive_strength")
         scale = strength.number("emissiveStrength", 1, 0) if strength else 1.0
-        r, g, b = (scale * value for value in place.color("emissiveFactor", (0.0, 0.0, 0.0)))
-        if not max(r, g, b):
+        emission: tuple[float, ...] = tuple(place.radiance("emissiveFactor", (0.0, 0.0, 0.0), scale))
+        if not max(emission):
             return {}
         sides = {"emission_sides": "both"} if place.flag("doubleSided") else {}
-        return {"emission": read.color(place, "emissiveTexture", (r, g, b)), **sides}
+        return {"emission": read.color(place, "emissiveTexture", emission), **sides}
 
     def _normal(self, read: Reading) -> dict[str, Any]:
         return layers.normal_map(read, read.place, "normalTexture", "normal_map")

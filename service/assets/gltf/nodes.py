@@ -28,7 +28,7 @@ class Node:
 class Nodes:
     def __init__(self, file: GltfFile) -> None:
         self._file = file
-        self._all = file.root.list("nodes")
+        self._all = file.root.array("nodes")
         self._parents: dict[int, int] | None = None
 
     @cached_property
@@ -44,7 +44,7 @@ class Nodes:
             seen.add(index)
             world = parent @ local_matrix(place)
             found.append(Node(place, index, world))
-            children = place.list("children")
+            children = place.array("children")
             stack += [(world, children[k], f"{place.at('children')}/{k}") for k in reversed(range(len(children)))]
         return found
 
@@ -72,7 +72,7 @@ class Nodes:
         found = {}
         for k in range(len(self._all)):
             place = Place(self._all[k], f"/nodes/{k}")
-            found.update({child: k for child in place.list("children") if type(child) is int})
+            found.update({child: k for child in place.array("children") if type(child) is int})
         return found
 
     def _roots(self) -> list[tuple[Any, str]]:
@@ -80,13 +80,13 @@ class Nodes:
         if not file.count("scenes"):
             return [(k, f"/nodes/{k}") for k in range(len(self._all)) if k not in self.parents]
         scene = file.item("scenes", file.root.value.get("scene", 0), "/scene")
-        return [(one, f"{scene.at('nodes')}/{k}") for k, one in enumerate(scene.list("nodes"))]
+        return [(one, f"{scene.at('nodes')}/{k}") for k, one in enumerate(scene.array("nodes"))]
 
 
 def local_matrix(place: Place) -> Doubles:
     """(4, 4): the matrix, given by columns, or T R S."""
     if "matrix" in place:
-        columns: Doubles = np.array(place.numbers("matrix", tuple(np.eye(4).reshape(-1))))
+        columns: Doubles = np.array(place.numbers("matrix", tuple(np.eye(4).reshape(-1)), 1e38))
         matrix: Doubles = np.ascontiguousarray(columns.reshape(4, 4).T)
         if tuple(matrix[3]) != (0, 0, 0, 1):
             raise place.error("matrix", f"must be affine: its last row is {shown(matrix[3].tolist())}")

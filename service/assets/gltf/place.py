@@ -9,6 +9,7 @@ from typing import Any
 from service.assets.errors import ParseError
 
 LARGEST_WHOLE = 1 << 53  # JSON's numbers are exact up to here
+LARGEST, BRIGHTEST = 1e9, 1e20  # the contract's ranges of lengths and of radiometric values
 
 
 class Place:
@@ -38,14 +39,14 @@ class Place:
             raise self.error(name, "is missing")
         return found
 
-    def list(self, name: str) -> list[Any]:
+    def array(self, name: str) -> list[Any]:
         found = self.value.get(name, [])
         if not isinstance(found, list):
             raise self.error(name, f"must be an array, not {shown(found)}")
         return found
 
     def objects(self, name: str) -> Iterator[Place]:
-        for k, one in enumerate(self.list(name)):
+        for k, one in enumerate(self.array(name)):
             yield Place(one, f"{self.at(name)}/{k}")
 
     def extension(self, name: str) -> Place | None:
@@ -62,18 +63,28 @@ class Place:
             raise self.error(name, f"must be {limits}, not {value:g}")
         return value
 
-    def numbers(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        """As many as the default has."""
+    def numbers(self, name: str, default: tuple[float, ...], most: float = LARGEST) -> tuple[float, ...]:
+        """As many as the default has, none beyond `most` on either side."""
         found = self.value.get(name, default)
         if not isinstance(found, list | tuple) or len(found) != len(default):
             raise self.error(name, f"must be {len(default)} numbers, not {shown(found)}")
-        return tuple(number(one, f"{self.at(name)}/{k}") for k, one in enumerate(found))
+        values = tuple(number(one, f"{self.at(name)}/{k}") for k, one in enumerate(found))
+        if max(map(abs, values)) > most:
+            raise self.error(name, f"must be at most {most:g}: {shown(found)}")
+        return values
 
     def color(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
         """Numbers none of which is negative."""
         found = self.numbers(name, default)
         if min(found) < 0:
             raise self.error(name, f"must not be negative: {shown(list(found))}")
+        return found
+
+    def radiance(self, name: str, default: tuple[float, ...], scale: float) -> list[float]:
+        """A colour, scaled, within the contract's range."""
+        found = [scale * value for value in self.color(name, default)]
+        if max(found) > BRIGHTEST:
+            raise self.error(name, f"times its strength or intensity must be at most {BRIGHTEST:g}: {max(found):g}")
         return found
 
     def flag(self, name: str) -> bool:

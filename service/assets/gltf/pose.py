@@ -17,7 +17,7 @@ from service.assets.gltf.primitives import Primitive, cofactors
 def weights(node: Place, mesh: Place) -> tuple[float, ...]:
     """Of the mesh's morph targets: the node's or else the mesh's; () where none has an effect."""
     owner = node if "weights" in node else mesh
-    found = tuple(number(one, f"{owner.at('weights')}/{k}") for k, one in enumerate(owner.list("weights")))
+    found = tuple(number(one, f"{owner.at('weights')}/{k}") for k, one in enumerate(owner.array("weights")))
     return found if any(found) else ()
 
 
@@ -47,7 +47,7 @@ class Skin:
 
     def __init__(self, file: GltfFile, place: Place, nodes: Nodes) -> None:
         self.place = place
-        joints = place.list("joints")
+        joints = place.array("joints")
         if not joints:
             raise place.error("joints", "must name at least one node")
         worlds = [nodes.world(joint, f"{place.at('joints')}/{k}") for k, joint in enumerate(joints)]

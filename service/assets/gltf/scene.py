@@ -168,7 +168,7 @@ class _Importer:
     def _unread(self) -> None:
         """Notes whatever else the file holds that would change the picture."""
         root = self.file.root
-        if root.list("animations"):
+        if root.array("animations"):
             self.notes.add("/animations", "are not played: the file's own pose is shown")
         if self.file.count("scenes") > 1:
             self.notes.add("/scenes", f"only number {whole(root.value.get('scene', 0), '/scene')} is shown")

@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from service.assets.data import Floats
+from service.assets.errors import ParseError
 from service.assets.gltf.place import Place
 from service.assets.gltf.textures import factor
 from service.assets.parts import linear
@@ -123,9 +124,12 @@ def _pixels(read: Reading, info: Place | None) -> Any:
     if source is None:
         return None
     Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
-    image = Image.open(io.BytesIO(read.textures.file.image(source)), formats=["PNG", "JPEG", "WEBP"])
-    check_size(*image.size, read.textures.file.limits)
-    return image.convert("RGBA")
+    try:
+        image = Image.open(io.BytesIO(read.textures.file.image(source)), formats=["PNG", "JPEG", "WEBP"])
+        check_size(*image.size, read.textures.file.limits)
+        return image.convert("RGBA")
+    except (OSError, SyntaxError, ValueError):
+        raise ParseError("is a broken image", source.pointer) from None
 
 
 def _png(pixels: np.ndarray) -> bytes:

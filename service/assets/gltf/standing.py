@@ -27,7 +27,7 @@ def lights(file: GltfFile, nodes: list[Node], notes: Notes) -> list[dict[str, An
         if used is None:
             continue
         held = file.root.extension("KHR_lights_punctual")
-        listed = held.list("lights") if held else []
+        listed = held.array("lights") if held else []
         index = used.whole("light")
         if held is None or index >= len(listed):
             raise used.error("light", f"refers to light {index} of {len(listed)}")
@@ -37,14 +37,14 @@ def lights(file: GltfFile, nodes: list[Node], notes: Notes) -> list[dict[str, An
 
 def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
     kind = place.text("type")
-    r, g, b = (place.number("intensity", 1, 0) * value for value in place.color("color", (1.0, 1.0, 1.0)))
+    power = place.radiance("color", (1.0, 1.0, 1.0), place.number("intensity", 1, 0))
     position, direction = node.world[:3, 3].tolist(), _axis(node, 2, -1)
     if kind == "directional":
-        return {"type": "directional", "direction": direction, "irradiance": [r, g, b]}
+        return {"type": "directional", "direction": direction, "irradiance": power}
     if "range" in place:
         notes.add(place.at("range"), "is not used: light falls off as 1/d^2 and never ends")
     if kind == "point":
-        return {"type": "point", "position": position, "intensity": [r, g, b]}
+        return {"type": "point", "position": position, "intensity": power}
     if kind != "spot":
         raise place.error("type", f"must be point, spot or directional, not {kind[:40]!r}")
     spot = place.object("spot") or Place({}, place.at("spot"))
@@ -55,7 +55,7 @@ def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
         "type": "spot",
         "position": position,
         "direction": direction,
-        "intensity": [r, g, b],
+        "intensity": power,
         "inner_angle": math.degrees(inner),
         "outer_angle": min(math.degrees(outer), 90.0),
     }

@@ -108,7 +108,7 @@ class Textures:
         if transform is None:
             return {"uv": uv} if uv else {}
         uv = transform.whole("texCoord", uv)
-        turn = transform.number("rotation", 0.0)
+        turn = transform.number("rotation", 0.0, -1e6, 1e6)
         x, y = transform.numbers("offset", (0.0, 0.0))
         sx, sy = transform.numbers("scale", (1.0, 1.0))
         c, s = math.cos(turn), math.sin(turn)
