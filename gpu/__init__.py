@@ -1,6 +1,6 @@
 """Arrays in, images out. Knows no HTTP, no JSON, no scene document; all names not listed here are private."""
 
-from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays
+from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays
 from gpu.errors import (
     CompileError,
     ContextError,
@@ -36,6 +36,7 @@ __all__ = [
     "Scene",
     "SceneArrays",
     "SceneTooLarge",
+    "TextureArrays",
     "WrongThread",
     "picture_bytes",
     "save",

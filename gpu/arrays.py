@@ -48,6 +48,21 @@ class EnvironmentArrays:
     sun_share: float = 0.0
 
 
+@dataclass(frozen=True)
+class TextureArrays:
+    """What the scene's textures are made of, and how its materials use them.
+
+    `slots`: the members of `layout.Material` that any material has textured (and "normal", "coat_normal"), with the
+    slot that gives each its texel; those of `layout.OTHER_RANGES` have slots of their own, after all others.
+    """
+
+    slots: dict[str, int]
+    words: np.ndarray  # (materials, n) uint32: its `layout.TextureSlot`s, then a `layout.TextureUse` for each member
+    texels: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint8))  # of 8-bit images, in a row
+    floats: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.float32))  # of all others
+    key: str = ""  # equal where the texels are
+
+
 def _empty(record: type[layout.Record]) -> np.ndarray:
     return np.zeros(0, record.dtype)
 
@@ -67,11 +82,15 @@ class SceneArrays:
     ellipsoids: np.ndarray = field(default_factory=lambda: _empty(layout.Solid))
     triangles: np.ndarray = field(default_factory=lambda: _empty(layout.Triangle))
     triangle_normals: np.ndarray = field(default_factory=lambda: _empty(layout.TriangleNormals))  # none: all flat
+    triangle_uvs: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # none, or all
+    triangle_uvs_1: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # of set 1
+    triangle_colors: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 4), np.float16))
     lights: np.ndarray = field(default_factory=lambda: _empty(layout.Light))
     nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # 8 octants' orders, one after the other
     node_origin: Vec3 = (0.0, 0.0, 0.0)
     node_scale: Vec3 = (0.0, 0.0, 0.0)
     bvh_kinds: frozenset[ShapeKind] = frozenset()
     environment: EnvironmentArrays | None = None
+    textures: TextureArrays | None = None
     radiance_scale: float = 1.0  # about the largest radiance a picture of it will hold; a power of two
     origin: Vec3 = (0.0, 0.0, 0.0)

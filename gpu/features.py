@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from gpu import layout
+from gpu import glsl_textures, layout
 from gpu.arrays import SceneArrays
 from gpu.layout import LightKind, Model, ShapeKind
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
@@ -48,6 +48,36 @@ def _transmits(materials: np.ndarray) -> np.ndarray:
     return out
 
 
+def _slot_flags(scene: SceneArrays) -> np.ndarray:
+    """The flags of all slots in use."""
+    if scene.textures is None:
+        return np.zeros(0, np.uint32)
+    count = max(scene.textures.slots.values(), default=-1) + 1
+    words = scene.textures.words[:, : count * layout.TextureSlot.words]
+    out: np.ndarray = np.ascontiguousarray(words).view(layout.TextureSlot.dtype)
+    return out["flags"][out["width"] > 0]
+
+
+def _slot(flag: int, kind: int = 0) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((_slot_flags(s) & (flag | kind) == flag).any())
+
+
+def _mapped(s: SceneArrays, *names: str) -> bool:
+    return s.textures is not None and any(name in s.textures.slots for name in names)
+
+
+def _thin(s: SceneArrays) -> bool:
+    return bool((s.triangle_colors[..., 3] < 1).any())
+
+
+def _veiled(s: SceneArrays) -> bool:
+    """Whether what shines, or its opacity, changes over a shape."""
+    shines = (s.materials["emission"] > 0).any(axis=1)
+    given = s.materials[shines]
+    textured = (given[name] == np.float32(layout.TEXTURED) for name in ("emission", "opacity"))
+    return any(bool(values.any()) for values in textured) or (len(given) > 0 and _thin(s))
+
+
 FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_SPHERES": _linear(ShapeKind.SPHERE, "spheres"),
     "HAS_QUADS": _linear(ShapeKind.QUAD, "quads"),
@@ -63,7 +93,17 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
     "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
     "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in COUNTS.values()),
-    "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()),
+    "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s),
+    "HAS_TEXTURES": lambda s: s.textures is not None or len(s.triangle_colors) > 0,
+    "HAS_BYTE_TEXELS": _slot(0, layout.SLOT_FLOATS | layout.SLOT_CHECKER),
+    "HAS_FLOAT_TEXELS": _slot(layout.SLOT_FLOATS, layout.SLOT_CHECKER),
+    "HAS_SRGB_TEXELS": _slot(layout.SLOT_SRGB),
+    "HAS_CHECKERS": _slot(layout.SLOT_CHECKER),
+    "HAS_UVS": lambda s: len(s.triangle_uvs) > 0,
+    "HAS_UVS_1": lambda s: len(s.triangle_uvs_1) > 0,
+    "HAS_VERTEX_COLORS": lambda s: len(s.triangle_colors) > 0,
+    "HAS_NORMAL_MAPS": lambda s: _mapped(s, "normal", "coat_normal"),
+    "HAS_TEXTURED_LIGHTS": _veiled,
     "HAS_EMISSION": lambda s: bool((s.materials["emission"] > 0).any()),
     "HAS_EMISSION_BOTH": lambda s: bool(
         ((s.materials["emission"] > 0).any(axis=1) & (s.materials["emission_sides"] == 2)).any()
@@ -127,16 +167,24 @@ COUNTS: dict[str, str] = {
     "TRIANGLE_COUNT": "triangles",
 }
 FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
-_FEW_MAX = 64  # 5 KiB of materials, well inside the 16 KiB that every driver gives a uniform block
+_FEW_MAX = 64
+_BLOCK_BYTES = 16384  # what every driver gives a uniform block
 PICK_MAX = 2
 
 
-def counts(scene: SceneArrays) -> dict[str, int]:
-    """How many shapes of each kind stand in the kernel's loops, and how many materials and lights, where few."""
+def counts(scene: SceneArrays) -> dict[str, object]:
+    """How many shapes of each kind stand in the kernel's loops, how many materials and lights, where few; and where
+    textures belong."""
     kinds = zip(COUNTS.items(), ShapeKind, strict=True)
-    out = {name: 0 if kind in scene.bvh_kinds else len(getattr(scene, records)) for (name, records), kind in kinds}
+    out: dict[str, object] = {
+        name: 0 if kind in scene.bvh_kinds else len(getattr(scene, records)) for (name, records), kind in kinds
+    }
     few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
-    return out | {name: n if n <= _FEW_MAX else 0 for name, n in few.items()} | {"QUAD_LAMP": _quad_lamp(scene)}
+    slots = {} if scene.textures is None else scene.textures.slots
+    room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * glsl_textures.groups(slots))
+    most = {"MATERIAL_COUNT": min(_FEW_MAX, room), "LIGHT_COUNT": _FEW_MAX}
+    out |= {name: n if n <= most[name] else 0 for name, n in few.items()}
+    return {**out, **glsl_textures.defines(slots), "QUAD_LAMP": _quad_lamp(scene)}
 
 
 def _quad_lamp(scene: SceneArrays) -> int:
@@ -146,11 +194,11 @@ def _quad_lamp(scene: SceneArrays) -> int:
 
 
 def defines(
-    raised: frozenset[str], settings: RenderSettings | None = None, shapes: Mapping[str, int] | None = None
+    raised: frozenset[str], settings: RenderSettings | None = None, shapes: Mapping[str, object] | None = None
 ) -> dict[str, object]:
     """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
-    out |= {name: 0 for name in (*COUNTS, *FEW)} | {"QUAD_LAMP": -1} | dict(shapes or {})
+    out |= {name: 0 for name in (*COUNTS, *FEW)} | {"QUAD_LAMP": -1} | glsl_textures.defines({}) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}

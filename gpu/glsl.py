@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import numpy as np
-
-from gpu import energy, layout
+from gpu import energy, glsl_textures, layout
 from gpu.layout import Frame, LightKind, Model, Record, ShapeKind, Slot
 
 
@@ -21,6 +19,7 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
     """
     group = 4 if record.words % 4 == 0 else 2
     groups = record.words // group
+    stride = "MATERIAL_GROUPS" if name == "material" else f"{groups}u"  # textures follow a material's numbers
     storage = (
         f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_words[]; }};"
     )
@@ -30,21 +29,15 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
         block = f"layout(std140, binding = {layout.COUNTED[name]}) uniform {name}_block"
         lines = [
             f"#if {count} > 0",
-            f"{block} {{ uvec4 {name}_words[{count} * {groups}]; }};",
+            f"{block} {{ uvec4 {name}_words[{count} * {stride}]; }};",
             "#else",
             storage,
             "#endif",
         ]
     lines.append(f"{record.__name__} {name}_load(uint i) {{")
     for k in range(groups):
-        lines.append(f"    uvec{group} w{k} = {name}_words[i * {groups}u + {k}u];")
-    values = []
-    for member, kind in record.members.items():
-        at = record.offsets[member]
-        swizzle = "xyzw"[at % group : at % group + kind.words]
-        word = f"w{at // group}.{swizzle}"
-        values.append(word if kind.base is np.uint32 else f"uintBitsToFloat({word})")
-    lines.append(f"    return {record.__name__}({', '.join(values)});\n}}")
+        lines.append(f"    uvec{group} w{k} = {name}_words[i * {stride} + {k}u];")
+    lines.append(f"    return {record.__name__}({glsl_textures.unpacked(record, group)});\n}}")
     return "\n".join(lines)
 
 
@@ -97,4 +90,4 @@ def text() -> str:
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     body = " ".join(f"{k.glsl} {name};" for name, k in Frame.members.items())
     frame = f"layout(std140, binding = {layout.FRAME_BLOCK}) uniform frame_block {{ {body} }} frame;"
-    return "\n".join([_constants(), *structs, *loaders, nodes, frame]) + "\n"
+    return "\n".join([_constants(), *structs, *loaders, nodes, frame, glsl_textures.text()]) + "\n"

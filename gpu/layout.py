@@ -15,6 +15,7 @@ import numpy as np
 
 NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
 ABSENT = -1.0  # a material's number that was not given
+TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises what it may need
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
 
@@ -113,6 +114,9 @@ FILTER_BLOCK = 1
 # Buffers with a NAME_COUNT that kernels are compiled for: uniform blocks where it is above 0. Binding points
 COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}
 ENVIRONMENT_TEXTURE = 0  # texture units
+BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
+UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
+COLORS_TEXTURE = 12
 ENERGY_TEXTURES = {"albedo": 1, "alike": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
 
 
@@ -179,6 +183,27 @@ class Material(Record):
     sheen_color: vec3  # ABSENT: from sheen_tint
     anisotropic_rotation: f32  # degrees
     ior: f32  # inside over outside; ABSENT: from `specular`
+
+
+class TextureSlot(Record):
+    """A texture as one material uses it. uv' = turn (u, v) + offset."""
+
+    first: u32  # its first texel among those of its kind
+    width: u32
+    height: u32
+    flags: u32  # SLOT_*
+    turn: vec4  # 2 x 2, row by row
+    color_a: vec3  # of a checker
+    offset_u: f32
+    color_b: vec3
+    offset_v: f32
+
+
+class TextureUse(Record):
+    """How a texel becomes a member of a material: that channel (or all three), times the factor."""
+
+    factor: vec3  # of a normal map x is its strength; of an opacity y is its cutoff, or ABSENT
+    channel: u32  # CHANNEL_*
 
 
 class Sphere(Record):
@@ -306,6 +331,30 @@ class Frame(Record):
     sun_first: u32  # among the lights: directional ones with a disk stand side by side
     sun_count: u32
 
+
+SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
+CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a
+
+# The numbers of a material that a texture may give, with their ranges: those a surface is made from, with which the
+# normals are asked for, and those that a path asks for elsewhere.
+UNIT, LARGE = (0.0, 1.0), (0.0, 1e20)
+SURFACE_RANGES: dict[str, tuple[float, float]] = {
+    name: UNIT
+    for name in (
+        "base_color", "roughness", "metallic", "subsurface", "specular", "specular_tint", "anisotropic", "sheen",
+        "sheen_tint", "clearcoat", "clearcoat_gloss", "sheen_roughness", "phong_specular", "transmission",
+        "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color",
+    )
+} | {
+    "shininess": LARGE,
+    "attenuation_distance": (1e-45, 1e9),
+    "anisotropic_rotation": (-1e9, 1e9),
+    "ior": (1.0, 4.0),
+}  # fmt: skip
+NORMALS = ("normal", "coat_normal")
+OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "ambient": LARGE}
+TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
+TEXELS_A_ROW = 8192  # of the textures that hold texels and coordinates, one after the other
 
 # A leaf's link: bit 31 set, kind << 28, (count - 1) << 24, first: index into the array of that kind
 LEAF_BIT = 0x80000000

@@ -19,7 +19,6 @@ from gpu.settings import RenderSettings
 log = logging.getLogger(__name__)
 
 _BUFFERS = {
-    Slot.MATERIALS: "materials",
     Slot.SPHERES: "spheres",
     Slot.QUADS: "quads",
     Slot.BOXES: "boxes",
@@ -52,6 +51,26 @@ def upload_tables(context: Any) -> dict[int, Any]:
     return out
 
 
+def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
+    """A texture of `layout.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
+    flat = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+    pitch = layout.TEXELS_A_ROW * channels * {"f1": 1, "f2": 2, "f4": 4}[dtype]
+    height, rest = divmod(len(flat), pitch)
+    size = (layout.TEXELS_A_ROW, height + (rest > 0))
+    try:
+        texture = context.texture(size, channels, dtype=dtype)
+    except Exception as error:
+        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures") from error
+    if height:
+        texture.write(flat[: height * pitch], viewport=(0, 0, layout.TEXELS_A_ROW, height))
+    if rest:
+        last = np.zeros(pitch, np.uint8)
+        last[:rest] = flat[height * pitch :]
+        texture.write(last, viewport=(0, height, layout.TEXELS_A_ROW, 1))
+    texture.filter = (context.NEAREST, context.NEAREST)
+    return texture
+
+
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
@@ -62,11 +81,12 @@ class Scene:
         self.arrays = arrays
         self._raise_flags()
         self._buffers: dict[Slot, Any] = {}
+        self._details: dict[int, Any] = {}  # textures by unit
         try:
             self._upload_all()
         except OutOfMemory:
-            for buffer in self._buffers.values():
-                buffer.release()
+            for thing in (*self._buffers.values(), *self._details.values()):
+                thing.release()
             raise
         self._tables = upload_tables(context) if "HAS_PRINCIPLED" in self._raised else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
@@ -75,8 +95,33 @@ class Scene:
     def _upload_all(self) -> None:
         for slot, name in _BUFFERS.items():
             self._buffers[slot] = self._upload(getattr(self.arrays, name))
+        self._buffers[Slot.MATERIALS] = self._upload(self._materials())
+        self._upload_details()
         self._texels, alias = self._upload_environment()
         self._buffers[Slot.ENVIRONMENT_ALIAS] = self._upload(alias)
+
+    def _materials(self) -> np.ndarray:
+        """Bytes of all materials, each followed by its slots and uses of textures."""
+        records = np.ascontiguousarray(self.arrays.materials)
+        words = records.view(np.uint32).reshape(len(records), layout.Material.words)
+        if self.arrays.textures is not None:
+            words = np.concatenate([words, self.arrays.textures.words], axis=1)
+        return words
+
+    def _upload_details(self) -> None:
+        """Textures of the images' texels and of what triangles have at their corners, each only where it is asked."""
+        a = self.arrays
+        asked = {
+            layout.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
+            layout.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
+            layout.COLORS_TEXTURE: (a.triangle_colors, 4, "f2"),
+        }
+        if a.textures is not None:
+            asked[layout.BYTES_TEXTURE] = (a.textures.texels, 4, "f1")
+            asked[layout.FLOATS_TEXTURE] = (a.textures.floats, 4, "f4")
+        for unit, (values, channels, dtype) in asked.items():
+            if len(values):
+                self._details[unit] = rows(self._context, values, channels, dtype)
 
     def _raise_flags(self) -> None:
         raised = features.flags(self.arrays, self._editing)
@@ -114,9 +159,11 @@ class Scene:
         self,
         camera: CameraArrays | None = None,
         materials: np.ndarray | None = None,
+        texture_words: np.ndarray | None = None,
         environment: tuple[float, float] | None = None,
     ) -> None:
-        """Replace the camera, the materials' bytes (as many as before), the environment's (rotation, scale).
+        """Replace the camera, the materials' bytes (as many as before), what they have of textures
+        (`TextureArrays.words`), the environment's (rotation, scale).
 
         Uploads nothing else. Pictures of this scene must be reset by the caller.
         """
@@ -128,11 +175,14 @@ class Scene:
             if len(materials) != len(self.arrays.materials):
                 raise ValueError(f"{len(materials)} materials for a scene of {len(self.arrays.materials)}")
             changes["materials"] = materials
-            self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(materials).view(np.uint8))
+        if texture_words is not None and self.arrays.textures is not None:
+            changes["textures"] = replace(self.arrays.textures, words=texture_words)
         if environment is not None and self.arrays.environment is not None:
             rotation, scale = environment
             changes["environment"] = replace(self.arrays.environment, rotation=rotation, scale=scale)
         self.arrays = replace(self.arrays, **changes)
+        if len(self.arrays.materials) and changes.keys() & {"materials", "textures"}:
+            self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._raise_flags()
         if "HAS_PRINCIPLED" in self._raised and not self._tables:
             self._tables = upload_tables(self._context)
@@ -144,8 +194,8 @@ class Scene:
             if slot in _BLOCKS:
                 buffer.bind_to_uniform_block(_BLOCKS[slot])
         self._texels.use(layout.ENVIRONMENT_TEXTURE)
-        for unit, table in self._tables.items():
-            table.use(unit)
+        for unit, texture in (*self._tables.items(), *self._details.items()):
+            texture.use(unit)
 
     def write_frame(self, frame: np.ndarray) -> None:
         """Fill the scene's part of a `layout.Frame` record."""
@@ -185,5 +235,5 @@ class Scene:
         for buffer in self._buffers.values():
             buffer.release()
         self._texels.release()
-        for table in self._tables.values():
-            table.release()
+        for texture in (*self._tables.values(), *self._details.values()):
+            texture.release()

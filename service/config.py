@@ -33,6 +33,9 @@ class Config(BaseSettings):
     max_triangles: int = Field(
         16_000_000, ge=1, le=2**24, description="Most triangles of a scene; at most 2^24 (float32 counts no further)."
     )
+    max_texels: int = Field(
+        2**26, ge=1, le=2**27, description="Most texels of a scene's textures: 2^26 are four of 4096 x 4096."
+    )
     max_body: int = Field(256 * 2**20, ge=1, description="Most bytes of a request's body, as decompressed.")
     max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
     data_dir: Path = Field(

@@ -9,6 +9,7 @@ layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec2 met[]; }; // ind
 #include "sobol.glsl"
 #include "sampling.glsl"
 #include "shapes.glsl"
+#include "texture.glsl"
 #include "camera.glsl"
 #include "passing.glsl"
 
@@ -29,7 +30,16 @@ void main() {
             met[slot] = n.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
         }
         if (n.id != NONE) {
+#if HAS_TEXTURES
+            vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
+            texture_look(at, texels);
+            Material m = texture_material(at, texels);
+#if HAS_NORMAL_MAPS
+            texture_normal(at, texels, at.ns);
+#endif
+#else
             Material m = material_load(at.material);
+#endif
             vec3 seen = m.base_color;
 #if HAS_TRANSMISSION
             if (m.model == MODEL_PRINCIPLED) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));

@@ -57,16 +57,42 @@ Emitter lights_emitter(Light l) {
 #if HAS_EMISSION
     Material m = material_pick(l.material);
     e.radiance = m.emission;
+#if HAS_TEXTURED_LIGHTS
+    e.radiance = vec3(1.0); // by the place that is sampled: lights_glow
+#endif
 #if HAS_EMISSION_BOTH
     e.sides = m.emission_sides;
 #endif
 #if HAS_OPACITY
+#if !HAS_TEXTURED_LIGHTS
     e.radiance *= m.opacity;
+#endif
     e.veil = 1.0 - m.opacity;
 #endif
 #endif
     return e;
 }
+
+#if HAS_TEXTURED_LIGHTS
+// The emission of the place that was sampled, by the share of it that is there.
+vec3 lights_glow(LightSample s, vec3 p) {
+    vec3 q = p + s.t * s.wi;
+    Nearest n = Nearest(0.0, s.id, vec2(0.0));
+#if HAS_TRIANGLE_LIGHTS
+    if (s.id >> LEAF_KIND_SHIFT == SHAPE_TRIANGLE) {
+        Triangle tri = triangle_pick(s.id & LEAF_FIRST_MASK);
+        vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, w = q - tri.v0, c = cross(e1, e2);
+        n.uv = vec2(dot(cross(w, e2), c), dot(cross(e1, w), c)) / dot(c, c);
+    }
+#endif
+    Point at = shapes_point(n, q, vec3(0.0, 0.0, 1.0));
+#if HAS_OPACITY
+    return texture_emission(at) * texture_opacity(at);
+#else
+    return texture_emission(at);
+#endif
+}
+#endif
 
 // p: the shaded point; u_pick chooses the light, the bits of two more numbers the direction.
 LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
@@ -112,6 +138,9 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
 #endif
 #if HAS_EMISSION
     if (l.kind >= LIGHT_SPHERE) s.radiance *= e.radiance;
+#if HAS_TEXTURED_LIGHTS
+    if (l.kind >= LIGHT_SPHERE && s.pdf > 0.0) s.radiance *= lights_glow(s, p);
+#endif
 #endif
     s.pdf *= l.probability;
     return s;

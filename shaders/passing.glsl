@@ -19,7 +19,11 @@ Nearest passing_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, out
 #endif
 #if HAS_OPACITY
         float u = sobol_pair(rng, PAIR_PASSING + bounce * PASSING_MAX + layer).x;
+#if HAS_TEXTURES
+        passes = passes || u >= texture_opacity(at);
+#else
         passes = passes || u >= material_pick(at.material).opacity;
+#endif
 #endif
         passes = passes && n.id != NONE && layer < PASSING_MAX;
         n.t += before;
@@ -50,7 +54,11 @@ float passing_share(vec3 o, vec3 d, float t_max, uvec2 skip) {
         Point at = shapes_point(n, o, d);
         more = n.id != NONE;
         if (more) {
+#if HAS_TEXTURES
+            share *= layer < PASSING_MAX ? 1.0 - texture_opacity(at) : 0.0;
+#else
             share *= layer < PASSING_MAX ? 1.0 - material_pick(at.material).opacity : 0.0;
+#endif
             o = shapes_leave(at, d);
             skip.x = at.flat_id;
             t_max -= n.t;

@@ -65,7 +65,12 @@ vec3 path_outside(vec3 d, float pdf, bool scattered) {
 
 // Emission towards the side the ray came from: the outward one, unless the material has both shine.
 vec3 path_emission(Point at, vec3 d) {
-#if HAS_EMISSION_BOTH
+#if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
+    bool both = material_pick(at.material).emission_sides == 2u;
+    if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at);
+#elif HAS_TEXTURED_LIGHTS
+    if (at.light != NONE && dot(d, at.ng) < 0.0) return texture_emission(at);
+#elif HAS_EMISSION_BOTH
     Material m = material_pick(at.material);
     if (at.light != NONE && (dot(d, at.ng) < 0.0 || m.emission_sides == 2u)) return m.emission;
 #elif HAS_EMISSION
@@ -76,18 +81,20 @@ vec3 path_emission(Point at, vec3 d) {
 
 // blinn_phong's radiance without a cause: from both sides, and no light to anything that picks lights.
 vec3 path_ambient(Point at) {
-#if HAS_AMBIENT
+#if HAS_AMBIENT && HAS_TEXTURES
+    return texture_ambient(at);
+#elif HAS_AMBIENT
     return material_pick(at.material).ambient;
 #else
     return vec3(0.0);
 #endif
 }
 
-// A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation can turn it away at a
-// silhouette; it is then bent back until it is just in view, which loses no light to black rims.
+// A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation, or a map, can turn it away
+// at a silhouette; it is then bent back until it is just in view, which loses no light to black rims.
 vec3 path_normal(Point at, vec3 wo_w) {
     vec3 n = dot(at.ng, wo_w) < 0.0 ? -at.ns : at.ns;
-#if HAS_SMOOTH_NORMALS
+#if HAS_SMOOTH_NORMALS || HAS_NORMAL_MAPS
     float c = dot(n, wo_w);
     if (c < 0.01) n = normalize(n + (0.01 - c) * wo_w);
 #endif
@@ -111,6 +118,29 @@ bool path_agrees(float shading, float geometric) {
     return geometric > 0.0;
 #endif
 }
+
+#if HAS_NORMAL_MAPS
+// A lobe about a normal that a map has bent reaches below the surface. What it sends there comes back up, as if the
+// surface were a mirror to it: nothing is lost, and nothing gained. It is the idea of [Schuessler, Heitz, Hanika,
+// Dachsbacher 2017, "Microfacet-based normal mapping"] with the tangent facet laid flat, of one further scattering.
+// So v has the sum of two directions of the lobe: itself and its image below. Light that is refracted folds likewise.
+Scatter path_folded(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool mapped) {
+    Scatter sum = Scatter(vec3(0.0), 0.0);
+    float side = dot(v, front);
+    vec3 w = v;
+    bool more;
+    uint k = 0u;
+    do {
+        vec3 wi = frame_to_local(basis, w);
+        Scatter f = bsdf_eval(s, wo, wi);
+        if (!mapped || wi.z * side > 0.0) sum = Scatter(sum.f + f.f, sum.pdf + f.pdf);
+        w = v - 2.0 * side * front;
+        more = k == 0u && mapped && dot(w, basis.z) * side > 0.0;
+        k++;
+    } while (more);
+    return sum;
+}
+#endif
 
 Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     Radiance result = Radiance(vec3(0.0), 0.0);
@@ -140,7 +170,13 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     float dense = 1.0;
     vec3 fog = vec3(0.0); // rate of attenuation along the ray
     if (alive && dot(at.ng, d) > 0.0) {
+#if HAS_TEXTURES
+        vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
+        texture_look(at, texels);
+        Material m = texture_material(at, texels);
+#else
         Material m = material_pick(at.material);
+#endif
         if (surface_transmits(m)) throughput = exp(-surface_attenuation(m) * n.t);
     }
 #endif
@@ -148,6 +184,13 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
         do {
             vec3 wo_w = -d;
             vec3 front = dot(at.ng, wo_w) < 0.0 ? -at.ng : at.ng;
+#if HAS_TEXTURES
+            vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
+            texture_look(at, texels);
+#endif
+#if HAS_NORMAL_MAPS
+            bool mapped = texture_normal(at, texels, at.ns);
+#endif
             Basis basis = frame_basis(path_normal(at, wo_w));
             vec2 tangent = vec2(1.0, 0.0);
 #if HAS_ANISOTROPIC
@@ -155,7 +198,11 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             float along2 = dot(along, along);
             if (along2 > 0.0) tangent = along * inversesqrt(along2);
 #endif
+#if HAS_TEXTURES
+            Material m = texture_material(at, texels);
+#else
             Material m = material_pick(at.material);
+#endif
             Surface s = surface_make(m, tangent);
             vec3 wo = frame_to_local(basis, wo_w);
 #if HAS_PRINCIPLED
@@ -180,8 +227,15 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             bool wanted = light.pdf > 0.0;
 #endif
             vec3 wi = frame_to_local(basis, light.wi);
+#if HAS_NORMAL_MAPS
+            float side = mapped ? dot(light.wi, front) : wi.z;
+            Scatter f = path_folded(s, basis, wo, light.wi, front, mapped);
+            wanted = wanted && (mapped || path_agrees(wi.z, dot(light.wi, front)));
+            wanted = wanted && max_component(f.f * light.radiance) > 0.0;
+#else
             Scatter f = bsdf_eval(s, wo, wi);
             wanted = wanted && path_agrees(wi.z, dot(light.wi, front)) && max_component(f.f * light.radiance) > 0.0;
+#endif
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
             wanted = wanted && light.id != n.id; // rounding may put a point on a ball's inside outside of it
 #endif
@@ -192,7 +246,11 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             if (wanted) {
                 vec3 c = throughput * (f.f * light.radiance * (weight / light.pdf));
 #if HAS_TRANSMISSION
+#if HAS_NORMAL_MAPS
+                c *= path_dense(dense, side, s, light.t);
+#else
                 c *= path_dense(dense, wi.z, s, light.t);
+#endif
                 c *= exp(-(clear ? (dot(at.ng, light.wi) < 0.0 ? inner : vec3(0.0)) : fog) * light.t);
 #endif
                 uvec2 skip = uvec2(flat_id, light.id);
@@ -218,14 +276,49 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #elif HAS_PRINCIPLED
             Sampled picked = bsdf_pick(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
             vec3 wi_next = picked.wi;
+#if HAS_NORMAL_MAPS
+            Scatter next = picked.there;
+#else
             Scatter next = bsdf_eval(s, wo, wi_next);
             if (picked.specular) next = picked.there;
+#endif
 #else
             vec3 wi_next = bsdf_sample(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
+#if HAS_NORMAL_MAPS
+            Scatter next = Scatter(vec3(0.0), 0.0);
+#else
             Scatter next = bsdf_eval(s, wo, wi_next);
 #endif
+#endif
             d = frame_to_world(basis, wi_next);
+#if HAS_NORMAL_MAPS
+#if HAS_PRINCIPLED
+            bool certain = picked.specular;
+#else
+            bool certain = false;
+#endif
+#if HAS_TRANSMISSION
+            bool goes = wi_next.z != 0.0 && (wi_next.z > 0.0 || s.transmission > 0.0);
+#else
+            bool goes = wi_next.z > 0.0;
+#endif
+#if ESTIMATOR == ESTIMATOR_UNIFORM
+            // Uniform about the surface itself, where nothing folds.
+            if (mapped && !certain) d = frame_to_world(frame_basis(front), wi_next);
+#endif
+            float across = dot(d, front);
+            if (mapped && across * wi_next.z < 0.0) d -= 2.0 * across * front;
+            Scatter folded = path_folded(s, basis, wo, d, front, mapped);
+#if ESTIMATOR == ESTIMATOR_UNIFORM
+            if (mapped && !certain) next.f = folded.f;
+#else
+            if (!certain) next = folded;
+#endif
+            float side_next = mapped ? dot(d, front) : wi_next.z;
+            alive = next.pdf > 0.0 && (mapped ? goes : path_agrees(wi_next.z, dot(d, front)));
+#else
             alive = next.pdf > 0.0 && path_agrees(wi_next.z, dot(d, front));
+#endif
             throughput *= next.f / (alive ? next.pdf : 1.0);
             float reach = max_component(throughput);
             alive = alive && reach > 0.0;
@@ -242,7 +335,11 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             o = shapes_leave(at, d);
             n.id = NONE;
 #if HAS_TRANSMISSION
+#if HAS_NORMAL_MAPS
+            dense = path_dense(dense, side_next, s, 0.0);
+#else
             dense = path_dense(dense, wi_next.z, s, 0.0);
+#endif
             if (clear) fog = dot(at.ng, d) < 0.0 ? inner : vec3(0.0);
 #endif
 #if HAS_OPACITY

@@ -9,6 +9,7 @@ layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer { uint path_ended; }
 #include "sobol.glsl"
 #include "sampling.glsl"
 #include "shapes.glsl"
+#include "texture.glsl"
 #include "path.glsl"
 #include "camera.glsl"
 

@@ -43,7 +43,8 @@ class Shelf:
 
 @dataclass
 class Few:
-    max_triangles: int
+    max_triangles: int = 1 << 24
+    max_texels: int = 1 << 26
 
 
 def cube_data():

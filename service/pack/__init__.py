@@ -5,12 +5,23 @@ placing     document -> `placed` (analytic shapes) and `meshes` with their `norm
 records     placed shapes -> records, relative to an origin; `tree` orders those that are many
 geometry    all of that together, with the shapes that shine
 sky         environment -> texels and the tables that draw from them
+textures    images -> texels, and which number of which material reads which of them
+glow        what textured shapes shine with
 lights      how often each light is picked
 scene       the whole; `cache` keeps geometries and skies between edits
 """
 
 from service.pack.cache import PackCache
 from service.pack.scene import Packed, pack
+from service.pack.textures import repacked
 from service.pack.values import pack_camera, pack_materials, pack_turn
 
-__all__ = ["PackCache", "Packed", "pack", "pack_camera", "pack_materials", "pack_turn"]
+__all__ = [
+    "PackCache",
+    "Packed",
+    "pack",
+    "pack_camera",
+    "pack_materials",
+    "pack_turn",
+    "repacked",
+]

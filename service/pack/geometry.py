@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Collection, Iterable, Sequence
+from collections.abc import Collection, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -29,6 +29,9 @@ class Geometry:
 
     shapes: dict[ShapeKind, np.ndarray]
     triangle_normals: np.ndarray
+    triangle_uvs: np.ndarray
+    triangle_uvs_1: np.ndarray
+    triangle_colors: np.ndarray
     lights: np.ndarray  # layout.Light of the shapes that shine, not yet weighted
     areas: np.ndarray  # of these, m^2
     nodes: np.ndarray
@@ -41,16 +44,21 @@ class Geometry:
 
 
 def geometry(
-    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int
-) -> Geometry:
-    """`names`: the materials in order; `emissive`: those that shine. Raises InvalidDocument."""
-    placed, placed_meshes = place(shapes, names, emissive, assets, max_triangles)
+    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
+    uv_sets: Mapping[str, frozenset[int]],
+) -> Geometry:  # fmt: skip
+    """`names`: the materials in order; `emissive`: those that shine; `uv_sets`: which texture coordinates they read.
+
+    Raises InvalidDocument.
+    """
+    placed, placed_meshes = place(shapes, names, emissive, assets, max_triangles, uv_sets)
     analytic = _analytic(placed, np.zeros(3))
     vertices = [mesh.vertices for mesh in placed_meshes]
     origin, radius = _frame([*(bounds for _, bounds in analytic.values()), *zip(vertices, vertices, strict=True)])
     if origin.any():
         analytic = _analytic(placed, origin)
-    triangles, normals, degenerate = meshes.triangles(placed_meshes, origin)
+    triangles, normals, degenerate, kept = meshes.triangles(placed_meshes, origin)
+    corners = {name: meshes.at_corners(placed_meshes, kept, name) for name in ("uvs", "uvs_1", "colors")}
     found = {kind: array for kind, (array, _) in analytic.items()} | {ShapeKind.TRIANGLE: triangles}
     bounds = {kind: bounds for kind, (_, bounds) in analytic.items() if len(found[kind]) > LINEAR[kind]}
     if len(triangles) > LINEAR[ShapeKind.TRIANGLE]:
@@ -61,14 +69,16 @@ def geometry(
         found |= {kind: found[kind][places] for kind, places in order.items()}
         if len(normals) and ShapeKind.TRIANGLE in order:
             normals = normals[order[ShapeKind.TRIANGLE]]
+        if ShapeKind.TRIANGLE in order:
+            corners = {n: a[order[ShapeKind.TRIANGLE]] if len(a) else a for n, a in corners.items()}
     _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
     warnings = [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
     warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
     return Geometry(
-        found, normals, shining, areas, nodes, node_origin, node_scale, frozenset(bounds), vec3(origin), radius,
-        tuple(warnings),
+        found, normals, corners["uvs"], corners["uvs_1"], corners["colors"], shining, areas, nodes, node_origin,
+        node_scale, frozenset(bounds), vec3(origin), radius, tuple(warnings),
     )  # fmt: skip
 
 

@@ -28,11 +28,15 @@ class PlacedMesh:
     single_sided: bool
     material: int
     shape: int
+    uvs: np.ndarray | None = None  # (n, 2), as the vertices
+    uvs_1: np.ndarray | None = None
+    colors: np.ndarray | None = None  # (n, 3 or 4)
 
 
 def place(
     vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, smooth: bool,
     matrix: np.ndarray | None, single_sided: bool, used: tuple[int, int],
+    uvs: np.ndarray | None = None, uvs_1: np.ndarray | None = None, colors: np.ndarray | None = None,
 ) -> PlacedMesh:  # fmt: skip
     """The mesh under its transform; a smooth one without normals gets them here, in its own space."""
     normal_faces = faces
@@ -47,15 +51,18 @@ def place(
             normals = normals @ (np.linalg.inv(axes) * np.abs(axes).max())
         if np.linalg.det(axes) < 0:
             faces, normal_faces = faces[:, [0, 2, 1]], normal_faces[:, [0, 2, 1]]
-    return PlacedMesh(vertices, faces, normals, normal_faces, single_sided, *used)
+    return PlacedMesh(vertices, faces, normals, normal_faces, single_sided, *used, uvs, uvs_1, colors)
 
 
-def triangles(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[np.ndarray, np.ndarray, dict[int, int]]:
-    """(`layout.Triangle` records, their `layout.TriangleNormals` or none if all are flat, degenerate ones by shape).
+def triangles(
+    meshes: list[PlacedMesh], origin: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, dict[int, int], list[np.ndarray]]:
+    """(`layout.Triangle` records, their `layout.TriangleNormals` or none if all are flat, degenerate ones by shape,
+    by mesh which faces are left).
 
     Degenerate triangles are left out: those whose normal would not survive float32.
     """
-    records, normals, degenerate = [], [], {}
+    records, normals, degenerate, kept = [], [], {}, []
     any_smooth = any(mesh.normals is not None for mesh in meshes)
     for mesh in meshes:
         vertices = (mesh.vertices - origin).astype(np.float32)
@@ -67,6 +74,7 @@ def triangles(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[np.ndarray,
         keep = np.flatnonzero((size > limit) & np.isfinite(size))
         if len(keep) < len(corners):
             degenerate[mesh.shape] = len(corners) - len(keep)
+        kept.append(keep)
         record = np.zeros(len(keep), layout.Triangle.dtype)
         record["v0"], record["v1"], record["v2"] = corners[keep, 0], corners[keep, 1], corners[keep, 2]
         record["material"], record["light"] = mesh.material, layout.NONE
@@ -75,7 +83,24 @@ def triangles(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[np.ndarray,
         if any_smooth:
             normals.append(_normals(mesh, keep, cross[keep]))
     empty = [np.zeros(0, layout.Triangle.dtype)], [np.zeros(0, layout.TriangleNormals.dtype)]
-    return np.concatenate(records or empty[0]), np.concatenate(normals or empty[1]), degenerate
+    return np.concatenate(records or empty[0]), np.concatenate(normals or empty[1]), degenerate, kept
+
+
+def at_corners(meshes: list[PlacedMesh], kept: list[np.ndarray], name: str) -> np.ndarray:
+    """`uvs`, `uvs_1` (triangles, 3, 2) float32 or `colors` (triangles, 3, 4) float16 of the kept faces; none where no
+    mesh has them, else zeros or white for those without.
+    """
+    width, dtype, missing = (4, np.float16, 1) if name == "colors" else (2, np.float32, 0)
+    if all(getattr(mesh, name) is None for mesh in meshes):
+        return np.zeros((0, 3, width), dtype)
+    out = np.full((sum(map(len, kept)), 3, width), missing, dtype)
+    end = 0
+    for mesh, keep in zip(meshes, kept, strict=True):
+        values = getattr(mesh, name)
+        start, end = end, end + len(keep)
+        if values is not None:
+            out[start:end, :, : values.shape[1]] = values.astype(dtype)[mesh.faces[keep]]
+    return out
 
 
 def _squares(v: np.ndarray) -> np.ndarray:

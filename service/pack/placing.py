@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 
 import numpy as np
 
-from service.assets import Assets
+from service.assets import Assets, MeshData
 from service.pack import meshes
 from service.pack.meshes import PlacedMesh
 from service.pack.placed import Placed, check_reach
@@ -15,14 +15,21 @@ from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereSha
 
 
 def place(
-    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int
-) -> tuple[Placed, list[PlacedMesh]]:
-    """(analytic shapes, meshes) in the world; `names` and `emissive` are materials. Raises InvalidDocument."""
+    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
+    uv_sets: Mapping[str, frozenset[int]],
+) -> tuple[Placed, list[PlacedMesh]]:  # fmt: skip
+    """(analytic shapes, meshes) in the world; `names` and `emissive` are materials, `uv_sets` what they read.
+
+    Raises InvalidDocument.
+    """
     materials = {name: i for i, name in enumerate(names)}
     placed, placed_meshes, count = Placed(), [], 0
     for i, shape in enumerate(shapes):
         matrix = None if shape.transform is None else shape.transform.matrix4()
         used = materials[shape.material], i
+        sets = uv_sets.get(shape.material, frozenset())
+        if 1 in sets and not isinstance(shape, MeshShape):
+            raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
         match shape:
             case SphereShape():
                 placed.sphere(shape.center, shape.radius, matrix, used)
@@ -31,28 +38,43 @@ def place(
             case BoxShape():
                 placed.box(shape.min, shape.max, matrix, used, shape.material in emissive)
             case MeshShape():
-                mesh = _mesh(shape, matrix, used, assets, max_triangles - count)
+                mesh = _mesh(shape, matrix, used, assets, max_triangles - count, sets)
                 count += len(mesh.faces)
                 placed_meshes.append(mesh)
     return placed, placed_meshes
 
 
 def _mesh(
-    shape: MeshShape, matrix: np.ndarray | None, used: tuple[int, int], assets: Assets, room: int
-) -> PlacedMesh:
-    if shape.asset is None:
-        assert shape.vertices is not None and shape.faces is not None
-        vertices, faces, normals = shape.vertices, shape.faces, shape.normals
-    else:
-        try:
-            data = assets.mesh(shape.asset)
-        except AssetError as error:
-            raise InvalidDocument([FieldError(f"/shapes/{used[1]}/asset", error.detail)]) from None
-        vertices, faces, normals = data.vertices, data.faces, data.normals
-    if len(faces) > room:
-        detail = f"has {len(faces)} triangles; this server has room for {room} more in a scene"
+    shape: MeshShape, matrix: np.ndarray | None, used: tuple[int, int], assets: Assets, room: int,
+    sets: frozenset[int],
+) -> PlacedMesh:  # fmt: skip
+    data = _data(shape, used[1], assets)
+    if len(data.faces) > room:
+        detail = f"has {len(data.faces)} triangles; this server has room for {room} more in a scene"
         raise InvalidDocument([FieldError(f"/shapes/{used[1]}", detail)])
-    mesh = meshes.place(vertices, faces, normals, shape.smooth, matrix, not shape.double_sided, used)
+    for number, uvs in ((0, data.uvs), (1, data.uvs_1)):
+        if number in sets and uvs is None:
+            field = "uvs" if shape.asset is None and number == 0 else "material" if shape.asset is None else "asset"
+            raise _uncharted(used[1], field, shape.material, f"uv set {number}, which this mesh does not have")
+    mesh = meshes.place(
+        data.vertices, data.faces, data.normals, shape.smooth, matrix, not shape.double_sided, used,
+        data.uvs if sets else None, data.uvs_1 if 1 in sets else None,
+        None if data.colors is None or (data.colors == 1).all() else data.colors,
+    )  # fmt: skip
     if matrix is not None:
         check_reach(used[1], float(np.abs(mesh.vertices).max(initial=0.0)))
     return mesh
+
+
+def _data(shape: MeshShape, number: int, assets: Assets) -> MeshData:
+    if shape.asset is None:
+        assert shape.vertices is not None and shape.faces is not None
+        return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors)
+    try:
+        return assets.mesh(shape.asset)
+    except AssetError as error:
+        raise InvalidDocument([FieldError(f"/shapes/{number}/asset", error.detail)]) from None
+
+
+def _uncharted(shape: int, field: str, material: str, what: str) -> InvalidDocument:
+    return InvalidDocument([FieldError(f"/shapes/{shape}/{field}", f"material {material[:80]!r} reads {what}")])

@@ -15,14 +15,13 @@ from service.assets import Assets
 from service.pack import lights
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
+from service.pack.glow import glow
 from service.pack.sky import Sky, make_sky, sky_key
+from service.pack.textures import pack_textures, uv_sets
 from service.pack.values import pack_camera, pack_materials, pack_turn
-from service.problems import FieldError, InvalidDocument
 from service.scene import Scene
 from service.scene.environment import Environment
-from service.scene.mistakes import escaped
 from service.scene.numbers import BRIGHTEST
-from service.scene.texture import references
 
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1
 
@@ -30,6 +29,9 @@ MAX_TRIANGLES = LEAF_FIRST_MASK + 1
 class Limits(Protocol):
     @property
     def max_triangles(self) -> int: ...
+
+    @property
+    def max_texels(self) -> int: ...
 
 
 @dataclass(frozen=True)
@@ -45,11 +47,11 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
 
     Raises InvalidDocument, its pointers from the scene's root. Slow where there is geometry: not for an event loop.
     """
-    _refuse_textures(scene)
     materials = pack_materials(scene)
+    textures, uses, texels, told = pack_textures(scene, assets, cache, limits)
     emissive = np.any(materials["emission"] > 0, axis=1)
     built = _geometry(scene, emissive, assets, cache, limits)
-    warnings = list(built.warnings)
+    warnings = [*built.warnings, *told]
     environment, sky_power, peak = None, 0.0, 0.0
     if scene.environment is not None:
         sky = _sky(scene.environment, assets, cache)
@@ -65,13 +67,12 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         if scale > 0:  # what it sends through a disk around the scene
             sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
     standing, standing_power = lights.standing(scene.lights, built.origin, built.radius)
-    emission = materials["emission"][built.lights["material"]]
+    emission, brightest = glow(materials, uses, texels, built)
     area_power = np.pi * built.areas * lights.luminance(emission) * lights.sides(built.lights, materials)
     reached = np.where(standing["kind"] == LightKind.DIRECTIONAL, 1.0, math.pi * built.radius**2)
     peak = max(
         peak,
-        float(emission.max(initial=0.0)),
-        float(materials["ambient"].max(initial=0.0)),
+        brightest,
         float((standing["intensity"].max(axis=1, initial=0.0) / reached).max(initial=0.0)),
     )
     arrays = SceneArrays(
@@ -83,6 +84,9 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         ellipsoids=built.shapes[ShapeKind.ELLIPSOID],
         triangles=built.shapes[ShapeKind.TRIANGLE],
         triangle_normals=built.triangle_normals,
+        triangle_uvs=built.triangle_uvs,
+        triangle_uvs_1=built.triangle_uvs_1,
+        triangle_colors=built.triangle_colors,
         lights=lights.weigh(
             np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power
         ),
@@ -91,16 +95,11 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         node_scale=built.node_scale,
         bvh_kinds=built.bvh_kinds,
         environment=environment,
+        textures=textures,
         radiance_scale=lights.radiance_scale(peak),
         origin=built.origin,
     )
     return Packed(arrays, warnings)
-
-
-def _refuse_textures(scene: Scene) -> None:
-    places = [f"/materials/{escaped(key)}/{field}" for key, m in scene.materials.items() for field in references(m)]
-    if places:
-        raise InvalidDocument([FieldError(place, "textures cannot be rendered yet") for place in places])
 
 
 def _geometry(
@@ -111,12 +110,15 @@ def _geometry(
     shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
     room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
 
+    sets = uv_sets(scene)
+
     def make() -> Geometry:
-        return geometry(scene.shapes, names, shining, assets, room)
+        return geometry(scene.shapes, names, shining, assets, room, sets)
 
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
         return make()
-    return cache.get(("geometry", tuple(map(content, scene.shapes)), tuple(names), shining, room), make)
+    key = ("geometry", tuple(map(content, scene.shapes)), tuple(names), shining, room, tuple(sets.items()))
+    return cache.get(key, make)
 
 
 def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> Sky:

@@ -12,10 +12,11 @@ from service.scene.camera import Camera
 from service.scene.environment import Environment, SkyEnvironment
 from service.scene.material import Material
 from service.scene.numbers import Vec3
-from service.scene.texture import ScalarTexture
+from service.scene.texture import ColorTexture, ScalarTexture
 
 # What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
-RENAMED = {"albedo": "base_color", "diffuse": "base_color"}
+RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity"}
+RENAMED |= {"normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
 # Where a name means another thing in one model.
 RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
 SIDES = {"front": 1, "both": 2}
@@ -49,18 +50,25 @@ def pack_materials(scene: Scene) -> np.ndarray:
             if name == "emission_sides":
                 record[name] = SIDES[material.emission_sides]
                 continue
-            member = RENAMED_IN.get(material.type, RENAMED).get(name, RENAMED.get(name, name))
+            member = member_of(material, name)
             if member in layout.Material.members:
                 value = getattr(material, name)
+                if isinstance(value, ScalarTexture | ColorTexture):
+                    value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
                 record[member] = layout.ABSENT if value is None else value
         record["opacity"] = opacity(material)
     return records
 
 
+def member_of(material: Material, name: str) -> str:
+    """What the renderer calls a material's parameter."""
+    return RENAMED_IN.get(material.type, {}).get(name, RENAMED.get(name, name))
+
+
 def opacity(material: Material) -> float:
     """The chance that a ray meets the surface."""
     if isinstance(material.alpha, ScalarTexture):
-        return 1.0
+        return layout.TEXTURED
     if material.alpha_cutoff is None:
         return material.alpha
     return 1.0 if material.alpha >= material.alpha_cutoff else 0.0

@@ -4,7 +4,11 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.scene import CubemapEnvironment, Scene, SkyEnvironment
+import numpy as np
+
+from service.scene import CubemapEnvironment, NormalTexture, Scene, SkyEnvironment
+from service.scene.material import Material
+from service.scene.texture import Reference, references
 
 BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for which packing has an answer
 
@@ -31,16 +35,33 @@ def change(old: Scene, new: Scene) -> Change:
 
 def risky(old: Scene, new: Scene) -> bool:
     """Whether packing `new` could be refused where `old` was not: other files, or more to hold."""
-    return _files(old) != _files(new) or len(old.shapes) != len(new.shapes)
+    return _files(old) != _files(new) or _asked(old) != _asked(new) or len(old.shapes) != len(new.shapes)
+
+
+def _asked(scene: Scene) -> list[object]:
+    """What a texture, or a mesh's coordinates, could turn out not to have."""
+    sets = [getattr(texture, "uv", 0) for texture in scene.textures.values()]
+    return [sets, [_looks(m) for m in scene.materials.values()], [shape.material for shape in scene.shapes]]
 
 
 def _skeleton(scene: Scene) -> tuple[object, ...]:
     """What arrays, light tables and kernels are made from: equal skeletons differ in values that are edited in place.
 
-    Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked.
+    Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked. So is
+    which parameter reads which texture; factors are not.
     """
-    materials = [(name, m.type, m.emission, m.emission_sides) for name, m in scene.materials.items()]
-    return materials, scene.shapes, scene.lights, _environment(scene)
+    materials = [(name, m.type, m.emission, m.emission_sides, _looks(m)) for name, m in scene.materials.items()]
+    return materials, scene.textures, scene.shapes, scene.lights, _environment(scene)
+
+
+def _looks(material: Material) -> list[object]:
+    looks = references(material).items()
+    return [(field, r.texture, getattr(r, "channel", None), _counts(r)) for field, r in looks]
+
+
+def _counts(reference: Reference) -> bool:
+    """Whether its factor leaves something of the texture, which then raises what the number may need."""
+    return isinstance(reference, NormalTexture) or bool(np.any(np.greater(reference.factor, 0)))
 
 
 def _environment(scene: Scene) -> object:
@@ -58,4 +79,5 @@ def _environment(scene: Scene) -> object:
 def _files(scene: Scene) -> list[object]:
     e = scene.environment
     faces = list(e.assets) if isinstance(e, CubemapEnvironment) else [getattr(e, "asset", None)]
-    return [*faces, *(getattr(shape, "asset", None) for shape in scene.shapes)]
+    images = (getattr(texture, "asset", None) for texture in scene.textures.values())
+    return [*faces, *images, *(getattr(shape, "asset", None) for shape in scene.shapes)]

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from service.pack import PackCache, pack_camera, pack_materials, pack_turn
+from service.pack import PackCache, pack_camera, pack_materials, pack_turn, repacked
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.rendering import protocol
@@ -36,6 +36,7 @@ class Live:
         self._cache = PackCache()
         self._given: Version | None = None  # the last one that the renderer has
         self._origin = (0.0, 0.0, 0.0)  # what its coordinates are relative to
+        self._textures: Any = None  # a gpu.TextureArrays: how its materials use textures
 
     def take(self, message: protocol.Start | protocol.Update) -> Update | None:
         """What the renderer must be told at once; None where that can wait for `settle`, after newer updates.
@@ -99,12 +100,13 @@ class Live:
         touched = change(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
             arrays = self._reader.pack(new.scene, self._cache).arrays
-            self._origin = arrays.origin
+            self._origin, self._textures = arrays.origin, arrays.textures
             return replace(update, scene=arrays)
         environment = new.scene.environment
         return replace(
             update,
             camera=pack_camera(new.scene.camera, self._origin) if touched.camera else None,
             materials=pack_materials(new.scene) if touched.materials else None,
+            texture_words=repacked(self._textures, new.scene) if touched.materials and self._textures else None,
             environment=pack_turn(environment) if touched.environment and environment is not None else None,
         )

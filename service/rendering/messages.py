@@ -10,6 +10,8 @@ import numpy as np
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
+EDITS = ("camera", "materials", "texture_words", "environment")  # what `Scene.edit` takes
+
 
 @dataclass(frozen=True)
 class StopRule:
@@ -45,8 +47,8 @@ class Progress:
 class Update:
     """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
 
-    `scene` is a gpu.SceneArrays, `settings` the arguments of gpu.RenderSettings; `camera`, `materials` and
-    `environment` are those of `Scene.edit`. Any of them starts accumulation again, `stop` and `denoise` don't.
+    `scene` is a gpu.SceneArrays, `settings` the arguments of gpu.RenderSettings. Any of these, or of EDITS, starts
+    accumulation again, `stop` and `denoise` don't.
     """
 
     task: int
@@ -56,14 +58,14 @@ class Update:
     stop: StopRule | None = None
     camera: Any = None
     materials: np.ndarray | None = None
+    texture_words: np.ndarray | None = None
     environment: tuple[float, float] | None = None
     denoise: bool | None = None
     interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
 
     @property
     def edits(self) -> dict[str, Any]:
-        named = {"camera": self.camera, "materials": self.materials, "environment": self.environment}
-        return {name: value for name, value in named.items() if value is not None}
+        return {name: getattr(self, name) for name in EDITS if getattr(self, name) is not None}
 
     @property
     def restarts(self) -> bool:
@@ -75,7 +77,7 @@ class Update:
             denoise = self.denoise if later.denoise is None else later.denoise
             settings, stop = later.settings or self.settings, later.stop or self.stop
             return replace(later, settings=settings, stop=stop, denoise=denoise)
-        names = ("settings", "stop", "denoise", "camera", "materials", "environment")
+        names = ("settings", "stop", "denoise", *EDITS)
         values = {name: getattr(later, name) for name in names if getattr(later, name) is not None}
         return replace(self, generation=later.generation, **values)
 

@@ -91,7 +91,8 @@ def unfolded(data: bytes) -> Any:
 
 def weight(packed: Packed) -> int:
     """Bytes of the arrays."""
-    return sum(getattr(value, "nbytes", 0) for value in vars(packed.arrays).values())
+    parts = [vars(part) for part in (packed.arrays, packed.arrays.textures) if part is not None]
+    return sum(getattr(value, "nbytes", 0) for part in parts for value in part.values())
 
 
 @contextmanager

@@ -25,6 +25,12 @@ Point solid_point(Solid s, vec3 q, vec3 n) {
     r.shape = s.shape;
     r.flat_id = NONE;
     r.tangent = axes[0];
+#if HAS_TEXTURES
+    r.uv = vec2(0.0);
+    r.uv_1 = vec2(0.0);
+    r.color = vec4(1.0);
+    r.handed = dot(s.row_x, cross(s.row_y, s.row_z)) < 0.0 ? -1.0 : 1.0;
+#endif
     return r;
 }
 
@@ -44,9 +50,12 @@ float ellipsoid_hit(Solid s, vec3 o, vec3 d, float t_max) {
 Point ellipsoid_point(Solid s, vec3 p) {
     vec3 q = normalize(solid_rows(s, p - s.center));
     Point r = solid_point(s, q, q);
-#if HAS_ANISOTROPIC
+#if HAS_ANISOTROPIC || HAS_TEXTURES
     vec3 t = dot(q.xz, q.xz) > 0.0 ? vec3(q.z, 0.0, -q.x) : vec3(1.0, 0.0, 0.0);
     r.tangent = solid_axes(s) * t;
+#endif
+#if HAS_TEXTURES
+    r.uv = sphere_uv(q);
 #endif
     return r;
 }
@@ -73,10 +82,15 @@ Point box_point(Solid s, vec3 p) {
     vec3 room = max(vec3(0.0), 1.0 - edge);
     q = mix(clamp(q, -room, room), n, notEqual(n, vec3(0.0)));
     Point r = solid_point(s, q, n);
-#if HAS_ANISOTROPIC
+#if HAS_ANISOTROPIC || HAS_TEXTURES
     // u to the right seen from outside: faces of x along -z or +z, of y along +x, of z along +x or -x.
     vec3 t = n.x != 0.0 ? vec3(0.0, 0.0, -n.x) : n.y != 0.0 ? vec3(1.0, 0.0, 0.0) : vec3(n.z, 0.0, 0.0);
     r.tangent = solid_axes(s) * t;
+#endif
+#if HAS_TEXTURES
+    // v up with +y; on the top along -z, on the bottom along +z.
+    vec3 b = n.y != 0.0 ? vec3(0.0, 0.0, -n.y) : vec3(0.0, 1.0, 0.0);
+    r.uv = clamp(0.5 + 0.5 * vec2(dot(q, t), dot(q, b)), 0.0, 1.0);
 #endif
     return r;
 }

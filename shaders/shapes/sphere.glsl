@@ -13,6 +13,14 @@ float sphere_hit(Sphere s, vec3 o, vec3 d, float t_max) {
     return disc >= 0.0 && t > 0.0 && t < t_max ? t : t_max;
 }
 
+#if HAS_TEXTURES
+// Of a place on the unit sphere: u eastwards from -z, v from the lower pole.
+vec2 sphere_uv(vec3 n) {
+    float u = n.x == 0.0 && n.z == 0.0 ? 0.0 : atan(n.x, n.z);
+    return vec2(0.5 + u * (0.5 * INV_PI), 1.0 - acos(clamp(n.y, -1.0, 1.0)) * INV_PI);
+}
+#endif
+
 Point sphere_point(Sphere s, vec3 p) {
     Point r;
     r.ng = normalize(p - s.center);
@@ -23,13 +31,19 @@ Point sphere_point(Sphere s, vec3 p) {
     r.light = s.light;
     r.shape = s.shape;
     r.flat_id = NONE;
-#if HAS_ANISOTROPIC
+#if HAS_ANISOTROPIC || HAS_TEXTURES
     // Along growing u = 1/2 + atan2(x, z) / 2 pi; at a pole any direction serves.
     vec3 n = frame_rotate(vec4(-s.rotation.xyz, s.rotation.w), r.ng);
     vec3 t = dot(n.xz, n.xz) > 0.0 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0);
     r.tangent = frame_rotate(s.rotation, t);
 #else
     r.tangent = vec3(1.0, 0.0, 0.0);
+#endif
+#if HAS_TEXTURES
+    r.uv = sphere_uv(n);
+    r.uv_1 = vec2(0.0);
+    r.color = vec4(1.0);
+    r.handed = 1.0;
 #endif
     return r;
 }

@@ -56,6 +56,53 @@ vec3 triangle_decode(uint bits) {
     return normalize(n);
 }
 
+#if HAS_UVS
+layout(binding = TEXTURE_UVS_UNIT) uniform sampler2D triangle_uvs; // three texels a triangle
+#endif
+#if HAS_UVS_1
+layout(binding = TEXTURE_UVS_1_UNIT) uniform sampler2D triangle_uvs_1;
+#endif
+#if HAS_VERTEX_COLORS
+layout(binding = TEXTURE_COLORS_UNIT) uniform sampler2D triangle_colors;
+#endif
+
+#if HAS_TEXTURES
+ivec2 triangle_corner(uint index, uint k) {
+    uint at = 3u * index + k;
+    return ivec2(at & (TEXTURE_ROW - 1u), at / TEXTURE_ROW);
+}
+
+// Texture coordinates and vertex colours at the weights b, and the tangent along growing u.
+void triangle_detail(uint index, vec3 b, vec3 e1, vec3 e2, inout Point r) {
+    r.uv = vec2(0.0);
+    r.uv_1 = vec2(0.0);
+    r.color = vec4(1.0);
+    r.handed = 1.0;
+#if HAS_UVS
+    vec2 a0 = texelFetch(triangle_uvs, triangle_corner(index, 0u), 0).xy;
+    vec2 a1 = texelFetch(triangle_uvs, triangle_corner(index, 1u), 0).xy;
+    vec2 a2 = texelFetch(triangle_uvs, triangle_corner(index, 2u), 0).xy;
+    r.uv = b.x * a0 + b.y * a1 + b.z * a2;
+    vec2 d1 = a1 - a0, d2 = a2 - a0;
+    float turned = d1.x * d2.y - d1.y * d2.x;
+    if (turned != 0.0) {
+        r.handed = turned < 0.0 ? -1.0 : 1.0;
+        r.tangent = r.handed * (d2.y * e1 - d1.y * e2);
+    }
+#endif
+#if HAS_UVS_1
+    r.uv_1 = b.x * texelFetch(triangle_uvs_1, triangle_corner(index, 0u), 0).xy
+           + b.y * texelFetch(triangle_uvs_1, triangle_corner(index, 1u), 0).xy
+           + b.z * texelFetch(triangle_uvs_1, triangle_corner(index, 2u), 0).xy;
+#endif
+#if HAS_VERTEX_COLORS
+    r.color = b.x * texelFetch(triangle_colors, triangle_corner(index, 0u), 0)
+            + b.y * texelFetch(triangle_colors, triangle_corner(index, 1u), 0)
+            + b.z * texelFetch(triangle_colors, triangle_corner(index, 2u), 0);
+#endif
+}
+#endif
+
 Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     Point r;
     vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, across = cross(e1, e2);
@@ -71,6 +118,9 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     r.p = b0 * tri.v0 + uv.x * tri.v1 + uv.y * tri.v2;
     r.ns = r.ng;
     r.tangent = e1;
+#if HAS_TEXTURES
+    triangle_detail(index, vec3(b0, uv), e1, e2, r);
+#endif
 #if HAS_SMOOTH_NORMALS
     TriangleNormals n = triangle_normals_load(index);
     vec3 ns = b0 * triangle_decode(n.n0) + uv.x * triangle_decode(n.n1) + uv.y * triangle_decode(n.n2);

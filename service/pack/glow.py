@@ -1,0 +1,88 @@
+"""How much light textured shapes send out: the means by which lights are picked, and the greatest radiance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from gpu import layout
+from gpu.layout import LightKind, ShapeKind
+from service.pack.geometry import Geometry
+from service.pack.textures import Texels, Use, record_of, values_of
+from service.scene.texture import CheckerTexture
+
+# Barycentric places at which a triangle's emission is looked at: the middles of its 16 quarters' quarters.
+_EDGE = np.arange(4)
+PLACES = np.array(
+    [((i + 1 / 3) / 4, (j + 1 / 3) / 4) for i in _EDGE for j in _EDGE if i + j < 4]
+    + [((i + 2 / 3) / 4, (j + 2 / 3) / 4) for i in _EDGE for j in _EDGE if i + j < 3]
+)
+LEAST = 0.02  # of the whole texture's mean: what a triangle is taken to shine with where the places found nothing
+
+
+def glow(materials: np.ndarray, uses: Sequence[Use], texels: Texels, built: Geometry) -> tuple[np.ndarray, float]:
+    """(mean emission of each light of `built` (n, 3), the greatest radiance of any emission or ambient)."""
+    emission, used = materials["emission"].astype(np.float64), built.lights["material"]
+    peak = max(float(emission[used].max(initial=0.0)), float(materials["ambient"].max(initial=0.0)))
+    for use in uses:
+        if use.member == "ambient" or (use.member == "emission" and (used == use.material).any()):
+            mean, greatest = _levels(use, texels)
+            peak = max(peak, greatest)
+            if use.member == "emission":
+                emission[use.material] = mean
+    shining = emission[used]
+    for use in uses:
+        if use.member == "emission":
+            _triangles(use, texels, built, emission[use.material], shining)
+    return shining, peak
+
+
+def _levels(use: Use, texels: Texels) -> tuple[np.ndarray, float]:
+    """(mean (3,), greatest) of what a texture gives a radiance."""
+    pixels: np.ndarray
+    if isinstance(use.texture, CheckerTexture):
+        pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
+    else:
+        pixels = texels.places[use.texture.asset][1].pixels
+    low, high = layout.TEXTURABLE[use.member]
+    total, greatest = np.zeros(3), 0.0
+    for rows in np.array_split(pixels, max(1, pixels.shape[0] // 256)):  # floats of a part of it at a time
+        values = np.clip(values_of(use, rows), low, high)
+        total += values.sum(axis=(0, 1), dtype=np.float64)
+        greatest = max(greatest, float(values.max()))
+    return total / (pixels.shape[0] * pixels.shape[1]), greatest
+
+
+def _triangles(use: Use, texels: Texels, built: Geometry, mean: np.ndarray, shining: np.ndarray) -> None:
+    """Writes each emitting triangle's own mean: most of a textured mesh may be dark."""
+    mine = np.flatnonzero((built.lights["kind"] == LightKind.TRIANGLE) & (built.lights["material"] == use.material))
+    second = not isinstance(use.texture, CheckerTexture) and use.texture.uv == 1
+    uvs = built.triangle_uvs_1 if second else built.triangle_uvs
+    if not len(mine) or len(uvs) != len(built.shapes[ShapeKind.TRIANGLE]):
+        return
+    corners = uvs[built.lights["index"][mine]].astype(np.float64)
+    total = np.zeros((len(mine), 3))
+    low, high = layout.TEXTURABLE["emission"]
+    for b1, b2 in PLACES:
+        uv = (1 - b1 - b2) * corners[:, 0] + b1 * corners[:, 1] + b2 * corners[:, 2]
+        total += np.clip(values_of(use, nearest(use, texels, uv)), low, high)
+    shining[mine] = np.maximum(total / len(PLACES), LEAST * mean)
+
+
+def nearest(use: Use, texels: Texels, uv: np.ndarray) -> np.ndarray:
+    """(n, channels) of the texels nearest to (n, 2) coordinates."""
+    record = record_of(use, texels)
+    turn = record["turn"].astype(np.float64).reshape(2, 2)
+    uv = uv @ turn.T + [float(record["offset_u"]), float(record["offset_v"])]
+    if isinstance(use.texture, CheckerTexture):
+        odd = np.floor(uv).sum(axis=1) % 2 != 0
+        return np.where(odd[:, None], use.texture.b, use.texture.a).astype(np.float32)
+    pixels = texels.places[use.texture.asset][1].pixels
+    if use.texture.wrap == "repeat":
+        uv = uv - np.floor(uv)
+    elif use.texture.wrap == "mirror":
+        uv = 1 - np.abs(uv - 2 * np.floor(uv / 2) - 1)
+    size = np.array(pixels.shape[1::-1])
+    x, y = np.clip((uv * size).astype(np.int64), 0, size - 1).T
+    return np.asarray(pixels[size[1] - 1 - y, x])

@@ -1,0 +1,169 @@
+// What textures and vertex colours make of a material at a point. Texels of all images stand one after another, row 0
+// first, in one texture for bytes and one for floats; they are filtered here, so that any size, wrap and number of them
+// costs no more than four fetches, and sRGB is decoded before it is filtered.
+#if HAS_TEXTURES
+ivec2 texture_place(uint at) { return ivec2(at & (TEXTURE_ROW - 1u), at / TEXTURE_ROW); }
+
+// IEC 61966-2-1 inverted: above the straight part a polynomial fitted to the 245 bytes there, off by 1.2e-5 of the value
+// at most. Twelve powers for each look at a texture would cost more than its fetches.
+vec3 texture_decoded(vec3 c) {
+    vec3 y = -0.196990575 * c + 0.831461812;
+    y = y * c - 1.50289935;
+    y = y * c + 1.56965339;
+    y = y * c - 1.14754887;
+    y = y * c + 0.933739775;
+    y = y * c + 0.475830709;
+    y = y * c + 0.0359005807;
+    y = y * c + 0.000841280823;
+    return mix(y, c / 12.92, lessThanEqual(c, vec3(0.04045)));
+}
+
+#if HAS_BYTE_TEXELS
+layout(binding = TEXTURE_BYTES_UNIT) uniform sampler2D texture_bytes;
+#endif
+#if HAS_FLOAT_TEXELS
+layout(binding = TEXTURE_FLOATS_UNIT) uniform sampler2D texture_floats;
+#endif
+
+vec4 texture_texel(TextureSlot s, int x, int y) {
+    uint at = s.first + uint(y) * s.width + uint(x);
+    vec4 c = vec4(0.0);
+#if HAS_BYTE_TEXELS
+    c = texelFetch(texture_bytes, texture_place(at), 0);
+#if HAS_SRGB_TEXELS
+    if ((s.flags & TEXTURE_SLOT_SRGB) != 0u) c.rgb = texture_decoded(c.rgb);
+#endif
+#endif
+#if HAS_FLOAT_TEXELS
+    vec4 f = texelFetch(texture_floats, texture_place(at), 0);
+    if ((s.flags & TEXTURE_SLOT_FLOATS) != 0u) c = f;
+#endif
+    return c;
+}
+
+// One axis: the two texels around x (0..1, or anything where it repeats) and the share of the second.
+void texture_axis(float x, uint n, uint flags, out int a, out int b, out float share) {
+    bool clamps = (flags & TEXTURE_SLOT_CLAMP) != 0u, mirrors = (flags & TEXTURE_SLOT_MIRROR) != 0u;
+    float folded = x - 2.0 * floor(0.5 * x);
+    float once = clamps ? clamp(x, 0.0, 1.0) : mirrors ? min(folded, 2.0 - folded) : fract(x);
+    float t = once * float(n) - 0.5, low = floor(t);
+    int last = int(n) - 1;
+    share = t - low;
+    a = int(low);
+    b = a + 1;
+    bool stays = clamps || mirrors; // a mirrored image's border texel meets itself
+    if (a < 0) a = stays ? 0 : last;
+    if (b > last) b = stays ? last : 0;
+}
+
+vec4 texture_sample(TextureSlot s, Point at) {
+    vec2 uv = at.uv;
+#if HAS_UVS_1
+    if ((s.flags & TEXTURE_SLOT_UV_1) != 0u) uv = at.uv_1;
+#endif
+    uv = vec2(dot(s.turn.xy, uv), dot(s.turn.zw, uv)) + vec2(s.offset_u, s.offset_v);
+    vec4 c = vec4(0.0);
+#if HAS_BYTE_TEXELS || HAS_FLOAT_TEXELS
+    int x0, x1, y0, y1;
+    vec2 share;
+    texture_axis(uv.x, s.width, s.flags, x0, x1, share.x);
+    texture_axis(uv.y, s.height, s.flags, y0, y1, share.y); // counted from below
+    int top = int(s.height) - 1;
+    vec4 low = mix(texture_texel(s, x0, top - y0), texture_texel(s, x1, top - y0), share.x);
+    vec4 high = mix(texture_texel(s, x0, top - y1), texture_texel(s, x1, top - y1), share.x);
+    c = mix(low, high, share.y);
+#endif
+#if HAS_CHECKERS
+    vec2 cell = floor(uv);
+    bool even = fract(0.5 * (cell.x + cell.y)) < 0.25;
+    if ((s.flags & TEXTURE_SLOT_CHECKER) != 0u) c = vec4(even ? s.color_a : s.color_b, 1.0);
+#endif
+    return c;
+}
+
+// The texels of all slots that a surface is made from.
+void texture_look(Point at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
+    texels[0] = vec4(0.0);
+    for (uint k = 0u; k < uint(TEXTURE_SURFACE_SLOTS); k++) {
+        texels[k] = texture_sample(texture_slot_pick(at.material, k), at);
+    }
+}
+
+// The material as it is there.
+Material texture_material(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
+    Material m = material_pick(at.material);
+    texture_members(at.material, texels, m);
+#if HAS_VERTEX_COLORS
+    m.base_color *= at.color.rgb;
+#endif
+    return m;
+}
+
+// The chance that a ray meets the surface there. An alpha's cutoff is compared with the filtered texel.
+float texture_opacity(Point at) {
+    float opacity = material_pick(at.material).opacity;
+#if TEXTURE_OPACITY >= 0
+    texture_use_opacity(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_OPACITY)), at), opacity);
+#endif
+#if HAS_VERTEX_COLORS
+    opacity *= at.color.a;
+#endif
+#if TEXTURE_OPACITY >= 0
+    TextureUse use = texture_use_pick(at.material, TEXTURE_OPACITY_USE);
+    if (use.channel != TEXTURE_CHANNEL_NONE && use.factor.y >= 0.0) opacity = opacity >= use.factor.y ? 1.0 : 0.0;
+#endif
+    return opacity;
+}
+
+vec3 texture_emission(Point at) {
+    vec3 emission = material_pick(at.material).emission;
+#if TEXTURE_EMISSION >= 0
+    texture_use_emission(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_EMISSION)), at), emission);
+#endif
+    return emission;
+}
+
+vec3 texture_ambient(Point at) {
+    vec3 ambient = material_pick(at.material).ambient;
+#if TEXTURE_AMBIENT >= 0
+    texture_use_ambient(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_AMBIENT)), at), ambient);
+#endif
+    return ambient;
+}
+
+#if HAS_NORMAL_MAPS
+// The shading normal n bent as a normal map has it: red along growing u, green along growing v, blue outwards.
+vec3 texture_bent(Point at, vec3 n, vec4 texel, float strength) {
+    vec3 t = 2.0 * texel.xyz - 1.0;
+    t.xy *= strength;
+    vec3 x = at.tangent - dot(at.tangent, n) * n;
+    float x2 = dot(x, x);
+    x *= inversesqrt(max(x2, 1e-30));
+    vec3 r = t.x * x + (at.handed * t.y) * cross(n, x) + t.z * n;
+    float r2 = dot(r, r);
+    return x2 > 1e-30 && r2 > 0.0 ? r * inversesqrt(r2) : n;
+}
+
+// The base's shading normal, outward; whether a map bent it.
+bool texture_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
+    bool mapped = false;
+#if TEXTURE_NORMAL >= 0
+    TextureUse use = texture_use_pick(at.material, TEXTURE_NORMAL_USE);
+    mapped = use.channel != TEXTURE_CHANNEL_NONE;
+    if (mapped) n = texture_bent(at, n, texels[TEXTURE_NORMAL], use.factor.x);
+#endif
+    return mapped;
+}
+
+// The coat's own.
+bool texture_coat_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
+    bool mapped = false;
+#if TEXTURE_COAT_NORMAL >= 0
+    TextureUse use = texture_use_pick(at.material, TEXTURE_COAT_NORMAL_USE);
+    mapped = use.channel != TEXTURE_CHANNEL_NONE;
+    if (mapped) n = texture_bent(at, n, texels[TEXTURE_COAT_NORMAL], use.factor.x);
+#endif
+    return mapped;
+}
+#endif
+#endif

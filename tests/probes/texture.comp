@@ -1,0 +1,20 @@
+// What a textured emission is at texture coordinates: set 0 in xy, set 1 in zw.
+layout(local_size_x = 64) in;
+#include "layout.glsl"
+layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
+#include "constants.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "shapes.glsl"
+#include "texture.glsl"
+uniform uint count;
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    Point at = shapes_point(Nearest(0.0, NONE, vec2(0.0)), vec3(0.0), vec3(0.0, 0.0, 1.0));
+    at.uv = asks[i].xy;
+    at.uv_1 = asks[i].zw;
+    answers[i] = vec4(texture_emission(at), texture_opacity(at));
+}
