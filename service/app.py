@@ -19,19 +19,22 @@ from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
-from fastapi.middleware.cors import CORSMiddleware
 from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from service import presets
 from service.assets import AssetStore
 from service.config import Config
+from service.documents import Documents
 from service.guard import Guard
+from service.quota import Quota
 from service.rendering.engine import Engine
 from service.rendering.reading import Reader
+from service.rendering.renders import Bounds, Renders
 from service.rendering.warming import Warming
-from service.routes import assets, info, renders, stream
+from service.routes import assets, documents, info, renders, stream
 from service.routes import presets as preset_routes
+from service.routes.description import describe
 from service.routes.errors import respond, tell_errors
 from service.routes.house import House
 
@@ -49,7 +52,9 @@ log = logging.getLogger(__name__)
 def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
     store = AssetStore(config.data_dir, config, presets.builtin_assets)
-    own = House(config, store, Reader(config, store), Engine(config.device))
+    saved = Documents(config.data_dir, store)
+    quota = Quota(config.data_dir, config.data_quota, saved.assets_in_use, lambda: saved.bytes)
+    own = House(config, store, Reader(config, store), Engine(config.device), saved, quota, Renders(_bounds(config)))
     app = FastAPI(
         title="Sunbox",
         version=metadata.version("sunbox"),
@@ -59,16 +64,13 @@ def create_app(config: Config) -> FastAPI:
         redoc_url=None,
     )
     app.state.house = own
-    for router in (info.router, preset_routes.router, assets.router, renders.router, stream.router):
+    for router in (info.router, preset_routes.router, assets.router, documents.router, renders.router, stream.router):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)
     app.mount("/", StaticFiles(directory=WEB, html=True))
     tell_errors(app)
-    origins = config.allowed_origins
-    app.add_middleware(
-        CORSMiddleware, allow_origins=origins, allow_methods=["*"], allow_headers=["*"], expose_headers=["Location"]
-    )
-    app.add_middleware(Guard, max_body=config.max_body, allowed_origins=origins, refuse=respond)
+    describe(app, keyed=bool(config.api_key))
+    app.add_middleware(Guard, config=config, refuse=respond)
     return app
 
 
@@ -163,6 +165,17 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     await own.farewell()
     await own.engine.close()
     await asyncio.to_thread(own.assets.close)
+
+
+def _bounds(config: Config) -> Bounds:
+    return Bounds(
+        running=config.max_running,
+        waiting=config.max_queue,
+        each=config.max_jobs,
+        kept=config.keep_renders,
+        kept_bytes=config.keep_bytes,
+        kept_s=config.keep_seconds,
+    )
 
 
 async def _docs() -> Response:

@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, ValidationError, field_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 1 GiB
+MIB, GIB = 2**20, 2**30
+
+Words = Annotated[list[str], NoDecode]
 
 
 class ConfigError(Exception):
@@ -29,27 +32,66 @@ class Config(BaseSettings):
 
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
+    api_key: Words = Field(
+        default_factory=list,
+        repr=False,
+        description="Keys, separated by commas, one of which `/v1/*` then asks for; renders belong to their key.",
+    )
+    allowed_origins: Words = Field(
+        default_factory=list, description="Origins besides the server's own that may call, separated by commas."
+    )
+    data_dir: Path = Field(
+        default_factory=_default_data_dir, description="Folder for assets and documents (default: ~/.cache/sunbox)."
+    )
+    data_quota: int = Field(
+        10 * GIB, ge=1, description="Most bytes of assets and documents; assets longest unused make room."
+    )
+    device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
+    require_gpu: bool = Field(False, description="Refuse to start on a software renderer.")
+    log_format: Literal["console", "json"] = Field("console", description="Logs for eyes, or a JSON object a line.")
+    log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="The least that is logged.")
+
+    max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body, as decompressed.")
+    max_bodies: int = Field(GIB, ge=1, description="Most bytes of all bodies that are being dealt with.")
+    body_timeout: float = Field(30.0, gt=0, description="Longest pause (s) within a body that is being sent.")
+    max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(
         16_000_000, ge=1, le=2**24, description="Most triangles of a scene; at most 2^24 (float32 counts no further)."
     )
     max_texels: int = Field(
-        2**26, ge=1, le=2**27, description="Most texels of a scene's textures: 2^26 are four of 4096 x 4096."
+        2**26, ge=1, le=2**27, description="Most texels of an image, and of a scene's textures: four of 4096 x 4096."
     )
-    max_body: int = Field(256 * 2**20, ge=1, description="Most bytes of a request's body, as decompressed.")
-    max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
-    data_dir: Path = Field(
-        default_factory=_default_data_dir, description="Folder for assets and caches (default: ~/.cache/sunbox)."
-    )
-    device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
-    allowed_origins: Annotated[list[str], NoDecode] = Field(
-        default_factory=list, description="Origins besides the server's own that may call, separated by commas."
-    )
+    max_asset: int = Field(GIB, ge=1, description="Most bytes of one asset.")
+    parse_seconds: float = Field(20.0, gt=0, description="Longest that an asset is parsed (s), and .25 s a MiB.")
+    parse_memory: int = Field(8 * GIB, ge=256 * MIB, description="Most bytes of memory that parsing an asset takes.")
+    max_seconds: float | None = Field(None, gt=0, description="Longest that a picture is rendered (s).")
+    max_running: int = Field(8, ge=1, description="Renders at once; more wait in line.")
+    max_queue: int = Field(256, ge=1, description="Most renders that wait in line.")
+    max_jobs: int = Field(64, ge=1, description="Most renders, running and waiting, of one key.")
+    keep_renders: int = Field(64, ge=1, description="How many ended renders are kept for each key.")
+    keep_bytes: int = Field(GIB, ge=1, description="Most bytes that the ended renders of all keys hold.")
+    keep_seconds: float = Field(3600.0, gt=0, description="How long an ended render is kept (s).")
 
-    @field_validator("allowed_origins", mode="before")
+    @field_validator("allowed_origins", "api_key", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
-        return [part.strip() for part in value.split(",") if part.strip()] if isinstance(value, str) else value
+        return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
+
+    @field_validator("allowed_origins")
+    @classmethod
+    def _named(cls, origins: list[str]) -> list[str]:
+        return [origin for origin in origins if origin]
+
+    @field_validator("api_key")
+    @classmethod
+    def _usable(cls, keys: list[str]) -> list[str]:
+        if "" in keys:
+            raise ValueError("there is an empty key among these, or none at all")
+        for key in keys:
+            if not all("!" <= letter <= "~" for letter in key):
+                raise ValueError("a key is of printable ASCII characters without blanks, or no header could hold it")
+        return keys
 
 
 def load_config(**given: Any) -> Config:
@@ -59,3 +101,23 @@ def load_config(**given: Any) -> Config:
     except ValidationError as error:
         lines = [f"SUNBOX_{str(e['loc'][0]).upper()}: {e['msg'].lower()}" for e in error.errors()]
         raise ConfigError("; ".join(lines)) from None
+
+
+def table() -> str:
+    """The README's table of variables, in Markdown."""
+    lines = ["| variable | default | |", "|---|---|---|"]
+    for name, field in Config.model_fields.items():
+        lines.append(f"| `SUNBOX_{name.upper()}` | {_told(field.get_default())} | {field.description} |")
+    return "\n".join(lines) + "\n"
+
+
+def _told(default: Any) -> str:
+    if default is None or not isinstance(default, int | float | str):
+        return ""
+    if isinstance(default, bool):
+        return str(default).lower()
+    if isinstance(default, int):
+        for unit, size in (("GiB", GIB), ("MiB", MIB)):
+            if default >= size and default % size == 0 and default != MAX_PIXELS and default != 2**26:
+                return f"{default // size} {unit}"
+    return f"{default:g}" if isinstance(default, float) else str(default)

@@ -1,57 +1,115 @@
-"""What stands between the network and the routes: how much a body may hold, which hosts and origins may ask.
+"""What stands between the network and the routes: who may ask, from which hosts and pages, and how much a body holds.
 
 Plain ASGI. Refusals are the errors of `problems.py`, answered by `refuse`; a stream is accepted, then closed.
 """
 
 from __future__ import annotations
 
+import asyncio
 import ipaddress
-from collections.abc import Awaitable, Callable, Iterable
+from collections.abc import Awaitable, Callable
 from urllib.parse import urlsplit
 
+from starlette._utils import get_route_path
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
-from service.problems import Forbidden, ServiceError, TooLarge, UnsupportedMedia
+from service.config import Config
+from service.keys import PROTOCOL, Keys
+from service.problems import (
+    Forbidden,
+    ServiceError,
+    TimedOut,
+    TooLarge,
+    Unauthorized,
+    Unavailable,
+    UnsupportedMedia,
+)
 
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}
-CROSS_ORIGIN = 4403  # close code of the stream
+CLOSE_CODES: dict[type[ServiceError], int] = {Unauthorized: 4401, Forbidden: 4403}  # of the stream
 REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
+RETRY_S = 5  # when to come again with a body that there is no room for
 # Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are made.
 CONTENT_POLICY = (
-    "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; object-src 'none'; "
+    "default-src 'self'; img-src 'self' blob: data:; object-src 'none'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
 )
+HEADERS = {
+    "x-content-type-options": "nosniff",
+    "referrer-policy": "no-referrer",
+    "cross-origin-opener-policy": "same-origin",
+    "x-frame-options": "SAMEORIGIN",
+}
+PREFLIGHT = {
+    "access-control-allow-methods": "GET, HEAD, POST, PUT, DELETE",
+    "access-control-allow-headers": "authorization, content-type, x-request-id",
+    "access-control-max-age": "600",
+}
+EXPOSED = "location, retry-after, x-request-id"
 
 Refuse = Callable[[ServiceError], ASGIApp]
 
 
 class Guard:
-    def __init__(self, app: ASGIApp, *, max_body: int, allowed_origins: Iterable[str], refuse: Refuse) -> None:
+    def __init__(self, app: ASGIApp, *, config: Config, refuse: Refuse) -> None:
         self._app = app
-        self._max_body = max_body
-        self._origins = {_origin(origin) for origin in allowed_origins}
+        self._config = config
+        self._keys = Keys(config.api_key)
+        self._origins = {_origin(origin) for origin in config.allowed_origins}
         self._hosts = LOOPBACK_NAMES | {host for _, host, _ in self._origins}
         self._refuse = refuse
+        self._held = 0  # bytes of bodies that are being dealt with
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
             return await self._app(scope, receive, send)
         headers = Headers(scope=scope)
+        granted = self._grant(headers)
         try:
             self._check_host(scope, headers)
             if scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS:
                 self._check_origin(headers)
             if scope["type"] == "http":
+                if granted and scope["method"] == "OPTIONS" and "access-control-request-method" in headers:
+                    return await _answer_preflight(send, granted)
                 self._check_body(headers)
-                receive = self._counted(receive)
+            scope["owner"] = self._owner(scope, headers)
         except ServiceError as error:
             if scope["type"] == "websocket":
-                return await _close(scope, receive, send, CROSS_ORIGIN, str(error))
-            return await self._refuse(error)(scope, receive, _secured(send, close=True))
-        await self._app(scope, receive, _secured(send) if scope["type"] == "http" else send)
+                return await _close(scope, receive, send, CLOSE_CODES[type(error)], str(error))
+            return await self._refuse(error)(scope, receive, _secured(send, granted, close=True))
+        if scope["type"] == "websocket":
+            return await self._app(scope, receive, send)
+        body = _Body(self, receive)
+        # HEAD is answered as GET is; the server leaves the body out.
+        asked = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
+        try:
+            await self._app(asked, body.receive, _secured(send, granted))
+        finally:
+            self._held -= body.received
+
+    def take(self, received: int, more: int) -> None:
+        """Lets `more` bytes of a body in that has `received` already. Raises TooLarge, Unavailable."""
+        if received + more > self._config.max_body:
+            raise self._too_large()
+        if self._held + more > self._config.max_bodies:
+            raise Unavailable("There is no room for this body just now (SUNBOX_MAX_BODIES).", RETRY_S)
+        self._held += more
+
+    @property
+    def body_timeout(self) -> float:
+        return self._config.body_timeout
+
+    def _owner(self, scope: Scope, headers: Headers) -> str:
+        """Whose key it is; "" where none is asked for. Raises Unauthorized."""
+        path = get_route_path(scope)
+        if not self._keys.asked_for or not (path == "/v1" or path.startswith("/v1/")):
+            return ""
+        offered = scope.get("subprotocols", []) if scope["type"] == "websocket" else []
+        return self._keys.owner(headers.get("authorization"), offered)
 
     def _check_host(self, scope: Scope, headers: Headers) -> None:
         """On a loopback address only its own names: a foreign one that resolves here is an attack (DNS rebinding)."""
@@ -70,39 +128,59 @@ class Guard:
         if not host or _authority(headers.get("host", ""), scheme) != (host, port):
             raise Forbidden(f"Origin {origin!r} may not do this: SUNBOX_ALLOWED_ORIGINS does not name it")
 
+    def _grant(self, headers: Headers) -> str | None:
+        """The page's origin where it is one of those that may read answers."""
+        origin = headers.get("origin")
+        return origin if origin is not None and _origin(origin) in self._origins else None
+
     def _check_body(self, headers: Headers) -> None:
         length = headers.get("content-length", "")
-        if length.isdigit() and int(length) > self._max_body:
+        if length.isdigit() and int(length) > self._config.max_body:
             raise self._too_large()
         if headers.get("content-encoding", "identity").strip().lower() != "identity":
             raise UnsupportedMedia("Compressed bodies are not taken: send it without Content-Encoding")
 
-    def _counted(self, receive: Receive) -> Receive:
-        """Raises TooLarge where a body of unannounced length passes the limit."""
-        received = 0
-
-        async def counting() -> Message:
-            nonlocal received
-            message = await receive()
-            received += len(message.get("body", b""))
-            if received > self._max_body:
-                raise self._too_large()
-            return message
-
-        return counting
-
     def _too_large(self) -> TooLarge:
-        return TooLarge(f"The body is larger than {self._max_body} bytes (SUNBOX_MAX_BODY)")
+        return TooLarge(f"The body is larger than {self._config.max_body} bytes (SUNBOX_MAX_BODY)")
 
 
-def _secured(send: Send, close: bool = False) -> Callable[[Message], Awaitable[None]]:
+class _Body:
+    """Counts what comes in: a body of unannounced length has its limit too, and one that does not go on is ended."""
+
+    def __init__(self, guard: Guard, receive: Receive) -> None:
+        self.received = 0
+        self._guard = guard
+        self._receive = receive
+        self._ended = False
+
+    async def receive(self) -> Message:
+        """Raises TooLarge, TimedOut, Unavailable."""
+        if self._ended:
+            return await self._receive()  # for the connection's end, which may take long
+        try:
+            message = await asyncio.wait_for(self._receive(), self._guard.body_timeout)
+        except TimeoutError:
+            self._ended = True
+            raise TimedOut("The body did not go on (SUNBOX_BODY_TIMEOUT).") from None
+        more = len(message.get("body", b""))
+        self._guard.take(self.received, more)
+        self.received += more
+        self._ended = not message.get("more_body", False)
+        return message
+
+
+def _secured(send: Send, granted: str | None, close: bool = False) -> Callable[[Message], Awaitable[None]]:
     async def sending(message: Message) -> None:
         if message["type"] == "http.response.start":
             headers = MutableHeaders(scope=message)
-            headers["x-content-type-options"] = "nosniff"
-            headers["referrer-policy"] = "no-referrer"
+            for name, value in HEADERS.items():
+                headers[name] = value
             headers.setdefault("content-security-policy", CONTENT_POLICY)
             headers.setdefault("cache-control", "no-cache")
+            if granted:
+                headers["access-control-allow-origin"] = granted
+                headers["access-control-expose-headers"] = EXPOSED
+                headers.add_vary_header("Origin")
             if close:  # the body was not read, so the connection can't be used again
                 headers["connection"] = "close"
         await send(message)
@@ -110,10 +188,18 @@ def _secured(send: Send, close: bool = False) -> Callable[[Message], Awaitable[N
     return sending
 
 
+async def _answer_preflight(send: Send, origin: str) -> None:
+    headers = {"access-control-allow-origin": origin, "vary": "Origin", **PREFLIGHT}
+    raw = [(name.encode(), value.encode()) for name, value in headers.items()]
+    await send({"type": "http.response.start", "status": 204, "headers": raw})
+    await send({"type": "http.response.body"})
+
+
 async def _close(scope: Scope, receive: Receive, send: Send, code: int, reason: str) -> None:
     """Accepts, so that a browser tells its page the code, and closes."""
     await receive()
-    offered = scope.get("subprotocols", [])  # a browser fails the handshake when none of its offers is taken
+    # A browser fails the handshake when none of its offers is taken; a key is not to be sent back.
+    offered = [offer for offer in scope.get("subprotocols", []) if not offer.startswith(PROTOCOL)]
     await send({"type": "websocket.accept", "subprotocol": offered[0] if offered else None})
     await send({"type": "websocket.close", "code": code, "reason": reason[:REASON_CHARACTERS]})
 

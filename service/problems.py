@@ -4,7 +4,7 @@ ServiceError
     MalformedJson  InvalidDocument  AssetError            the body
     Unauthorized  Forbidden                               who asks
     NotFound  Conflict  Gone                              what is asked for
-    TooLarge  UnsupportedMedia                            how it is sent
+    TooLarge  UnsupportedMedia  TimedOut                  how it is sent
     TooManyRequests  Unavailable  Internal                the service
 """
 
@@ -92,6 +92,10 @@ class UnsupportedMedia(ServiceError):
     pass
 
 
+class TimedOut(ServiceError):
+    pass
+
+
 class TooManyRequests(ServiceError):
     """`retry_after` goes into the header of that name, in whole seconds."""
 
@@ -130,6 +134,7 @@ ANSWERS: dict[type[ServiceError], Answer] = {
     NotFound: Answer(404, "not-found", "Not found"),
     Conflict: Answer(409, "conflict", "Not possible in this state"),
     Gone: Answer(410, "gone", "Gone"),
+    TimedOut: Answer(408, "timed-out", "Request took too long"),
     TooLarge: Answer(413, "too-large", "Too large"),
     UnsupportedMedia: Answer(415, "unsupported-media", "Unsupported media type"),
     TooManyRequests: Answer(429, "too-many-requests", "Too many requests"),

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
 from typing import Annotated, Any, Literal
@@ -70,38 +70,41 @@ def read(document: Any) -> Recipe:
     return Recipe(found.scene, found.settings, found.view, found.assets)
 
 
+Step = str | int
+
+
+def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
+    """Where a document (valid or not) refers to an asset, step by step, and to which."""
+    if not isinstance(scene, dict):
+        return
+    holders: list[tuple[tuple[Step, ...], Any]] = [(("environment",), scene.get("environment"))]
+    if isinstance(textures := scene.get("textures"), dict):
+        holders += [(("textures", name), texture) for name, texture in textures.items()]
+    if isinstance(shapes := scene.get("shapes"), list):
+        holders += [(("shapes", i), shape) for i, shape in enumerate(shapes)]
+    for place, holder in holders:
+        if not isinstance(holder, dict):
+            continue
+        if isinstance(ref := holder.get("asset"), str):
+            yield (*place, "asset"), ref
+        if isinstance(several := holder.get("assets"), dict):
+            yield from (((*place, "assets", key), ref) for key, ref in several.items() if isinstance(ref, str))
+
+
 def references(scene: Any) -> list[str]:
-    """Every asset that a document (valid or not) refers to, once, in order."""
-    found: dict[str, None] = {}
-
-    def note(ref: str) -> str:
-        found[ref] = None
-        return ref
-
-    renamed(scene, note)
-    return list(found)
+    """Every asset that a document refers to, once, in order."""
+    return list(dict.fromkeys(ref for _, ref in places(scene)))
 
 
 def renamed(scene: Any, name: Callable[[str], str]) -> Any:
-    """The document with other names for its assets; the rest is shared with the one given."""
+    """The document with other names for its assets; what need not differ is shared with the one given."""
     if not isinstance(scene, dict):
         return scene
-    out = dict(scene)
-    if "environment" in scene:
-        out["environment"] = _renamed(scene["environment"], name)
-    if isinstance(scene.get("textures"), dict):
-        out["textures"] = {key: _renamed(texture, name) for key, texture in scene["textures"].items()}
-    if isinstance(scene.get("shapes"), list):
-        out["shapes"] = [_renamed(shape, name) for shape in scene["shapes"]]
-    return out
-
-
-def _renamed(holder: Any, name: Callable[[str], str]) -> Any:
-    if not isinstance(holder, dict):
-        return holder
-    out = dict(holder)
-    if isinstance(out.get("asset"), str):
-        out["asset"] = name(out["asset"])
-    if isinstance(out.get("assets"), dict):
-        out["assets"] = {key: name(ref) if isinstance(ref, str) else ref for key, ref in out["assets"].items()}
-    return out
+    copies: dict[tuple[Step, ...], Any] = {(): scene.copy()}
+    for place, ref in places(scene):
+        for depth in range(1, len(place)):
+            holder, step = copies[place[: depth - 1]], place[depth - 1]
+            if place[:depth] not in copies:
+                copies[place[:depth]] = holder[step] = holder[step].copy()
+        copies[place[:-1]][place[-1]] = name(ref)
+    return copies[()]

@@ -15,6 +15,7 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore
+from service.config import Config
 from service.problems import AssetError
 from tests import asset_files as make
 from tests.asset_files import OBJ
@@ -240,15 +241,21 @@ def test_the_child_outlived_them_all(store: AssetStore) -> None:
 
 
 def test_too_many_triangles(tmp_path: Path) -> None:
-    class Config:
-        max_triangles = 3
-
-    store = AssetStore(tmp_path, Config())
+    store = AssetStore(tmp_path, Config(max_triangles=3))
     twice = make.gltf([{"mesh": 0, "children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "children": [3]}, {"mesh": 0}])
     for data in (make.glb(twice), OBJ + FACES * 3, make.stl(np.zeros((4, 3, 3)))):
         with pytest.raises(AssetError, match="triangles"):
             store.add(data)
     store.add(OBJ + FACES * 2)
+    store.close()
+
+
+def test_limits_come_from_the_configuration(tmp_path: Path) -> None:
+    store = AssetStore(tmp_path, Config(max_texels=100, max_asset=2000))
+    with pytest.raises(AssetError, match=r"texels|100"):
+        store.add(make.png(np.zeros((8, 16, 3), np.uint8)))
+    with pytest.raises(AssetError, match="2000 are allowed"):
+        store.add(OBJ + b"#" * 2000)
     store.close()
 
 

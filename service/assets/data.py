@@ -89,6 +89,7 @@ class AssetLimits:
     max_texels: int = 1 << 26  # 8192 x 8192: as float32 RGBA 1 GiB
     max_file: int = 1 << 30
     seconds: float = 20.0  # wall and processor time for one file
+    memory: int = 8 << 30  # bytes, for one file, however much its kind may need
     cache_bytes: int = 512 << 20
     children: int = 2
 

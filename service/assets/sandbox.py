@@ -89,7 +89,8 @@ class Sandbox:
         else:
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
-        request = {"format": format, "whole": whole, "memory": BASE_BYTES + worst, "limits": asdict(limits)}
+        memory = min(BASE_BYTES + worst, self.limits.memory)
+        request = {"format": format, "whole": whole, "memory": memory, "limits": asdict(limits)}
         child = self._take()
         try:
             reply, result = child.ask(request, fd, limits)

@@ -7,8 +7,8 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import asdict, replace
+from contextlib import contextmanager, suppress
+from dataclasses import asdict
 from pathlib import Path
 from typing import Protocol
 
@@ -32,6 +32,18 @@ class HasLimits(Protocol):
     @property
     def max_triangles(self) -> int: ...
 
+    @property
+    def max_texels(self) -> int: ...
+
+    @property
+    def max_asset(self) -> int: ...
+
+    @property
+    def parse_seconds(self) -> float: ...
+
+    @property
+    def parse_memory(self) -> int: ...
+
 
 class AssetStore:
     """For any number of threads, and for several processes on one folder.
@@ -45,8 +57,7 @@ class AssetStore:
         config: HasLimits | None = None,
         builtin: Callable[[], dict[str, bytes]] | None = None,
     ) -> None:
-        limits = AssetLimits()
-        self.loader = Loader(replace(limits, max_triangles=config.max_triangles) if config else limits)
+        self.loader = Loader(_limits(config))
         self._folder = root / "assets"
         self._builtin = builtin
 
@@ -85,8 +96,16 @@ class AssetStore:
     def read(self, id: str) -> bytes:
         """Raises NotFound."""
         if self._known(id):
-            return self._path(id).read_bytes()
+            try:
+                with suppress(OSError):
+                    os.utime(self._path(id))  # who makes room goes by this
+                return self._path(id).read_bytes()
+            except FileNotFoundError:  # to make room, just now
+                pass
         return self._builtin_bytes(id)
+
+    def holds(self, id: str) -> bool:
+        return self._known(id) is not None or (self._builtin is not None and id in self._builtin())
 
     def info(self, id: str) -> AssetInfo:
         """Raises NotFound."""
@@ -201,6 +220,18 @@ class AssetStore:
             os.fsync(folder)
         finally:
             os.close(folder)
+
+
+def _limits(config: HasLimits | None) -> AssetLimits:
+    if config is None:
+        return AssetLimits()
+    return AssetLimits(
+        max_triangles=config.max_triangles,
+        max_texels=config.max_texels,
+        max_file=config.max_asset,
+        seconds=config.parse_seconds,
+        memory=config.parse_memory,
+    )
 
 
 def _format(data: bytes) -> str:

@@ -116,10 +116,13 @@ def source_assets(source: Source, roots: Sequence[str], config: Config) -> Itera
     """Where the scene's assets are: beside its file, in `roots`, and by sha256 in the data folder."""
     from service.assets import AssetStore, FileAssets
     from service.commands.assets import SourceAssets
+    from service.documents import Documents
+    from service.quota import Quota
 
     uploaded = source.store or AssetStore(config.data_dir, config, _builtin_assets)
     with closing(uploaded), FileAssets(source.path.parent, asset_folders(roots), uploaded) as assets:
-        yield SourceAssets(assets, uploaded, source.assets)
+        quota = Quota(config.data_dir, config.data_quota, Documents(config.data_dir, uploaded).assets_in_use)
+        yield SourceAssets(assets, uploaded, quota, source.assets)
 
 
 def asset_folders(roots: Sequence[str]) -> list[Path]:

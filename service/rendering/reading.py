@@ -6,7 +6,7 @@ import json
 import zlib
 from collections.abc import Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from pydantic import Field, TypeAdapter
@@ -69,7 +69,13 @@ class Reader:
         return parse_scene(document, "/scene")
 
     def settings(self, document: Any) -> ResolvedSettings:
-        return resolve(parse_settings(document, "/settings", self._config))
+        settings = parse_settings(document, "/settings", self._config)
+        most = self._config.max_seconds
+        if most is not None and settings.time_limit is not None and settings.time_limit > most:
+            detail = f"must be at most {most:g} (SUNBOX_MAX_SECONDS)"
+            raise InvalidDocument([FieldError("/settings/time_limit", detail)])
+        resolved = resolve(settings)
+        return replace(resolved, time_limit=most) if most is not None and resolved.time_limit is None else resolved
 
     def pack(self, scene: Scene, cache: PackCache | None = None) -> Packed:
         with _under("/scene"):

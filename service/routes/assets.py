@@ -10,26 +10,45 @@ from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
 
 from service import presets
+from service.assets import AssetInfo
 from service.rendering.threads import packing
+from service.routes import answers
 from service.routes.house import house
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
 FOREVER = "public, max-age=31536000, immutable"  # an id is the hash of what it names
 HEADER_BYTES = 4096  # proxies refuse headers not much longer
-BODY = {"requestBody": {"required": True, "content": {"application/octet-stream": {}}}}
 
 
-@router.post("", status_code=201, summary="Upload a mesh, an image or a glTF scene", openapi_extra=BODY)
+@router.post(
+    "",
+    status_code=201,
+    summary="Upload a mesh, an image or a glTF scene",
+    openapi_extra=answers.ASSET_BODY,
+    response_model=None,
+    responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 503),
+)
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     data = await request.body()
     kind = request.headers.get("content-type")
-    info = await packing(lambda: house(request).assets.add(data, kind, filename))
+    own = house(request)
+
+    def add() -> AssetInfo:
+        own.quota.make_room(len(data))
+        return own.assets.add(data, kind, filename)
+
+    info = await packing(add)
     return {name: value for name, value in asdict(info).items() if value is not None}
 
 
-@router.get("/{id}/scene", summary="A glTF file as a scene document")
-async def scene(request: Request, id: str) -> Response:
+@router.get(
+    "/{id}/scene",
+    summary="A glTF file as a scene document",
+    response_class=JSONResponse,
+    responses=answers.DOCUMENT | answers.problems(404, 422),
+)
+async def scene(request: Request, id: answers.AssetId) -> Response:
     """Its references are assets here. What the file asks for and does not get is told in the answer to its upload
     (`warnings`), and here in the header `Sunbox-Warnings`: as much of that list as has room, as JSON."""
     imported = await packing(lambda: house(request).assets.scene(id))
@@ -44,8 +63,13 @@ def _fitting(warnings: list[dict[str, str]]) -> str:
     return text
 
 
-@router.get("/{id}", summary="The bytes", response_class=Response)
-async def download(request: Request, id: str) -> Response:
+@router.get(
+    "/{id}",
+    summary="The bytes",
+    response_class=Response,
+    responses=answers.files("application/octet-stream") | answers.problems(404),
+)
+async def download(request: Request, id: answers.AssetId) -> Response:
     data = await packing(lambda: house(request).assets.read(id))
     headers = {"content-disposition": "attachment", "cache-control": FOREVER}
     return Response(data, media_type="application/octet-stream", headers=headers)

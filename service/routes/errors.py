@@ -6,8 +6,9 @@ from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
 from starlette.responses import JSONResponse, Response
+from starlette.routing import Match, Mount
 
-from service.problems import FieldError, InvalidDocument, ServiceError, answer, problem
+from service.problems import FieldError, InvalidDocument, ServiceError, Unauthorized, answer, problem
 
 MEDIA_TYPE = "application/problem+json"
 
@@ -15,6 +16,8 @@ MEDIA_TYPE = "application/problem+json"
 def respond(error: Exception) -> Response:
     retry_after = getattr(error, "retry_after", None)
     headers = {} if retry_after is None else {"retry-after": str(retry_after)}
+    if isinstance(error, Unauthorized):
+        headers["www-authenticate"] = "Bearer"
     return JSONResponse(problem(error), answer(error).status, headers, MEDIA_TYPE)
 
 
@@ -40,10 +43,23 @@ async def _invalid(request: Request, error: Exception) -> Response:
 
 async def _unrouted(request: Request, error: Exception) -> Response:
     assert isinstance(error, HTTPException)
+    headers = {"allow": _allowed(request)} if error.status_code == 405 else error.headers
     body = {
         "type": "about:blank",
         "title": error.detail,
         "status": error.status_code,
         "detail": f"{request.method} {request.url.path}: {error.detail}",
     }
-    return JSONResponse(body, error.status_code, error.headers, MEDIA_TYPE)
+    return JSONResponse(body, error.status_code, headers, MEDIA_TYPE)
+
+
+def _allowed(request: Request) -> str:
+    """Every method of the address: the framework names those of one route."""
+
+    def fits(method: str) -> bool:
+        asked = {**request.scope, "method": method}
+        routes = (route for route in request.app.router.routes if not isinstance(route, Mount))
+        return any(route.matches(asked)[0] is Match.FULL for route in routes)
+
+    methods = {method for method in ("DELETE", "GET", "POST", "PUT") if fits(method)} or {"GET"}
+    return ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))

@@ -12,8 +12,10 @@ from starlette.requests import HTTPConnection
 
 from service.assets import AssetStore
 from service.config import Config
+from service.documents import Documents
 from service.problems import Unavailable
 from service.quality import PRESETS
+from service.quota import Quota
 from service.rendering.engine import Engine
 from service.rendering.reading import Reader
 from service.rendering.renders import Renders
@@ -29,6 +31,8 @@ class House:
     assets: AssetStore
     reader: Reader
     engine: Engine
+    documents: Documents
+    quota: Quota
     renders: Renders = field(default_factory=Renders)
     sessions: Sessions = field(init=False)
 
@@ -65,4 +69,10 @@ class House:
 
 def house(connection: HTTPConnection) -> House:
     found: House = connection.app.state.house
+    return found
+
+
+def owner(connection: HTTPConnection) -> str:
+    """Whose key it was, by a name that the guard gave it; "" where no keys are asked for."""
+    found: str = connection.scope.get("owner", "")
     return found

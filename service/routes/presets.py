@@ -2,20 +2,26 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Annotated, Any
 
-from fastapi import APIRouter
+from fastapi import APIRouter, Path
 
 from service import presets
+from service.routes import answers
 
 router = APIRouter(prefix="/v1/presets", tags=["presets"])
 
 
-@router.get("/{kind}", summary="Names and titles of scenes, materials or environments")
-def names(kind: str) -> list[dict[str, str]]:
-    return presets.names(kind)
+@router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
+def names(kind: answers.PresetKind) -> list[answers.Named]:
+    return [answers.Named(**entry) for entry in presets.names(kind)]
 
 
-@router.get("/{kind}/{name}", summary="The bare document")
-def preset(kind: str, name: str) -> dict[str, Any]:
+@router.get(
+    "/{kind}/{name}",
+    summary="The bare document",
+    response_model=None,
+    responses=answers.DOCUMENT | answers.problems(404),
+)
+def preset(kind: answers.PresetKind, name: Annotated[str, Path(examples=[presets.DEFAULT_SCENE])]) -> dict[str, Any]:
     return presets.get(kind, name)

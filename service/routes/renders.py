@@ -20,20 +20,15 @@ from service.rendering.job import Job
 from service.rendering.messages import Encoding, View
 from service.rendering.reading import unfolded
 from service.rendering.threads import encoding, packing
-from service.routes.house import STARTING_S, House, house
+from service.routes import answers
+from service.routes.bodies import json_body
+from service.routes.house import STARTING_S, House, house, owner
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 
-LONGEST_WAIT_S = 60.0  # proxies cut idle connections about there
+LONGEST_WAIT_S = 600.0  # many proxies cut idle connections long before
+Wait = Annotated[float, Query(ge=0, le=LONGEST_WAIT_S, allow_inf_nan=False, description="s")]
 DISPLAYED = ("png", "jpeg", "webp")
-REQUEST = {
-    "type": "object",
-    "required": ["scene"],
-    "properties": {"scene": {"type": "object"}, "settings": {"type": "object"}},
-}
-BODY = {"requestBody": {"required": True, "content": {"application/json": {"schema": REQUEST}}}}
-
-
 class Bits(IntEnum):
     EIGHT = 8
     SIXTEEN = 16
@@ -58,7 +53,14 @@ class ImageQuery(BaseModel):
         return View(self.aov, self.exposure, self.tone_map, encoding)
 
 
-@router.post("/render", summary="Render and return the image", openapi_extra=BODY, response_class=Response)
+@router.post(
+    "/render",
+    summary="Render and return the image",
+    description="Waits for the render's end; closing the connection cancels it.",
+    openapi_extra=answers.RENDER_BODY,
+    response_class=Response,
+    responses=answers.files(*images.MIME.values()) | answers.problems(400, 413, 415, 422, 429, 503),
+)
 async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
     view = query.view()
     job = await _job(request)
@@ -75,7 +77,15 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
         job.release()
 
 
-@router.post("/renders", status_code=202, summary="Start a render", openapi_extra=BODY)
+@router.post(
+    "/renders",
+    status_code=202,
+    summary="Start a render",
+    openapi_extra=answers.RENDER_BODY,
+    response_model=None,
+    responses=answers.shaped(answers.Render, "It waits for its turn; `Location` leads to it.", 202)
+    | answers.problems(400, 413, 415, 422, 429, 503),
+)
 async def start(request: Request, response: Response) -> dict[str, Any]:
     job = await _job(request)
     house(request).renders.submit(job)
@@ -83,40 +93,60 @@ async def start(request: Request, response: Response) -> dict[str, Any]:
     return job.status()
 
 
-@router.get("/renders", summary="All renders")
+@router.get(
+    "/renders",
+    summary="One's own renders",
+    response_model=None,
+    responses=answers.shaped(list[answers.Render]),
+)
 async def renders(request: Request) -> list[dict[str, Any]]:
-    return [job.status() for job in house(request).renders.all()]
+    return [job.status() for job in house(request).renders.all(owner(request))]
 
 
-@router.get("/renders/{id}", summary="How far it is")
-async def status(
-    request: Request, id: str, wait: Annotated[float, Query(ge=0, le=LONGEST_WAIT_S, allow_inf_nan=False)] = 0
-) -> dict[str, Any]:
-    job = house(request).renders.get(id)
+@router.get(
+    "/renders/{id}",
+    summary="How far it is",
+    description="With `wait`, answers at the render's end, or after so many seconds.",
+    response_model=None,
+    responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422),
+)
+async def status(request: Request, id: answers.RenderId, wait: Wait = 0) -> dict[str, Any]:
+    job = house(request).renders.get(id, owner(request))
     if wait:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(job.finished.wait(), wait)
     return job.status()
 
 
-@router.get("/renders/{id}/image", summary="The image so far", response_class=Response)
-async def image(request: Request, id: str, query: Annotated[ImageQuery, Query()]) -> Response:
-    return await _image(house(request).renders.get(id), query, query.view())
+@router.get(
+    "/renders/{id}/image",
+    summary="The image so far",
+    response_class=Response,
+    responses=answers.files(*images.MIME.values()) | answers.problems(404, 409, 410, 422),
+)
+async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
+    return await _image(house(request).renders.get(id, owner(request)), query, query.view())
 
 
-@router.delete("/renders/{id}", status_code=204, summary="Cancel; the image so far stays")
-async def cancel(request: Request, id: str) -> None:
-    house(request).renders.get(id).cancel()
+@router.delete(
+    "/renders/{id}",
+    status_code=204,
+    summary="Cancel; the image so far stays",
+    responses=answers.problems(404, 410),
+)
+async def cancel(request: Request, id: answers.RenderId) -> None:
+    house(request).renders.get(id, owner(request)).cancel()
 
 
 async def _job(request: Request) -> Job:
     began = time.monotonic()
     own: House = house(request)
-    body = await request.body()
+    body = await json_body(request)
+    own.renders.admit(owner(request))
     await own.engine.ready(STARTING_S)
     order = await packing(partial(own.reader.request, body))
     setup_s = time.monotonic() - began
-    return Job(own.engine, order.packed, order.settings, setup_s, document=order.document)
+    return Job(own.engine, order.packed, order.settings, setup_s, owner(request), order.document)
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:

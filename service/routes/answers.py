@@ -1,0 +1,110 @@
+"""What answers look like, for the API's description: shapes, statuses, and examples that work when pasted."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any, Literal
+
+from fastapi import Path
+from pydantic import BaseModel, Field
+
+from service import documents, presets
+from service.problems import ANSWERS
+from service.routes.examples import ANY_DOCUMENT, ASSET, MATERIAL, RENDER, SCENE
+
+PROBLEM = {"$ref": "#/components/schemas/Problem"}
+TITLES = {row.status: row.title for row in ANSWERS.values()}
+
+DocumentKind = Annotated[str, Path(json_schema_extra={"enum": list(documents.KINDS)}, examples=["scenes"])]
+PresetKind = Annotated[str, Path(json_schema_extra={"enum": list(presets.KINDS)}, examples=["scenes"])]
+RenderId = Annotated[str, Path(description="As the answer to the render's start has it.")]
+AssetId = Annotated[str, Path(description="`sha256:` and 64 hexadecimal digits.")]
+
+Responses = dict[int | str, dict[str, Any]]
+
+
+class FieldProblem(BaseModel):
+    pointer: str = Field(description="RFC 6901, from the body's root; of a parameter its name.")
+    detail: str
+
+
+class Problem(BaseModel):
+    """RFC 9457."""
+
+    type: str
+    title: str
+    status: int
+    detail: str
+    errors: list[FieldProblem] = Field(default_factory=list)
+
+
+class Named(BaseModel):
+    name: str
+    title: str
+
+
+class Render(BaseModel):
+    id: str
+    state: Literal["queued", "running", "done", "cancelled", "failed"]
+    reason: Literal["max_samples", "time_limit", "target_noise", "stopped"] | None
+    samples: int = Field(description="Complete ones per pixel.")
+    noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
+    elapsed_s: float = Field(description="From the first dispatch to the end of the last sample.")
+    setup_s: float = Field(description="Loading, building and compiling before that.")
+    eta_s: float | None
+    warnings: list[str]
+    settings: dict[str, Any] = Field(description="What each knob became; null is no such limit.")
+
+
+class Asset(BaseModel):
+    id: str
+    kind: Literal["mesh", "image", "scene"]
+    bytes: int
+
+
+def problems(*statuses: int) -> Responses:
+    """What else may be answered."""
+    content = {"application/problem+json": {"schema": PROBLEM}}
+    return {status: {"description": TITLES[status], "content": content} for status in statuses}
+
+
+def shaped(model: Any, description: str = "", status: int = 200) -> Responses:
+    return {status: {"model": model, "description": description or "It is."}}
+
+
+def files(*mimes: str) -> Responses:
+    binary = {"schema": {"type": "string", "format": "binary"}}
+    return {200: {"description": "The file.", "content": {mime: binary for mime in mimes}}}
+
+
+def body(schema: dict[str, Any], **examples: Any) -> dict[str, Any]:
+    """`openapi_extra` of a call whose body is JSON."""
+    named = {name: {"value": value} for name, value in examples.items()}
+    content = {"application/json": {"schema": schema, "examples": named}}
+    return {"requestBody": {"required": True, "content": content}}
+
+
+def reference(name: str) -> dict[str, str]:
+    return {"$ref": f"#/components/schemas/{name}"}
+
+
+_ANY = {"application/json": {"schema": ANY_DOCUMENT}}
+DOCUMENT: Responses = {200: {"description": "The document.", "content": _ANY}}
+RENDER_BODY = body(
+    {
+        "type": "object",
+        "required": ["scene"],
+        "additionalProperties": False,
+        "properties": {"scene": reference("Scene"), "settings": reference("Settings")},
+    },
+    sphere=RENDER,
+)
+DOCUMENT_BODY = body({"anyOf": [reference("Scene"), reference("Material")]}, material=MATERIAL, scene=SCENE)
+ASSET_BODY = {
+    "requestBody": {
+        "required": True,
+        "content": {
+            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
+            "model/obj": {"schema": {"type": "string"}, "examples": {"triangle": {"value": ASSET}}},
+        },
+    }
+}

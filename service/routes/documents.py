@@ -1,0 +1,67 @@
+"""Scenes and materials that users save under names of their own."""
+
+from __future__ import annotations
+
+import asyncio
+from functools import partial
+from typing import Annotated, Any
+
+from fastapi import APIRouter, Path, Query, Request, Response
+
+from service.documents import LONGEST_NAME
+from service.routes import answers
+from service.routes.bodies import json_body
+from service.routes.house import house
+from service.scene import load_json
+
+router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
+
+Name = Annotated[
+    str,
+    Path(
+        min_length=1,
+        max_length=LONGEST_NAME,
+        pattern=r"^[^\x00-\x1f\x7f/]+$",
+        description="Of your choice, without slashes.",
+        examples=["my-scene"],
+    ),
+]
+Title = Annotated[str | None, Query(min_length=1, max_length=200, description="For menus; else the name.")]
+
+
+@router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
+async def names(request: Request, kind: answers.DocumentKind) -> list[answers.Named]:
+    return [answers.Named(**entry) for entry in await asyncio.to_thread(house(request).documents.names, kind)]
+
+
+@router.get("/{kind}/{name}", summary="The bare document", responses=answers.DOCUMENT | answers.problems(404, 422))
+async def document(request: Request, kind: answers.DocumentKind, name: Name) -> Any:
+    return await asyncio.to_thread(house(request).documents.get, kind, name)
+
+
+@router.put(
+    "/{kind}/{name}",
+    summary="Save a document",
+    description="The body is the bare document, and must be valid; what had the name is replaced.",
+    openapi_extra=answers.DOCUMENT_BODY,
+    responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 413, 415, 422),
+)
+async def put(
+    request: Request, response: Response, kind: answers.DocumentKind, name: Name, title: Title = None
+) -> answers.Named:
+    data = await json_body(request)
+    own = house(request)
+
+    def save() -> tuple[str, bool]:
+        own.quota.make_room(len(data))
+        return own.documents.put(kind, name, load_json(data), title)
+
+    kept, new = await asyncio.to_thread(save)
+    if new:
+        response.status_code = 201
+    return answers.Named(name=name, title=kept)
+
+
+@router.delete("/{kind}/{name}", status_code=204, summary="Delete a document", responses=answers.problems(404, 422))
+async def delete(request: Request, kind: answers.DocumentKind, name: Name) -> None:
+    await asyncio.to_thread(partial(house(request).documents.delete, kind, name))

@@ -1,0 +1,21 @@
+"""Documents that the API's description shows; each is sent to a real server by a test."""
+
+from __future__ import annotations
+
+from typing import Any
+
+MATERIAL: dict[str, Any] = {"type": "principled", "base_color": "#b03020", "roughness": 0.4, "clearcoat": 1}
+SCENE: dict[str, Any] = {
+    "version": 1,
+    "camera": {"position": [0, 1.2, 4], "target": [0, 0.6, 0]},
+    "environment": {"type": "constant", "radiance": 0.6},
+    "lights": [{"type": "point", "position": [2, 4, 3], "intensity": 60}],
+    "materials": {"coat": MATERIAL, "floor": {"type": "diffuse", "albedo": 0.5}},
+    "shapes": [
+        {"type": "sphere", "center": [0, 0.7, 0], "radius": 0.7, "material": "coat"},
+        {"type": "quad", "origin": [-5, 0, 5], "u": [10, 0, 0], "v": [0, 0, -10], "material": "floor"},
+    ],
+}
+RENDER: dict[str, Any] = {"scene": SCENE, "settings": {"width": 256, "height": 256, "max_samples": 16}}
+ASSET = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+ANY_DOCUMENT: dict[str, Any] = {"type": "object"}

@@ -1,0 +1,195 @@
+"""Keys, and limits that a real server keeps."""
+
+from __future__ import annotations
+
+import json
+import socket
+import time
+from collections.abc import Iterator
+from typing import Any
+from urllib.parse import urlsplit
+
+import httpx
+import pytest
+from websockets.exceptions import ConnectionClosed
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
+
+from service.config import Config, ConfigError, load_config
+from service.keys import Keys
+from service.problems import Unauthorized
+from tests.serving import ENDLESS, SCENE, SMALL, Server
+from tests.test_rest import OBJ, is_problem
+
+ANNA, BERT = {"authorization": "Bearer anna-1"}, {"authorization": "bearer  bert-2"}
+BODY = {"scene": SCENE, "settings": SMALL}
+
+
+@pytest.fixture(scope="module")
+def keyed(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server with keys and narrow limits; asking for `server` first: they share what that has cached."""
+    variables = {
+        "SUNBOX_API_KEY": "anna-1, bert-2",
+        "SUNBOX_MAX_RUNNING": "1",
+        "SUNBOX_MAX_QUEUE": "2",
+        "SUNBOX_MAX_JOBS": "2",
+        "SUNBOX_KEEP_RENDERS": "2",
+        "SUNBOX_MAX_BODY": "4000",
+        "SUNBOX_BODY_TIMEOUT": "0.5",
+        "SUNBOX_DATA_QUOTA": "3000",
+        "SUNBOX_MAX_SECONDS": "5",
+        "SUNBOX_ALLOWED_ORIGINS": "https://friend.example",
+    }
+    served = Server(tmp_path_factory.mktemp("keyed"), **variables)
+    served.wait()
+    yield served
+    assert served.stop() == 0
+
+
+@pytest.fixture
+def http(keyed: Server) -> httpx.Client:
+    return keyed.http
+
+
+@pytest.mark.parametrize("shown", [{}, {"authorization": "Bearer wrong"}, {"authorization": "Basic anna-1"}])
+def test_a_key_is_asked_for(http: httpx.Client, shown: dict[str, str]) -> None:
+    for method, address in (("GET", "/v1/info"), ("POST", "/v1/renders"), ("GET", "/v1/renders/x"), ("GET", "/v1")):
+        answer = http.request(method, address, headers=shown)
+        assert is_problem(answer, 401) and answer.headers["www-authenticate"] == "Bearer"
+        assert "anna" not in answer.text
+    for address in ("/", "/healthz", "/readyz", "/docs", "/openapi.json"):
+        assert http.get(address, headers=shown).status_code == 200, address
+    assert http.get("/v1/info", headers=ANNA).status_code == http.get("/v1/info", headers=BERT).status_code == 200
+
+
+def test_renders_belong_to_their_key(http: httpx.Client) -> None:
+    answer = http.post("/v1/renders", json=BODY, headers=ANNA)
+    address = "/v1/" + answer.headers["location"]
+    assert http.get(address, params={"wait": 20}, headers=ANNA).json()["state"] == "done"
+    for method, under in (("GET", ""), ("DELETE", ""), ("GET", "/image")):
+        assert is_problem(http.request(method, address + under, headers=BERT), 404)
+    assert http.get(address + "/image", headers=ANNA).status_code == 200
+    assert http.get("/v1/renders", headers=BERT).json() == []
+    assert [render["id"] for render in http.get("/v1/renders", headers=ANNA).json()] == [answer.json()["id"]]
+    for _ in range(2):
+        http.post("/v1/render", json=BODY, headers=ANNA)  # not kept, and makes nobody go
+    assert http.get(address, headers=ANNA).status_code == 200
+    newer = [http.post("/v1/renders", json=BODY, headers=ANNA).headers["location"] for _ in range(2)]
+    for location in newer:
+        http.get(f"/v1/{location}", params={"wait": 20}, headers=ANNA)
+    assert is_problem(http.get(address, headers=ANNA), 410)
+    assert is_problem(http.get(address, headers=BERT), 404)
+
+
+def test_there_is_an_end_to_what_one_may_ask_for(http: httpx.Client) -> None:
+    endless = {"scene": SCENE, "settings": ENDLESS}
+    started = []
+    try:
+        for key in (ANNA, ANNA, BERT):
+            answer = http.post("/v1/renders", json=endless, headers=key)
+            assert answer.status_code == 202
+            started.append((f"/v1/{answer.headers['location']}", key))
+        too_many = http.post("/v1/renders", json=endless, headers=ANNA)
+        assert is_problem(too_many, 429) and int(too_many.headers["retry-after"]) > 0
+        full = http.post("/v1/render", json=endless, headers=BERT)
+        assert is_problem(full, 503) and int(full.headers["retry-after"]) > 0
+    finally:
+        for address, key in started:
+            http.delete(address, headers=key)
+
+
+def test_time_has_its_limit(http: httpx.Client) -> None:
+    long = {"scene": SCENE, "settings": {**SMALL, "time_limit": 6}}
+    assert is_problem(http.post("/v1/renders", json=long, headers=ANNA), 422, "/settings/time_limit")
+    answer = http.post("/v1/renders", json=BODY, headers=BERT)
+    assert answer.json()["settings"]["time_limit"] == 5
+
+
+@pytest.mark.parametrize(
+    ("protocols", "headers", "welcome"),
+    [
+        (["sunbox.v1", "sunbox.key.anna-1"], {}, True),
+        (["sunbox.v1"], BERT, True),
+        (["sunbox.key.wrong", "sunbox.v1"], {}, False),
+        (["sunbox.v1"], {}, False),
+    ],
+)
+def test_a_stream_shows_its_key(keyed: Server, protocols: list[str], headers: Any, welcome: bool) -> None:
+    address = keyed.url.replace("http", "ws") + "/v1/stream"
+    offered = [Subprotocol(protocol) for protocol in protocols]
+    with connect(address, subprotocols=offered, additional_headers=headers) as stream:
+        assert stream.subprotocol == "sunbox.v1"
+        if welcome:
+            assert json.loads(stream.recv(20))["type"] == "hello"
+            return
+        with pytest.raises(ConnectionClosed) as closed:
+            stream.recv(20)
+        assert closed.value.rcvd is not None and closed.value.rcvd.code == 4401
+
+
+def test_a_page_of_a_friend_reads_answers(http: httpx.Client) -> None:
+    origin = {"origin": "https://friend.example"}
+    asking = {**origin, "access-control-request-method": "PUT", "access-control-request-headers": "authorization"}
+    preflight = http.options("/v1/documents/scenes/x", headers=asking)
+    assert preflight.status_code == 204 and preflight.headers["access-control-allow-origin"] == origin["origin"]
+    assert "PUT" in preflight.headers["access-control-allow-methods"]
+    refused = http.get("/v1/info", headers=origin)
+    assert is_problem(refused, 401) and refused.headers["access-control-allow-origin"] == origin["origin"]
+    stranger = http.options("/v1/info", headers={**asking, "origin": "https://evil.example"})
+    assert "access-control-allow-origin" not in stranger.headers and stranger.status_code >= 400
+
+
+def test_a_body_that_stops_is_ended(keyed: Server) -> None:
+    address = urlsplit(keyed.url)
+    with socket.create_connection((address.hostname, address.port), 10) as connection:
+        head = f"POST /v1/assets HTTP/1.1\r\nHost: {address.netloc}\r\nAuthorization: Bearer anna-1\r\n"
+        connection.sendall(f"{head}Content-Length: 100\r\n\r\nonly this".encode())
+        began = time.monotonic()
+        assert b" 408 " in connection.recv(1000)
+        assert time.monotonic() - began < 8
+
+
+def test_the_disk_has_its_quota(http: httpx.Client) -> None:
+    def post(size: int) -> httpx.Response:
+        return http.post("/v1/assets", content=OBJ + b"#" * (size - len(OBJ)), headers=ANNA)
+
+    assert is_problem(post(3500), 413)
+    first, second, third = (post(size) for size in (1100, 1200, 1300))
+    assert {answer.status_code for answer in (first, second, third)} == {201}
+    assert is_problem(http.get(f"/v1/assets/{first.json()['id']}", headers=ANNA), 404)
+    assert http.get(f"/v1/assets/{third.json()['id']}", headers=ANNA).status_code == 200
+
+
+def test_head_is_get_without_the_body(http: httpx.Client) -> None:
+    got, head = (http.request(method, "/v1/schema", headers=ANNA) for method in ("GET", "HEAD"))
+    assert head.status_code == 200 and head.content == b""
+    assert head.headers["content-length"] == got.headers["content-length"]
+    assert http.head("/v1/nothing", headers=ANNA).status_code == 404
+
+
+def test_every_answer_is_guarded(http: httpx.Client) -> None:
+    for address in ("/", "/docs", "/v1/info", "/nothing"):
+        headers = http.get(address).headers
+        assert headers["x-content-type-options"] == "nosniff" and headers["referrer-policy"] == "no-referrer"
+        assert "unsafe-inline" not in headers["content-security-policy"]
+        assert "server" not in headers
+
+
+def test_keys_are_told_apart() -> None:
+    keys = Keys(["one", "two"])
+    assert keys.owner("Bearer one") != keys.owner(None, ["sunbox.v1", "sunbox.key.two"])
+    assert keys.owner("Bearer two") == keys.owner(None, ["sunbox.key.two"]) and "two" not in keys.owner("Bearer two")
+    for authorization in ("Bearer", "Bearer onetwo", "Bearer ", "one", None, "Bearer ön"):
+        with pytest.raises(Unauthorized):
+            keys.owner(authorization)
+
+
+@pytest.mark.parametrize("value", [",", "a,,b", "a b", "schlüssel"])
+def test_useless_keys_are_refused(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_API_KEY", value)
+    with pytest.raises(ConfigError, match="SUNBOX_API_KEY"):
+        load_config()
+
+
+def test_no_key_is_in_the_configurations_text() -> None:
+    assert "secret" not in repr(Config(api_key=["secret"]))

@@ -1,0 +1,91 @@
+"""The description of the API is true: its examples work when pasted, and every call is in it."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import httpx
+import pytest
+
+from tests.serving import Server
+
+
+@pytest.fixture(scope="module")
+def description(server: Server) -> Any:
+    return server.http.get("/openapi.json").json()
+
+
+def test_every_call_is_described(description: Any) -> None:
+    calls = {f"{method.upper()} {path}" for path, methods in description["paths"].items() for method in methods}
+    assert {
+        "GET /healthz",
+        "GET /readyz",
+        "GET /v1/info",
+        "GET /v1/schema",
+        "GET /v1/presets/{kind}",
+        "GET /v1/presets/{kind}/{name}",
+        "POST /v1/assets",
+        "GET /v1/assets/{id}",
+        "GET /v1/documents/{kind}",
+        "GET /v1/documents/{kind}/{name}",
+        "PUT /v1/documents/{kind}/{name}",
+        "DELETE /v1/documents/{kind}/{name}",
+        "POST /v1/renders",
+        "GET /v1/renders",
+        "GET /v1/renders/{id}",
+        "GET /v1/renders/{id}/image",
+        "DELETE /v1/renders/{id}",
+        "POST /v1/render",
+    } <= calls
+    for methods in description["paths"].values():
+        for call in methods.values():
+            assert call["summary"] and "application/problem+json" in call["responses"]["default"]["content"]
+
+
+def test_every_reference_leads_somewhere(description: Any) -> None:
+    def check(value: Any) -> None:
+        if isinstance(value, dict):
+            if isinstance(value.get("$ref"), str):
+                at = description
+                for step in value["$ref"].removeprefix("#/").split("/"):
+                    at = at[step]
+            for child in value.values():
+                check(child)
+        elif isinstance(value, list):
+            for child in value:
+                check(child)
+
+    check(description)
+    schemas = description["components"]["schemas"]
+    assert {"Scene", "Settings", "Material", "Problem", "Render"} <= schemas.keys()
+    assert "HTTPValidationError" not in str(description)
+
+
+def test_examples_work_when_pasted(server: Server, description: Any) -> None:
+    sent = 0
+    for path, methods in description["paths"].items():
+        for method, call in methods.items():
+            for mime, content in call.get("requestBody", {}).get("content", {}).items():
+                for name, example in content.get("examples", {}).items():
+                    address = path.replace("{kind}", f"{name}s").replace("{name}", "example")
+                    answer = send(server.http, method, address, mime, example["value"])
+                    assert answer.status_code in (200, 201, 202), (path, name, answer.text)
+                    sent += 1
+    assert sent >= 5
+    for kind in ("scenes", "materials"):
+        server.http.delete(f"/v1/documents/{kind}/example")
+
+
+def send(http: httpx.Client, method: str, address: str, mime: str, value: Any) -> httpx.Response:
+    if mime == "application/json":
+        return http.request(method, address, json=value)
+    return http.request(method, address, content=value, headers={"content-type": mime})
+
+
+def test_answers_have_the_described_shape(server: Server, description: Any) -> None:
+    """Every field of a render's status is described, and none is missing."""
+    example = description["paths"]["/v1/renders"]["post"]["requestBody"]["content"]["application/json"]["examples"]
+    status = server.http.post("/v1/renders", json=example["sphere"]["value"]).json()
+    described = description["components"]["schemas"]["Render"]
+    assert status.keys() == described["properties"].keys() == set(described["required"])
+    server.http.delete(f"/v1/renders/{status['id']}")
