@@ -27,6 +27,7 @@ from service.assets import AssetStore
 from service.config import Config
 from service.documents import Documents
 from service.guard import Guard
+from service.logs import Requests
 from service.quota import Quota
 from service.rendering.engine import Engine
 from service.rendering.reading import Reader
@@ -71,6 +72,7 @@ def create_app(config: Config) -> FastAPI:
     tell_errors(app)
     describe(app, keyed=bool(config.api_key))
     app.add_middleware(Guard, config=config, refuse=respond)
+    app.add_middleware(Requests, refuse=respond, heard=own.traffic.heard)
     return app
 
 
@@ -94,8 +96,9 @@ def run(config: Config) -> int:
         timeout_graceful_shutdown=GRACE_S,
     )
     address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
-    _Server(settings, app.state.house, address).run([listener])
-    return 0
+    server = _Server(settings, app.state.house, address)
+    server.run([listener])
+    return 1 if server.refused else 0
 
 
 class Stuck:
@@ -122,6 +125,7 @@ class _Server(uvicorn.Server):
         self._house = house
         self._address = address
         self._stuck = Stuck()
+        self.refused = False
 
     async def on_tick(self, counter: int) -> bool:
         if counter % TICKS == 0:
@@ -129,6 +133,11 @@ class _Server(uvicorn.Server):
         return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
+        if (reason := await self._house.gpu_missing()) is not None:
+            log.error("not started: %s", reason)
+            await self._house.engine.close()
+            self.refused = self.should_exit = True
+            return
         await super().startup(sockets)
         sys.stdout.write(f"Sunbox is at {self._address}\n")
         sys.stdout.flush()
@@ -157,7 +166,8 @@ class _Server(uvicorn.Server):
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own: House = app.state.house
-    own.engine.start()
+    if own.engine.process_id is None:
+        own.engine.start()
     own.assets.warm()
     warming = asyncio.create_task(Warming(own.engine, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run())
     yield

@@ -57,7 +57,7 @@ def test_a_key_is_asked_for(http: httpx.Client, shown: dict[str, str]) -> None:
         answer = http.request(method, address, headers=shown)
         assert is_problem(answer, 401) and answer.headers["www-authenticate"] == "Bearer"
         assert "anna" not in answer.text
-    for address in ("/", "/healthz", "/readyz", "/docs", "/openapi.json"):
+    for address in ("/", "/healthz", "/readyz", "/metrics", "/docs", "/openapi.json"):
         assert http.get(address, headers=shown).status_code == 200, address
     assert http.get("/v1/info", headers=ANNA).status_code == http.get("/v1/info", headers=BERT).status_code == 200
 

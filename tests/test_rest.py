@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import hashlib
 import io
-import json
 import os
 import signal
 import socket
@@ -169,25 +168,6 @@ def test_no_image_before_the_first_sample(http: httpx.Client) -> None:
     answer = http.get(f"/v1/renders/{id}/image")
     http.delete(f"/v1/renders/{id}")
     assert is_problem(answer, 409)
-
-
-def test_closing_the_connection_cancels(server: Server, running: str) -> None:
-    """Nothing shares the GPU with the running render once the one shot's client is gone."""
-    endless = json.dumps({"scene": SCENE, "settings": {**ENDLESS, "width": 64}}).encode()
-    address = urlsplit(server.url)
-    with socket.create_connection((address.hostname, address.port)) as connection:
-        head = f"POST /v1/render HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Length: {len(endless)}\r\n\r\n"
-        connection.sendall(head.encode() + endless)
-        time.sleep(0.4)
-        shared = speed(server.http, running)
-    time.sleep(0.3)
-    assert speed(server.http, running) > 1.3 * shared
-
-
-def speed(http: httpx.Client, id: str) -> float:
-    before, began = status(http, id)["samples"], time.monotonic()
-    time.sleep(0.6)
-    return (status(http, id)["samples"] - before) / (time.monotonic() - began)
 
 
 @pytest.mark.parametrize("limit", [0.2, 0.5])

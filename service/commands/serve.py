@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import argparse
-import logging
 
 from service.commands.configuration import configuration
 
 
 def run(arguments: argparse.Namespace) -> int:
     config = configuration(host=arguments.host, port=arguments.port)
-    logging.basicConfig(level=logging.INFO, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
-    from service import app
+    from service import app, logs
+
+    logs.configure(config.log_format, config.log_level)
 
     return app.run(config)

@@ -13,15 +13,18 @@ from starlette.requests import HTTPConnection
 from service.assets import AssetStore
 from service.config import Config
 from service.documents import Documents
+from service.metrics import Traffic
 from service.problems import Unavailable
 from service.quality import PRESETS
 from service.quota import Quota
+from service.readiness import SOFTWARE, Readiness
 from service.rendering.engine import Engine
 from service.rendering.reading import Reader
 from service.rendering.renders import Renders
 from service.rendering.sessions import Sessions
 
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
+GPU_S = 60.0  # ... when without one nothing is to be served at all
 FAREWELL_S = 2.0  # for a client that reads slowly to be told
 
 
@@ -34,9 +37,12 @@ class House:
     documents: Documents
     quota: Quota
     renders: Renders = field(default_factory=Renders)
+    traffic: Traffic = field(default_factory=Traffic)
     sessions: Sessions = field(init=False)
+    readiness: Readiness = field(init=False)
 
     def __post_init__(self) -> None:
+        self.readiness = Readiness(self.engine, self.reader, self.config.require_gpu)
         self.sessions = Sessions(self.engine, self.reader, self.config.max_clients)
 
     async def info(self) -> dict[str, Any]:
@@ -57,6 +63,17 @@ class House:
             },
             "quality": PRESETS,
         }
+
+    async def gpu_missing(self) -> str | None:
+        """Why SUNBOX_REQUIRE_GPU forbids to start; None where nothing does. Waits for the renderer."""
+        if not self.config.require_gpu:
+            return None
+        self.engine.start()
+        try:
+            renderer = await self.engine.ready(GPU_S)
+        except Unavailable as error:
+            return f"SUNBOX_REQUIRE_GPU is set, and there is no renderer: {error.detail}"
+        return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None
 
     async def farewell(self) -> None:
         """Tells everybody that the server ends: closes streams, cancels renders, so that who waits gets an answer."""

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import asyncio
 from typing import Any
 
-from fastapi import APIRouter, Request
+from fastapi import APIRouter, Request, Response
+from fastapi.responses import PlainTextResponse
 
 from service import scene
+from service.metrics import MIME, text
 from service.rendering import protocol
+from service.routes import answers
 from service.routes.house import house
 
 router = APIRouter(tags=["service"])
@@ -18,10 +22,26 @@ async def healthz() -> dict[str, str]:
     return {"status": "ok"}
 
 
-@router.get("/readyz", summary="Able to render now")
+@router.get(
+    "/readyz",
+    summary="Able to render now",
+    description="A small picture was rendered, at most five seconds ago.",
+    responses=answers.problems(503),
+)
 async def readyz(request: Request) -> dict[str, str]:
-    await house(request).engine.ready(0)
+    await house(request).readiness.check()
     return {"status": "ok"}
+
+
+@router.get(
+    "/metrics",
+    summary="Prometheus' text",
+    response_class=PlainTextResponse,
+    responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
+)
+async def metrics(request: Request) -> Response:
+    own = house(request)
+    return Response(await asyncio.to_thread(text, own, own.traffic), media_type=MIME)
 
 
 @router.get("/v1/info", summary="Version, renderer, limits, quality presets")

@@ -8,6 +8,7 @@ import os
 import signal
 import socket
 
+from service import logs
 from service.rendering import link
 from service.rendering.messages import Ready, Unable
 from service.rendering.worker.lifeline import end_with
@@ -28,7 +29,7 @@ def main() -> int:
     if not end_with(arguments.server):
         return 0
     os.nice(NICENESS)
-    logging.basicConfig(level=arguments.log_level, format="%(asctime)s %(levelname)s %(name)s: %(message)s")
+    logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
             return _serve(end, arguments.device)

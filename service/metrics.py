@@ -1,0 +1,120 @@
+"""/metrics: what the server, the renderer and the clients have been through, in Prometheus' words."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator, Mapping
+from importlib import metadata
+from typing import TYPE_CHECKING, Any
+
+from service.rendering.statistics import Distribution
+
+if TYPE_CHECKING:
+    from prometheus_client.registry import Collector
+
+    from service.routes.house import House
+
+METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "WEBSOCKET")
+MIME = "text/plain; version=0.0.4; charset=utf-8"
+PAGE = 4096  # bytes, of /proc/PID/statm
+
+
+class Traffic:
+    """Requests since the server began."""
+
+    def __init__(self) -> None:
+        self.count: Counter[tuple[str, str, str]] = Counter()
+        self.seconds = Distribution()
+
+    def heard(self, method: str, route: str, status: int, seconds: float) -> None:
+        """`route` is the address's pattern, "" for none: addresses themselves would be endless."""
+        known = method if method in METHODS else "OTHER"
+        self.count[known, route or "other", str(status)] += 1
+        if known != "WEBSOCKET":
+            self.seconds.add(seconds)
+
+
+def text(house: House, traffic: Traffic) -> bytes:
+    """One scrape."""
+    from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
+
+    registry = CollectorRegistry(auto_describe=False)
+    ProcessCollector(registry=registry)
+    registry.register(_collector(house, traffic))
+    return generate_latest(registry)
+
+
+def _collector(house: House, traffic: Traffic) -> Collector:
+    from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
+    from prometheus_client.registry import Collector
+
+    def counter(name: str, told: str, value: float) -> Metric:
+        return CounterMetricFamily(f"sunbox_{name}", told, value=value)
+
+    def counters(name: str, told: str, labels: tuple[str, ...], values: Mapping[Any, float]) -> Metric:
+        family = CounterMetricFamily(f"sunbox_{name}", told, labels=labels)
+        for key, value in values.items():
+            family.add_metric(key, value)
+        return family
+
+    def gauge(name: str, told: str, value: float) -> Metric:
+        return GaugeMetricFamily(f"sunbox_{name}", told, value=value)
+
+    def gauges(name: str, told: str, label: str, values: Mapping[str, float]) -> Metric:
+        family = GaugeMetricFamily(f"sunbox_{name}", told, labels=(label,))
+        for key, value in values.items():
+            family.add_metric((key,), value)
+        return family
+
+    def histogram(name: str, told: str, values: Distribution) -> Metric:
+        buckets = [(f"{bound:g}", float(count)) for bound, count in values.cumulative()]
+        return HistogramMetricFamily(
+            f"sunbox_{name}", told, buckets=[*buckets, ("+Inf", values.count)], sum_value=values.total
+        )
+
+    class Sunbox(Collector):
+        def collect(self) -> Iterator[Metric]:
+            seen = house.engine.statistics
+            renderer = house.engine.info or {}
+            about = GaugeMetricFamily("sunbox_info", "Version and renderer.", labels=("version", "renderer"))
+            about.add_metric((metadata.version("sunbox"), str(renderer.get("renderer", ""))), 1)
+            yield about
+            yield gauge("renderer_up", "Whether there is a renderer.", float(bool(renderer)))
+            yield gauge("renderer_software", "Whether it runs on the processor.", float(renderer.get("software", 0)))
+            requests = "Requests, by method, route and status."
+            yield counters("requests", requests, ("method", "route", "status"), traffic.count)
+            yield histogram("request_seconds", "From a request to its answer's end.", traffic.seconds)
+            yield counter("frames", "Frames sent on streams.", seen.frames)
+            yield counter("frame_bytes", "Bytes of these frames.", seen.frame_bytes)
+            yield counter("samples", "Samples of pixels that were traced.", seen.samples)
+            yield histogram("first_frame_seconds", "From a stream's update to its first frame.", seen.first_frame_s)
+            used = {(kind,): seconds for kind, seconds in seen.gpu_s.items()}
+            yield counters("gpu_seconds", "GPU time, by whose work it was.", ("client",), used)
+            yield histogram("compile_seconds", "Compiling kernels that were not in memory.", seen.compile_s)
+            yield counter("kernel_cache_hits", "Loads whose kernel was in memory.", seen.kernels_found)
+            yield histogram("setup_seconds", "Uploading a scene and compiling for it.", seen.setup_s)
+            restarts = {(reason,): float(count) for reason, count in seen.restarts.items()}
+            yield counters("renderer_restarts", "Renderers lost, by how.", ("reason",), restarts)
+            yield histogram("recovery_seconds", "From a renderer's loss to the next one.", seen.recovery_s)
+            errors = {(kind,): float(count) for kind, count in seen.errors.items()}
+            yield counters("errors", "Told on streams and of failed renders, by problem.", ("type",), errors)
+            renders = house.renders
+            states = {"queued": renders.queued, "running": renders.running, "kept": renders.kept}
+            yield gauges("renders", "Renders asked for over REST.", "state", states)
+            sessions = {"connected": house.sessions.attended, "waiting": house.sessions.waiting}
+            yield gauges("streams", "Streams with a client, and those whose client may come back.", "state", sessions)
+            yield gauge("renderer_tasks", "Pictures that the renderer holds.", seen.tasks)
+            yield gauge("gpu_bytes", "What they hold on the GPU.", seen.gpu_bytes)
+            yield gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(house))
+            yield gauge("data_bytes", "Assets and documents on the disk.", house.quota.used())
+            yield gauge("data_quota_bytes", "What they may take.", house.config.data_quota)
+
+    return Sunbox()
+
+
+def _resident(house: House) -> int:
+    try:
+        with open(f"/proc/{house.engine.process_id}/statm") as sizes:
+            return int(sizes.read().split()[1]) * PAGE
+    except (OSError, ValueError, IndexError):
+        return 0

@@ -1,0 +1,163 @@
+"""What an operator sees: metrics, logs, readiness, and a refusal to start where that is better than to serve."""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import re
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from service import config, logs
+from service.logs import _fields
+from tests.serving import ENDLESS, SCENE, SMALL, Server, client
+
+ROOT = Path(__file__).parent.parent
+
+
+def metrics(server: Server) -> dict[str, float]:
+    """Values by name and labels, as they are written."""
+    lines = [line for line in server.http.get("/metrics").text.splitlines() if not line.startswith("#")]
+    return {name: float(value) for name, value in (line.rsplit(" ", 1) for line in lines)}
+
+
+def wait_until(reached: Any) -> None:
+    until = time.monotonic() + 20
+    while not reached():
+        assert time.monotonic() < until
+        time.sleep(0.05)
+
+
+def test_metrics_tell_what_happens(server: Server) -> None:
+    before = metrics(server)
+    server.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL})
+    with client(server) as stream:
+        stream.start()
+        stream.finished()
+        assert metrics(server)['sunbox_streams{state="connected"}'] >= 1
+    for name in (
+        'sunbox_requests_total{method="POST",route="/v1/render",status="200"}',
+        "sunbox_frames_total",
+        "sunbox_frame_bytes_total",
+        "sunbox_samples_total",
+        "sunbox_first_frame_seconds_count",
+        'sunbox_gpu_seconds_total{client="stream"}',
+        'sunbox_gpu_seconds_total{client="render"}',
+        "sunbox_setup_seconds_count",
+        "sunbox_request_seconds_count",
+    ):
+        wait_until(lambda name=name: metrics(server)[name] > before.get(name, 0))
+    now = metrics(server)
+    assert now["sunbox_renderer_up"] == 1 and now["sunbox_renderer_resident_bytes"] > 1e7
+    assert now["process_resident_memory_bytes"] > 1e7 and now["sunbox_data_quota_bytes"] > 1e9
+    assert now["sunbox_samples_total"] - before["sunbox_samples_total"] >= 2 * 8 * 32 * 24
+    names = {re.split(r"[{ ]", name)[0] for name in now}
+    assert {"sunbox_kernel_cache_hits_total", "sunbox_renders", "sunbox_gpu_bytes", "sunbox_info"} <= names
+
+
+def test_closing_the_connection_cancels(server: Server) -> None:
+    endless = {"scene": SCENE, "settings": ENDLESS}
+    running = 'sunbox_renders{state="running"}'
+    before = metrics(server)[running]
+    with pytest.raises(httpx.ReadTimeout):
+        httpx.post(f"{server.url}/v1/render", json=endless, timeout=1)
+    wait_until(lambda: metrics(server)[running] == before)
+
+
+def test_addresses_do_not_become_labels(server: Server) -> None:
+    for i in range(3):
+        server.http.get(f"/v1/renders/nobody{i}")
+        server.http.get(f"/nothing{i}")
+    assert not [name for name in metrics(server) if "nobody" in name or "nothing" in name]
+
+
+def test_requests_have_ids(server: Server) -> None:
+    given = server.http.get("/v1/info", headers={"x-request-id": "from-a-proxy.1"})
+    assert given.headers["x-request-id"] == "from-a-proxy.1"
+    ours = [server.http.get("/nothing", headers={"x-request-id": "no\tgood"}).headers["x-request-id"] for _ in "ab"]
+    assert ours[0] != ours[1] and "good" not in ours[0]
+
+
+def test_logs_for_machines(server: Server, tmp_path: Path) -> None:
+    """Every line is an object, the renderer's process included; a refusal bears its request's id and no secret."""
+    variables = {"SUNBOX_LOG_FORMAT": "json", "SUNBOX_API_KEY": "very-secret"}
+    talking = Server(tmp_path, **variables)
+    talking.wait()
+    key = {"authorization": "Bearer very-secret", "x-request-id": "mine"}
+    assert talking.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL}, headers=key).status_code == 200
+    talking.http.get("/v1/info?key=very-secret%0a")
+    assert talking.stop() == 0
+    text = (tmp_path / "server.log").read_text()
+    lines = [json.loads(line) for line in text.splitlines()]
+    (answered,) = (line for line in lines if line.get("request") == "mine" and line["event"] == "answered")
+    assert (answered["method"], answered["path"], answered["status"]) == ("POST", "/v1/render", 200)
+    assert answered["ms"] > 0 and answered["level"] == "info" and answered["timestamp"].endswith("Z")
+    assert any(line["logger"] == "gpu.context" and line["renderer"] for line in lines), "of the renderer's process"
+    assert "very-secret" not in text
+
+
+@pytest.mark.parametrize(
+    ("message", "arguments", "told"),
+    [
+        (
+            "told %s of it who=%s times=%d s=%.2f",
+            ("all", "a b", 3, 0.12345),
+            {"event": "told all of it", "who": "a b", "times": 3, "s": 0.1235},
+        ),
+        ("100 %% of=%s", ("it",), {"event": "100 % of=it"}),
+        ("nothing", (), {"event": "nothing"}),
+    ],
+)
+def test_messages_become_fields(message: str, arguments: tuple[Any, ...], told: dict[str, Any]) -> None:
+    record = logging.makeLogRecord({"msg": message, "args": arguments})
+    event = {"event": record.getMessage(), "_record": record, "positional_args": arguments}
+    out = dict(_fields(None, "info", event))
+    del out["_record"]
+    assert out == told
+
+
+def test_a_software_renderer_is_refused(server: Server, tmp_path: Path) -> None:
+    if metrics(server)["sunbox_renderer_software"] != 1:
+        pytest.skip("there is a GPU")
+    environment = {**os.environ, "SUNBOX_REQUIRE_GPU": "1", "SUNBOX_DATA_DIR": str(tmp_path)}
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 1 and answer.stdout == ""
+    assert "SUNBOX_REQUIRE_GPU" in answer.stderr and "llvmpipe" in answer.stderr and "Traceback" not in answer.stderr
+
+
+def test_a_device_that_is_not_there(server: Server, tmp_path: Path) -> None:
+    """The server lives, and is not ready."""
+    lost = Server(tmp_path, SUNBOX_DEVICE="99")
+    try:
+        assert lost.http.get("/healthz").status_code == 200
+        wait_until(lambda: "99" in lost.http.get("/readyz").json()["detail"])
+        assert lost.http.get("/readyz").status_code == 503 and "retry-after" in lost.http.get("/readyz").headers
+        assert lost.http.get("/v1/info").json()["renderer"] is None
+    finally:
+        assert lost.stop() == 0
+
+
+def test_the_readme_has_the_configuration() -> None:
+    """Written by: python -c 'from service import config; print(config.table())'."""
+    assert config.table() in (ROOT / "README.md").read_text()
+
+
+def test_logging_is_set_up_once(capfd: pytest.CaptureFixture[str]) -> None:
+    root = logging.getLogger()
+    before, level = root.handlers[:], root.level
+    try:
+        logs.configure("json", "warning")
+        logging.getLogger("a.b").warning("what happened count=%d", 3)
+        logging.getLogger("a.b").info("not told")
+        told = json.loads(capfd.readouterr().err)
+        assert (told["event"], told["count"], told["logger"]) == ("what happened", 3, "a.b")
+    finally:
+        root.handlers[:], root.level = before, level
