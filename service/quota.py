@@ -64,7 +64,7 @@ class Quota:
 def _delete(path: Path) -> int:
     """How many bytes that gave. What vouches for an asset goes first: there is never one without its bytes."""
     freed = 0
-    for file in (path.with_suffix(".json"), path):
+    for file in (path.with_suffix(".json"), *path.parent.glob(f"{path.name}.*"), path):
         size = _size(file)
         try:
             file.unlink()
