@@ -74,6 +74,8 @@ class Picture:
         if kernel is not self._kernel or self._tiles.max_bounces != self.settings.max_bounces:
             self._kernel = kernel
             self._cut()
+        if self._kernels.last_compile_ms:
+            self._compile_fully()
         for buffer in (*self.state, *self._guides.values()):
             buffer.clear()
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
@@ -83,6 +85,16 @@ class Picture:
         self._guide_samples, self._guide_row = 0, 0
         self._pass_samples = 0  # samples of the pass under way; 0: none is
         self._row, self._column = 0, 0  # where its next tile begins; rows beyond the picture are the meter's
+
+    def _compile_fully(self) -> None:
+        """Drivers write machine code when a kernel first runs: here, over no pixel, and not in a timed slice."""
+        start = time.perf_counter()
+        self._bind()
+        self._bind_part(self._main, (0, 0, 1, 1), 1)
+        self._frame_buffer.write(self._frame((0, 0), (0, 0), 0, 1).tobytes())
+        self._kernel.run(1, 1)
+        self.context.finish()
+        self.compile_ms += (time.perf_counter() - start) * 1e3
 
     def _cut(self) -> None:
         s = self.settings

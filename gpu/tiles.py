@@ -11,7 +11,8 @@ SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another clie
 PASS_S = 0.2  # samples per pass aim at this, once there are some
 MAX_SAMPLES_A_PASS = 256
 BAND = 16  # rows
-_LEAST = 8  # columns of a tile, a work group's: no smaller piece is cheaper
+_LEAST = 8  # columns of a tile: a work group's
+_LONG_BAND, _LONG_LEAST = 4, 16  # where paths may be so long that 128 pixels take a tenth of a second
 _GUESS_S = 2e-7  # of a sample of a pixel, before any was measured
 _USUAL_BOUNCES = 16  # of more, a path that nobody has seen yet may cost as much more than those seen
 
@@ -23,10 +24,11 @@ class Tiles:
 
     def __init__(self, width: int, height: int, most: int, max_bounces: int = 0) -> None:
         self.size, self.max_bounces = (width, height), max_bounces
-        self._band = BAND if BAND * width <= most else max(1, most // width)
+        self._caution = max(1.0, max_bounces / _USUAL_BOUNCES)
+        band, self._least = (BAND, _LEAST) if self._caution < 4 else (_LONG_BAND, _LONG_LEAST)
+        self._band = band if band * width <= most else max(1, most // width)
         self._most_rows = max(self._band, most // width // self._band * self._band)
         self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
-        self._caution = max(1.0, max_bounces / _USUAL_BOUNCES)
         self._rates = np.zeros(-(-height // self._band))  # s per sample of a pixel, by band; 0: unknown
         self.cost_s = 0.0  # the same of late; 0: unknown
 
@@ -34,7 +36,7 @@ class Tiles:
         """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
         width, height = self.size
         first = row // self._band
-        guess = (self.cost_s or _GUESS_S) * self._caution
+        guess = (self.cost_s or _GUESS_S * self._caution) * self._caution
         pixels = SLICE_S / samples / (self._rates[first] or guess)
         rows = min(self._band, height - row)
         if column == 0 and pixels >= self._band * width:
@@ -45,8 +47,8 @@ class Tiles:
                     break
                 rows += self._band
             return 0, row, width, min(rows, height - row)
-        columns = int(min(max(pixels / self._band, _LEAST), width)) // _LEAST * _LEAST
-        return column, row, min(max(columns, _LEAST), self._most_columns, width - column), rows
+        columns = max(int(min(pixels / self._band, width)) // _LEAST * _LEAST, self._least)
+        return column, row, min(columns, self._most_columns, width - column), rows
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
         """What a tile has cost: a dearer one counts at once, a cheaper one bit by bit."""
@@ -61,5 +63,5 @@ class Tiles:
         if samples == 0 or self.cost_s == 0:
             return 1
         width, height = self.size
-        most = min(PASS_S / (self.cost_s * width * height), SLICE_S / (self._rates.max() * _LEAST * self._band))
+        most = min(PASS_S / (self.cost_s * width * height), SLICE_S / (self._rates.max() * self._least * self._band))
         return max(1, min(int(most), samples, MAX_SAMPLES_A_PASS))
