@@ -80,6 +80,7 @@ def _veiled(s: SceneArrays) -> bool:
 
 FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_SPHERES": _linear(ShapeKind.SPHERE, "spheres"),
+    "HAS_VAST_SPHERES": lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any()),
     "HAS_QUADS": _linear(ShapeKind.QUAD, "quads"),
     "HAS_BOXES": _linear(ShapeKind.BOX, "boxes"),
     "HAS_ELLIPSOIDS": _linear(ShapeKind.ELLIPSOID, "ellipsoids"),

@@ -14,6 +14,7 @@ from typing import ClassVar
 import numpy as np
 
 NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
+NOT_VAST = 3.4e38
 ABSENT = -1.0  # a material's number that was not given
 TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises what it may need
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
@@ -214,6 +215,7 @@ class Sphere(Record):
     material: u32
     light: u32  # its place among the lights, or NONE
     shape: u32  # index in the scene document
+    power: f32  # |center|^2 - radius^2 in float64, where the surface of a vast ball passes the origin; else NOT_VAST
 
 
 class Quad(Record):

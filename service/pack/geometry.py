@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import math
-from collections.abc import Collection, Iterable, Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -12,6 +11,9 @@ from gpu import layout
 from gpu.layout import Node, ShapeKind
 from service.assets import Assets
 from service.pack import lights, meshes, records
+from service.pack.meshes import PlacedMesh
+from service.pack.origin import choose
+from service.pack.origin import warnings as lost
 from service.pack.placed import Placed
 from service.pack.placing import place
 from service.pack.records import Bounds
@@ -19,8 +21,6 @@ from service.pack.tree import LINEAR, plant, triangle_bounds
 from service.pack.values import vec3
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
-
-FAR = 4.0  # extents from 0 at which a scene's float32 positions begin to lose digits it needs
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ def geometry(
     """
     placed, placed_meshes = place(shapes, names, emissive, assets, max_triangles, uv_sets)
     analytic = _analytic(placed, np.zeros(3))
-    vertices = [mesh.vertices for mesh in placed_meshes]
-    origin, radius = _frame([*(bounds for _, bounds in analytic.values()), *zip(vertices, vertices, strict=True)])
+    low, high, owners, exact = _extents(analytic, placed_meshes)
+    origin, radius = choose(low, high)
     if origin.any():
         analytic = _analytic(placed, origin)
     triangles, normals, degenerate, kept = meshes.triangles(placed_meshes, origin)
@@ -76,6 +76,7 @@ def geometry(
     areas = lights.areas(found, shining)
     warnings = [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
     warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
+    warnings += lost(low, high, owners, exact, origin)
     return Geometry(
         found, normals, corners["uvs"], corners["uvs_1"], corners["colors"], shining, areas, nodes, node_origin,
         node_scale, frozenset(bounds), vec3(origin), radius, tuple(warnings),
@@ -100,16 +101,14 @@ def _analytic(placed: Placed, origin: np.ndarray) -> dict[ShapeKind, tuple[np.nd
     }
 
 
-def _frame(bounds: Iterable[Bounds]) -> tuple[np.ndarray, float]:
-    """(origin, radius). The origin is 0 unless everything lies far from it: most scenes keep their numbers."""
-    some = [(low.min(axis=0), high.max(axis=0)) for low, high in bounds if len(low)]
-    if not some:
-        return np.zeros(3), 1.0
-    low, high = np.min([b[0] for b in some], axis=0), np.max([b[1] for b in some], axis=0)
-    center, extent = (low + high) / 2, high - low
-    size = float(extent.max())
-    radius = float(np.linalg.norm(extent)) / 2
-    if np.abs(center).max() <= FAR * size:
-        return np.zeros(3), radius or 1.0
-    step = 2.0 ** math.floor(math.log2(size)) if size else 1.0  # a power of two: round numbers stay round
-    return np.rint(center / step) * step, radius or 1.0
+def _extents(
+    analytic: dict[ShapeKind, tuple[np.ndarray, Bounds]], placed_meshes: list[PlacedMesh]
+) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
+    """Boxes around all shapes, low and high (n, 3), which of the document they are (n,), and which are balls."""
+    some = [mesh for mesh in placed_meshes if len(mesh.vertices)]
+    low = [bounds[0] for _, bounds in analytic.values()] + [mesh.vertices.min(axis=0)[None] for mesh in some]
+    high = [bounds[1] for _, bounds in analytic.values()] + [mesh.vertices.max(axis=0)[None] for mesh in some]
+    owners = [records["shape"] for records, _ in analytic.values()]
+    owners += [np.array([mesh.shape], np.uint32) for mesh in some]
+    shapes = np.concatenate(owners)
+    return np.concatenate(low), np.concatenate(high), shapes, np.arange(len(shapes)) < len(owners[0])

@@ -9,6 +9,8 @@ import numpy as np
 from gpu import layout
 from service.pack.placed import Placed, Solids
 
+VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin
+
 Bounds = tuple[np.ndarray, np.ndarray]  # (n, 3) each, float64
 
 
@@ -19,6 +21,11 @@ def spheres(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     centers, radii, rotations = zip(*placed.spheres, strict=True)
     center, radius = np.array(centers) - origin, np.array(radii)
     records["center"], records["radius"], records["rotation"] = center, radius, rotations
+    # Near the surface of a ball float32 knows a place to no better than 2^-24 of the radius. Where the scene stands
+    # on it, around the origin, that is too little.
+    away = np.linalg.norm(center, axis=1)
+    power = (away - radius) * (away + radius)
+    records["power"] = np.where(np.abs(away - radius) * VAST < radius, power, layout.NOT_VAST)
     return records, (center - radius[:, None], center + radius[:, None])
 
 

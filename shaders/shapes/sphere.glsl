@@ -1,3 +1,13 @@
+// |p - c|^2 - r^2. Of a ball so vast that p stands on it like on a plain, from what float64 has made of the centre
+// and the radius together: neither knows them to a metre where they are 10 000 km.
+float sphere_power(Sphere s, vec3 p) {
+    vec3 f = p - s.center;
+#if HAS_VAST_SPHERES
+    if (s.power < INFINITY_T) return dot(p, p - 2.0 * s.center) + s.power;
+#endif
+    return dot(f, f) - s.radius * s.radius;
+}
+
 // Nearest root of |o + t d - c| = r in (0, t_max), or t_max [Haines et al. 2019, "Precision improvements for
 // ray/sphere intersection"]: the discriminant from the closest approach, the roots without cancelling.
 float sphere_hit(Sphere s, vec3 o, vec3 d, float t_max) {
@@ -5,8 +15,11 @@ float sphere_hit(Sphere s, vec3 o, vec3 d, float t_max) {
     float b = -dot(f, d);
     vec3 l = f + b * d;
     float disc = s.radius * s.radius - dot(l, l);
+    float c = sphere_power(s, o);
+#if HAS_VAST_SPHERES
+    if (s.power < INFINITY_T) disc = b * b - c;
+#endif
     float q = b + (b < 0.0 ? -1.0 : 1.0) * sqrt(max(disc, 0.0));
-    float c = dot(f, f) - s.radius * s.radius;
     float ta = c / q, tb = q;
     float near = min(ta, tb), far = max(ta, tb);
     float t = near > 0.0 ? near : far;
@@ -26,6 +39,12 @@ Point sphere_point(Sphere s, vec3 p) {
     r.ng = normalize(p - s.center);
     r.p = s.center + s.radius * r.ng;
     r.error = gamma_error(6.0) * (abs(s.center) + s.radius);
+#if HAS_VAST_SPHERES
+    if (s.power < INFINITY_T) {
+        r.p = p - sphere_power(s, p) / (length(p - s.center) + s.radius) * r.ng;
+        r.error = gamma_error(16.0) * abs(p) + gamma_error(16.0) * length(p);
+    }
+#endif
     r.ns = r.ng;
     r.material = s.material;
     r.light = s.light;
