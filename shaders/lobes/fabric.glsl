@@ -9,7 +9,7 @@ float fabric_fit(float c, float alpha) {
 }
 
 float fabric_mask(float c, float alpha) {
-    float l = fabric_fit(c < 0.5 ? c : 1.0 - c, alpha);
+    float l = fabric_fit(c < 0.5 ? c : max(0.0, 1.0 - c), alpha); // a reflected direction's cosine may round above 1
     return exp(c < 0.5 ? l : 2.0 * fabric_fit(0.5, alpha) - l);
 }
 

@@ -102,7 +102,7 @@ def test_what_float32_does_not_hold_is_said() -> None:
     assert warned(icosphere("white", 1, translate=[far / 4, 0, 0]), ball("white", (-far / 4, 0, 0))) == []
     lost = warned(icosphere("white", 1, translate=[1.5 * far, 0, 0]), ball("white", (-1.5 * far, 0, 0)))
     assert [line.split(":")[0] for line in lost] == ["/shapes/0", "/shapes/1"]
-    assert "its place is known to 0.2" in lost[0]
+    assert "place is known to 0.1%" in lost[0]
     tilted = quad("white", (-VAST, -VAST, VAST), (2 * VAST, 2 * VAST, 0), (0, 0, -2 * VAST))
     (line,) = warned(tilted, ball("white", radius=0.5))
     assert line.startswith("/shapes/0: is 2.62e+05 m across beside shapes of 1 m")
