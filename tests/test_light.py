@@ -187,12 +187,12 @@ def test_all_estimators_converge_to_the_same_picture(gpu: Renderer) -> None:
 
 @pytest.mark.parametrize("filter_name", FILTERS)
 def test_the_cut_into_slices_does_not_show(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, filter_name: str) -> None:
-    from gpu import picture as module
+    from gpu import tiles as module
 
     pictures = []
     for slice_s, pass_s, budget in ((1.0, 1.0, 600.0), (1e-5, 1e-4, 1e-4), (1e-3, 5.0, 1e-3)):
-        monkeypatch.setattr(module, "_SLICE_S", slice_s)
-        monkeypatch.setattr(module, "_PASS_S", pass_s)
+        monkeypatch.setattr(module, "SLICE_S", slice_s)
+        monkeypatch.setattr(module, "PASS_S", pass_s)
         made = picture(gpu, _showcase(), 0, width=80, height=56, max_bounces=4, filter=filter_name)
         while made.samples < 7:
             made.trace(budget, 7)
