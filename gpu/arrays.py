@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -71,6 +72,8 @@ def _empty(record: type[layout.Record]) -> np.ndarray:
 class SceneArrays:
     """Everything the renderer needs. Shapes of a kind in `bvh_kinds` are met through `nodes`, all others in a loop.
 
+    The first `large` of a kind in `bvh_kinds` stand in the loop, too, instead of among the leaves.
+
     Positions are relative to `origin` (float64, world): what was subtracted before rounding to float32.
     """
 
@@ -90,6 +93,7 @@ class SceneArrays:
     node_origin: Vec3 = (0.0, 0.0, 0.0)
     node_scale: Vec3 = (0.0, 0.0, 0.0)
     bvh_kinds: frozenset[ShapeKind] = frozenset()
+    large: Mapping[ShapeKind, int] = field(default_factory=dict)
     environment: EnvironmentArrays | None = None
     textures: TextureArrays | None = None
     radiance_scale: float = 1.0  # about the largest radiance a picture of it will hold; a power of two

@@ -6,6 +6,7 @@ Importing this loads numba (half a second), so import it where a tree is needed.
 from __future__ import annotations
 
 import os
+from collections.abc import Mapping
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 
@@ -56,10 +57,14 @@ def _grid(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     return np.stack([(low - 2 * step).astype(np.float32).astype(np.float64), step])
 
 
-def build(lower: np.ndarray, upper: np.ndarray, kinds: np.ndarray, leaf_size: int | None = None) -> Tree:
+def build(
+    lower: np.ndarray, upper: np.ndarray, kinds: np.ndarray, leaf_size: int | None = None,
+    firsts: Mapping[int, int] | None = None,
+) -> Tree:  # fmt: skip
     """The tree over n boxes: `lower`, `upper` (n, 3) float32, finite; `kinds` (n,) `layout.ShapeKind`.
 
-    A leaf holds one kind only. The tree does not depend on the number of threads. Raises SceneTooLarge.
+    A leaf holds one kind only. `firsts`: where, not at 0, the boxes of a kind begin in its array. The tree
+    does not depend on the number of threads. Raises SceneTooLarge.
     """
     n = len(kinds)
     if not 0 < n <= MAX_PRIMITIVES:
@@ -95,7 +100,10 @@ def build(lower: np.ndarray, upper: np.ndarray, kinds: np.ndarray, leaf_size: in
             ends = pool.map(lambda r: subtree(r[2], reserved + 2 * r[0], r[0], r[1], 0)[0], ranges)
             regions += [(reserved + 2 * a, end) for (a, _, _), end in zip(ranges, ends, strict=True)]
         measure(rows, 1, top, 0)
-    return Tree(order, _ranks(kinds[order], mixed), rows, np.array(regions, np.int64), *_as_tuples(grid))
+    ranks = _ranks(kinds[order], mixed)
+    for kind, first in (firsts or {}).items():
+        ranks[kinds[order] == kind] += np.uint32(first)
+    return Tree(order, ranks, rows, np.array(regions, np.int64), *_as_tuples(grid))
 
 
 def _as_tuples(grid: np.ndarray) -> tuple[Vec3, Vec3]:

@@ -17,8 +17,13 @@ from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 FILTER_TABLE_SIZE = 512
 
 
+def _looped(scene: SceneArrays, kind: ShapeKind, records: str) -> int:
+    """How many shapes of a kind stand in the kernel's loop: they come first among their records."""
+    return scene.large.get(kind, 0) if kind in scene.bvh_kinds else len(getattr(scene, records))
+
+
 def _linear(kind: ShapeKind, records: str) -> Callable[[SceneArrays], bool]:
-    return lambda s: len(getattr(s, records)) > 0 and kind not in s.bvh_kinds
+    return lambda s: _looped(s, kind, records) > 0
 
 
 def _tree(kind: ShapeKind) -> Callable[[SceneArrays], bool]:
@@ -177,9 +182,7 @@ def counts(scene: SceneArrays) -> dict[str, object]:
     """How many shapes of each kind stand in the kernel's loops, how many materials and lights, where few; and where
     textures belong."""
     kinds = zip(COUNTS.items(), ShapeKind, strict=True)
-    out: dict[str, object] = {
-        name: 0 if kind in scene.bvh_kinds else len(getattr(scene, records)) for (name, records), kind in kinds
-    }
+    out: dict[str, object] = {name: _looped(scene, kind, records) for (name, records), kind in kinds}
     few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
     slots = {} if scene.textures is None else scene.textures.slots
     room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * glsl_textures.groups(slots))
@@ -191,7 +194,7 @@ def counts(scene: SceneArrays) -> dict[str, object]:
 def _quad_lamp(scene: SceneArrays) -> int:
     """The index of the only emitting quad, where there is one and it stands in the kernel's loop; else -1."""
     lamps = np.flatnonzero(scene.quads["light"] != layout.NONE)
-    return int(lamps[0]) if len(lamps) == 1 and ShapeKind.QUAD not in scene.bvh_kinds else -1
+    return int(lamps[0]) if len(lamps) == 1 and lamps[0] < _looped(scene, ShapeKind.QUAD, "quads") else -1
 
 
 def defines(

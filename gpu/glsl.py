@@ -16,27 +16,60 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
 
     A buffer of which kernels know the count is a uniform block: llvmpipe loads those once for all lanes where the
     index is constant, as in unrolled loops, and storage buffers lane by lane wherever control flow has diverged.
+    A kind of which the first stand in a loop and the others in the tree has both, and `NAME_tree_load(i)` for any.
     """
-    group = 4 if record.words % 4 == 0 else 2
-    groups = record.words // group
-    stride = "MATERIAL_GROUPS" if name == "material" else f"{groups}u"  # textures follow a material's numbers
-    storage = (
-        f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_words[]; }};"
-    )
-    lines = [storage]
-    if name in layout.COUNTED:
-        count = f"{name.upper()}_COUNT"
-        block = f"layout(std140, binding = {layout.COUNTED[name]}) uniform {name}_block"
-        lines = [
-            f"#if {count} > 0",
-            f"{block} {{ uvec4 {name}_words[{count} * {stride}]; }};",
+    storage = _storage(name, record, slot, "words")
+    if name not in layout.COUNTED:
+        return "\n".join([storage, _load(name, record, "load", "words")])
+    count, stride = f"{name.upper()}_COUNT", _stride(name, record)
+    block = f"layout(std140, binding = {layout.COUNTED[name]}) uniform {name}_block"
+    lines = [
+        f"#if {count} > 0",
+        f"{block} {{ uvec4 {name}_words[{count} * {stride}]; }};",
+        "#else",
+        storage,
+        "#endif",
+        _load(name, record, "load", "words"),
+    ]
+    if name in _SHAPES:
+        lines += [
+            f"#if {_split(name)}",
+            _storage(name, record, slot, "stored"),
+            _load(name, record, "tree_load", "stored"),
             "#else",
-            storage,
+            f"#define {name}_tree_load {name}_load",
             "#endif",
         ]
-    lines.append(f"{record.__name__} {name}_load(uint i) {{")
-    for k in range(groups):
-        lines.append(f"    uvec{group} w{k} = {name}_words[i * {stride} + {k}u];")
+    return "\n".join(lines)
+
+
+_SHAPES = frozenset(kind.name.lower() for kind in ShapeKind)
+
+
+def _split(name: str) -> str:
+    """Whether a kernel's loop holds some shapes of a kind and its tree the others."""
+    return f"{name.upper()}_COUNT > 0 && HAS_BVH_{layout.BUFFERS[name][1].name}"
+
+
+def _stride(name: str, record: type[Record]) -> str:
+    if name == "material":
+        return "MATERIAL_GROUPS"  # textures follow a material's numbers
+    return f"{record.words // (4 if record.words % 4 == 0 else 2)}u"
+
+
+def _storage(name: str, record: type[Record], slot: Slot, words: str) -> str:
+    group = 4 if record.words % 4 == 0 else 2
+    return (
+        f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_{words}[]; }};"
+    )
+
+
+def _load(name: str, record: type[Record], function: str, words: str) -> str:
+    group = 4 if record.words % 4 == 0 else 2
+    stride = _stride(name, record)
+    lines = [f"{record.__name__} {name}_{function}(uint i) {{"]
+    for k in range(record.words // group):
+        lines.append(f"    uvec{group} w{k} = {name}_{words}[i * {stride} + {k}u];")
     lines.append(f"    return {record.__name__}({glsl_textures.unpacked(record, group)});\n}}")
     return "\n".join(lines)
 
@@ -44,9 +77,10 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
 def _picker(name: str, record: type[Record]) -> str:
     """`NAME_pick(i)`: as `_load`, but where there are very few, chosen among loads at constant places."""
     count = f"{name.upper()}_COUNT"
+    tree = f"#if {_split(name)}\n    return {name}_tree_load(i);\n#elif" if name in _SHAPES else "#if"
     return f"""
 {record.__name__} {name}_pick(uint i) {{
-#if {count} == 0 || {count} > PICK_MAX
+{tree} {count} == 0 || {count} > PICK_MAX
     return {name}_load(i);
 #else
     {record.__name__} r = {name}_load(0u);

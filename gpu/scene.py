@@ -31,6 +31,7 @@ _BUFFERS = {
 
 
 _BLOCKS = {layout.BUFFERS[name][1]: block for name, block in layout.COUNTED.items()}
+_BLOCK_MAX = 16384  # bytes that every driver gives a uniform block; of longer buffers kernels see the first records
 
 
 RADIANCE_MAX = 1e20  # what a texel times the environment's scale may reach
@@ -192,7 +193,7 @@ class Scene:
         for slot, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(int(slot))
             if slot in _BLOCKS:
-                buffer.bind_to_uniform_block(_BLOCKS[slot])
+                buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
         self._texels.use(layout.ENVIRONMENT_TEXTURE)
         for unit, texture in (*self._tables.items(), *self._details.items()):
             texture.use(unit)

@@ -1,6 +1,6 @@
 // Nearest hit and any hit. Shapes of a kind that is few stand in a loop of constant length, which compilers unroll:
 // their numbers are then loaded once for all lanes (on llvmpipe a tenth of the time of a load by varying index).
-// Kinds that are many go through the tree.
+// Kinds that are many go through the tree, but for their few largest, which would stand in every ray's way there.
 struct Point {
     vec3 p;
     vec3 error;   // bound on p's distance from the surface, per axis

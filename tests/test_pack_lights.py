@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpu import layout
-from gpu.features import flags
+from gpu.features import counts, flags
 from gpu.layout import LightKind, ShapeKind
 from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere
 
@@ -59,6 +59,32 @@ def test_leaves_point_at_what_their_boxes_hold():
     assert {kind: len(indices) for kind, indices in found.items()} == {
         ShapeKind.SPHERE: 40, ShapeKind.QUAD: 40, ShapeKind.TRIANGLE: 120,
     }  # fmt: skip
+
+
+def test_the_few_large_stand_out_of_the_tree_and_come_first():
+    """Walls among small lamps, a globe under small balls: in the loop, in the way of nobody who asks the tree."""
+    walls = [quad(origin=[0, 0, 0], u=[9, 0, 0], v=[0, 8, 0]), quad(origin=[0, 0, 9], u=[9, 0, 0], v=[0, 9, 0])]
+    lamps = [quad(origin=[i % 6, 5, i // 6], u=[0.1, 0, 0], v=[0, 0, 0.1], material="lamp") for i in range(36)]
+    balls = [sphere(center=[i, 1, 1], radius=0.1) for i in range(12)]
+    arrays = packed(*lamps[:20], *walls, *lamps[20:], *balls, sphere(center=[4, -90, 4], radius=88)).arrays
+    assert arrays.large == {ShapeKind.SPHERE: 1, ShapeKind.QUAD: 2}
+    assert arrays.quads["shape"][:2].tolist() == [21, 20] and arrays.spheres["shape"][0] == 50
+    assert sorted(arrays.quads["shape"]) == list(range(38))
+    links = arrays.nodes["link"][: len(arrays.nodes) // 8]
+    leaves = links[links & layout.LEAF_BIT != 0]
+    found = {ShapeKind.SPHERE: set(), ShapeKind.QUAD: set()}
+    for link in leaves.tolist():
+        first, count = link & layout.LEAF_FIRST_MASK, ((link >> layout.LEAF_COUNT_SHIFT) & 15) + 1
+        found[ShapeKind((link >> layout.LEAF_KIND_SHIFT) & 7)] |= set(range(first, first + count))
+    assert found == {ShapeKind.SPHERE: set(range(1, 13)), ShapeKind.QUAD: set(range(2, 38))}
+    assert np.array_equal(arrays.quads["light"] == layout.NONE, np.isin(arrays.quads["shape"], [20, 21]))
+    assert {"HAS_QUADS", "HAS_BVH_QUADS", "HAS_SPHERES", "HAS_BVH_SPHERES"} <= flags(arrays)
+    assert (counts(arrays)["QUAD_COUNT"], counts(arrays)["SPHERE_COUNT"]) == (2, 1)
+    assert counts(arrays)["QUAD_LAMP"] == -1
+
+
+def test_shapes_of_about_one_size_all_go_through_the_tree():
+    assert not any(packed(*[sphere(center=[3 * i, 0, 0]) for i in range(9)]).arrays.large.values())
 
 
 KINDS = {

@@ -32,17 +32,19 @@ def crowd():
 
 def test_the_tree_finds_what_the_loops_find(gpu: Renderer, monkeypatch) -> None:
     seen = []
-    for few in (0, 10**6):
+    for few in (0, 1, 10**6):
+        monkeypatch.setattr(tree, "LARGE_SHARE", 1e-5 if few == 1 else 1.0)
         monkeypatch.setattr(tree, "LINEAR", dict.fromkeys(tree.LINEAR, few))
         monkeypatch.setattr("service.pack.geometry.LINEAR", tree.LINEAR)
         arrays = pack(parse_scene(crowd()), Shelf()).arrays
-        assert len(arrays.bvh_kinds) == (5 if few == 0 else 0)
+        assert len(arrays.bvh_kinds) == (0 if few > 1 else 5)
+        assert any(arrays.large.values()) == (few == 1)
         scene = gpu.load(arrays)
         picture = gpu.picture(scene, RenderSettings(64, 64, max_bounces=1))
         picture.trace(60.0, 4)
         seen.append((picture.read("depth"), picture.read("normal")))
         picture.release()
         scene.release()
-    (depth, normal), (looped_depth, looped_normal) = seen
-    assert np.array_equal(depth, looped_depth) and np.array_equal(normal, looped_normal)
+    for depth, normal in seen[1:]:
+        assert np.array_equal(depth, seen[0][0]) and np.array_equal(normal, seen[0][1])
     assert np.ptp(depth) > 0

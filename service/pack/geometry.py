@@ -17,7 +17,7 @@ from service.pack.origin import warnings as lost
 from service.pack.placed import Placed
 from service.pack.placing import place
 from service.pack.records import Bounds
-from service.pack.tree import LINEAR, plant, triangle_bounds
+from service.pack.tree import LINEAR, plant, stand_out, triangle_bounds
 from service.pack.values import vec3
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
@@ -38,6 +38,7 @@ class Geometry:
     node_origin: Vec3
     node_scale: Vec3
     bvh_kinds: frozenset[ShapeKind]
+    large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
     origin: Vec3
     radius: float  # of a ball around everything; 1 where there is nothing
     warnings: tuple[str, ...]
@@ -64,8 +65,10 @@ def geometry(
     if len(triangles) > LINEAR[ShapeKind.TRIANGLE]:
         bounds[ShapeKind.TRIANGLE] = triangle_bounds(triangles)
     nodes, node_origin, node_scale = np.zeros(0, Node.dtype), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
+    standing: dict[ShapeKind, np.ndarray] = {}
     if bounds:
-        nodes, order, node_origin, node_scale = plant(bounds)
+        standing = stand_out(bounds)
+        nodes, order, node_origin, node_scale = plant(bounds, standing)
         found |= {kind: found[kind][places] for kind, places in order.items()}
         if len(normals) and ShapeKind.TRIANGLE in order:
             normals = normals[order[ShapeKind.TRIANGLE]]
@@ -79,7 +82,8 @@ def geometry(
     warnings += lost(low, high, owners, exact, origin)
     return Geometry(
         found, normals, corners["uvs"], corners["uvs_1"], corners["colors"], shining, areas, nodes, node_origin,
-        node_scale, frozenset(bounds), vec3(origin), radius, tuple(warnings),
+        node_scale, frozenset(bounds), {kind: len(places) for kind, places in standing.items()}, vec3(origin), radius,
+        tuple(warnings),
     )  # fmt: skip
 
 

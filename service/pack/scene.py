@@ -94,6 +94,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         node_origin=built.node_origin,
         node_scale=built.node_scale,
         bvh_kinds=built.bvh_kinds,
+        large=built.large,
         environment=environment,
         textures=textures,
         radiance_scale=lights.radiance_scale(peak),
