@@ -71,6 +71,18 @@ def _mapped(s: SceneArrays, *names: str) -> bool:
     return s.textures is not None and any(name in s.textures.slots for name in names)
 
 
+def _coat_apart(s: SceneArrays) -> bool:
+    """Whether some coat's normal is not that of what is under it."""
+    if s.textures is None or not _mapped(s, "normal", "coat_normal"):
+        return False
+    names = list(s.textures.slots)
+    first = (max(s.textures.slots.values()) + 1) * layout.TextureSlot.words
+    uses = np.ascontiguousarray(s.textures.words[:, first:]).view(layout.TextureUse.dtype)
+    mapped = [uses["channel"][:, names.index(n)] != layout.CHANNEL_NONE for n in layout.NORMALS if n in names]
+    coated = (s.materials["model"] == Model.PRINCIPLED) & (s.materials["clearcoat"] > 0)
+    return bool((np.any(mapped, axis=0) & coated).any())
+
+
 def _thin(s: SceneArrays) -> bool:
     return bool((s.triangle_colors[..., 3] < 1).any())
 
@@ -109,6 +121,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_UVS_1": lambda s: len(s.triangle_uvs_1) > 0,
     "HAS_VERTEX_COLORS": lambda s: len(s.triangle_colors) > 0,
     "HAS_NORMAL_MAPS": lambda s: _mapped(s, "normal", "coat_normal"),
+    "HAS_COAT_NORMALS": _coat_apart,
     "HAS_TEXTURED_LIGHTS": _veiled,
     "HAS_EMISSION": lambda s: bool((s.materials["emission"] > 0).any()),
     "HAS_EMISSION_BOTH": lambda s: bool(

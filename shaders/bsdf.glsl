@@ -111,6 +111,9 @@ struct Sampled {
     vec3 wi;
     bool specular; // from a perfectly specular lobe: `there` is its f and its chance, in place of bsdf_eval's
     Scatter there;
+#if HAS_COAT_NORMALS
+    bool coated;   // from the coat, which reflects though wi lie below the base's normal
+#endif
 };
 #endif
 
@@ -146,8 +149,13 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 
 #if HAS_PRINCIPLED
 Sampled bsdf_pick(Surface s, vec3 wo, float u_lobe, vec2 u) {
+#if HAS_COAT_NORMALS
+    Sampled r = Sampled(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0), false);
+    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.specular, r.there, r.coated);
+#else
     Sampled r = Sampled(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0));
     if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.specular, r.there);
+#endif
     return r;
 }
 
@@ -156,6 +164,9 @@ Sampled bsdf_pick_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
     Sampled r = bsdf_pick(s, wo, u_lobe, u);
     float rest = s.model == MODEL_PRINCIPLED ? 1.0 - principled_specular(s, wo) : 1.0;
     if (!r.specular) {
+#if HAS_COAT_NORMALS
+        r.coated = false;
+#endif
         r.wi = sampling_hemisphere(u);
         float pdf = 0.5 * INV_PI;
 #if HAS_TRANSMISSION

@@ -136,6 +136,11 @@ Scatter path_folded(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool ma
         if (!mapped || wi.z * side > 0.0) sum = Scatter(sum.f + f.f, sum.pdf + f.pdf);
         w = v - 2.0 * side * front;
         more = k == 0u && mapped && dot(w, basis.z) * side > 0.0;
+#if HAS_COAT_NORMALS
+        Scatter c = principled_coat(s, wo, wi);
+        if (side > 0.0) sum = Scatter(sum.f + c.f, sum.pdf + c.pdf);
+        more = more || (k == 0u && mapped && side > 0.0 && dot(frame_to_local(basis, w), s.coat.z) > 0.0);
+#endif
         k++;
     } while (more);
     return sum;
@@ -188,8 +193,15 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
             texture_look(at, texels);
 #endif
+#if HAS_COAT_NORMALS
+            Point coat_at = at;
+            bool coat_mapped = texture_coat_normal(at, texels, coat_at.ns);
+#endif
 #if HAS_NORMAL_MAPS
             bool mapped = texture_normal(at, texels, at.ns);
+#endif
+#if HAS_COAT_NORMALS
+            mapped = mapped || coat_mapped;
 #endif
             Basis basis = frame_basis(path_normal(at, wo_w));
             vec2 tangent = vec2(1.0, 0.0);
@@ -205,6 +217,9 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
             Surface s = surface_make(m, tangent);
             vec3 wo = frame_to_local(basis, wo_w);
+#if HAS_COAT_NORMALS
+            s.coat = frame_basis(frame_to_local(basis, path_normal(coat_at, wo_w)));
+#endif
 #if HAS_PRINCIPLED
             principled_face(wo, dot(at.ng, wo_w) < 0.0, s);
 #endif
@@ -302,15 +317,20 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #else
             bool goes = wi_next.z > 0.0;
 #endif
+            float lobe = wi_next.z;
+#if HAS_COAT_NORMALS
+            goes = goes || picked.coated;
+            if (picked.coated) lobe = 1.0;
+#endif
 #if ESTIMATOR == ESTIMATOR_UNIFORM
             // Uniform about the surface itself, where nothing folds.
             if (mapped && !certain) d = frame_to_world(frame_basis(front), wi_next);
 #endif
             float across = dot(d, front);
-            if (mapped && across * wi_next.z < 0.0) d -= 2.0 * across * front;
+            if (mapped && across * lobe < 0.0) d -= 2.0 * across * front;
             Scatter folded = path_folded(s, basis, wo, d, front, mapped);
 #if ESTIMATOR == ESTIMATOR_UNIFORM
-            if (mapped && !certain) next.f = folded.f;
+            if (!certain) next.f = folded.f;
 #else
             if (!certain) next = folded;
 #endif

@@ -17,6 +17,13 @@ float principled_layers(Surface s, float coat_i, float sheen_i) {
     return (1.0 - max(s.coat_kept, coat_i)) * (1.0 - max(s.sheen_kept, sheen_i));
 }
 
+#if HAS_COAT_NORMALS
+// The coat's own frame, where its normal is not that of what is under it.
+float principled_coat_cosine(Surface s, vec3 w) { return dot(s.coat.z, w); }
+#else
+#define principled_coat_cosine(s, w) w.z
+#endif
+
 float principled_coat_kept(Surface s, float c) {
 #if HAS_CLEARCOAT
     return coat_kept(s, c);
@@ -47,7 +54,7 @@ void principled_face(vec3 wo, bool behind, inout Surface s) {
     s.kept = principled_kept(s, wo);
     s.kept_mean = energy_mean(s.mirror ? 0.0 : s.roughness, s.aspect, s.eta_outside);
     // The layers lie on the outer side.
-    s.coat_kept = s.inside ? 0.0 : principled_coat_kept(s, wo.z);
+    s.coat_kept = s.inside ? 0.0 : principled_coat_kept(s, principled_coat_cosine(s, wo));
     s.sheen_kept = s.inside ? 0.0 : principled_sheen_kept(s, wo.z);
 }
 
@@ -102,7 +109,7 @@ Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) 
         f += facets_transmit(s, wo_t, wi_t, wm);
         pdf += w.facets * facets_transmit_pdf(s, wo_t, wi_t, wm);
     }
-    float coat_i = s.inside ? principled_coat_kept(s, wi.z) : 0.0;
+    float coat_i = s.inside ? principled_coat_kept(s, principled_coat_cosine(s, wi)) : 0.0;
     float sheen_i = s.inside ? principled_sheen_kept(s, wi.z) : 0.0;
     return Scatter(f * principled_layers(s, coat_i, sheen_i), pdf);
 }
@@ -130,13 +137,13 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
         pdf += w.facets * facets_reflect_pdf(s, wo_t, wm_t, cos_d);
     }
     if (!s.inside) {
-        float coat_i = principled_coat_kept(s, wi.z), sheen_i = principled_sheen_kept(s, wi.z);
+        float coat_i = principled_coat_kept(s, principled_coat_cosine(s, wi)), sheen_i = principled_sheen_kept(s, wi.z);
         f *= principled_layers(s, coat_i, sheen_i);
 #if HAS_SHEEN
         f += fabric_eval(s, wo, wi) * (1.0 - max(s.coat_kept, coat_i));
         pdf += w.sheen * fabric_pdf();
 #endif
-#if HAS_CLEARCOAT
+#if HAS_CLEARCOAT && !HAS_COAT_NORMALS
         f += coat_eval(s, wo, wi, wm, cos_d);
         pdf += w.coat * coat_pdf(s, wo, wm);
 #endif
@@ -147,8 +154,22 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     return Scatter(f, pdf);
 }
 
+#if HAS_COAT_NORMALS
+// The coat alone, with the cosine: it may send light where the base's normal sees none.
+Scatter principled_coat(Surface s, vec3 wo, vec3 wi) {
+    vec3 o = frame_to_local(s.coat, wo), i = frame_to_local(s.coat, wi);
+    if (s.model != MODEL_PRINCIPLED || s.inside || o.z <= 0.0 || i.z <= 0.0) return Scatter(vec3(0.0), 0.0);
+    vec3 wm = normalize(o + i);
+    return Scatter(vec3(coat_eval(s, o, i, wm, dot(o, wm)) * i.z), principled_weights(s, wo).coat * coat_pdf(s, o, wm));
+}
+#endif
+
 // A direction, and whether a perfectly specular lobe gave it: then `there` is its reflectance and its chance.
-vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool specular, out Scatter there) {
+vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool specular, out Scatter there
+#if HAS_COAT_NORMALS
+    , out bool coated
+#endif
+) {
     PrincipledWeights w = principled_weights(s, wo);
     there = Scatter(vec3(0.0), 0.0);
     specular = false;
@@ -175,7 +196,7 @@ vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool specul
         float coat_i = s.coat_kept, sheen_i = s.sheen_kept; // a mirror's wi has wo's cosine
 #if HAS_TRANSMISSION
         if (below && s.inside) {
-            coat_i = principled_coat_kept(s, wi.z);
+            coat_i = principled_coat_kept(s, principled_coat_cosine(s, wi));
             sheen_i = principled_sheen_kept(s, wi.z);
         }
 #endif
@@ -190,11 +211,16 @@ vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool specul
     v -= w.sheen;
 #endif
 #if HAS_CLEARCOAT
+#if HAS_COAT_NORMALS
+    vec3 coat = frame_to_world(s.coat, coat_sample(s, frame_to_local(s.coat, wo), u));
+    coated = v >= 0.0 && w.coat > 0.0;
+#else
     vec3 coat = coat_sample(s, wo, u);
+#endif
     if (v >= 0.0 && w.coat > 0.0) {
         wi = coat;
         specular = s.coat_mirror;
-        if (specular) there = Scatter(vec3(s.clearcoat * fresnel_dielectric(wo.z, COAT_ETA)), w.coat);
+        if (specular) there = Scatter(vec3(s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), COAT_ETA)), w.coat);
     }
 #endif
     return wi;

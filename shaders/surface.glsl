@@ -29,6 +29,9 @@ struct Surface {
     vec4 kept_mean;
     float coat_kept;       // share of light that the coat and the sheen keep from what is under them, at wo
     float sheen_kept;
+#if HAS_COAT_NORMALS
+    Basis coat;            // the coat's own frame, in the shading frame
+#endif
 #endif
 };
 

@@ -76,10 +76,6 @@ def pack_textures(
     scene: Scene, assets: Assets, cache: PackCache | None, limits: TexelLimits | None
 ) -> tuple[TextureArrays | None, list[Use], Texels, list[str]]:
     """The renderer's arrays or None, what they serve, and warnings. Raises InvalidDocument."""
-    coats = [f"/materials/{escaped(k)}/clearcoat_normal_map" for k, m in scene.materials.items()
-             if "clearcoat_normal_map" in references(m)]  # fmt: skip
-    if coats:
-        raise InvalidDocument([FieldError(coat, "cannot be rendered yet") for coat in coats])
     images = _images(scene, assets)
     uses = list(_uses(scene, images))
     _check_channels(uses, images)
