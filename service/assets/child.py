@@ -6,6 +6,7 @@ does, and is killed where a file takes too much time; memory that a file must no
 
 import contextlib
 import ctypes
+import errno
 import fcntl
 import importlib
 import json
@@ -81,9 +82,9 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         return {"arrays": table, **facts}, fd
     except ParseError as error:
         return {"error": error.detail[:2000], "pointer": error.pointer[:1000]}, -1
-    except MemoryError:
-        return {"error": f"reading it takes more than the {request['memory'] >> 20} MiB allowed"}, -1
     except Exception as error:
+        if isinstance(error, MemoryError) or getattr(error, "errno", None) == errno.ENOMEM:
+            return {"error": f"reading it takes more than the {request['memory'] >> 20} MiB allowed"}, -1
         # Libraries raise anything at all on nonsense; none of it may end the child.
         plain = isinstance(error, OSError | ValueError) and str(error)
         said = str(error) if plain else f"{type(error).__name__}: {error}"
@@ -111,12 +112,11 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshDa
     size = os.fstat(source).st_size
     if not size:
         raise ParseError("the file is empty")
-    data = os.pread(source, size, 0)
-    if whole:
-        return read_scene(data, limits)
     if format in SIGNATURES:
-        return parse_image(format, data, f"/proc/self/fd/{source}", limits)
-    return parse_mesh(format, data, limits)
+        return parse_image(format, os.pread(source, size, 0), f"/proc/self/fd/{source}", limits)
+    # Mapped and not read: the file is in memory already.
+    data = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
+    return read_scene(data, limits) if whole else parse_mesh(format, data, limits)
 
 
 def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Array], dict[str, Any]]:

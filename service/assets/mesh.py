@@ -12,7 +12,7 @@ from service.assets.errors import ParseError
 from service.assets.parts import Numbers, Parts, check, unit_colors, unit_normals
 
 
-def parse_mesh(format: str, data: bytes, limits: AssetLimits) -> MeshData:
+def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     """Raises ParseError, or whatever a library raises on nonsense."""
     parts = READERS[format](data, limits)
     check(parts, limits.max_triangles)
@@ -33,28 +33,29 @@ def _floats(rows: Numbers | None) -> Floats | None:
     return None if rows is None else np.ascontiguousarray(rows, np.float32)
 
 
-def _obj(data: bytes, limits: AssetLimits) -> Parts:
+def _obj(data: memoryview, limits: AssetLimits) -> Parts:
     from service.assets.obj import read_obj
 
     return read_obj(data)
 
 
-def _ply(data: bytes, limits: AssetLimits) -> Parts:
+def _ply(data: memoryview, limits: AssetLimits) -> Parts:
     from service.assets.ply import read_ply
 
     return read_ply(data)
 
 
-def _gltf(data: bytes, limits: AssetLimits) -> Parts:
+def _gltf(data: memoryview, limits: AssetLimits) -> Parts:
     from service.assets.gltf.whole import read_whole
 
     return read_whole(data, limits)
 
 
-def _stl(data: bytes, limits: AssetLimits) -> Parts:
+def _stl(view: memoryview, limits: AssetLimits) -> Parts:
     """Through trimesh, whose text reader stops in silence where a number or an `endsolid` is missing: we count."""
     from trimesh.exchange.stl import load_stl
 
+    data = bytes(view)
     promised = int.from_bytes(data[80:84], "little")
     if len(data) < 84 or len(data) != 84 + 50 * promised:
         if not re.match(rb"\s*+solid\b", data, re.IGNORECASE):
@@ -75,7 +76,7 @@ def _stl(data: bytes, limits: AssetLimits) -> Parts:
     return Parts(vertices, np.arange(len(vertices)).reshape(-1, 3))
 
 
-READERS: dict[str, Callable[[bytes, AssetLimits], Parts]] = {
+READERS: dict[str, Callable[[memoryview, AssetLimits], Parts]] = {
     "obj": _obj,
     "ply": _ply,
     "stl": _stl,

@@ -1,148 +1,177 @@
 """Wavefront OBJ -> triangles, strictly. Runs in the parsing child.
 
 Our own, and not trimesh's: that one drops a face or a normal it cannot read in silence, keeps indices beyond the
-vertices, and reorders. Lines, materials and free-form statements are skipped.
+vertices, and reorders.
 """
 
-import re
-import warnings
-from array import array
+from __future__ import annotations
+
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 import numpy.typing as npt
 
 from service.assets.data import Doubles
 from service.assets.errors import ParseError
-from service.assets.parts import Parts
+from service.assets.obj_rows import CORNERS, NUMBERS, Rows, blocks, starts_of_words
+from service.assets.parts import Numbers, Parts
 from service.assets.polygons import Longs, triangulate
 
-NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
-CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
-BLANK = 32  # this byte and those below separate words
+Ints = npt.NDArray[np.int32]
+WIDTHS = {"v": 3, "vt": 2, "vn": 3}
+NAMES = {
+    "v": ("vertex", "vertices"),
+    "vt": ("texture coordinate", "texture coordinates"),
+    "vn": ("normal", "normals"),
+}
+MOST_ROWS = 2**31 - 1
 
 
 @dataclass
-class Statements:
-    """The statements of one keyword: what followed it, and on which line it stood."""
+class Found:
+    """What the blocks read so far held. Corners count from 1, 0 being none; negative ones are resolved already."""
 
-    rows: list[bytes] = field(default_factory=list)
-    lines: "array[int]" = field(default_factory=lambda: array("q"))
+    tables: dict[str, list[Numbers]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
+    colors: list[Numbers] = field(default_factory=list)
+    counts: list[Ints] = field(default_factory=list)
+    corners: dict[str, list[Ints]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
+    lines: list[Ints] = field(default_factory=list)  # of the faces
 
-    def error(self, row: int, what: str) -> ParseError:
-        return ParseError(f"line {self.lines[row]}: {what}: {_shown(self.rows[row])}")
+    def rows(self, keyword: str) -> int:
+        return sum(map(len, self.tables[keyword]))
 
 
-def read_obj(data: bytes) -> Parts:
+def read_obj(data: bytes | memoryview) -> Parts:
     """Vertices as the file has them, or, where it gives more, one for each set of indices that a corner has."""
-    found, seen = _statements(data)
-    vertices, colors = _vectors(found["v"], "v", 3)
-    faces = found["f"]
-    if not faces.rows:
+    found = Found()
+    for block in blocks(data):
+        rows_before = [found.rows(k) for k in WIDTHS]
+        for keyword, width in WIDTHS.items():
+            if block.rows[keyword].text:
+                table, colors = _vectors(block.rows[keyword], keyword, width)
+                found.tables[keyword].append(table)
+                if keyword == "v":
+                    found.colors.append(np.empty((0, 3)) if colors is None else colors)
+        if block.rows["f"].text:
+            counts, *corners = _corners(block.rows["f"])
+            found.counts.append(counts.astype(np.int32))
+            found.lines.append(block.rows["f"].lines.astype(np.int32))
+            for k, (keyword, index) in enumerate(zip(WIDTHS, corners, strict=True)):
+                _count_back(index, counts, rows_before[k] + block.before[:, k], keyword, block.rows["f"])
+                if index.max() > MOST_ROWS:
+                    bad, (one, many) = int(index.argmax()), NAMES[keyword]
+                    row = int(np.repeat(np.arange(len(counts)), counts)[bad])
+                    have = found.rows(keyword)
+                    raise block.rows["f"].error(row, f"{one} {index[bad]} does not exist, there are {have} {many}")
+                found.corners[keyword].append(index.astype(np.int32))
+    if not found.counts:
         raise ParseError("it has no faces")
-    counts, *corner = _corners(faces)
-    row = np.repeat(np.arange(len(counts)), counts)
-    places = np.frombuffer(seen, np.int64).reshape(-1, 3)[row]
-    index = _resolve(faces, row, corner[0], places[:, 0], len(vertices), "vertex", "vertices")
-    triangles = triangulate(vertices, index, counts)
-    tables: list[Doubles | None] = [vertices, colors]
-    indices = [index, index]
-    for k, keyword, one, many, width in ((1, "vt", "texture coordinate", "texture coordinates", 2),
-                                         (2, "vn", "normal", "normals", 3)):  # fmt: skip
-        given = corner[k] != 0
-        if not given.any():
-            tables.append(None)
-            indices.append(corner[k])
-            continue
-        table = _vectors(found[keyword], keyword, width)[0]
-        corner[k][given] = _resolve(faces, row[given], corner[k][given], places[given, k], len(table), one, many)
-        corner[k][~given] = len(table)  # a row of zeros: a normal is computed
-        tables.append(np.concatenate([table, np.zeros((1, width))]))
-        indices.append(corner[k])
-    parts = _joined(tables, indices, triangles)
-    bare = int(np.count_nonzero(corner[1] == len(tables[2]) - 1)) if tables[2] is not None else 0
-    if bare:
-        parts.warnings.append(f"{bare} corners have no texture coordinate; they take 0 0")
-    return parts
+    return _joined(found)
 
 
-def _joined(tables: list[Doubles | None], indices: list[Longs], triangles: Longs) -> Parts:
+def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces: Rows) -> None:
+    """Indices from 1 in the place of negative ones; `before`: the rows that preceded each face."""
+    back = np.flatnonzero(index < 0)
+    if len(back):
+        row = np.repeat(np.arange(len(counts)), counts)[back]
+        resolved = index[back] + before[row] + 1
+        bad = np.flatnonzero(resolved < 1)
+        if len(bad):
+            one, many = NAMES[keyword]
+            named, have = index[back[bad[0]]], before[row[bad[0]]]
+            raise faces.error(int(row[bad[0]]), f"{one} {named} does not exist, there are {have} {many} before it")
+        index[back] = resolved
+
+
+def _joined(found: Found) -> Parts:
     """One vertex for each distinct set of indices; the file's own where they all count alike."""
-    vertices, colors, uvs, normals = tables
-    assert vertices is not None
-    index, first = indices[0], np.empty(0, np.int64)
-    others = [(place, table) for place, table in zip(indices[2:], tables[2:], strict=True) if table is not None]
-    if all(len(table) == len(vertices) + 1 and np.array_equal(index, place) for place, table in others):
-        n = len(vertices)
-        return Parts(vertices, index[triangles], normals=_first(normals, n), uvs=_first(uvs, n), colors=colors)
-    for place, _ in others:
-        mixed = index * (int(place.max()) + 1) + place
-        _, first, index = np.unique(mixed, return_index=True, return_inverse=True)
-    vertices, colors, uvs, normals = (
-        None if table is None else table[place[first]] for table, place in zip(tables, indices, strict=True)
-    )
-    assert vertices is not None
-    return Parts(vertices, index[triangles], normals=normals, uvs=uvs, colors=colors)
+    counts = np.concatenate(found.counts).astype(np.int64)
+    tables = {k: np.concatenate(found.tables[k] or [np.empty((0, width))]) for k, width in WIDTHS.items()}
+    colors = np.concatenate(found.colors or [np.empty((0, 3))])
+    found.tables, found.colors = {}, []
+    index = {}
+    for keyword in WIDTHS:
+        index[keyword] = np.concatenate(found.corners.pop(keyword))
+        _check(index[keyword], len(tables[keyword]), keyword, found, counts)
+    vertices = tables["v"]
+    corner = index["v"] - 1
+    warnings = []
+    used = {}
+    for keyword in ("vt", "vn"):
+        missing = int(np.count_nonzero(index[keyword] == 0))
+        if missing < len(corner):
+            used[keyword] = index[keyword] - 1  # -1: the row of zeros at the end; a normal is computed
+            if missing:
+                tables[keyword] = np.concatenate([tables[keyword], np.zeros((1, WIDTHS[keyword]))])
+                if keyword == "vt":
+                    warnings.append(f"{missing} corners have no texture coordinate; they take 0 0")
+    triangles = None if (counts == 3).all() else triangulate(vertices, corner, counts)
+    alike = all(len(tables[k]) == len(vertices) and np.array_equal(corner, place) for k, place in used.items())
+    rows = {"v": vertices, **{k: tables[k] for k in used}}
+    if len(colors) == len(vertices):
+        rows["colors"] = colors
+    if not alike:
+        mixed = corner.astype(np.int64)
+        for keyword, place in used.items():
+            mixed = mixed * (len(tables[keyword]) + 1) + (place + 1)
+            if keyword == "vt" and "vn" in used:  # three indices of 31 bits don't fit into 64: two at a time
+                mixed = np.unique(mixed, return_inverse=True)[1]
+        _, first, joined = np.unique(mixed, return_index=True, return_inverse=True)
+        del mixed
+        places = {"v": corner, "colors": corner, **used}
+        rows = {k: table[places[k][first]] for k, table in rows.items()}
+        corner = joined.astype(np.int32)
+    faces = corner.reshape(-1, 3) if triangles is None else corner[triangles]
+    return Parts(rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings)
 
 
-def _first(table: Doubles | None, count: int) -> Doubles | None:
-    return None if table is None else table[:count]
+def _check(index: Ints, have: int, keyword: str, found: Found, counts: Longs) -> None:
+    if int(index.max(initial=0)) > have:
+        bad = int(np.flatnonzero(index > have)[0])
+        face = int(np.searchsorted(np.cumsum(counts), bad, "right"))
+        one, many = NAMES[keyword]
+        line = np.concatenate(found.lines)[face]
+        raise ParseError(f"line {line}: {one} {index[bad]} does not exist, there are {have} {many}")
 
 
-def _statements(data: bytes) -> tuple[dict[str, Statements], "array[int]"]:
-    """The statements that matter, and how many rows of each preceded each face: indices may count back."""
-    v, vt, vn, f = Statements(), Statements(), Statements(), Statements()
-    kinds, seen = {b"v": v, b"vt": vt, b"vn": vn, b"f": f}, array("q")
-    text = data.replace(b"\r\n", b"\n").replace(b"\r", b"\n").replace(b"\\\n", b" ")
-    for number, line in enumerate(text.split(b"\n"), 1):
-        words = line.split(None, 1)
-        if not words or (kind := kinds.get(words[0])) is None:
-            continue
-        rest = words[1] if len(words) == 2 else b""
-        kind.rows.append(rest.partition(b"#")[0] if b"#" in rest else rest)
-        kind.lines.append(number)
-        if kind is f:
-            seen.extend((len(v.rows), len(vt.rows), len(vn.rows)))
-    return {"v": v, "vt": vt, "vn": vn, "f": f}, seen
-
-
-def _vectors(found: Statements, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
+def _vectors(found: Rows, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
     """The first numbers of each row; and where every row has six, as some write colours, the last three."""
-    if not found.rows:
-        return np.empty((0, width)), None
-    text = b"\n".join(found.rows)
-    counts = _counts(text, _starts(np.frombuffer(text, np.uint8)))
+    counts = found.counts(starts_of_words(np.frombuffer(found.text, np.uint8)))
     # A texture coordinate of one number lies on v = 0.
     least = 1 if keyword == "vt" else width
     if counts.min() < least:
-        raise found.error(int(counts.argmin()), f"`{keyword}` needs {'a number' if least == 1 else 'three numbers'}")
-    flat = _parse(text, np.float64, found, NUMBERS, int(counts.sum()))
-    starts = np.cumsum(counts) - counts
-    vectors: Doubles = flat[np.minimum(starts[:, None] + np.arange(width), len(flat) - 1)]
-    vectors[counts[:, None] <= np.arange(width)] = 0
-    colors = flat[starts[:, None] + np.arange(3, 6)] if keyword == "v" and (counts == 6).all() else None
+        needs = "a number" if least == 1 else "three numbers"
+        raise found.error(int(counts.argmin()), f"`{keyword}` needs {needs}")
+    flat = found.parse(found.text, np.float64, NUMBERS, int(counts.sum()))
+    colors = None
+    if (counts == width).all():
+        vectors: Doubles = flat.reshape(-1, width)
+    else:
+        starts = np.cumsum(counts) - counts
+        vectors = flat[np.minimum(starts[:, None] + np.arange(width), len(flat) - 1)]
+        vectors[counts[:, None] <= np.arange(width)] = 0
+        if keyword == "v" and (counts == 6).all():
+            colors = flat.reshape(-1, 6)[:, 3:]
     if not np.isfinite(vectors).all():
         row = int(np.flatnonzero(~np.isfinite(vectors).all(axis=1))[0])
         raise found.error(row, f"`{keyword}` is not finite")
     return vectors, colors
 
 
-def _corners(faces: Statements) -> tuple[Longs, Longs, Longs, Longs]:
+def _corners(faces: Rows) -> tuple[Longs, Longs, Longs, Longs]:
     """How many corners each face has, and each corner's v, vt and vn as written, 0 where absent.
 
     A corner is v, v/vt, v//vn or v/vt/vn: a number's place is told by the slashes before it in its corner.
     """
-    text = b"\n".join(faces.rows)
-    letters = np.frombuffer(text, np.uint8)
-    corners = _starts(letters)
-    counts = _counts(text, corners)
+    letters = np.frombuffer(faces.text, np.uint8)
+    corners = starts_of_words(letters)
+    counts = faces.counts(corners)
     if counts.min() < 3:
         worst = int(counts.argmin())
         raise faces.error(worst, f"a face needs at least three corners, this one has {counts[worst]}")
-    spaced = text.replace(b"/", b" ")
-    numbers = _starts(np.frombuffer(spaced, np.uint8))
-    values = _parse(spaced, np.int64, faces, CORNERS, len(numbers))
+    spaced = faces.text.replace(b"/", b" ")
+    numbers = starts_of_words(np.frombuffer(spaced, np.uint8))
+    values = faces.parse(spaced, np.int64, CORNERS, len(numbers))
     owner = np.searchsorted(corners, numbers, "right") - 1
     slashes = np.flatnonzero(letters == ord("/"))
     slot = np.searchsorted(slashes, numbers) - np.searchsorted(slashes, corners)[owner]
@@ -156,47 +185,3 @@ def _corners(faces: Statements) -> tuple[Longs, Longs, Longs, Longs]:
     if not v.all():
         raise faces.error(int(row[np.flatnonzero(v == 0)[0]]), "a corner lacks its vertex")
     return counts, v, vt, vn
-
-
-def _resolve(faces: Statements, row: Longs, index: Longs, before: Longs, have: int, one: str, many: str) -> Longs:
-    """Indices from 0, of indices from 1 or, negative, from the last one read before the face."""
-    resolved = np.where(index > 0, index - 1, before + index)
-    bad = np.flatnonzero((resolved < 0) | (resolved >= have))
-    if len(bad):
-        what = f"{one} {index[bad[0]]} does not exist, there are {have} {many}"
-        raise faces.error(int(row[bad[0]]), what)
-    return resolved
-
-
-def _starts(letters: npt.NDArray[np.uint8]) -> Longs:
-    """Where words begin."""
-    blank = letters <= BLANK
-    return np.flatnonzero(~blank & np.concatenate([[True], blank[:-1]]))
-
-
-def _counts(text: bytes, starts: Longs) -> Longs:
-    """Words on each line."""
-    ends = np.flatnonzero(np.frombuffer(text + b"\n", np.uint8) == ord("\n"))
-    return np.diff(np.searchsorted(starts, ends), prepend=0)
-
-
-def _parse(text: bytes, dtype: Any, found: Statements, pattern: bytes, expected: int) -> npt.NDArray[Any]:
-    """`expected` numbers; where the quick parser stumbles, the pattern of a good row finds the bad one."""
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("error")  # numpy warns where it stops short of the end
-            values = np.fromstring(text, dtype, sep=" ")
-        if len(values) == expected:
-            return values
-    except (ValueError, DeprecationWarning):
-        pass
-    for row, content in enumerate(found.rows):
-        if not re.fullmatch(pattern, content, re.IGNORECASE):
-            raise found.error(row, "not understood")
-    raise ParseError("it holds numbers that can't be read")
-
-
-def _shown(row: bytes) -> str:
-    """A row for a message: short, printable."""
-    text = row[:60].decode("utf-8", "replace").strip()
-    return repr(text + ("…" if len(row) > 60 else "")) if text else "nothing follows"

@@ -66,7 +66,7 @@ def _count_of(p: Property) -> str:
     return f"count of {p.name}"
 
 
-def read_ply(data: bytes) -> Parts:
+def read_ply(data: memoryview) -> Parts:
     elements, encoding, start = _header(data)
     body = Body(data, start) if encoding != "ascii" else _text_as_binary(data, start, elements)
     vertex: Columns = {}
@@ -98,7 +98,7 @@ def read_ply(data: bytes) -> Parts:
         raise ParseError(f"face {face} (counted from 0) names vertex {corners[at]}; there are {len(vertices)}")
     return Parts(
         vertices,
-        corners[triangulate(vertices, corners, counts)],
+        corners.reshape(-1, 3) if (counts == 3).all() else corners[triangulate(vertices, corners, counts)],
         _named(vertex, (("nx", "ny", "nz"),)),
         _named(vertex, UVS),
         _named(vertex, UVS_1),
@@ -125,11 +125,12 @@ def _colors(columns: Columns, declared: dict[str, str]) -> Floats | None:
     return found.astype(np.float32) if kind[0] == "f" else linear(found / np.iinfo(kind).max)
 
 
-def _header(data: bytes) -> tuple[list[Element], str, int]:
+def _header(view: memoryview) -> tuple[list[Element], str, int]:
     """The elements in order, the byte order (`<`, `>`, or `ascii`), and where the data begin."""
+    data = bytes(view[:HEADER_BYTES])
     if not data.startswith((b"ply\n", b"ply\r")):
         raise ParseError("not a PLY file: it does not begin with `ply`")
-    end = data.find(b"end_header", 0, HEADER_BYTES)
+    end = data.find(b"end_header")
     newline = data.find(b"\n", end)
     if end < 0 or newline < 0:
         raise ParseError("the header is cut off: no `end_header`")
@@ -167,7 +168,7 @@ def _header(data: bytes) -> tuple[list[Element], str, int]:
 class Body:
     """The data after the header, eaten element by element; never gives out more than the file holds."""
 
-    def __init__(self, data: bytes, at: int) -> None:
+    def __init__(self, data: bytes | memoryview, at: int) -> None:
         self.data, self.at = data, at
 
     def rows(self, element: Element, lengths: dict[str, int] | None = None) -> npt.NDArray[np.void]:
@@ -234,12 +235,12 @@ def _whole(values: npt.NDArray[Any]) -> Longs:
     return values.astype(np.int64)
 
 
-def _text_as_binary(data: bytes, start: int, elements: list[Element]) -> Body:
+def _text_as_binary(data: memoryview, start: int, elements: list[Element]) -> Body:
     """The numbers of a text file as float64, so that one reader does for both: they hold any 32-bit index exactly."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy warns where it stops short of the end
         try:
-            numbers = np.fromstring(data[start:], "<f8", sep=" ")
+            numbers = np.fromstring(bytes(data[start:]), "<f8", sep=" ")
         except (ValueError, DeprecationWarning):
             raise ParseError("its data hold something that is not a number") from None
     for p in (p for element in elements for p in element.properties):

@@ -33,7 +33,11 @@ SECONDS_PER_BYTE = 0.25 / (1 << 20)
 CLOSING_SECONDS = 5.0
 START_SECONDS = 30.0  # libraries read from a cold disk
 # One thread each: a second one gains nothing on files of this size and takes address space from the limit.
-THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENIMAGEIO_THREADS": "1"}
+# And what a big file took goes back to the machine: glibc else keeps blocks of up to 32 MiB for the next one.
+THREADS = {
+    **{"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1", "OPENIMAGEIO_THREADS": "1"},
+    **{"MALLOC_MMAP_THRESHOLD_": "1048576", "MALLOC_TRIM_THRESHOLD_": "4194304"},
+}
 CRASHES = {
     signal.SIGXCPU: "reading it takes more processor time than the {seconds:g} s allowed",
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
