@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import ctypes
 import logging
 import os
 import signal
@@ -47,6 +48,8 @@ TICKS = 50  # of uvicorn, ten a second: how often closed connections are looked 
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
 
+M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
+
 log = logging.getLogger(__name__)
 
 
@@ -78,6 +81,7 @@ def create_app(config: Config) -> FastAPI:
 
 def run(config: Config) -> int:
     """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 when the address can't be had."""
+    _give_memory_back()
     try:
         listener = socket.create_server((config.host, config.port), family=_family(config.host), backlog=2048)
     except OSError as error:
@@ -190,6 +194,15 @@ def _bounds(config: Config) -> Bounds:
 
 async def _docs() -> Response:
     return FileResponse(WEB / "docs.html")
+
+
+def _give_memory_back() -> None:
+    """Has glibc return freed blocks of a megabyte at once. It learns to keep ones of up to 32 MiB for the next, and
+    here they are a scene's arrays: 95 MB stayed after a mesh of a million triangles was packed."""
+    with contextlib.suppress(AttributeError):  # another C library
+        libc = ctypes.CDLL(None)
+        libc.mallopt(M_MMAP_THRESHOLD, 1 << 20)
+        libc.mallopt(M_TRIM_THRESHOLD, 4 << 20)
 
 
 def _family(host: str) -> socket.AddressFamily:
