@@ -1,4 +1,4 @@
-"""Pictures for the eye of what is not colour, and which pixels the noise meter looks at. Runs without GL."""
+"""Pictures for the eye of what is not colour. Runs without GL."""
 
 from __future__ import annotations
 
@@ -36,23 +36,3 @@ def _coloured(ids: np.ndarray) -> np.ndarray:
     hue = 2 * np.pi * ((ids.astype(np.float64) * 0.6180339887498949) % 1)
     phase = np.array([0, 2, 4]) * np.pi / 3
     return np.where(ids > 0, 0.55 + 0.4 * np.cos(hue - phase), 0.0)
-
-
-def _hash(x: np.ndarray) -> np.ndarray:
-    """`sobol_hash` of shaders/sobol.glsl."""
-    low = np.uint64(0xFFFFFFFF)
-    s = (x * np.uint64(747796405) + np.uint64(2891336453)) & low
-    w = (((s >> ((s >> np.uint64(28)) + np.uint64(4))) ^ s) * np.uint64(277803737)) & low
-    out: np.ndarray = (w >> np.uint64(22)) ^ w
-    return out
-
-
-def meter_pixels(cells: tuple[int, int], stride: int, size: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-    """x and y of the pixel that stands for each cell, row by row: `camera_pixel` of shaders/camera.glsl."""
-    y, x = (a.astype(np.uint64) for a in np.divmod(np.arange(cells[0] * cells[1]), cells[0]))
-    h = _hash(x ^ _hash(y)) if stride > 1 else np.zeros(len(x), np.uint64)
-    px = np.minimum(x * np.uint64(stride) + h % np.uint64(stride), np.uint64(size[0] - 1)).astype(np.int64)
-    py = np.minimum(y * np.uint64(stride) + (h >> np.uint64(8)) % np.uint64(stride), np.uint64(size[1] - 1)).astype(
-        np.int64
-    )
-    return px, py

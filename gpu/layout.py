@@ -323,7 +323,7 @@ class Frame(Record):
     environment_probability: f32  # of picking the environment among the lights
     moment_scale: f32  # second moments are of radiance times this
     environment_background: u32
-    pixel_stride: u32  # 1: every pixel; n: one pixel of each n x n block, for the noise meter
+    slot_width: u32  # of a row of the accumulators: the picture's, or the noise meter's
     environment_cube: u32  # 1: its texture holds the six faces of a cube
     environment_sun: vec3  # unit, towards the sun's middle, before the environment's rotation
     environment_sun_cap: f32  # 1 - cos of its angular radius

@@ -12,9 +12,10 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
-from gpu import display, features, filters, layout
+from gpu import display, features, filters, layout, meter
 from gpu.errors import NothingRendered
 from gpu.layout import Slot
+from gpu.meter import Meter
 from gpu.program import Kernels
 from gpu.saved import Saved
 from gpu.scene import Scene
@@ -23,7 +24,6 @@ from gpu.tiles import Tile, Tiles
 
 _GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
 _GUIDE_PIXELS = 1 << 16  # traced at once for them: 25 ms on llvmpipe in a large mesh
-_METER_PIXELS = 4096  # the noise meter looks at about so many pixels
 _LINE = 1024  # pixels that resolve.comp takes for a row
 _ALIGNED = 32  # pixels: a multiple of it is, at 8 bytes or 16, where a binding may begin on any driver
 IDS = ("shape_id", "material_id")
@@ -37,27 +37,22 @@ class Picture:
         self.scene, self.settings = scene, settings
         self.compile_ms = 0.0
         pixels = settings.width * settings.height
-        self._stride = max(1, min(8, math.isqrt(max(1, pixels // _METER_PIXELS))))
-        self._cells = (-(-settings.width // self._stride), -(-settings.height // self._stride))
         self._main: dict[Slot, Any] = {}
-        self._meter: dict[Slot, Any] = {}
         self._guides: dict[Slot, Any] = {}
         self._ended = context.buffer(reserve=16)
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
         self._kernel: Any = None
         self._most_pixels = contexts.storage_block_bytes(context) // 16 // _ALIGNED * _ALIGNED - _ALIGNED
+        self._meter = Meter(context, kernels, (settings.width, settings.height), self._most_pixels)
         self._cut()
         try:
-            self._allocate(self._main, pixels)
-            self._allocate(self._meter, self._cells[0] * self._cells[1])
+            for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
+                self._main[slot] = contexts.allocate(self.context, 16 * pixels)
+            self._meter.allocate()
             self.reset()
         except Exception:
             self.release()
             raise
-
-    def _allocate(self, out: dict[Slot, Any], pixels: int) -> None:
-        for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
-            out[slot] = contexts.allocate(self.context, 16 * pixels)
 
     def configure(self, settings: RenderSettings) -> None:
         """Other settings at the same size; starts again."""
@@ -99,12 +94,12 @@ class Picture:
     def _cut(self) -> None:
         s = self.settings
         self._tiles = Tiles(s.width, s.height, self._most_pixels, s.max_bounces)
-        self._meter_tiles = Tiles(*self._cells, self._most_pixels, s.max_bounces)
+        self._meter_tiles = Tiles(meter.LINE, self._meter.lines, self._most_pixels, s.max_bounces)
 
     @property
     def state(self) -> list[Any]:
         """The buffers that samples are added to."""
-        return [*self._main.values(), *self._meter.values(), self._ended]
+        return [*self._main.values(), *self._meter.buffers.values(), self._ended]
 
     @property
     def under_way(self) -> tuple[int, int, int]:
@@ -146,7 +141,8 @@ class Picture:
         self._bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
-                self._pass_samples = min(self._tiles.pass_samples(self.samples), max_samples - self.samples)
+                end = min(max_samples, meter.FROM) if self.samples < meter.FROM else max_samples
+                self._pass_samples = min(self._tiles.pass_samples(self.samples), end - self.samples)
             self._slice()
             if time.perf_counter() - start >= budget_s:
                 break
@@ -165,7 +161,11 @@ class Picture:
         self._column = tile[0] + tile[2]
         if self._column >= tiles.size[0]:
             self._column, self._row = 0, self._row + tile[3]
-        if self._row >= height + self._cells[1]:
+        after = self.samples + self._pass_samples
+        if self._row == height and self._column == 0 and self.samples < meter.FROM <= after:
+            self._meter.place(self._main, self.settings.seed)
+            self._bind()
+        if self._row >= height + self._meter.lines or (self._row >= height and after < meter.FROM):
             self._row = 0
             self.samples += self._pass_samples
             self._pass_samples = 0
@@ -179,7 +179,7 @@ class Picture:
         frame["sample_first"], frame["sample_count"] = first, count
         frame["max_bounces"], frame["roulette_depth"], frame["seed"] = s.max_bounces, s.roulette_depth, s.seed
         frame["clamp_radiance"] = s.clamp or 0.0
-        frame["pixel_stride"] = 1
+        frame["slot_width"] = s.width
         return frame
 
     def _bind(self) -> None:
@@ -200,11 +200,13 @@ class Picture:
         return first
 
     def _dispatch(self, tile: Tile, metering: bool) -> None:
-        frame = self._frame(tile[:2], tile[2:], self.samples, self._pass_samples)
         if metering:
-            frame["pixel_stride"], frame["replicate"] = self._stride, 1
-            frame["slot_first"] = self._bind_part(self._meter, tile, self._cells[0])
+            first = self.samples if self.samples >= meter.FROM else 0
+            frame = self._frame(tile[:2], tile[2:], first, self.samples + self._pass_samples - first)
+            frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, meter.LINE
+            frame["slot_first"] = self._bind_part(self._meter.buffers, tile, meter.LINE)
         else:
+            frame = self._frame(tile[:2], tile[2:], self.samples, self._pass_samples)
             frame["slot_first"] = self._bind_part(self._main, tile, self.settings.width)
         self._frame_buffer.write(frame.tobytes())
         self._kernel.run(-(-tile[2] // 8), -(-tile[3] // 8))
@@ -298,24 +300,12 @@ class Picture:
         return self._guide_samples >= want
 
     def noise(self) -> float | None:
-        """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black.
-
-        From a second, independent scramble of the sampler on a share of the pixels: half the mean squared
-        difference of two estimates of a pixel is its variance, whatever the sampler gains.
-        """
+        """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""
         if self.samples < 2:
             return None
         contexts.use(self.context)
-        weights = np.array([0.2126, 0.7152, 0.0722], np.float32)
-        mean = self.read()[..., :3] @ weights
-        at = display.meter_pixels(self._cells, self._stride, (self.settings.width, self.settings.height))
-        sums = np.frombuffer(self._meter[Slot.SUM].read(), np.float32).reshape(-1, 4)[:, :3]
-        other = sums / self.samples @ weights
-        average = float(mean.mean(dtype=np.float64))
-        if average == 0:
-            return 0.0
-        difference = (mean[at[1], at[0]].astype(np.float64) - other) / average
-        return float(np.sqrt(0.5 * np.mean(difference**2)))
+        scale = float(self.scene.arrays.radiance_scale)
+        return self._meter.noise(self._main, self.samples >= meter.FROM, scale)
 
     def display(
         self,

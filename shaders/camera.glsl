@@ -14,16 +14,10 @@ void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
     d = normalize(through);
 }
 
-// The pixel of this invocation, and whether there is one. With a stride, one pixel of each block, at a place that
-// is fixed by hash, stands for the block.
+// The pixel of this invocation, and whether there is one.
 bool camera_pixel(out uvec2 pixel, out uint slot) {
     uvec2 g = gl_GlobalInvocationID.xy;
-    uvec2 cell = frame.tile_origin + g;
-    uint stride = frame.pixel_stride;
-    uvec2 cells = (frame.resolution + stride - 1u) / stride;
-    bool there = g.x < frame.tile_size.x && g.y < frame.tile_size.y && cell.x < cells.x && cell.y < cells.y;
-    uint h = stride > 1u ? sobol_hash(cell.x ^ sobol_hash(cell.y)) : 0u;
-    pixel = min(cell * stride + uvec2(h % stride, (h >> 8u) % stride), frame.resolution - 1u);
-    slot = cell.y * cells.x + cell.x - frame.slot_first;
-    return there;
+    pixel = frame.tile_origin + g;
+    slot = pixel.y * frame.slot_width + pixel.x - frame.slot_first;
+    return g.x < frame.tile_size.x && g.y < frame.tile_size.y;
 }

@@ -21,6 +21,7 @@ void main() {
     // million samples 4e-8, where a plain sum has 9e-5 and a running average 4e-4.
     precise vec4 sum = sums[slot], lost = compensations[slot];
     vec4 moment = moments[slot];
+    if (frame.replicate != 0u) pixel = uvec2(moment.xy); // the meter's buffers say where (gpu/meter.py)
     uint i = 0u;
     do {
         Sampler rng = sobol_begin(pixel, frame.sample_first + i);

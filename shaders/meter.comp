@@ -1,0 +1,61 @@
+// Entry: what the noise meter asks of the accumulators, of which a part is bound. METER_WEIGH 1: how much each block of
+// pixels errs, as far as its samples and its neighbours' say. 0: sums over all pixels, and the metered pixels' values.
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "layout.glsl"
+layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
+
+// Of the luminance, times (n - 1) of the sum's n samples: as if channels went together, which they nearly do.
+float meter_spread(uint slot) {
+    float s = dot(sqrt(max(moments[slot].rgb, vec3(0.0))), vec3(0.2126, 0.7152, 0.0722));
+    return s * s;
+}
+
+#if METER_WEIGH
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };
+uniform uvec2 size; // of the bound rows
+uniform uint block; // pixels a side
+
+void main() {
+    uvec2 b = gl_GlobalInvocationID.xy, blocks = (size + block - 1u) / block;
+    if (b.x >= blocks.x || b.y >= blocks.y) return;
+    // One pixel around it: where few samples found a thin edge, its neighbours lie on the edge as well.
+    uvec2 low = uvec2(max(ivec2(b * block) - 1, ivec2(0))), high = min((b + 1u) * block + 1u, size);
+    float sum = 0.0;
+    uint y = low.y;
+    do {
+        uint x = low.x;
+        do sum += meter_spread(y * size.x + x);
+        while (++x < high.x);
+    } while (++y < high.y);
+    weights[b.y * blocks.x + b.x] = sum / float((high.x - low.x) * (high.y - low.y));
+}
+#else
+layout(std430, binding = SLOT_SUM) readonly buffer sum_buffer { vec4 sums[]; };
+layout(std430, binding = SLOT_COMPENSATION) readonly buffer place_buffer { vec4 places[]; };
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 results[]; };
+uniform uint first; // pixel of the bound part
+uniform uint count; // of its pixels
+uniform uint width; // of the picture
+uniform uint lines; // of METER_LINE invocations
+
+float meter_luminance(uint slot) {
+    return dot(sums[slot].rgb, vec3(0.2126, 0.7152, 0.0722)) / max(moments[slot].w, 1.0);
+}
+
+void main() {
+    uvec2 g = gl_GlobalInvocationID.xy;
+    if (g.x >= uint(METER_LINE) || g.y >= lines) return;
+    uint i = g.y * uint(METER_LINE) + g.x, k = i;
+    vec4 result = vec4(0.0); // luminance, its variance, both summed; and the metered pixel's, where it is bound
+    if (k < count) {
+        do {
+            float n = moments[k].w;
+            result.xy += vec2(meter_luminance(k), n > 1.0 ? meter_spread(k) / (n * (n - 1.0)) : 0.0);
+            k += uint(METER_LINE) * lines;
+        } while (k < count);
+    }
+    uint pixel = uint(places[i].y) * width + uint(places[i].x) - first;
+    if (pixel < count) result.z = meter_luminance(pixel);
+    results[i] = result;
+}
+#endif

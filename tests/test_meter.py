@@ -1,0 +1,118 @@
+"""The noise meter against the real error, which pixels it draws, and that it disturbs nothing."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer
+from gpu.meter import FROM, draw, inclusion
+from service import presets
+from tests.rendering import Images, document, picture
+
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+SHAPES = [
+    {"type": "sphere", "center": [0, 0, 0], "radius": 0.8, "material": "ball"},
+    {"type": "quad", "origin": [-6, -0.8, 6], "u": [12, 0, 0], "v": [0, 0, -12], "material": "floor"},
+]
+FLOOR = {"type": "diffuse", "albedo": 0.5}
+
+
+def under_a_lamp(ball: dict[str, Any]) -> dict[str, Any]:
+    """A small lamp in sight, whose edges carry most of the error."""
+    lamp = {"type": "quad", "origin": [-0.4, 1.2, -0.4], "u": [0.8, 0, 0], "v": [0, 0, 0.8], "material": "lamp"}
+    materials = {"ball": ball, "floor": FLOOR, "lamp": {"type": "diffuse", "albedo": 0, "emission": 30}}
+    return document([*SHAPES, lamp], materials, environment={"type": "constant", "radiance": 0.3})
+
+
+SCENES = {
+    "cornell": presets.get("scenes", "cornell-boxes"),
+    "rough metal": under_a_lamp({"type": "principled", "metallic": 1, "roughness": 0.3}),
+    "rough glass": under_a_lamp({"type": "principled", "transmission": 1, "roughness": 0.4}),
+    "furnace": document(SHAPES[:1], {"ball": FLOOR}, environment={"type": "constant", "radiance": 1}),
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_it_tells_the_truth(gpu: Renderer, name: str) -> None:
+    """Within 20 % from 16 samples on, for both samplers; over two seeds, for a picture's own error scatters too."""
+    settings: dict[str, Any] = {"width": 64, "height": 64, "max_bounces": 4, "filter": "blackman_harris"}
+    assets: Any = Images()
+    halves = [luminance(picture(gpu, SCENES[name], 600, assets, seed=s, **settings)) for s in (11, 12)]
+    reference, doubt = (halves[0] + halves[1]) / 2, ((halves[0] - halves[1]) ** 2).mean() / 4
+    for sampler in ("sobol", "independent"):
+        made = [picture(gpu, SCENES[name], 1, assets, sampler=sampler, seed=s, **settings) for s in (1, 2)]
+        for samples in (16, 64):
+            squares = []
+            for one in made:
+                one.trace(600, samples)
+                squares.append(((luminance(one) - reference) ** 2).mean() - doubt)
+            error = np.sqrt(np.mean(squares)) / reference.mean()
+            assert np.mean([one.noise() or 0.0 for one in made]) == pytest.approx(error, rel=0.2), (sampler, samples)
+
+
+def luminance(made: Any) -> np.ndarray:
+    values: np.ndarray = made.read()[..., :3].astype(float) @ LUMINANCE
+    return values
+
+
+def test_nothing_black_and_tiny(gpu: Renderer) -> None:
+    lit = document(SHAPES, {"ball": FLOOR, "floor": FLOOR}, environment={"type": "constant", "radiance": 1})
+    for size in ((1, 1), (3, 2), (70, 1)):
+        made = picture(gpu, lit, 1, width=size[0], height=size[1])
+        assert made.noise() is None
+        for samples in (2, FROM - 1, FROM, 40):
+            made.trace(60, samples)
+            noise = made.noise()
+            assert noise is not None and 0 <= noise < 10
+    dark = picture(gpu, document(SHAPES, {"ball": FLOOR, "floor": FLOOR}), 20)
+    assert dark.noise() == 0
+
+
+@pytest.mark.parametrize("radiance", [1e-20, 1e20])
+def test_it_knows_no_scale(gpu: Renderer, radiance: float) -> None:
+    def noise(radiance: float, samples: int) -> float:
+        sky = {"type": "constant", "radiance": radiance}
+        scene = document(SHAPES, {"ball": FLOOR, "floor": FLOOR}, environment=sky)
+        measured = picture(gpu, scene, samples, max_bounces=3).noise()
+        assert measured is not None
+        return measured
+
+    for samples in (4, 20):
+        assert noise(radiance, samples) == pytest.approx(noise(1, samples), rel=1e-3)
+
+
+def test_the_cut_of_the_work_does_not_show(gpu: Renderer) -> None:
+    made = [picture(gpu, SCENES["rough metal"], 1, width=48, height=40) for _ in range(2)]
+    made[0].trace(600, 50)
+    for samples in range(2, 51):
+        made[1].trace(0.0, samples)
+        while made[1].samples < samples:
+            made[1].trace(0.0, samples)
+    assert np.array_equal(made[0].read(), made[1].read()) and made[0].noise() == made[1].noise()
+
+
+def test_pixels_are_drawn_by_their_weights() -> None:
+    weights = np.zeros((40, 50))
+    weights[20, 5:45] = 1  # a thin bright edge carries all that is known
+    drawn = np.concatenate([draw(weights, (50, 40), 1, 200, seed) for seed in range(200)])
+    seen = np.zeros((40, 50))
+    np.add.at(seen, (drawn[:, 1].astype(int), drawn[:, 0].astype(int)), 1 / 200)
+    assert seen[20, 5:45] == pytest.approx(1) and seen.max() == pytest.approx(1)  # always, and never twice
+    assert seen[:20].mean() == pytest.approx(160 / 1960, rel=0.05)
+    assert drawn[:, 2].sum() / 200 == pytest.approx(2000, rel=0.02)  # each stands for as many as its chance says
+
+
+def test_blocks_at_the_rim_have_fewer_pixels() -> None:
+    drawn = draw(np.ones((3, 4)), (7, 5), 2, 35, 0)
+    assert drawn[:, 0].max() <= 6 and drawn[:, 1].max() <= 4
+    assert len(drawn) <= 12 and drawn[:, 2].sum() == pytest.approx(35)
+
+
+def test_chances_sum_to_the_count_and_end_at_one() -> None:
+    shares = np.array([1000.0, 100.0, 1.0, 1.0, 1.0, 1.0])
+    chances = inclusion(shares, 3)
+    assert chances.sum() == pytest.approx(3) and chances[:2] == pytest.approx(1)
+    assert inclusion(np.ones(5), 5) == pytest.approx(1)
