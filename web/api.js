@@ -1,6 +1,8 @@
 // Every URL and every message shape of the service, in one place. URLs are relative to the page,
 // so that the editor works under a subpath too.
 
+import { readKey } from "./key.js";
+
 const root = new URL("v1/", document.baseURI);
 
 export const PROTOCOL = "sunbox.v1";
@@ -15,22 +17,67 @@ export class Problem extends Error {
   }
 }
 
-async function get(path) {
-  const response = await fetch(new URL(path, root), { headers: { accept: "application/json" } });
-  const body = await response.json().catch(() => ({}));
-  if (!response.ok) throw new Problem({ status: response.status, title: response.statusText, ...body });
-  return body;
+const authorization = () => (readKey() ? { authorization: `Bearer ${readKey()}` } : {});
+
+async function ask(method, path, { body, headers = {}, signal } = {}) {
+  const response = await fetch(new URL(path, root), {
+    method, body, signal, headers: { accept: "application/json", ...authorization(), ...headers },
+  });
+  if (response.ok) return response;
+  const told = await response.json().catch(() => ({}));
+  throw new Problem({ status: response.status, title: response.statusText, ...told });
 }
 
+const json = (document) => ({ body: JSON.stringify(document), headers: { "content-type": "application/json" } });
+const get = async (path) => (await ask("GET", path)).json();
+
 export const fetchSchema = () => get("schema");
+export const fetchApi = async () => (await fetch(new URL("openapi.json", document.baseURI))).json();
 export const listPresets = (kind) => get(`presets/${kind}`);
 export const fetchPreset = (kind, name) => get(`presets/${kind}/${encodeURIComponent(name)}`);
 
-export function streamUrl() {
+const saved = (kind, name) => `documents/${kind}/${encodeURIComponent(name)}`;
+export const listSaved = (kind) => get(`documents/${kind}`);
+export const fetchSaved = (kind, name) => get(saved(kind, name));
+export const save = (kind, name, document) => ask("PUT", saved(kind, name), json(document));
+export const forget = (kind, name) => ask("DELETE", saved(kind, name));
+
+export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
+
+// A small picture of a scene, as a PNG.
+export const renderPicture = async (scene, settings, signal) =>
+  (await ask("POST", "render?format=png", { ...json({ scene, settings }), signal })).blob();
+
+export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;
+
+// Uploads a file: what the server says of it, {id, kind, ...}. `progress(share)` is told how much has gone.
+export function upload(file, progress) {
+  return new Promise((resolve, reject) => {
+    const request = new XMLHttpRequest(); // fetch does not tell how far a body is
+    request.open("POST", new URL(`assets?filename=${encodeURIComponent(file.name.slice(-200))}`, root));
+    for (const [name, value] of Object.entries(authorization())) request.setRequestHeader(name, value);
+    request.setRequestHeader("content-type", "application/octet-stream");
+    request.responseType = "json";
+    request.upload.onprogress = ({ loaded, total }) => progress(total ? loaded / total : 0);
+    request.onload = () => {
+      const told = request.response ?? {};
+      if (request.status < 300) resolve(told);
+      else reject(new Problem({ status: request.status, title: request.statusText, ...told }));
+    };
+    request.onerror = () => reject(new Error("The connection was lost on the way."));
+    request.send(file);
+  });
+}
+
+// Where the stream is; `session` takes up one that was cut off.
+export function streamUrl(session) {
   const url = new URL("stream", root);
   url.protocol = url.protocol === "https:" ? "wss:" : "ws:";
+  if (session) url.searchParams.set("session", session);
   return url.href;
 }
+
+export const streamProtocols = () => (readKey() ? [PROTOCOL, `sunbox.key.${readKey()}`] : [PROTOCOL]);
 
 export const message = {
   start: (generation, { scene, settings, view }) => ({ type: "start", generation, scene, settings, view }),
@@ -39,11 +86,12 @@ export const message = {
   ack: (seq) => ({ type: "ack", seq }),
   pause: () => ({ type: "pause" }),
   resume: () => ({ type: "resume" }),
+  ping: () => ({ type: "ping" }),
 };
 
 // A binary frame: u32 little-endian length, that much JSON, the image's bytes.
 export function parseFrame(buffer) {
   const length = new DataView(buffer).getUint32(0, true);
   const header = JSON.parse(new TextDecoder().decode(new Uint8Array(buffer, 4, length)));
-  return { header, blob: new Blob([new Uint8Array(buffer, 4 + length)], { type: header.mime }) };
+  return { header, bytes: buffer.slice(4 + length) };
 }

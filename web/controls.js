@@ -84,6 +84,25 @@ function toggle(field, id, { input, commit }) {
   return { element: box, show: (value) => { box.checked = Boolean(value); } };
 }
 
+// Three numbers in a row; a single one in the document stands for all three.
+function vector(field, id, { input, commit, refuse, restore }) {
+  let latest = [0, 0, 0];
+  const entries = ["X", "Y", "Z"].map((axis, i) => {
+    const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
+      input: (value) => input(latest.map((x, k) => (k === i ? value : x))), commit, refuse, restore,
+    });
+    entry.element.setAttribute("aria-label", `${field.title}, ${axis}`);
+    return entry;
+  });
+  return {
+    element: element("div", { class: "vector" }, ...entries.map((entry) => entry.element)),
+    show(value) {
+      latest = Array.isArray(value) ? value : [value ?? 0, value ?? 0, value ?? 0];
+      entries.forEach((entry, i) => entry.show(latest[i]));
+    },
+  };
+}
+
 const NUMBERS = /^\s*[\d.eE+-]+(?:[\s,]+[\d.eE+-]+){2}\s*$/;
 
 // Swatch and text; a colour that may pass 1 is split into a tint and a strength.
@@ -161,6 +180,8 @@ const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
 
 export function control(field, id, events) {
   if (field.widget === "color") return color(field, id, events);
+  if (field.widget === "vector") return vector(field, id, events);
+  if (field.widget === "texture") return { element: element("span", { class: "note", id }, "Drop an image here"), show() {} };
   if (field.widget === "choice") return choice(field, id, events);
   if (field.widget === "toggle") return toggle(field, id, events);
   if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);

@@ -1,21 +1,25 @@
-// What the hand does, as changes of the state {scene, settings, view, chosen, home}. `chosen` is what the
-// pickers show, `home` the scene as it was picked.
+// What the hand does, as changes of the state {scene, settings, view, chosen, home, compare}. `chosen` is what
+// the pickers show, `home` the scene as it was picked, `compare` a second variant of one material.
 
 import { fetchPreset } from "./api.js";
-import { orbit, pan, zoom } from "./camera.js";
+import * as moving from "./camera.js";
 import { OWN } from "./library.js";
-import { at, put } from "./patch.js";
-import { defaults, fields, materialModels, model } from "./schema.js";
+import { at, pointer, put } from "./patch.js";
+import { defaults, environmentModels, fields, materialModels, model } from "./schema.js";
 import { Store } from "./store.js";
 
-// The material that the eye goes to: that of the first shape which is not flat.
-function subject({ shapes, materials }) {
-  const shape = shapes.find(({ type }) => type !== "quad") ?? shapes[0];
-  return shape?.material ?? Object.keys(materials)[0];
+// The shape that the eye goes to: the first which is not flat.
+function subject({ shapes }) {
+  const index = shapes.findIndex(({ type }) => type !== "quad");
+  return Math.max(index, 0);
 }
 
 const picked = (name, scene) => ({
-  scene, home: scene, chosen: { scene: name, environment: OWN, material: subject(scene) },
+  scene, home: scene, compare: null,
+  chosen: {
+    scene: name, environment: OWN, thing: pointer("shapes", subject(scene)),
+    material: scene.shapes[subject(scene)]?.material ?? Object.keys(scene.materials)[0],
+  },
 });
 
 export class Editor extends Store {
@@ -30,26 +34,34 @@ export class Editor extends Store {
     this.complain = complain;
     this.forgive = forgive;
     this.#cameraDefaults = defaults(schema.scene, model(schema.scene, schema.scene, "camera"));
+    const move = (how) => (...amounts) => this.#setCamera(how(this.camera, ...amounts), "camera");
     this.moves = {
-      orbit: (right, down) => this.#move(orbit, right, down),
-      pan: (right, down) => this.#move(pan, right, down),
-      zoom: (factor) => this.#move(zoom, factor),
-      rest: () => this.seal(),
+      orbit: move(moving.orbit), look: move(moving.look), pan: move(moving.pan), zoom: move(moving.zoom),
+      fly: move(moving.fly), turn: (share) => this.#turn(share), rest: () => this.seal(),
     };
   }
 
-  #move(how, ...amounts) {
-    const { camera } = this.state.scene;
-    this.#setCamera({ ...camera, ...how({ ...this.#cameraDefaults, ...camera }, ...amounts) }, "camera");
+  // The camera with what its document leaves out.
+  get camera() { return { ...this.#cameraDefaults, ...this.state.scene.camera }; }
+
+  setCamera(members) { this.#setCamera(members, null); }
+
+  #setCamera(members, gesture) {
+    this.change({ scene: { ...this.state.scene, camera: { ...this.state.scene.camera, ...members } } }, gesture);
   }
 
-  #setCamera(camera, gesture) {
-    this.change({ scene: { ...this.state.scene, camera } }, gesture);
+  // Turns the environment by shares of a whole turn.
+  #turn(share) {
+    const { environment } = this.state.scene;
+    if (!environment) return;
+    const { min, max } = fields(this.#schema, environmentModels(this.#schema)[environment.type])
+      .find(({ name }) => name === "rotation").soft;
+    const wound = (environment.rotation ?? 0) + share * 360;
+    const rotation = wound < min ? wound + 360 : wound > max ? wound - 360 : wound;
+    this.change(put(this.state, "/scene/environment/rotation", Number(rotation.toFixed(2))), "turn");
   }
 
-  resetView() {
-    this.#setCamera(this.state.home.camera, null);
-  }
+  resetView() { this.change({ scene: { ...this.state.scene, camera: this.state.home.camera } }); }
 
   // A value at a place such as /scene/camera/vfov; undefined gives it back to its default.
   edit(place, value) {
@@ -57,9 +69,7 @@ export class Editor extends Store {
     this.change(put(this.state, place, value), place);
   }
 
-  rest() {
-    this.seal();
-  }
+  rest() { this.seal(); }
 
   async #fetch(kind, name, use) {
     const turn = ++this.#picks;
@@ -72,47 +82,130 @@ export class Editor extends Store {
     }
   }
 
-  pickScene(name) {
-    return this.#fetch("scenes", name, (scene) => this.change(picked(name, scene)));
-  }
+  pickScene(name) { return this.#fetch("scenes", name, (scene) => this.openScene(scene, name)); }
+
+  openScene(scene, name) { this.change(picked(name, scene)); }
 
   pickEnvironment(name) {
-    const use = (environment) => this.change({
+    if (name === null) this.putEnvironment(undefined, name);
+    else if (name === OWN) this.putEnvironment(this.state.home.environment, name);
+    else this.#fetch("environments", name, (environment) => this.putEnvironment(environment, name));
+  }
+
+  putEnvironment(environment, name = OWN) {
+    this.change({
       ...put(this.state, "/scene/environment", environment),
       chosen: { ...this.state.chosen, environment: name },
     });
-    if (name === null) use(undefined);
-    else if (name === OWN) use(this.state.home.environment);
-    else this.#fetch("environments", name, use);
   }
+
+  // --- materials ---
+
+  // Where the material in hand is: in the scene, or variant B.
+  get materialPlace() {
+    const { chosen, compare } = this.state;
+    const isB = compare?.side === "b" && compare.material === chosen.material;
+    return isB ? "/compare/document" : pointer("scene", "materials", chosen.material);
+  }
+
+  get material() { return at(this.state, this.materialPlace); }
 
   pickMaterial(material) {
-    this.amend({ chosen: { ...this.state.chosen, material } });
+    const shape = this.state.scene.shapes.findIndex((each) => each.material === material);
+    const thing = shape < 0 ? this.state.chosen.thing : pointer("shapes", shape);
+    this.amend({ chosen: { ...this.state.chosen, material, thing } });
   }
 
-  putMaterial(material) {
-    const { scene, chosen } = this.state;
-    this.change({ scene: { ...scene, materials: { ...scene.materials, [chosen.material]: material } } });
-  }
+  putMaterial(material) { this.change(put(this.state, this.materialPlace, material)); }
 
   // Another model for the material: what both know stays, and so does the colour.
-  pickModel(type) {
+  converted(old, type) {
     const models = materialModels(this.#schema);
-    const old = this.state.scene.materials[this.state.chosen.material];
     const [before, after] = [old.type, type].map((each) => fields(this.#schema, models[each]));
     const material = { type };
     for (const { name } of after) if (old[name] !== undefined) material[name] = old[name];
     const [from, to] = [before, after].map((all) => all.find(({ widget }) => widget === "color"));
     if (from && to) material[to.name] = old[from.name] ?? from.initial;
-    this.putMaterial(material);
+    return material;
+  }
+
+  pickModel(type) { this.putMaterial(this.converted(this.material, type)); }
+
+  // --- two variants ---
+
+  // B begins as a copy of the material in hand, so that what changes from here on shows.
+  startComparing() {
+    const { chosen, scene } = this.state;
+    this.change({ compare: { material: chosen.material, document: scene.materials[chosen.material], side: "a" } });
+  }
+
+  stopComparing() { this.change({ compare: null }); }
+
+  editSide(side) {
+    const { compare, chosen } = this.state;
+    this.amend({ compare: { ...compare, side }, chosen: { ...chosen, material: compare.material } });
+  }
+
+  putVariant(document) { this.change({ compare: { ...this.state.compare, document } }); }
+
+  swapVariants() {
+    const { compare, scene } = this.state;
+    const a = scene.materials[compare.material];
+    this.change({
+      compare: { ...compare, document: a },
+      scene: { ...scene, materials: { ...scene.materials, [compare.material]: compare.document } },
+    });
+  }
+
+  // The scene with variant B in the place of A, or null.
+  get sceneB() {
+    const { scene, compare } = this.state;
+    if (!compare || !scene.materials[compare.material]) return null;
+    return { ...scene, materials: { ...scene.materials, [compare.material]: compare.document } };
+  }
+
+  // --- things of the scene ---
+
+  // `thing`: /camera, /environment, /lights/0, /shapes/0.
+  select(thing) {
+    const shape = thing.startsWith("/shapes/") ? at(this.state.scene, thing) : null;
+    const { chosen } = this.state;
+    this.amend({ chosen: { ...chosen, thing, material: shape?.material ?? chosen.material } });
+  }
+
+  add(kind, document) {
+    const { scene, chosen } = this.state;
+    const all = scene[kind] ?? [];
+    this.change({
+      scene: { ...scene, [kind]: [...all, document] },
+      chosen: { ...chosen, thing: pointer(kind, all.length), material: document.material ?? chosen.material },
+    });
+  }
+
+  duplicate(thing) {
+    const [, kind] = thing.split("/");
+    this.add(kind, at(this.state.scene, thing));
+  }
+
+  // A scene keeps at least one shape.
+  removable(thing) {
+    return thing.startsWith("/lights/") || (thing.startsWith("/shapes/") && this.state.scene.shapes.length > 1);
+  }
+
+  remove(thing) {
+    const [, kind, index] = thing.split("/");
+    const { scene, chosen } = this.state;
+    const left = scene[kind].filter((_, i) => i !== Number(index));
+    const next = left.length ? pointer(kind, Math.min(Number(index), left.length - 1)) : "/camera";
+    this.change({ scene: { ...scene, [kind]: left }, chosen: { ...chosen, thing: next } });
   }
 
   // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and
   // says which place the control is for (null: none has it).
   takeBack({ errors }, valid, mark) {
     const places = errors
-      .filter(({ pointer }) => /^\/(scene|settings)(\/|$)/.test(pointer))
-      .map(({ pointer, detail }) => mark(pointer, detail));
+      .filter(({ pointer: wrong }) => /^\/(scene|settings)(\/|$)/.test(wrong))
+      .map(({ pointer: wrong, detail }) => mark(wrong, detail));
     if (!valid || !places.length) return;
     const { scene, settings } = valid;
     if (places.includes(null)) this.amend({ scene, settings: this.#own(settings) });

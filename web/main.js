@@ -1,19 +1,30 @@
 // Wires the rest. State flows one way: control -> store -> stream -> frame -> viewport.
 
-import { fetchPreset, fetchSchema } from "./api.js";
+import { boot } from "./boot.js";
+import { Comparison } from "./compare.js";
+import { Desk, forgetWork, keepWork } from "./desk.js";
+import { element } from "./dom.js";
 import { Editor } from "./editor.js";
-import { watchGestures, watchKeys } from "./gestures.js";
-import { openLibrary } from "./library.js";
-import { Messages } from "./messages.js";
+import * as exporting from "./export.js";
+import { saveAs } from "./files.js";
+import { ACCEPT, Importer, watchDrops } from "./importer.js";
+import { Keep } from "./keep.js";
+import { askForKey } from "./key.js";
+import { fillSheet, watchKeys } from "./keys.js";
+import { Announcer, Messages } from "./messages.js";
 import { DISPLAY, Panel } from "./panel.js";
-import { defaults } from "./schema.js";
+import { defaults, materialModels } from "./schema.js";
+import { essence, linkTo, revived } from "./share.js";
+import { Stage, viewOf } from "./stage.js";
 import { Status } from "./status.js";
 import { Stream } from "./stream.js";
+import { watchTabs } from "./tabs.js";
+import { Thumbnails } from "./thumbnails.js";
 import { Viewport, pictureSize } from "./viewport.js";
+import { inWords } from "./words.js";
 
-const FIRST_SCENE = "sphere-on-floor";
-const BOOT_RETRY_MS = 1500;
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
+const KEEP_REST_MS = 600;
 
 // Pixels that a renderer can keep up with under the hand.
 const AREA = { software: 512 * 512, hardware: 1920 * 1080 };
@@ -22,38 +33,11 @@ const AREA = { software: 512 * 512, hardware: 1920 * 1080 };
 const PAUSED_QUALITY = 90;
 
 const find = (id) => document.getElementById(id);
-const stage = find("stage");
+const root = find("stage");
 const messages = new Messages(find("messages"));
+const announcer = new Announcer(find("announcer"));
 const status = new Status(document);
-
-async function load() {
-  for (;;) {
-    try {
-      const [schema, library] = await Promise.all([fetchSchema(), openLibrary()]);
-      const names = library.scenes.map(({ name }) => name);
-      const name = names.includes(FIRST_SCENE) ? FIRST_SCENE : names[0];
-      const scene = await fetchPreset("scenes", name);
-      messages.hide("connection");
-      return { schema, library, name, scene };
-    } catch (problem) {
-      status.state("Offline");
-      messages.show("connection", { title: "The server does not answer.", detail: "Trying again…", lasting: true });
-      await new Promise((wake) => { setTimeout(wake, BOOT_RETRY_MS); });
-    }
-  }
-}
-
-const { schema, library, name, scene } = await load();
-const editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal") });
-const panel = new Panel(find("panel"), { schema, library, acts: editor });
-
-const displayDefaults = defaults(schema.view, schema.view, DISPLAY);
-
-let info = null;
-let isPaused = false;
-let isConnected = false;
-let ended = null; // the generation that is done
-let painted = 0; // the generation on the canvas
+const desk = new Desk();
 
 function complain(problem) {
   const [first, ...others] = problem.errors ?? [];
@@ -62,74 +46,175 @@ function complain(problem) {
   messages.show("refusal", { title: first ? "Not taken." : "That did not work.", detail });
 }
 
-// What the chosen quality makes of the settings that are not given.
-function knobs() {
-  const { quality = schema.settings.properties.quality.default, time_limit, target_noise } = editor.state.settings;
-  const preset = info?.quality[quality] ?? {};
-  return time_limit || target_noise ? { ...preset, max_samples: null } : preset;
-}
+const { schema, library, calls, name, scene, left } = await boot({
+  keyDialog: find("key-dialog"), complain,
+  told(problem) {
+    if (!problem) return messages.hide("connection");
+    status.state("Offline");
+    messages.show("connection", { title: "The server does not answer.", detail: "Trying again…", lasting: true });
+  },
+});
+const editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal") });
+if (left) editor.amend(left.state);
 
-const limit = () => editor.state.settings.max_samples ?? knobs().max_samples ?? null;
+const displayDefaults = defaults(schema.view, schema.view, DISPLAY);
+const layers = schema.view.properties.aov.enum;
 
-// Tells the stream what is wanted, and the page how things stand.
-function push() {
-  if (!info) return;
-  const { scene, settings, view } = editor.state;
-  const area = Math.min(info.renderer?.software === false ? AREA.hardware : AREA.software, info.limits.max_pixels);
-  const size = pictureSize(stage.getBoundingClientRect(), window.devicePixelRatio, area);
-  stream.show({
-    scene,
-    settings: { ...settings, ...size },
-    // Whole, because a view keeps what a message leaves out.
-    view: { ...displayDefaults, ...view, format: "jpeg", quality: isPaused ? PAUSED_QUALITY : null },
-  });
-  status.state(!isConnected ? "Offline" : isPaused ? "Paused" : ended === painted ? "Done" : "Rendering");
-}
+let info = null;
+let isPaused = false;
+let isConnected = false;
+let isWaiting = false;
+let ended = null; // the generation that is done
+let painted = 0; // the generation on the canvas
+let header = null; // of the frame on the canvas
+let knobs = {}; // what the chosen quality makes of the settings that are not given
 
-function refresh() {
-  panel.show(editor.state, knobs());
-  find("undo").disabled = !editor.canUndo;
-  find("redo").disabled = !editor.canRedo;
-  push();
-}
+const names = (layer) => {
+  const { shapes, materials } = editor.state.scene;
+  return layer === "shape_id" ? shapes.map(({ type, material }, i) => `${i + 1} ${inWords(type)}, ${inWords(material)}`) : Object.keys(materials).map(inWords);
+};
 
-const viewport = new Viewport(find("picture"), (header) => {
-  stage.classList.add("live");
-  painted = header.generation;
-  status.frame(header, limit());
-  push();
+const viewport = new Viewport(find("picture"), {
+  names,
+  painted(frame) {
+    ({ header } = frame);
+    root.classList.add("live");
+    painted = header.generation;
+    status.frame(header, limit());
+    stage.painted(frame);
+    comparison.painted();
+    if (stream.isNewest(painted)) root.setAttribute("aria-busy", "false");
+    tellState();
+  },
 });
 
 const stream = new Stream({
-  hello(hello) {
+  hello(hello, isTakenUp) {
     info = hello;
     isConnected = true;
     messages.hide("connection");
     messages.hide("refusal");
     find("renderer").textContent = info.renderer?.renderer ?? "";
     viewport.restart();
+    if (!isTakenUp) stage.picker.forget();
     refresh();
   },
-  frame: (header, blob, acknowledge) => viewport.show(header, blob, acknowledge),
+  frame: (frame, bytes, view, acknowledge) => viewport.show(frame, bytes, view, acknowledge),
+  waiting(is) {
+    isWaiting = is;
+    if (is) stage.inspector.forget();
+    setTimeout(tellState, is ? 500 : 0);
+  },
   done({ generation }) {
     ended = generation;
-    push();
+    tellState();
+    announcer.say("The picture is done");
+    thumbnails.work();
   },
   refused(problem, valid) {
     editor.takeBack(problem, valid, (pointer, detail) => panel.mark(pointer, detail));
     complain(problem);
   },
-  lost(reason, wait_ms) {
-    isConnected = false;
-    push();
-    messages.show("connection", {
-      title: "The connection to the server was lost.",
-      detail: [reason, wait_ms === null ? "" : "Trying to reconnect…"].filter(Boolean).join(" "),
-      action: { label: "Try now", does: () => stream.retry() },
-      lasting: true,
-    });
+  lost,
+});
+
+function lost({ title, detail = "", key }, wait_ms) {
+  isConnected = false;
+  tellState();
+  if (key) {
+    askForKey(find("key-dialog"), sessionStorage.getItem("sunbox.key") !== null).then(() => stream.retry());
+    return;
+  }
+  messages.show("connection", {
+    title, detail: [detail, wait_ms === null ? "" : "Trying to reconnect…"].filter(Boolean).join(" "),
+    action: { label: wait_ms === null ? "Try again" : "Try now", does: () => stream.retry() }, lasting: true,
+  });
+}
+
+const stage = new Stage({
+  find, acts: editor, desk, stream, viewport, complain, say: (text) => announcer.say(text),
+});
+const thumbnails = new Thumbnails(() => isConnected && ended === painted && !isPaused);
+const importer = new Importer({ schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y) });
+editor.takeTexture = (place, file) => importer.texture(place, file);
+editor.frame = (thing) => stage.frame(thing);
+editor.radius = () => stage.radius();
+const panel = new Panel(find("panel"), {
+  schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch),
+});
+const comparison = new Comparison(
+  { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },
+  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {} },
+);
+
+const keep = new Keep(find("page-keep"), {
+  hasDocuments: Object.keys(calls).some((path) => path.startsWith("/v1/documents")),
+  acts: {
+    document: (kind) => (kind === "scenes" ? editor.state.scene : editor.material),
+    open: (kind, document, title) => (kind === "scenes" ? editor.openScene(document, title) : editor.putMaterial(document)),
+    state: () => essence(editor.state),
+    restore: (kept) => editor.change(revived(kept)),
+    async snapshot() {
+      const { bytes, header: taken } = await stream.capture({ format: "jpeg", quality: 85, aov: "color" });
+      return { blob: new Blob([bytes], { type: taken.mime }), note: `${taken.samples} samples` };
+    },
+    link: () => linkTo(editor.state),
+    command: () => exporting.curl(editor.state.scene, exporting.exactSettings({ ...editor.state.settings, ...size() }, header?.samples ?? 1), shownView()),
+    png: (bits) => exporting.png(stream, bits),
+    exr: () => exporting.exr(stream, layers, { scene: editor.state.scene, settings: { ...editor.state.settings, ...size() } }),
+    complain, announce: (text) => announcer.say(text),
   },
 });
+
+const limit = () => editor.state.settings.max_samples ?? knobs.max_samples ?? null;
+const shownView = () => ({ ...displayDefaults, ...editor.state.view });
+
+// Transparency shows where the scene asks for it, or the person does.
+const isCheckered = () => desk.state.checker ?? editor.state.scene.environment?.background === false;
+
+function size() {
+  const area = Math.min(info.renderer?.software === false ? AREA.hardware : AREA.software, info.limits.max_pixels);
+  return pictureSize(comparison.fit(root.getBoundingClientRect()), window.devicePixelRatio, comparison.isOn ? area / 2 : area);
+}
+
+function tellState() {
+  const busy = isWaiting ? "Preparing" : "Rendering";
+  status.state(!isConnected ? "Offline" : isPaused ? "Paused" : ended === painted && !isWaiting ? "Done" : busy);
+}
+
+// Tells the streams what is wanted, and the page how things stand.
+function push() {
+  if (!info) return;
+  const { scene: document, settings } = editor.state;
+  const second = editor.sceneB;
+  const view = viewOf({ ...desk.state, checkered: isCheckered() }, shownView(), {
+    isPaused: isPaused || (second && comparison.mode === "difference"), quality: PAUSED_QUALITY,
+  });
+  comparison.show(second && { scene: second, settings: { ...settings, ...size() }, view }, isPaused);
+  stream.show({ scene: document, settings: { ...settings, ...size() }, view });
+  root.classList.toggle("checker", isCheckered());
+  find("compare").setAttribute("aria-pressed", String(second !== null));
+  tellState();
+}
+
+let keeping = 0;
+function refresh() {
+  root.setAttribute("aria-busy", "true");
+  const { quality = schema.settings.properties.quality.default, time_limit, target_noise } = editor.state.settings;
+  const preset = info?.quality[quality] ?? {};
+  knobs = time_limit || target_noise ? { ...preset, max_samples: null } : preset;
+  panel.show(editor.state, knobs);
+  if (info) panel.showQualities(info.quality, editor.state.settings);
+  find("undo").disabled = !editor.canUndo;
+  find("redo").disabled = !editor.canRedo;
+  find("paste-material").disabled = clip === null && !navigator.clipboard?.readText;
+  push();
+  if (stream.isNewest(painted)) root.setAttribute("aria-busy", "false");
+  clearTimeout(keeping);
+  if (editor.canUndo || left) keeping = setTimeout(() => keepWork(essence(editor.state)), KEEP_REST_MS);
+}
+
+// --- what buttons and keys do ---
 
 function togglePause() {
   isPaused = !isPaused;
@@ -145,12 +230,8 @@ async function download() {
   const button = find("download");
   button.disabled = true;
   try {
-    const { header, blob } = await stream.capture();
-    const link = document.createElement("a");
-    link.href = URL.createObjectURL(blob);
-    link.download = `sunbox-${editor.state.chosen.scene}-${header.samples}.png`;
-    link.click();
-    setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+    const { blob, header: taken } = await exporting.png(stream, 8);
+    saveAs(blob, `sunbox-${editor.state.chosen.scene || "scene"}-${taken.samples}.png`);
   } catch (error) {
     complain(error);
   }
@@ -163,28 +244,121 @@ function travel(step) {
   step();
 }
 
-editor.subscribe(refresh);
-find("pause").addEventListener("click", togglePause);
-find("download").addEventListener("click", download);
-find("undo").addEventListener("click", () => travel(() => editor.undo()));
-find("redo").addEventListener("click", () => travel(() => editor.redo()));
-find("reset-view").addEventListener("click", () => editor.resetView());
-watchGestures(stage, editor.moves);
-watchKeys(editor.moves, { f: () => editor.resetView(), " ": togglePause });
-document.addEventListener("keydown", (event) => {
-  if (!(event.ctrlKey || event.metaKey) || event.target.dataset?.dirty) return;
-  const key = event.key.toLowerCase();
-  if (key === "z" && !event.shiftKey) travel(() => editor.undo());
-  else if (key === "y" || key === "z") travel(() => editor.redo());
-  else return;
-  event.preventDefault();
+// The browser's clipboard where it lets us, else one of our own.
+let clip = null;
+
+function copyMaterial() {
+  clip = editor.material;
+  navigator.clipboard?.writeText(JSON.stringify(clip, null, 2)).catch(() => {});
+  announcer.say("Material copied");
+  refresh();
+}
+
+async function pasteMaterial() {
+  try {
+    const text = await navigator.clipboard?.readText().catch(() => null);
+    if (text?.trim().startsWith("{")) importer.openJson(text, "pasted");
+    else if (clip) editor.putMaterial(clip);
+  } catch (error) {
+    complain(error);
+  }
+}
+
+const toggle = (member) => desk.set({ [member]: !desk.state[member] });
+const toggleCompare = () => (editor.state.compare ? editor.stopComparing() : editor.startComparing());
+const toggleChecker = () => desk.set({ checker: !isCheckered() });
+const showKeys = () => find("keys-dialog").showModal();
+const reset = () => editor.putMaterial({ type: editor.material.type });
+
+const tools = ["orbit", "fly", "focus", "inspect"];
+const acts = [
+  { keys: ["z"], ctrl: true, shift: false, does: () => travel(() => editor.undo()), says: "undo, also the camera", group: "Work" },
+  { keys: ["z"], ctrl: true, shift: true, does: () => travel(() => editor.redo()), says: "redo", group: "Work" },
+  { keys: ["y"], ctrl: true, does: () => travel(() => editor.redo()), says: "redo", group: "Work" },
+  { keys: ["c"], ctrl: true, notInText: true, does: copyMaterial, says: "copy the material", group: "Work" },
+  { keys: ["v"], ctrl: true, notInText: true, does: pasteMaterial, says: "paste a material or a scene", group: "Work" },
+  { keys: ["o"], ctrl: true, does: () => find("file").click(), says: "open files", group: "Work" },
+  { keys: [" "], does: togglePause, says: "pause, resume", group: "Work" },
+  { keys: ["p"], does: download, says: "the picture as a PNG", group: "Work" },
+  { keys: ["n"], does: () => keep.snapshot(), says: "take a snapshot", group: "Work" },
+  ...tools.map((tool, i) => ({
+    keys: [String(i + 1)], does: () => desk.set({ tool }), group: "Tools",
+    says: ["orbit and select", "look around", "focus by clicking", "zoom to pixels; arrows move the cross"][i],
+  })),
+  { keys: ["f"], does: () => stage.frame(), says: "frame the selection", group: "View" },
+  { keys: ["home"], does: () => editor.resetView(), says: "back to the first view", group: "View" },
+  { keys: ["escape"], does: () => desk.set({ tool: "orbit" }), says: "put the tool away", group: "Tools" },
+  { keys: ["c"], does: toggleCompare, says: "compare two variants", group: "View" },
+  { keys: ["l"], does: () => desk.set({ layer: layers[(layers.indexOf(desk.state.layer) + 1) % layers.length] }), says: "next layer", group: "View" },
+  { keys: ["h"], does: () => toggle("histogram"), says: "histogram", group: "View" },
+  { keys: ["x"], does: () => toggle("clipping"), says: "clipped pixels", group: "View" },
+  { keys: ["k"], does: toggleChecker, says: "checker behind transparency", group: "View" },
+  { keys: ["g"], does: () => toggle("guides"), says: "guides: action and title safe, thirds", group: "View" },
+  { keys: ["?"], does: showKeys, says: "this sheet", group: "Work" },
+];
+watchKeys(stage.keyMove, acts);
+fillSheet(find("keys"), acts);
+
+const clicks = {
+  pause: togglePause, download, compare: toggleCompare, help: showKeys,
+  undo: () => travel(() => editor.undo()), redo: () => travel(() => editor.redo()),
+  frame: () => stage.frame(), "reset-view": () => editor.resetView(), "open-file": () => find("file").click(),
+  "copy-material": copyMaterial, "paste-material": pasteMaterial, "reset-material": reset,
+  theme: () => desk.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
+};
+for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
+
+find("file").accept = ACCEPT;
+find("file").addEventListener("change", async ({ target }) => {
+  await importer.take([...target.files]);
+  target.value = "";
 });
+watchDrops(document, {
+  take: (files, at) => importer.take(files, at),
+  tell(text) {
+    find("drop").hidden = text === null;
+    find("drop-hint").textContent = text ?? "";
+  },
+});
+
+// --- the desk ---
+
+const showTab = watchTabs(find("tabs"), desk.state.tab, (tab) => desk.set({ tab }));
+const layer = find("layer");
+layer.append(...layers.map((each) => element("option", { value: each }, inWords(each))));
+layer.addEventListener("change", () => desk.set({ layer: layer.value }));
+const checks = { histogram: "Histogram", clipping: "Clipped pixels", checker: "Checker behind alpha", guides: "Guides" };
+find("overlays").append(...Object.entries(checks).map(([member, title]) => element("label", {},
+  element("input", {
+    type: "checkbox", class: "toggle", id: `show-${member}`,
+    onchange: () => (member === "checker" ? toggleChecker() : toggle(member)),
+  }), title)));
+
+function showDesk() {
+  const { tab, theme } = desk.state;
+  showTab(tab);
+  layer.value = desk.state.layer;
+  for (const member of Object.keys(checks)) find(`show-${member}`).checked = member === "checker" ? isCheckered() : desk.state[member];
+  if (theme) document.documentElement.dataset.theme = theme;
+  stage.showDesk(desk.state);
+  push();
+}
+
+desk.subscribe(showDesk);
+editor.subscribe(refresh);
 
 let resizing = 0;
 new ResizeObserver(() => {
   clearTimeout(resizing);
-  resizing = setTimeout(push, RESIZE_REST_MS);
-}).observe(stage);
+  resizing = setTimeout(() => { push(); stage.overlay(); }, RESIZE_REST_MS);
+}).observe(root);
 
+if (left?.from === "work") {
+  messages.show("work", {
+    title: "Your last work is back.",
+    action: { label: "Start afresh", does: () => { forgetWork(); messages.hide("work"); editor.openScene(scene, name); } },
+  });
+}
+showDesk();
 refresh();
 stream.connect();

@@ -10,21 +10,39 @@ export class Messages {
     this.root = root;
   }
 
-  // `action` is {label, does}; a message without `lasting` can be closed by hand.
-  show(kind, { title, detail = "", action = null, lasting = false }) {
+  // `action` is {label, does}; a message without `lasting` can be closed by hand; `list` are lines under it.
+  // With `progress` it shows a bar, and what is returned sets it, 0..1.
+  show(kind, { title, detail = "", list = [], action = null, lasting = false, progress = false }) {
     this.hide(kind);
     const button = action && element("button", { type: "button", onclick: action.does }, action.label);
     const close = lasting ? null : element("button", {
       type: "button", class: "close", "aria-label": "Close message", onclick: () => this.hide(kind),
     }, "×");
-    const text = element("p", {}, element("strong", {}, title), detail ? ` ${detail}` : "");
-    const node = element("div", { class: `message ${kind}` }, text, button, close);
+    const text = element("div", {}, element("strong", {}, title), detail ? ` ${detail}` : "");
+    if (list.length) text.append(element("ul", {}, ...list.map((line) => element("li", {}, line))));
+    const bar = progress ? element("progress", { max: "1", value: "0", "aria-label": title }) : null;
+    const node = element("div", { class: `message ${kind}` }, text, bar, button, close);
     this.#shown.set(kind, node);
     this.root.append(node);
+    return (share) => { if (bar) bar.value = share; };
   }
 
   hide(kind) {
     this.#shown.get(kind)?.remove();
     this.#shown.delete(kind);
+  }
+}
+
+// Says short things to a screen reader: the newest one, and not while they still change.
+export class Announcer {
+  #timer = null;
+
+  constructor(root) {
+    this.root = root;
+  }
+
+  say(text) {
+    clearTimeout(this.#timer);
+    this.#timer = setTimeout(() => { this.root.textContent = text; }, 400);
   }
 }

@@ -3,14 +3,16 @@
 
 import { element } from "./dom.js";
 import { OWN, fillPicker, materialButtons } from "./library.js";
-import { equal, pointer } from "./patch.js";
-import { environmentModels, fields, materialModels, model } from "./schema.js";
+import { Outliner, additions } from "./outliner.js";
+import { equal } from "./patch.js";
+import { fields, materialModels } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
+import { qualityChoice } from "./quality.js";
 import { inWords } from "./words.js";
 
 // The settings that stand open; the others are a click away. The picture's size is the window's business.
-const MAIN_SETTINGS = ["quality", "max_samples"];
-const NOT_SETTINGS = ["width", "height"];
+const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "denoise"];
+const NOT_SETTINGS = ["width", "height", "quality"];
 
 // What of a view is a matter of taste; the rest is how the stream carries it.
 export const DISPLAY = ["exposure", "tone_map"];
@@ -21,36 +23,53 @@ export class Panel {
   #forms = {};
   #shape = {}; // what the exchangeable forms were made for
 
-  // `acts` has edit(place, value), rest(), forgive(), pickScene(name), pickEnvironment(name or null or OWN),
-  // pickMaterial(name), pickModel(type), putMaterial(document), complain(problem).
-  constructor(root, { schema, library, acts }) {
+  // `acts`: the editor, and takeTexture(place, file), frame(thing), radius(). `paint` as materialButtons wants it.
+  constructor(root, { schema, library, acts, paint }) {
     this.root = root;
     this.acts = acts;
     this.materials = materialModels(schema.scene);
-    this.environments = environmentModels(schema.scene);
     this.schema = schema;
     const view = fields(schema.view, schema.view);
     const settings = fields(schema.settings, schema.settings).filter(({ name }) => !NOT_SETTINGS.includes(name));
-    const camera = fields(schema.scene, model(schema.scene, schema.scene, "camera"));
     this.#forms.view = this.#mount("view", view.filter(({ name }) => DISPLAY.includes(name)), "/view");
-    const main = MAIN_SETTINGS.map((name) => settings.find((field) => field.name === name));
+    const main = MAIN_SETTINGS.map((name) => settings.find((field) => field.name === name)).filter(Boolean);
     this.#forms.settings = this.#mount("settings", main, "/settings");
-    const more = settings.filter(({ name }) => !MAIN_SETTINGS.includes(name));
-    this.#forms.more = this.#mount("more", more, "/settings");
-    this.#forms.camera = this.#mount("camera", camera, "/scene/camera");
+    this.#forms.more = this.#mount("more", settings.filter((field) => !main.includes(field)), "/settings");
+    this.outliner = new Outliner(root, schema, acts);
+    this.#qualities = qualityChoice(this.#find("qualities"), (name) => acts.edit("/settings/quality", name));
+    this.#pickers(library, paint);
+    this.#additions(schema.scene);
+  }
 
-    fillPicker(this.#find("scene"), library.scenes, (name) => acts.pickScene(name));
+  #qualities;
+
+  #find(id) { return this.root.querySelector(`#${id}`); }
+
+  #pickers(library, paint) {
+    const { acts } = this;
+    fillPicker(this.#find("scene"), [{ name: "", title: "Your own" }, ...library.scenes], (name) => name && acts.pickScene(name));
+    this.#find("scene").options[0].hidden = true;
     const environments = [{ name: OWN, title: "" }, { name: NONE, title: "None (black)" }, ...library.environments];
     fillPicker(this.#find("environment"), environments, (name) => acts.pickEnvironment(name === NONE ? null : name));
     fillPicker(this.#find("material"), [], (name) => acts.pickMaterial(name));
     const models = Object.keys(this.materials).map((name) => ({ name, title: inWords(name) }));
     fillPicker(this.#find("model"), models, (name) => acts.pickModel(name));
-    const swatches = this.#find("material-presets");
-    const put = (material) => acts.putMaterial(material);
-    this.presets = materialButtons(swatches, library.materials, put, acts.complain);
+    this.presets = materialButtons(this.#find("material-presets"), library.materials, {
+      pick: (material) => acts.putMaterial(material), fail: acts.complain, paint,
+    });
   }
 
-  #find(id) { return this.root.querySelector(`#${id}`); }
+  #additions(schema) {
+    const add = this.#find("add");
+    const offers = additions(schema);
+    add.append(...offers.map(({ title }, i) => element("option", { value: String(i) }, title)));
+    add.addEventListener("change", () => {
+      const offer = offers[Number(add.value)];
+      add.value = "";
+      const { acts } = this;
+      acts.add(offer.kind, offer.make(acts.camera, acts.radius(), acts.state.chosen.material));
+    });
+  }
 
   // Puts a form for some fields of the place in the document into the panel.
   #mount(id, chosen, place) {
@@ -58,40 +77,46 @@ export class Panel {
       change: (name, value) => this.acts.edit(`${place}/${name}`, value),
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
+      takeFile: (name, file) => this.acts.takeTexture(`${place}/${name}`, file),
     });
     this.#find(`${id}-form`).replaceChildren(form.element);
     return { place, ...form };
   }
 
-  #remount(id, models, type, place) {
-    if (this.#shape[id] === type + place) return;
-    this.#shape[id] = type + place;
-    this.#forms[id] = this.#mount(id, models[type] ? fields(this.schema.scene, models[type]) : [], place);
-  }
-
   // `knobs`: what the chosen quality makes of the settings that are not given.
-  show({ scene, settings, view, chosen, home }, knobs) {
+  show(state, knobs) {
+    const { scene, settings, view, chosen, home } = state;
     this.#find("scene").value = chosen.scene;
+    if (this.#find("scene").selectedIndex < 0) this.#find("scene").value = "";
     this.#find("environment").value = chosen.environment ?? NONE;
     this.#find("environment").options[0].text = home.environment ? "The scene's own" : "The scene's own: none";
+    this.#showMaterial(scene, chosen);
+    this.outliner.show(state);
+    this.#forms.view.show(view);
+    this.#forms.settings.show(settings, knobs);
+    this.#forms.more.show(settings, knobs);
+  }
+
+  #showMaterial(scene, chosen) {
     const names = Object.keys(scene.materials);
     if (!equal(names, this.#shape.names)) {
       this.#shape.names = names;
       this.#find("material").replaceChildren(...names.map((name) => element("option", { value: name }, inWords(name))));
     }
     this.#find("material").value = chosen.material;
-    const material = scene.materials[chosen.material];
-    const place = pointer("scene", "materials", chosen.material);
-    this.#remount("material", this.materials, material.type, place);
-    this.#remount("environment", this.environments, scene.environment?.type ?? "", "/scene/environment");
+    const { material, materialPlace: place } = this.acts;
+    if (!material) return;
+    if (this.#shape.material !== material.type + place) {
+      this.#shape.material = material.type + place;
+      this.#forms.material = this.#mount("material", fields(this.schema.scene, this.materials[material.type]), place);
+    }
     this.#find("model").value = material.type;
     this.presets.show(material);
     this.#forms.material.show(material);
-    this.#forms.environment.show(scene.environment ?? {});
-    this.#forms.camera.show(scene.camera);
-    this.#forms.view.show(view);
-    this.#forms.settings.show(settings, knobs);
-    this.#forms.more.show(settings, knobs);
+  }
+
+  showQualities(presets, settings) {
+    this.#qualities(presets, settings.quality ?? this.schema.settings.properties.quality.default);
   }
 
   // Says at the control for this place what is wrong with it: the control's place, or null where there is none.
@@ -101,11 +126,13 @@ export class Panel {
       const [name] = wrong.slice(place.length + 1).split("/");
       if (mark(name, text)) return `${place}/${name}`;
     }
-    return null;
+    return this.outliner.mark(wrong, text);
   }
 
   // Takes all such words away.
   forgive() {
     for (const form of Object.values(this.#forms)) form.forgive();
+    this.outliner.forgive();
   }
 }
+

@@ -4,20 +4,33 @@
 import { linear } from "./color.js";
 import { control } from "./controls.js";
 import { element, freshId } from "./dom.js";
-import { equal } from "./patch.js";
+import { acceptFiles } from "./files.js";
+import { equal, isObject } from "./patch.js";
 import { describe } from "./tooltip.js";
 import { unitText } from "./words.js";
 
 const isSame = ({ widget }, a, b) =>
-  widget === "color" && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
+  widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
 
-function row(field, { change, commit, forgive }) {
+// What stands in for the control while an image has its place.
+function textureChip(field, { drop }) {
+  const name = element("span", { class: "name" });
+  const remove = element("button", {
+    type: "button", class: "forget", "aria-label": `Remove the image from ${field.title}`, onclick: drop,
+  }, "×");
+  const node = element("div", { class: "texture", hidden: true }, "▦", name, remove);
+  return { element: node, show: (value) => { name.textContent = value.texture; name.title = JSON.stringify(value); } };
+}
+
+const isTexture = (value) => isObject(value) && value.texture !== undefined;
+
+function row(field, { change, commit, forgive, takeFile }) {
   const id = freshId(field.name);
   const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
   const mark = (text) => {
     trouble.hidden = !text;
     trouble.textContent = text ?? "";
-    for (const input of widget.element.parentNode.querySelectorAll("input, select")) {
+    for (const input of node.querySelectorAll("input, select")) {
       if (text) input.setAttribute("aria-invalid", "true");
       else input.removeAttribute("aria-invalid");
     }
@@ -39,8 +52,10 @@ function row(field, { change, commit, forgive }) {
     label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
   }
   const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
-  const parts = [label, widget.element, reset, hint, trouble];
+  const chip = field.takesTexture && textureChip(field, { drop: () => { change(field.name, undefined); commit(); } });
+  const parts = [label, widget.element, chip?.element, reset, hint, trouble].filter(Boolean);
   const node = element("div", { class: "field", "data-field": field.name }, ...parts);
+  if (chip && takeFile) acceptFiles(node, (file) => takeFile(field.name, file));
   for (const input of node.querySelectorAll("input, select")) {
     input.setAttribute("aria-describedby", `${hint ? hint.id : ""} ${trouble.id}`.trim());
   }
@@ -49,16 +64,23 @@ function row(field, { change, commit, forgive }) {
     element: node, mark,
     show(value, initial = field.initial) {
       latest = value ?? initial;
-      if (trouble.hidden) widget.show(latest); // else what was refused stays in sight
-      reset.hidden = field.required || value === undefined || isSame(field, value, initial);
+      const textured = isTexture(latest);
+      if (chip) {
+        chip.element.hidden = !textured;
+        widget.element.hidden = textured;
+        if (textured) chip.show(latest);
+      }
+      if (trouble.hidden && !textured) widget.show(latest); // else what was refused stays in sight
+      reset.hidden = textured || field.required || value === undefined || isSame(field, value, initial);
     },
   };
 }
 
 // Calls `change(name, value)` with each new value (undefined: the default again), `commit()` when the
-// hand comes to rest, `forgive()` when something refused is taken back by hand.
-export function schemaForm(fields, { change, commit, forgive }) {
-  const rows = new Map(fields.map((field) => [field.name, row(field, { change, commit, forgive })]));
+// hand comes to rest, `forgive()` when something refused is taken back by hand, `takeFile(name, file)` when an
+// image is dropped onto a field that takes textures.
+export function schemaForm(fields, acts) {
+  const rows = new Map(fields.map((field) => [field.name, row(field, acts)]));
   return {
     element: element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
     // `initials` stand in for the schema's defaults where these depend on something else.

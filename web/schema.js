@@ -37,6 +37,10 @@ export const model = (schema, owner, name) =>
 
 export const materialModels = (schema) => variants(schema, property(schema, schema, "materials").additionalProperties);
 export const environmentModels = (schema) => variants(schema, schema.properties.environment);
+export const shapeModels = (schema) => variants(schema, schema.properties.shapes.items);
+export const lightModels = (schema) => variants(schema, schema.properties.lights.items);
+export const transformModel = (schema) =>
+  branches(schema, property(schema, Object.values(shapeModels(schema))[0], "transform")).find((node) => node.properties?.translate);
 
 const bound = (nodes, key) => nodes.map((node) => node[key]).find((value) => value !== undefined);
 
@@ -52,6 +56,8 @@ function field(schema, name, raw, required) {
   const nodes = [top, ...options];
   const color = bound(nodes, "x-widget") === "color";
   const numeric = options.find((node) => ["number", "integer"].includes(node.type));
+  const vector = !color && options.find((node) => node.type === "array" && node.maxItems === 3 && node.items?.type === "number");
+  const reference = options.find((node) => node.properties?.texture);
   const whole = !options.some((node) => node.type === "number");
   const limits = [top, ...(numeric ? [numeric] : [])];
   const choices = bound(nodes, "enum");
@@ -60,12 +66,14 @@ function field(schema, name, raw, required) {
   const max = bound(limits, "maximum") ?? open.max;
   const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
   const widget = color ? "color"
+    : vector ? "vector"
     : choices ? "choice"
     : options.some((node) => node.type === "boolean") ? "toggle"
-    : numeric ? (bound(nodes, "x-widget") ?? "number") : null;
+    : numeric ? (bound(nodes, "x-widget") ?? "number")
+    : reference ? "texture" : null;
   if (!widget || bound(nodes, "const") !== undefined) return null;
   return {
-    name, widget, choices, min, max, open, required,
+    name, widget, choices, min, max, open, required, takesTexture: reference !== undefined,
     title: top.title ?? name,
     hint: bound(nodes, "description") ?? "",
     unit: bound(nodes, "x-unit") ?? "",
@@ -76,7 +84,7 @@ function field(schema, name, raw, required) {
   };
 }
 
-// The fields of a model that a control can be made for; vectors, names and fixed members have none.
+// The fields of a model that a control can be made for; names, lists and fixed members have none.
 export function fields(schema, owner) {
   const { properties = {}, required = [] } = resolve(schema, owner);
   return Object.entries(properties)

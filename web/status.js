@@ -1,4 +1,4 @@
-// The line under the picture: how far it is, how good, how long.
+// The line under the picture: how far it is, how good, how fast, how long.
 
 import { count, duration, percent } from "./words.js";
 
@@ -8,7 +8,7 @@ export class Status {
   #places = {};
 
   constructor(root) {
-    for (const name of ["samples", "noise", "elapsed", "left", "progress", "preview", "state"]) {
+    for (const name of ["samples", "rate", "noise", "elapsed", "left", "progress", "preview", "state"]) {
       this.#places[name] = root.querySelector(`#${name}`);
     }
   }
@@ -17,6 +17,8 @@ export class Status {
   frame({ samples, noise, elapsed_s, eta_s, scale }, limit) {
     const places = this.#places;
     places.samples.textContent = limit ? `${count(samples)} / ${count(limit)}` : count(samples);
+    const rate = samples / elapsed_s;
+    places.rate.textContent = Number.isFinite(rate) ? Number(rate.toPrecision(2)) : NOTHING;
     places.noise.textContent = noise === null ? NOTHING : percent(noise);
     places.elapsed.textContent = duration(elapsed_s);
     places.left.textContent = eta_s === null ? NOTHING : duration(eta_s);
@@ -27,6 +29,7 @@ export class Status {
 
   // "Rendering", "Paused", "Done", ...: the word that leads the line.
   state(word) {
+    if (this.#places.state.textContent === word) return;
     this.#places.state.textContent = word;
     this.#places.state.dataset.state = word.toLowerCase().replaceAll(" ", "-");
   }

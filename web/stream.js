@@ -6,16 +6,20 @@
 
 import { Problem, message, parseFrame } from "./api.js";
 import { Connection } from "./connection.js";
-import { diff } from "./patch.js";
+import { diff, equal } from "./patch.js";
 
 // A renderer that says nothing for so long (loading, compiling) doesn't hold up the next update.
 const PATIENCE_MS = 3000;
 const CAPTURE_MS = 20000;
+const REMIND_MS = 1500; // until a picture that did not come is asked for again
+
+const MIME = { jpeg: "image/jpeg", png: "image/png", webp: "image/webp", rgba32f: "application/octet-stream" };
 
 export class Stream {
   #on;
   #connection;
   #greeted = false;
+  #session = null;
   #generation = 0; // rises over all connections
   #wanted = null; // {scene, settings, view}: what the user wants to see
   #sent = null; // the same, as the server was told; null: it must be told everything
@@ -24,11 +28,14 @@ export class Stream {
   #pending = null; // the timer of an update without an answer
   #halted = { user: false, hidden: document.hidden };
   #told = false; // whether the server was told to pause
-  #capture = null;
+  #captures = []; // the first one is under way
+  #seen = null; // the view that frames come in; null while that is changing
+  #reminder = null;
   #flushing = false;
+  #hide = () => this.#halt("hidden", document.hidden);
 
-  // `on` has hello(info), frame(header, blob, acknowledge), refused(problem, valid), done(message),
-  // lost(reason, wait_ms or null).
+  // `on` has hello(info), frame(header, bytes, view, acknowledge), waiting(bool), refused(problem, valid),
+  // done(message), lost(reason, wait_ms or null).
   constructor(on) {
     this.#on = on;
     this.#connection = new Connection({
@@ -36,10 +43,19 @@ export class Stream {
       bytes: (buffer) => this.#receive(buffer),
       lost: (reason, wait) => this.#lose(reason, wait),
     });
-    document.addEventListener("visibilitychange", () => this.#halt("hidden", document.hidden));
+    document.addEventListener("visibilitychange", this.#hide);
   }
 
   connect() { this.#connection.open(); }
+
+  close() {
+    document.removeEventListener("visibilitychange", this.#hide);
+    this.#endCaptures(new Error("The stream was closed."));
+    clearTimeout(this.#pending);
+    clearTimeout(this.#reminder);
+    this.#connection.close();
+    this.#greeted = false;
+  }
 
   // Tries at once instead of waiting for the next turn.
   retry() { this.#connection.retry(); }
@@ -52,30 +68,51 @@ export class Stream {
   pause() { this.#halt("user", true); }
   resume() { this.#halt("user", false); }
 
-  // The picture as the server has it now, as a PNG: {header, blob}.
-  capture() {
-    this.#endCapture(new Error("Another picture was asked for."));
+  // Whether a picture of this generation shows all that is wanted.
+  isNewest(generation) {
+    if (!this.#wanted) return false;
+    const { scene, settings } = this.#sent ?? {};
+    return generation === this.#generation && this.#pending === null
+      && scene === this.#wanted.scene && equal(settings, this.#wanted.settings);
+  }
+
+  // The picture as the server has it now, seen otherwise: {header, bytes, generation, scene}. Costs no sample.
+  capture(view) {
     return new Promise((resolve, reject) => {
       if (!this.#sent) return reject(new Error("There is no connection to the server."));
-      const timer = setTimeout(() => this.#endCapture(new Error("The server sent no picture.")), CAPTURE_MS);
-      this.#capture = { resolve, reject, timer };
-      this.#tellView();
+      const capture = { view, resolve, reject };
+      capture.timer = setTimeout(() => {
+        this.#captures = this.#captures.filter((each) => each !== capture);
+        reject(new Error("The server sent no picture."));
+        this.#tellView();
+      }, CAPTURE_MS);
+      this.#captures.push(capture);
+      if (this.#captures.length === 1) this.#tellView();
     });
   }
 
-  #endCapture(error, picture) {
-    if (!this.#capture) return;
-    const { resolve, reject, timer } = this.#capture;
-    clearTimeout(timer);
-    this.#capture = null;
-    if (error) reject(error);
-    else resolve(picture);
-    if (this.#sent) this.#tellView();
+  #endCaptures(error) {
+    for (const { reject, timer } of this.#captures) {
+      clearTimeout(timer);
+      reject(error);
+    }
+    this.#captures = [];
   }
 
+  // Frames that were made for an older view are dropped by the server; once it has answered, all are of this one.
   #tellView() {
-    const format = this.#capture ? { format: "png" } : {};
-    this.#connection.send(message.view({ ...this.#sent.view, ...format }));
+    if (!this.#sent) return;
+    const capture = this.#captures[0];
+    const view = { ...this.#sent.view, ...capture?.view };
+    this.#seen = null;
+    this.#connection.send(message.view(view));
+    this.#connection.ask(() => {
+      if (capture !== this.#captures[0]) return;
+      this.#seen = view;
+      // A frame may have slipped through before the answer, and a resting picture sends no second one.
+      clearTimeout(this.#reminder);
+      this.#reminder = setTimeout(() => this.#tellView(), REMIND_MS);
+    });
   }
 
   #halt(reason, on) {
@@ -119,11 +156,13 @@ export class Stream {
     if (this.#refused && diff(this.#refused, this.#wanted) === undefined) return;
     this.#sent = this.#wanted;
     this.#connection.send(message.start(this.#expect(), this.#sent));
+    this.#tellView();
   }
 
   // The generation of an update that is about to leave.
   #expect() {
     this.#pending = setTimeout(() => this.#settle(), PATIENCE_MS);
+    this.#on.waiting(true);
     return ++this.#generation;
   }
 
@@ -137,21 +176,20 @@ export class Stream {
   #answered() {
     this.#valid = this.#sent;
     this.#refused = null;
+    this.#on.waiting(false);
     if (this.#pending !== null) this.#settle();
   }
 
   #hear(heard) {
     const isNewest = heard.generation === this.#generation;
-    if (heard.type === "hello") {
-      this.#greeted = true;
-      this.#told = false;
-      this.#on.hello(heard);
-      this.#soon();
-    } else if (heard.type === "error") {
+    if (heard.type === "hello") this.#greet(heard);
+    else if (heard.type === "error") {
       // The server goes on with the last scene that it took. It is told everything anew: that costs it no
       // more than what has changed, and nothing has to be known here about which scene that was.
       this.#refused = this.#sent ?? this.#refused;
       this.#sent = null;
+      this.#on.waiting(false);
+      this.#endCaptures(new Error("The server did not take the scene."));
       this.#on.refused(new Problem(heard.problem), this.#valid);
       this.#settle();
     } else if (heard.type === "done" && isNewest && this.#sent) {
@@ -160,21 +198,50 @@ export class Stream {
     }
   }
 
+  #greet(hello) {
+    const isTakenUp = hello.session !== undefined && hello.session === this.#session && this.#sent !== null;
+    this.#session = hello.session;
+    this.#connection.keep(hello.session);
+    this.#greeted = true;
+    this.#told = false;
+    if (!isTakenUp) this.#sent = null;
+    this.#on.hello(hello, isTakenUp);
+    if (isTakenUp) {
+      this.#connection.send(message.resume());
+      this.#tellView();
+      this.#obey();
+    }
+    this.#soon();
+  }
+
   #receive(buffer) {
-    const { header, blob } = parseFrame(buffer);
+    const { header, bytes } = parseFrame(buffer);
     const acknowledge = () => this.#connection.send(message.ack(header.seq));
     if (header.generation !== this.#generation) return acknowledge();
     if (this.#sent) this.#answered();
-    const isWhole = header.scale === 1 || this.#halted.user; // a paused picture may never become larger
-    if (header.mime === "image/png" && isWhole) this.#endCapture(null, { header, blob });
-    this.#on.frame(header, blob, acknowledge);
+    const view = this.#seen ?? this.#sent?.view;
+    const fits = view && header.mime === MIME[view.format];
+    const capture = this.#seen && this.#captures[0];
+    if (!fits || (!this.#seen && view.format === "rgba32f")) return acknowledge();
+    if (this.#seen) clearTimeout(this.#reminder);
+    if (!capture) return this.#on.frame(header, bytes, view, acknowledge);
+    acknowledge();
+    if (header.scale < 1 && !this.#halted.user) return; // a paused picture may never become larger
+    clearTimeout(capture.timer);
+    this.#captures.shift();
+    capture.resolve({ header, bytes, scene: this.#sent?.scene });
+    this.#tellView();
   }
 
   #lose(reason, wait) {
     clearTimeout(this.#pending);
+    clearTimeout(this.#reminder);
     this.#greeted = false;
-    this.#pending = this.#sent = this.#refused = null;
-    this.#endCapture(new Error("The connection was lost."));
+    // What was under way may or may not have been taken: then the server is told everything.
+    if (this.#pending !== null || !this.#session) this.#sent = null;
+    this.#pending = this.#refused = this.#seen = null;
+    this.#endCaptures(new Error("The connection was lost."));
+    this.#on.waiting(false);
     this.#on.lost(reason, wait);
   }
 }

@@ -28,9 +28,9 @@ PATIENCE_S = 60.0
 def measure() -> dict[str, float]:
     """Milliseconds: server start to first image with empty and with filled caches, and first frames after a move."""
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder:
-        with _server(folder) as (port, began), _stream(port) as stream:
+        with server(folder) as (port, began), _stream(port) as stream:
             cold_ms = Editor(port, stream).start(began)
-        with _server(folder) as (port, began), _stream(port) as stream:
+        with server(folder) as (port, began), _stream(port) as stream:
             editor = Editor(port, stream)
             warm_ms = editor.start(began)
             moves = sorted(editor.move() for _ in range(MOVES))
@@ -44,7 +44,7 @@ def measure() -> dict[str, float]:
 
 
 @contextmanager
-def _server(folder: str) -> Iterator[tuple[int, float]]:
+def server(folder: str) -> Iterator[tuple[int, float]]:
     """A server of our own with its caches in `folder`: its port, and when its process was started."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
@@ -57,7 +57,7 @@ def _server(folder: str) -> Iterator[tuple[int, float]]:
     with told.open("wb") as log:
         server = subprocess.Popen(command, env=environment, stdout=log, stderr=log)
     try:
-        while not _listens(port):
+        while not listens(port):
             if server.poll() is not None:
                 raise RuntimeError(f"the server ended instead of starting: {told.read_text()[-500:]}")
             time.sleep(0.01)
@@ -127,7 +127,7 @@ def _stream(port: int) -> AbstractContextManager[ClientConnection]:
     return connect(address, subprotocols=protocol, max_size=None, open_timeout=PATIENCE_S)
 
 
-def _listens(port: int) -> bool:
+def listens(port: int) -> bool:
     try:
         socket.create_connection(("127.0.0.1", port)).close()
     except ConnectionRefusedError:

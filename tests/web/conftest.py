@@ -126,18 +126,22 @@ class Editor:
         return int(digits or 0)
 
     def pixels(self) -> list[float]:
-        """The canvas in 12x12 averages of red, green and blue: too coarse for noise to count."""
+        """The canvas in 8x8 averages of red, green and blue: too coarse for noise to count."""
         values: list[float] = self.page.evaluate("""() => {
-            const small = new OffscreenCanvas(12, 12).getContext("2d");
+            const small = new OffscreenCanvas(8, 8).getContext("2d");
             small.imageSmoothingQuality = "high";
-            small.drawImage(document.querySelector("#picture"), 0, 0, 12, 12);
-            return [...small.getImageData(0, 0, 12, 12).data].filter((_, i) => i % 4 < 3);
+            small.drawImage(document.querySelector("#picture"), 0, 0, 8, 8);
+            return [...small.getImageData(0, 0, 8, 8).data].filter((_, i) => i % 4 < 3);
         }""")
         return values
 
     def settled(self) -> list[float]:
         """The pixels after enough samples at full size that noise is no reason to differ."""
-        self.wait("a settled picture", lambda: self.page.is_hidden("#preview") and self.samples() >= 4)
+        ready = "#stage[aria-busy=false]"
+        self.wait(
+            "a settled picture",
+            lambda: self.page.query_selector(ready) and self.page.is_hidden("#preview") and self.samples() >= 4,
+        )
         return self.pixels()
 
     def differs(self, before: list[float], least: float = 4.0) -> bool:
@@ -148,6 +152,35 @@ class Editor:
 
     def wait_for_change(self, before: list[float], least: float = 4.0) -> None:
         self.wait("other pixels", lambda: self.differs(before, least))
+
+    def tab(self, name: str) -> None:
+        self.page.click(f"#tab-{name}")
+
+    def drop(self, selector: str, files: dict[str, bytes]) -> None:
+        """As when files are let go over an element, in its middle."""
+        contents = {name: list(data) for name, data in files.items()}
+        self.page.evaluate(
+            """([selector, contents]) => {
+                const target = document.querySelector(selector);
+                const dataTransfer = new DataTransfer();
+                for (const [name, bytes] of Object.entries(contents)) {
+                    dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
+                }
+                const { left, top, width, height } = target.getBoundingClientRect();
+                const at = { clientX: left + width / 2, clientY: top + height / 2 };
+                const options = { dataTransfer, bubbles: true, cancelable: true, ...at };
+                for (const kind of ["dragenter", "dragover", "drop"]) {
+                    target.dispatchEvent(new DragEvent(kind, options));
+                }
+            }""",
+            [selector, contents],
+        )
+
+    def shot(self, click: str) -> bytes:
+        """The file that a click hands out."""
+        with self.page.expect_download() as waiting:
+            self.page.click(click)
+        return waiting.value.path().read_bytes()
 
     def field(self, name: str, kind: str = "range", form: str = "#panel") -> str:
         return f"{form} [data-field={name}] input[type={kind}]"

@@ -1,0 +1,44 @@
+// What the page needs before it can begin: the schema, the library, and what to show first.
+
+import { Problem, fetchApi, fetchPreset, fetchSchema } from "./api.js";
+import { lastWork } from "./desk.js";
+import { askForKey } from "./key.js";
+import { openLibrary } from "./library.js";
+import { readLink, revived } from "./share.js";
+
+const FIRST_SCENE = "sphere-on-floor";
+const BOOT_RETRY_MS = 1500;
+
+// What the address or the last visit left: {state, from} or null. A bad link is told and passed over.
+async function left(complain) {
+  try {
+    const linked = await readLink();
+    if (linked) return { state: revived(linked), from: "link" };
+  } catch (error) {
+    complain(new Error(`This link could not be opened. ${error.message}`));
+  }
+  const work = lastWork();
+  return work?.scene ? { state: revived(work), from: "work" } : null;
+}
+
+// {schema, library, calls, name, scene, left}. Asks until the server answers; `told(problem)` says why it waits.
+export async function boot({ keyDialog, told, complain }) {
+  for (let wasWrong = false; ;) {
+    try {
+      const [schema, library, api] = await Promise.all([fetchSchema(), openLibrary(), fetchApi()]);
+      const names = library.scenes.map(({ name }) => name);
+      const name = names.includes(FIRST_SCENE) ? FIRST_SCENE : names[0];
+      const scene = await fetchPreset("scenes", name);
+      told(null);
+      return { schema, library, calls: api.paths ?? {}, name, scene, left: await left(complain) };
+    } catch (problem) {
+      if (problem instanceof Problem && problem.status === 401) {
+        await askForKey(keyDialog, wasWrong);
+        wasWrong = true;
+      } else {
+        told(problem);
+        await new Promise((wake) => { setTimeout(wake, BOOT_RETRY_MS); });
+      }
+    }
+  }
+}

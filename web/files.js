@@ -1,0 +1,31 @@
+// Files that are dropped, picked, or handed out.
+
+// Calls `take(file)` with the first file dropped onto an element; the page's own drop stays out of it.
+export function acceptFiles(node, take) {
+  node.addEventListener("dragover", (event) => {
+    if (!event.dataTransfer.types.includes("Files")) return;
+    event.preventDefault();
+    event.stopPropagation();
+    node.classList.add("over");
+  });
+  node.addEventListener("dragleave", () => node.classList.remove("over"));
+  node.addEventListener("drop", (event) => {
+    node.classList.remove("over");
+    const [file] = event.dataTransfer.files;
+    if (!file) return;
+    event.preventDefault();
+    event.stopPropagation();
+    take(file);
+  });
+}
+
+// Hands a file to the person.
+export function saveAs(blob, name) {
+  const link = document.createElement("a");
+  link.href = URL.createObjectURL(blob);
+  link.download = name;
+  link.click();
+  setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+}
+
+export const jsonBlob = (document) => new Blob([`${JSON.stringify(document, null, 2)}\n`], { type: "application/json" });

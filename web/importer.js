@@ -1,0 +1,150 @@
+// Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
+// images textures, glTF a scene, JSON what it says it is.
+
+import { fetchAssetScene, upload } from "./api.js";
+import { ball } from "./bounds.js";
+import { equal, pointer, put } from "./patch.js";
+import { fields, materialModels } from "./schema.js";
+import { revived } from "./share.js";
+
+const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
+const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
+
+export const ACCEPT = Object.keys(ENDINGS).map((ending) => `.${ending}`).join(",");
+
+const sort = (file) => ENDINGS[file.name.split(".").at(-1).toLowerCase()];
+const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
+
+// A name that is not taken, from one that is wished for.
+function fresh(wanted, taken) {
+  let name = wanted;
+  for (let i = 2; name in taken; i += 1) name = `${wanted}-${i}`;
+  return name;
+}
+
+// A transform that stands what has these bounds where the ball is; undefined without bounds.
+export function fitting(bounds, { center, radius }) {
+  if (!bounds) return undefined;
+  const [low, high] = bounds;
+  const size = Math.hypot(...high.map((x, i) => x - low[i])) / 2;
+  const scale = Number((radius / size).toPrecision(4));
+  return { scale, translate: center.map((x, i) => Number((x - (scale * (low[i] + high[i])) / 2).toPrecision(6))) };
+}
+
+export class Importer {
+  // `acts` is the editor; `messages` tells; `picked(x, y)` gives the shape under a point of the page, or null.
+  constructor({ schema, acts, messages, picked }) {
+    Object.assign(this, { schema: schema.scene, acts, messages, picked });
+    this.takesTextures = schema.scene.properties.textures !== undefined;
+  }
+
+  // One after the other; `at` is where they were dropped.
+  async take(files, at = null) {
+    const known = [...files].sort((a, b) => ORDER.indexOf(sort(a)) - ORDER.indexOf(sort(b)));
+    for (const file of known) {
+      try {
+        await this.#take(file, at);
+      } catch (problem) {
+        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problem.message });
+      }
+      this.messages.hide("upload");
+    }
+  }
+
+  async #take(file, at) {
+    const kind = sort(file);
+    if (!kind) throw new Error(`Sunbox reads ${[...new Set(Object.keys(ENDINGS))].join(", ")}.`);
+    if (kind === "json") return this.openJson(await file.text(), stem(file));
+    const info = await this.upload(file);
+    if (info.kind === "scene") return this.#openScene(info, file);
+    if (info.kind === "mesh") return this.#addMesh(info, file);
+    if (kind === "light") return this.acts.putEnvironment({ type: "image", asset: info.id });
+    const shape = at && (await this.picked(at.x, at.y));
+    if (shape !== null && shape !== undefined) this.acts.select(pointer("shapes", shape));
+    return this.#paint(this.#colorField(), info, file);
+  }
+
+  async upload(file) {
+    const set = this.messages.show("upload", { title: `Sending ${file.name}`, lasting: true, progress: true });
+    return upload(file, set);
+  }
+
+  // A scene, a material or a whole page's state, by what it holds.
+  openJson(text, name) {
+    const document = JSON.parse(text);
+    if (document?.scene?.shapes) this.acts.change(revived(document));
+    else if (document?.shapes) this.acts.openScene(document, name);
+    else if (materialModels(this.schema)[document?.type]) this.acts.putMaterial(document);
+    else throw new Error("It holds neither a scene nor a material.");
+  }
+
+  async #openScene({ id, warnings = [] }, file) {
+    const document = await fetchAssetScene(id);
+    this.acts.openScene(document, stem(file));
+    this.#tell(file, warnings);
+  }
+
+  #tell(file, warnings) {
+    if (!warnings.length) return;
+    const list = warnings.map((each) => (typeof each === "string" ? each : [each.pointer, each.detail].filter(Boolean).join(": ")));
+    this.messages.show("import", { title: `${file.name}: not everything was taken.`, list });
+  }
+
+  #addMesh({ id, bounds, warnings = [] }, file) {
+    const { state, camera } = this.acts;
+    const subject = state.scene.shapes.map(ball).filter(Boolean).sort((a, b) => a.radius - b.radius)[0];
+    const place = subject ?? { center: camera.target, radius: this.acts.radius() };
+    const transform = fitting(bounds, place);
+    this.acts.add("shapes", { type: "mesh", asset: id, material: state.chosen.material, ...(transform ? { transform } : {}) });
+    this.#tell(file, warnings);
+  }
+
+  #colorField() {
+    const { type } = this.acts.material;
+    const field = fields(this.schema, materialModels(this.schema)[type]).find(({ widget, takesTexture }) => widget === "color" && takesTexture);
+    return field && `${this.acts.materialPlace}/${field.name}`;
+  }
+
+  // An image for a parameter.
+  async texture(place, file) {
+    try {
+      await this.#paint(place, await this.upload(file), file);
+    } catch (problem) {
+      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problem.message });
+    }
+    this.messages.hide("upload");
+  }
+
+  #paint(place, { id, kind }, file) {
+    if (!this.takesTextures || !place) throw new Error("Nothing here takes an image.");
+    if (kind !== "image") throw new Error("An image is needed here: PNG, JPEG, WebP, EXR or HDR.");
+    const { state } = this.acts;
+    const textures = state.scene.textures ?? {};
+    const same = Object.keys(textures).find((name) => equal(textures[name], { asset: id }));
+    const name = same ?? fresh(stem(file), textures);
+    const scene = { ...state.scene, textures: { ...textures, [name]: { asset: id } } };
+    this.acts.change(put({ ...state, scene }, place, { texture: name }));
+  }
+}
+
+// Watches the page for files: `tell(text or null)` shows what a drop would do.
+export function watchDrops(page, { take, tell }) {
+  let depth = 0;
+  const isFiles = (event) => event.dataTransfer?.types.includes("Files");
+  page.addEventListener("dragenter", (event) => {
+    if (!isFiles(event)) return;
+    depth += 1;
+    tell("Scenes (GLB, JSON), meshes (OBJ, PLY, STL), light (HDR, EXR), images (PNG, JPEG)");
+  });
+  page.addEventListener("dragleave", (event) => {
+    if (isFiles(event) && (depth -= 1) <= 0) tell(null);
+  });
+  page.addEventListener("dragover", (event) => { if (isFiles(event)) event.preventDefault(); });
+  page.addEventListener("drop", (event) => {
+    depth = 0;
+    tell(null);
+    if (event.defaultPrevented || !event.dataTransfer?.files.length) return;
+    event.preventDefault();
+    take([...event.dataTransfer.files], { x: event.clientX, y: event.clientY });
+  });
+}

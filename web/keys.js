@@ -1,0 +1,108 @@
+// What the keys do, once: the table that obeys them is the sheet that explains them.
+
+import { element } from "./dom.js";
+
+const KEY_ORBIT = Math.PI / 36;
+const KEY_PAN = 0.05; // of the picture's height
+const KEY_ZOOM = 1.1;
+const FLY_PER_S = 0.6; // distances to the target
+
+const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, -1], arrowdown: [0, 1] };
+const FLIGHT = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], e: [0, 1, 0], q: [0, -1, 0] };
+const BUTTONS = "button, summary, a, [role=option], [role=tab], [role=listbox]";
+const WRITING = "input, select, textarea, [contenteditable]";
+
+// Keys that are held: flying goes on with the display's beat.
+class Flight {
+  #held = new Set();
+  #at = 0;
+
+  constructor(move) { this.move = move; }
+
+  press(key) {
+    if (!this.#held.size) {
+      this.#at = performance.now();
+      requestAnimationFrame((now) => this.#step(now));
+    }
+    this.#held.add(key);
+  }
+
+  lift(key) {
+    if (this.#held.delete(key) && !this.#held.size) this.move.rest();
+  }
+
+  stop() { for (const key of [...this.#held]) this.lift(key); }
+
+  #step(now) {
+    if (!this.#held.size) return;
+    const amount = FLY_PER_S * Math.min(0.1, Math.max(0, now - this.#at) / 1000);
+    this.#at = now;
+    const sum = [0, 0, 0];
+    for (const key of this.#held) FLIGHT[key].forEach((x, i) => { sum[i] += x * amount; });
+    if (amount > 0) this.move.fly(...sum);
+    requestAnimationFrame((next) => this.#step(next));
+  }
+}
+
+// `acts`: [{key, shift, ctrl, does, says, group}]; a letter stands for itself, `says` explains it.
+export function watchKeys(move, acts) {
+  const flight = new Flight(move);
+  const inText = ({ target }) => target instanceof Element && target.closest(WRITING) && target.type !== "range";
+
+  document.addEventListener("keydown", (event) => {
+    const key = event.key.toLowerCase();
+    const ctrl = event.ctrlKey || event.metaKey;
+    if (event.altKey || document.querySelector("dialog[open]")) return;
+    const act = acts.find((each) => each.keys.includes(key) && Boolean(each.ctrl) === ctrl
+      && (each.shift === undefined || each.shift === event.shiftKey));
+    if (act?.ctrl) {
+      if (event.target.dataset?.dirty || (act.notInText && inText(event))) return;
+    } else {
+      if (ctrl || event.target.closest?.(WRITING)) return;
+      if ((key === " " || key === "enter" || ARROWS[key]) && event.target.closest(BUTTONS)) return;
+    }
+    const arrow = !ctrl && ARROWS[key];
+    if (act) act.does();
+    else if (arrow && event.shiftKey) move.pan(arrow[0] * KEY_PAN, arrow[1] * KEY_PAN);
+    else if (arrow) move.orbit(arrow[0] * KEY_ORBIT, arrow[1] * KEY_ORBIT);
+    else if (!ctrl && (key === "+" || key === "=")) move.zoom(1 / KEY_ZOOM);
+    else if (!ctrl && (key === "-" || key === "_")) move.zoom(KEY_ZOOM);
+    else if (!ctrl && FLIGHT[key]) flight.press(key);
+    else return;
+    event.preventDefault();
+  });
+  document.addEventListener("keyup", (event) => {
+    const key = event.key.toLowerCase();
+    flight.lift(key);
+    if (ARROWS[key] || "+=-_".includes(key)) move.rest();
+  });
+  window.addEventListener("blur", () => flight.stop());
+}
+
+const MOVES = [
+  ["The picture", [
+    ["drag", "orbit"], ["Shift", "drag", "slide the view; also the right button, or two fingers"],
+    ["scroll", "come nearer, go away; also a pinch"], ["Alt", "drag", "turn the environment"], ["click", "select a thing and its material"],
+    ["←", "→", "↑", "↓", "orbit; with Shift slide"], ["+", "−", "come nearer, go away"],
+    ["W", "A", "S", "D", "fly; E rises, Q sinks"],
+  ]],
+];
+
+const NAMES = { " ": "Space", escape: "Esc", home: "Home", delete: "Del" };
+const shown = ({ keys: [key], ctrl, shift }) => [
+  ...(ctrl ? ["Ctrl"] : []), ...(shift ? ["Shift"] : []), NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key),
+];
+
+// The sheet: every act with its keys, by groups.
+export function fillSheet(root, acts) {
+  const groups = new Map(MOVES.map(([name, rows]) => [name, rows.map((row) => [row.slice(0, -1), row.at(-1)])]));
+  for (const act of acts) {
+    if (!groups.has(act.group)) groups.set(act.group, []);
+    groups.get(act.group).push([shown(act), act.says]);
+  }
+  root.replaceChildren(...[...groups].map(([name, rows]) => element("section", {},
+    element("h3", {}, name),
+    element("dl", {}, ...rows.flatMap(([keys, says]) => [
+      element("dt", {}, ...keys.flatMap((key) => [element("kbd", {}, key), " "])), element("dd", {}, says),
+    ])))));
+}

@@ -1,0 +1,189 @@
+// What the scene contains, as a list to pick from; and which fields the picked thing has.
+
+import { element } from "./dom.js";
+import { at, equal, pointer } from "./patch.js";
+import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "./schema.js";
+import { schemaForm } from "./schema-form.js";
+import { inWords } from "./words.js";
+
+const ICONS = {
+  camera: "M2 5h2.5l1-1.5h5l1 1.5H14v8H2zm6 1.6a2.3 2.3 0 1 0 0 4.6 2.3 2.3 0 0 0 0-4.6",
+  environment: "M8 1.5a6.5 6.5 0 1 1 0 13 6.5 6.5 0 0 1 0-13M2.8 8h10.4v1H2.8z",
+  light: "M8 1.5A4.5 4.5 0 0 1 10.5 9.7V12h-5V9.7A4.5 4.5 0 0 1 8 1.5M6 13h4v1.5H6z",
+  sphere: "M8 2a6 6 0 1 1 0 12A6 6 0 0 1 8 2", box: "m8 1.5 5.8 3v7L8 14.5l-5.8-3v-7z",
+  quad: "M4.5 4H15l-3.5 8H1z", mesh: "M8 1.5 14.5 14h-13zM8 5.2 4.3 12.4h7.4z",
+};
+
+function icon(name) {
+  const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
+  const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
+  svg.setAttribute("viewBox", "0 0 16 16");
+  svg.setAttribute("aria-hidden", "true");
+  path.setAttribute("d", ICONS[name] ?? ICONS.mesh);
+  path.setAttribute("fill-rule", "evenodd");
+  svg.append(path);
+  return svg;
+}
+
+// [{thing, icon, title, note}] of a scene.
+export function things({ environment, lights = [], shapes }) {
+  const count = {};
+  const title = (type) => {
+    count[type] = (count[type] ?? 0) + 1;
+    return count[type] > 1 ? `${inWords(type)} ${count[type]}` : inWords(type);
+  };
+  return [
+    { thing: "/camera", icon: "camera", title: "Camera", note: "" },
+    { thing: "/environment", icon: "environment", title: "Environment", note: environment ? inWords(environment.type) : "None" },
+    ...lights.map(({ type }, i) => ({ thing: pointer("lights", i), icon: "light", title: `${title(type)} light`, note: "" })),
+    ...shapes.map(({ type, material }, i) => ({ thing: pointer("shapes", i), icon: type, title: title(type), note: inWords(material) })),
+  ];
+}
+
+export class Outliner {
+  #shown = null;
+  #made = null; // what the form was made for
+  #forms = [];
+
+  // `acts` is the editor; `root` the panel.
+  constructor(root, schema, acts) {
+    this.root = root;
+    this.schema = schema.scene;
+    this.acts = acts;
+    this.list = this.#find("outline-list");
+    this.list.addEventListener("click", ({ target }) => {
+      const row = target.closest("[data-thing]");
+      if (row) acts.select(row.dataset.thing);
+    });
+    this.list.addEventListener("keydown", (event) => this.#walk(event));
+    this.#find("thing-material").addEventListener("change", ({ target }) => {
+      acts.edit(`/scene${this.thing}/material`, target.value);
+      acts.select(this.thing);
+    });
+  }
+
+  #find(id) { return this.root.querySelector(`#${id}`); }
+
+  #walk(event) {
+    const all = this.#shown.map(({ thing }) => thing);
+    const now = all.indexOf(this.thing);
+    const to = { ArrowDown: now + 1, ArrowUp: now - 1, Home: 0, End: all.length - 1 }[event.key];
+    if (event.key === "Delete") this.acts.removable(this.thing) && this.acts.remove(this.thing);
+    else if (to === undefined) return;
+    else this.acts.select(all[Math.min(Math.max(to, 0), all.length - 1)]);
+    event.preventDefault();
+  }
+
+  show(state) {
+    const { scene, chosen } = state;
+    const list = things(scene);
+    this.thing = list.some(({ thing }) => thing === chosen.thing) ? chosen.thing : "/camera";
+    if (!equal(list, this.#shown)) {
+      this.#shown = list;
+      this.list.replaceChildren(...list.map((each) => element(
+        "li", { role: "option", "data-thing": each.thing, id: `thing${each.thing.replaceAll("/", "-")}` },
+        icon(each.icon), element("span", {}, each.title), element("span", { class: "dim" }, each.note),
+      )));
+    }
+    for (const row of this.list.children) {
+      const isIt = row.dataset.thing === this.thing;
+      if (isIt && row.getAttribute("aria-selected") !== "true") row.scrollIntoView({ block: "nearest" });
+      row.setAttribute("aria-selected", String(isIt));
+    }
+    this.list.setAttribute("aria-activedescendant", `thing${this.thing.replaceAll("/", "-")}`);
+    this.#showThing(scene, list.find(({ thing }) => thing === this.thing));
+  }
+
+  #model(document) {
+    if (this.thing === "/camera") return model(this.schema, this.schema, "camera");
+    const models = { environment: environmentModels, lights: lightModels, shapes: shapeModels }[this.thing.split("/")[1]];
+    return models(this.schema)[document?.type];
+  }
+
+  #showThing(scene, { title }) {
+    const document = at(scene, this.thing);
+    const isShape = this.thing.startsWith("/shapes/");
+    this.#find("thing-title").textContent = title;
+    this.#find("environment-picker").hidden = this.thing !== "/environment";
+    this.#find("reset-view").hidden = this.thing !== "/camera";
+    this.#find("thing-material-row").hidden = !isShape;
+    if (isShape) {
+      const names = Object.keys(scene.materials);
+      this.#find("thing-material").replaceChildren(...names.map((name) => element("option", { value: name }, inWords(name))));
+      this.#find("thing-material").value = document.material;
+    }
+    const kind = `${this.thing} ${document?.type}${document?.transform?.matrix ? " matrix" : ""}`;
+    if (kind !== this.#made) this.#make(kind, document, isShape);
+    for (const { place, form } of this.#forms) form.show(at(scene, place) ?? {});
+  }
+
+  #make(kind, document, isShape) {
+    this.#made = kind;
+    const own = this.#model(document);
+    const parts = own ? [{ place: this.thing, fields: fields(this.schema, own) }] : [];
+    if (isShape && !document.transform?.matrix) {
+      parts.push({ title: "Transform", place: `${this.thing}/transform`, fields: fields(this.schema, transformModel(this.schema)) });
+    }
+    this.#forms = parts.map(({ title, place, fields: chosen }) => ({
+      place, title,
+      form: schemaForm(chosen, {
+        change: (name, value) => this.acts.edit(`/scene${place}/${name}`, value),
+        commit: () => this.acts.rest(), forgive: () => this.acts.forgive(),
+      }),
+    }));
+    const removable = this.acts.removable(this.thing);
+    const button = (label, does) => element("button", { type: "button", class: "button small", onclick: does }, label);
+    const thing = this.thing;
+    this.#find("thing-acts").replaceChildren(...[
+      isShape ? button("Frame", () => this.acts.frame(thing)) : null,
+      /^\/(shapes|lights)\//.test(thing) ? button("Duplicate", () => this.acts.duplicate(thing)) : null,
+      removable ? button("Delete", () => this.acts.remove(thing)) : null,
+    ].filter(Boolean));
+    this.#find("thing-form").replaceChildren(...this.#forms.flatMap(({ title, form }) =>
+      [...(title ? [element("h3", {}, title)] : []), form.element]));
+  }
+
+  // As Panel.mark: the control's place, or null.
+  mark(wrong, text) {
+    for (const { place, form } of this.#forms) {
+      if (!wrong.startsWith(`/scene${place}/`)) continue;
+      const [name] = wrong.slice(place.length + 7).split("/");
+      if (form.mark(name, text)) return `/scene${place}/${name}`;
+    }
+    return null;
+  }
+
+  forgive() { for (const { form } of this.#forms) form.forgive(); }
+}
+
+// New things, in the middle of what is looked at: [{title, kind, make(camera, materials)}].
+export function additions(schema) {
+  const shapes = shapeModels(schema);
+  const lights = lightModels(schema);
+  const near = ({ target }) => target.map((x) => Number(x.toFixed(3)));
+  const above = ({ target, position }) => {
+    const far = Math.hypot(...target.map((x, i) => x - position[i]));
+    return { point: target.map((x, i) => Number((x + [0.3, 0.6, 0.3][i] * far).toFixed(3))), strength: Number((far * far * 2).toPrecision(2)) };
+  };
+  const all = [
+    { title: "Sphere", kind: "shapes", needs: shapes.sphere, make: (c, r, material) => ({ type: "sphere", center: near(c), radius: r, material }) },
+    {
+      title: "Box", kind: "shapes", needs: shapes.box,
+      make: (c, r, material) => ({ type: "box", min: near(c).map((x) => x - r), max: near(c).map((x) => x + r), material }),
+    },
+    {
+      title: "Quad", kind: "shapes", needs: shapes.quad,
+      make: (c, r, material) => ({ type: "quad", origin: near(c).map((x, i) => x + [-r, 0, r][i]), u: [2 * r, 0, 0], v: [0, 0, -2 * r], material }),
+    },
+    { title: "Point light", kind: "lights", needs: lights.point, make: (c) => ({ type: "point", position: above(c).point, intensity: above(c).strength }) },
+    {
+      title: "Spot light", kind: "lights", needs: lights.spot,
+      make: (c) => ({
+        type: "spot", position: above(c).point, direction: near(c).map((x, i) => Number((x - above(c).point[i]).toFixed(3))),
+        intensity: 2 * above(c).strength, inner_angle: 20, outer_angle: 30,
+      }),
+    },
+    { title: "Sun", kind: "lights", needs: lights.directional, make: () => ({ type: "directional", direction: [-0.4, -1, -0.5], irradiance: 3, angular_diameter: 0.53 }) },
+  ];
+  return all.filter(({ needs }) => needs);
+}
