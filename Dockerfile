@@ -1,0 +1,53 @@
+# syntax=docker/dockerfile:1
+# Sunbox on an NVIDIA GPU where the container is given one, else on the processor through Mesa's llvmpipe.
+#   docker build -t sunbox .
+#   docker run --rm -p 8000:8000 --read-only -v sunbox:/data sunbox
+#   docker run --rm -p 8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
+
+FROM python:3.11-slim-bookworm AS build
+ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
+RUN python -m venv /opt/sunbox
+WORKDIR /source
+COPY requirements.serve.lock ./
+RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r requirements.serve.lock
+COPY pyproject.toml README.md ./
+COPY gpu gpu
+COPY service service
+COPY shaders shaders
+COPY web web
+RUN python -m venv /opt/build && /opt/build/bin/pip install hatchling==1.33.0 \
+    && /opt/build/bin/python -m hatchling build -t wheel -d /tmp/wheel \
+    && /opt/sunbox/bin/pip install --no-deps /tmp/wheel/*.whl \
+    && /opt/sunbox/bin/pip uninstall -y pip \
+    && /opt/sunbox/bin/python -m compileall -q /opt/sunbox/lib
+
+FROM python:3.11-slim-bookworm
+# Mesa's software renderer, and glvnd, which finds NVIDIA's driver when the container runtime brings one along.
+# hadolint ignore=DL3008
+RUN apt-get update \
+    && apt-get install -y --no-install-recommends libegl1 libopengl0 libgl1-mesa-dri \
+    && rm -rf /var/lib/apt/lists/* \
+    && mkdir -p /usr/share/glvnd/egl_vendor.d \
+    && printf '{"file_format_version": "1.0.0", "ICD": {"library_path": "libEGL_nvidia.so.0"}}\n' \
+        > /usr/share/glvnd/egl_vendor.d/10_nvidia.json \
+    && useradd --uid 10001 --no-create-home --home-dir /data sunbox \
+    && install -d -o sunbox -g sunbox /data
+COPY --from=build /opt/sunbox /opt/sunbox
+# Everything that is written lies under /data: assets, documents, and the compilers' caches.
+ENV PATH=/opt/sunbox/bin:$PATH \
+    PYTHONDONTWRITEBYTECODE=1 \
+    NVIDIA_VISIBLE_DEVICES=all \
+    NVIDIA_DRIVER_CAPABILITIES=graphics,compute,utility \
+    HOME=/data \
+    XDG_CACHE_HOME=/data/cache \
+    MESA_SHADER_CACHE_MAX_SIZE=256M \
+    __GL_SHADER_DISK_CACHE_PATH=/data/cache \
+    SUNBOX_DATA_DIR=/data \
+    SUNBOX_HOST=0.0.0.0 \
+    SUNBOX_PORT=8000
+USER 10001
+VOLUME /data
+EXPOSE 8000
+HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD ["python", "-c", "import os, urllib.request as r; r.urlopen(f'http://127.0.0.1:{os.environ[\"SUNBOX_PORT\"]}/healthz', timeout=4)"]
+ENTRYPOINT ["sunbox"]
+CMD ["serve"]
