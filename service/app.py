@@ -31,6 +31,7 @@ from service.guard import Guard
 from service.logs import Requests
 from service.quota import Quota
 from service.rendering.engine import Engine
+from service.rendering.process import Options
 from service.rendering.reading import Reader
 from service.rendering.renders import Bounds, Renders
 from service.rendering.warming import Warming
@@ -58,7 +59,15 @@ def create_app(config: Config) -> FastAPI:
     store = AssetStore(config.data_dir, config, presets.builtin_assets)
     saved = Documents(config.data_dir, store)
     quota = Quota(config.data_dir, config.data_quota, saved.assets_in_use, lambda: saved.bytes)
-    own = House(config, store, Reader(config, store), Engine(config.device), saved, quota, Renders(_bounds(config)))
+    own = House(
+        config,
+        store,
+        Reader(config, store),
+        Engine(Options(config.device, config.hang_s, config.gpu_memory)),
+        saved,
+        quota,
+        Renders(_bounds(config)),
+    )
     app = FastAPI(
         title="Sunbox",
         version=metadata.version("sunbox"),

@@ -55,6 +55,12 @@ class Config(BaseSettings):
     max_bodies: int = Field(GIB, ge=1, description="Most bytes of all bodies that are being dealt with.")
     body_timeout: float = Field(30.0, gt=0, description="Longest pause (s) within a body that is being sent.")
     max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
+    gpu_memory: int | None = Field(
+        None, ge=1, description="Most bytes of scenes and pictures on the device (default: half of a CPU's memory)."
+    )
+    hang_s: float = Field(
+        10.0, gt=0, description="Without progress for so long (s), and ten slices, the renderer is replaced."
+    )
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(
         16_000_000, ge=1, le=2**24, description="Most triangles of a scene; at most 2^24 (float32 counts no further)."

@@ -119,5 +119,3 @@ def _path(scope: Scope) -> str:
     """As it was sent, percent-encoded: nothing in it can end a line. The query may hold a session's id."""
     raw: bytes = scope.get("raw_path") or b""
     return raw.partition(b"?")[0].decode("ascii", "replace")[:500]
-
-

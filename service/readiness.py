@@ -83,6 +83,9 @@ class _Probe:
             else:
                 self.seen.set_exception(Unavailable("The renderer gives black pictures."))
 
+    def again(self) -> None:
+        """Another renderer is asked: the picture comes from that one."""
+
     def lost(self, detail: str) -> None:
         if not self.seen.done():
             self.seen.set_exception(Unavailable(detail))

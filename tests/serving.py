@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -64,6 +64,17 @@ class Server:
     def children(self) -> list[int]:
         found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(self.process.pid)], capture_output=True, text=True)
         return [int(pid) for pid in found.stdout.split()]
+
+    def renderer(self) -> int:
+        """The process id of the renderer that there is, or comes."""
+        until = time.monotonic() + PATIENCE_S
+        while True:
+            for pid in self.children():
+                with suppress(OSError):  # it may be gone by now
+                    if b"rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                        return pid
+            assert time.monotonic() < until, self._log.read_text()
+            time.sleep(0.02)
 
     def stop(self, number: int = signal.SIGTERM) -> int:
         """The exit code."""

@@ -371,36 +371,3 @@ def test_children_end_when_the_server_is_killed(server: Server, tmp_path: Path) 
     os.kill(doomed.process.pid, signal.SIGKILL)
     doomed.process.wait()
     wait_until(lambda: not [pid for pid in children if Path(f"/proc/{pid}").exists()])
-
-
-def renderer_of(server: Server) -> int:
-    commands = {pid: Path(f"/proc/{pid}/cmdline").read_bytes() for pid in server.children()}
-    (pid,) = (pid for pid, command in commands.items() if b"rendering.worker" in command)
-    return pid
-
-
-def test_losing_the_renderer(server: Server, tmp_path: Path) -> None:
-    """Who waited is told; the next request finds another renderer."""
-    fragile = Server(tmp_path)
-    fragile.wait()
-    try:
-        finished = start(fragile.http)["id"]
-        status(fragile.http, finished, 20)
-        unfinished = start(fragile.http, ENDLESS)["id"]
-        wait_until(lambda: status(fragile.http, unfinished)["samples"] > 0)
-        with opened(fragile) as stream:
-            stream.start(settings=ENDLESS)
-            stream.frame()
-            os.kill(renderer_of(fragile), signal.SIGKILL)
-            assert stream.until("error")[0]["problem"]["status"] == 500
-            with pytest.raises(ConnectionClosed) as closed:
-                stream.until("never")
-            assert closed.value.rcvd is not None and closed.value.rcvd.code == 4500
-        failed = status(fragile.http, unfinished)
-        assert failed["state"] == "failed" and failed["problem"]["status"] == 500
-        assert is_problem(fragile.http.get(f"/v1/renders/{unfinished}/image"), 500)
-        assert status(fragile.http, finished)["state"] == "done"
-        assert is_problem(fragile.http.get(f"/v1/renders/{finished}/image"), 410)
-        assert status(fragile.http, start(fragile.http)["id"], 20)["state"] == "done"
-    finally:
-        assert fragile.stop(signal.SIGINT) == 0

@@ -10,8 +10,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from gpu import GpuError
 from service.commands import Failed
 from service.commands.progress import ProgressLine
+from service.rendering import messages
 from service.rendering.messages import (
     Done,
     FromRenderer,
@@ -79,6 +81,7 @@ class Tracing:
                 self._go_on()
             else:
                 self._task.stop()
+                self._go_on()
         self._line.close()
 
     def pixels(self, view: View) -> np.ndarray:
@@ -96,7 +99,7 @@ class Tracing:
 
     def _go_on(self) -> None:
         if self._task.ready:
-            self._task.step()
+            self._task.turn()
         else:
             self._denoiser.sleep(timeout_s=SIGNAL_S)
         self._denoiser.hear()
@@ -121,6 +124,8 @@ class Tracing:
         elif isinstance(message, Progressed):
             if self._line.due():
                 self._line.show(message.progress)
+        elif isinstance(message, messages.Failed):
+            raise GpuError(message.detail)
         elif isinstance(message, Loaded | Done):
             self.warnings += [warning for warning in message.warnings if warning not in self.warnings]
             if isinstance(message, Done):

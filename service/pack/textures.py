@@ -135,9 +135,7 @@ def _check_channels(uses: list[Use], images: Mapping[str, ImageData]) -> None:
         raise InvalidDocument(errors)
 
 
-def _texels(
-    wanted: dict[str, tuple[str, ImageData]], cache: PackCache | None, limits: TexelLimits | None
-) -> Texels:
+def _texels(wanted: dict[str, tuple[str, ImageData]], cache: PackCache | None, limits: TexelLimits | None) -> Texels:
     room = MAX_TEXELS if limits is None else min(limits.max_texels, MAX_TEXELS)
     for name, image in wanted.values():
         height, width = image.pixels.shape[:2]

@@ -1,26 +1,43 @@
-"""The server's hold on the renderer's process: starts it, speaks with it, starts another when it dies."""
+"""The server's hold on the renderer: speaks with its process, starts another when it is lost, tells that one all."""
 
 from __future__ import annotations
 
 import asyncio
 import itertools
 import logging
-import os
-import socket
-import subprocess
-import sys
 import time
-from pathlib import Path
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 
 from service.problems import Unavailable
 from service.rendering import link
-from service.rendering.messages import Drop, FromRenderer, Loaded, Ready, ToRenderer, Unable, Update, Usage
+from service.rendering.messages import (
+    Done,
+    Drop,
+    Evicted,
+    Frame,
+    FromRenderer,
+    Image,
+    Loaded,
+    Progress,
+    Progressed,
+    Read,
+    Ready,
+    ToRenderer,
+    Unable,
+    Update,
+    Usage,
+)
+from service.rendering.process import Cause, Options, Process
+from service.rendering.record import Record
 from service.rendering.statistics import Kind, Statistics
 
-ROOT = Path(__file__).parents[2]
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
 BETWEEN_TRIES_S = 0.5
+HOPELESS_S = 15.0  # ... between those that come then, and find nobody waiting
+STRIKES = 3  # renderers that a task may bring down
+FORGIVEN_S = 5.0  # of life with that task, after which an earlier loss was not its fault
+WATCH_S = 0.5
 FAREWELL_S = 3.0  # for the renderer to end by itself; one slice on a slow machine, or a compilation
 
 log = logging.getLogger(__name__)
@@ -31,122 +48,206 @@ class Listener(Protocol):
 
     def heard(self, message: FromRenderer) -> None: ...
 
+    def again(self) -> None:
+        """The renderer was lost, and another one begins the task again."""
+
     def lost(self, detail: str) -> None:
-        """The renderer died, and the task with it."""
+        """There is no renderer for this task any more."""
+
+
+@dataclass
+class _Held:
+    listener: Listener
+    kind: Kind
+    client: str
+    record: Record
+    resident: bool = True  # the renderer has it, or is being told
+    strikes: int = 0
+    struck_at: float = field(default=0.0)
 
 
 class Engine:
-    def __init__(self, device: int | None = None) -> None:
+    def __init__(self, options: Options | None = None) -> None:
         self.statistics = Statistics()
-        self._device = device
-        self._listeners: dict[int, Listener] = {}
-        self._kinds: dict[int, Kind] = {}
-        self._lost_at: float | None = None
+        self._options = options or Options()
+        self._tasks: dict[int, _Held] = {}
         self._numbers = itertools.count(1)
         self._ready: asyncio.Future[dict[str, Any]] | None = None
-        self._process: subprocess.Popen[bytes] | None = None
-        self._link: link.Link | None = None
-        self._began = 0.0
+        self._process: Process | None = None
+        self._lost_at: float | None = None
         self._failures = 0
         self._detail = "The renderer has not been started."
-        self._restart: asyncio.Task[None] | None = None
+        self._chores: set[asyncio.Task[None]] = set()
         self._closed = False
 
     def start(self) -> None:
         """Starts the renderer's process; it is ready some tenths of a second later."""
-        if self._ready is None or self._ready.done():
-            self._ready = asyncio.get_running_loop().create_future()
-        self._began = time.monotonic()
-        ours, theirs = link.pair()
-        self._process = _spawn(theirs, self._device)
-        theirs.close()
-        self._link = link.Link(ours, self._received, self._lost)
+        self._ready = asyncio.get_running_loop().create_future()
+        self._begin()
+        self._do(self._watch())
 
     async def close(self) -> None:
         self._closed = True
-        if self._restart is not None:
-            self._restart.cancel()
+        for chore in self._chores:
+            chore.cancel()
+        await asyncio.gather(*self._chores, return_exceptions=True)
         self._fail_all("The server is shutting down.")
-        if self._link is not None:
-            self._link.close()
-        if self._process is not None:
-            await asyncio.to_thread(_reap, self._process, FAREWELL_S)
+        process, self._process = self._process, None
+        if process is not None:
+            await process.end(FAREWELL_S)
 
     @property
     def process_id(self) -> int | None:
-        return None if self._process is None else self._process.pid
+        return None if self._process is None else self._process.id
 
     @property
     def info(self) -> dict[str, Any] | None:
         """What renders; None while nothing can."""
-        done = self._ready is not None and self._ready.done() and not self._ready.cancelled()
-        return self._ready.result() if self._ready is not None and done and not self._ready.exception() else None
+        ready = self._ready
+        return ready.result() if ready is not None and ready.done() and not self.hopeless else None
+
+    @property
+    def hopeless(self) -> bool:
+        return self._failures >= TRIES
 
     async def ready(self, timeout_s: float) -> dict[str, Any]:
         """What renders, as soon as it does. Raises Unavailable saying why nothing does."""
-        if self._ready is None or self._closed:
+        if self._ready is None or self._closed or self.hopeless:
             raise Unavailable(self._detail)
         try:
             return await asyncio.wait_for(asyncio.shield(self._ready), timeout_s)
         except TimeoutError:
             raise Unavailable("The renderer is starting.") from None
 
-    def open(self, listener: Listener, kind: Kind = "stream") -> int:
-        """The number of a new task, whose messages `listener` hears until `drop`. Raises Unavailable."""
-        if self._link is None or self._closed:
+    def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
+        """The number of a new task, whose messages `listener` hears until `drop`. Raises Unavailable.
+
+        Tasks of one `client` share its part of the GPU's time; without a name each has its own.
+        """
+        if self._ready is None or self._closed or self.hopeless:
             raise Unavailable(self._detail)
         task = next(self._numbers)
-        self._listeners[task], self._kinds[task] = listener, kind
+        self._tasks[task] = _Held(listener, kind, client or str(task), Record(task))
         return task
 
     def drop(self, task: int) -> None:
-        self._kinds.pop(task, None)
-        self.statistics.gpu_s_of.pop(task, None)
-        if self._listeners.pop(task, None) is not None and self._link is not None:
-            self._link.send(Drop(task))
+        held = self._tasks.pop(task, None)
+        if held is not None:
+            self.statistics.gpu_s_of.pop(task, None)
+            held.record.close()
+            self._send(Drop(task))
 
     def send(self, message: ToRenderer) -> None:
-        """Hands the message on; nothing happens when its task is lost or dropped."""
-        if message.task in self._listeners and self._link is not None:
-            self._link.send(message)
+        """Hands the message on; nothing happens when its task was lost or dropped."""
+        held = self._tasks.get(message.task)
+        if held is None:
+            return
+        held.record.told(message)
+        if held.resident:
+            self._send(message)
+        elif isinstance(message, Read):
+            self._do(self._bring_back(message.task, held))
 
     async def send_scene(self, update: Update) -> None:
         """Like `send`, for a whole scene: copying that to shared memory is not the event loop's work."""
+        held = self._tasks.get(update.task)
+        if held is None:
+            return
+        update = replace(update, client=held.client)
         encoded = await asyncio.to_thread(link.encode, update)
-        if update.task in self._listeners and self._link is not None:
-            self._link.send_encoded(encoded)
+        if update.task not in self._tasks:
+            return link.discard(encoded)
+        held.record.scene_told(update, encoded)
+        self._send_encoded(encoded)
+
+    def _send(self, message: ToRenderer) -> None:
+        if self._process is not None:
+            self._process.link.send(message)
+
+    def _send_encoded(self, encoded: link.Encoded) -> None:
+        if self._process is not None:
+            self._process.link.send_encoded(encoded)
         else:
             link.discard(encoded)
 
+    def _begin(self) -> None:
+        self._process = process = Process(self._options, self._received, lambda: self._lose(process))
+        for held in self._tasks.values():
+            held.resident = held.record.saved is None
+            if held.resident:
+                self._tell_all(held.record)
+                held.listener.again()
+            elif held.record.reads:
+                self._do(self._bring_back(next(iter(held.record.reads.values())).task, held))
+
+    def _tell_all(self, record: Record) -> None:
+        for message in record.again():
+            if isinstance(message, tuple):
+                self._send_encoded(message)
+            else:
+                self._send(message)
+
+    async def _bring_back(self, task: int, held: _Held) -> None:
+        """Gives the renderer a finished picture that it has no more, and then what is to be read of it."""
+        process = self._process
+        encoded = await asyncio.to_thread(link.encode, held.record.saved)
+        if held.resident or process is None or process is not self._process or task not in self._tasks:
+            return link.discard(encoded)
+        held.resident = True
+        self._tell_all(held.record)
+        self._send_encoded(encoded)
+        for read in held.record.reads.values():
+            self._send(read)
+
     def _received(self, message: FromRenderer) -> None:
         if isinstance(message, Ready):
-            seconds = time.monotonic() - self._began
-            log.info("renderer ready renderer=%s seconds=%.2f", message.info.get("renderer"), seconds)
-            if self._ready is not None and not self._ready.done():
-                self._ready.set_result(message.info)
-            if self._lost_at is not None:
-                self.statistics.recovery_s.add(time.monotonic() - self._lost_at)
-                self._lost_at = None
+            self._is_ready(message)
         elif isinstance(message, Unable):
             self._detail = message.detail
             log.error("no renderer: %s", message.detail)
         elif isinstance(message, Usage):
             self._account(message)
-        else:
-            if isinstance(message, Loaded):
-                self._count(message)
-            listener = self._listeners.get(message.task)
-            if listener is not None:
-                listener.heard(message)
+        elif (held := self._tasks.get(message.task)) is not None:
+            self._hear(message, held)
+
+    def _hear(self, message: FromRenderer, held: _Held) -> None:
+        if isinstance(message, Evicted):
+            held.resident = held.record.saved is None
+            if held.resident:  # it ended before it had a sample
+                for read in list(held.record.reads.values()):
+                    held.listener.heard(held.record.heard(Image(message.task, read.serial, None, Progress())))
+            elif held.record.reads:
+                self._do(self._bring_back(message.task, held))
+            return
+        if isinstance(message, Done) and held.record.saved is not None:
+            return  # it was brought back, and had a turn before it heard that it is finished
+        if isinstance(message, Loaded):
+            self._count(message)
+        elif isinstance(message, Frame | Progressed | Done) and time.monotonic() - held.struck_at > FORGIVEN_S:
+            held.strikes = 0
+        held.listener.heard(held.record.heard(message))
+
+    def _is_ready(self, message: Ready) -> None:
+        assert self._process is not None
+        self._process.ready = True
+        self._failures = 0
+        seconds = time.monotonic() - self._process.began
+        log.info("renderer ready renderer=%s seconds=%.2f", message.info.get("renderer"), seconds)
+        if self._ready is not None and not self._ready.done():
+            self._ready.set_result(message.info)
+        if self._lost_at is not None:
+            self.statistics.recovery_s.add(time.monotonic() - self._lost_at)
+            self._lost_at = None
 
     def _account(self, usage: Usage) -> None:
         statistics = self.statistics
         statistics.samples += usage.samples
-        statistics.tasks = usage.tasks
+        statistics.tasks, statistics.gpu_bytes = usage.tasks, usage.bytes
         for task, seconds in usage.gpu_s.items():
-            if task in self._listeners:
+            held = self._tasks.get(task)
+            if held is not None:
                 statistics.gpu_s_of[task] += seconds
-            statistics.gpu_s[self._kinds.get(task, "server")] += seconds
+            statistics.gpu_s["server" if held is None else held.kind] += seconds
 
     def _count(self, loaded: Loaded) -> None:
         self.statistics.setup_s.add(loaded.setup_s)
@@ -155,57 +256,67 @@ class Engine:
         else:
             self.statistics.kernels_found += 1
 
-    def _lost(self) -> None:
-        """The renderer's end of the link is closed."""
-        process, lived_s, was_ready = self._process, time.monotonic() - self._began, self.info is not None
-        self._link = self._process = None
-        if self._closed or process is None:
+    async def _watch(self) -> None:
+        loop, pause_s = asyncio.get_running_loop(), min(WATCH_S, self._options.patience_s / 4)
+        while True:
+            began = loop.time()
+            await asyncio.sleep(pause_s)
+            late = loop.time() - began > 2 * pause_s  # then it is the server that was slow, and has not listened
+            if self._process is not None:
+                self._process.watch(excused=late)
+
+    def _lose(self, process: Process) -> None:
+        """That renderer's end of the link is closed."""
+        if self._closed or process is not self._process:
             return
-        self._failures = 0 if was_ready else self._failures + 1
-        log.error("renderer lost lived_s=%.1f failures=%d", lived_s, self._failures)
-        self.statistics.restarts["crashed"] += 1
+        self._process = None
         self._lost_at = self._lost_at or time.monotonic()
-        if was_ready:
+        if process.ready:
             self._detail = "The renderer was lost."
             self._ready = asyncio.get_running_loop().create_future()
-        self._fail_all(self._detail)
-        self._restart = asyncio.get_running_loop().create_task(self._again(process))
+        self._do(self._replace(process))
 
-    async def _again(self, process: subprocess.Popen[bytes]) -> None:
-        await asyncio.to_thread(_reap, process, 0.0)
-        if self._failures < TRIES:
+    async def _replace(self, process: Process) -> None:
+        cause = await process.end(0.0)
+        self._failures = 0 if process.ready else self._failures + 1
+        self.statistics.restarts[cause] += 1
+        log.error("renderer lost cause=%s lived_s=%.1f failures=%d", cause, process.lived_s, self._failures)
+        self._blame(process, cause)
+        if self.hopeless:
+            self._fail_all(self._detail)
+            if self._ready is not None and not self._ready.done():
+                self._ready.set_exception(Unavailable(self._detail))
+                self._ready.exception()  # looked at: perhaps nobody waits, and asyncio would complain
+            await asyncio.sleep(HOPELESS_S)
+            self._ready = asyncio.get_running_loop().create_future()
+        else:
             await asyncio.sleep(BETWEEN_TRIES_S * self._failures)
-            self.start()
-        elif self._ready is not None:
-            self._ready.set_exception(Unavailable(self._detail))
-            self._ready.exception()  # looked at: perhaps nobody waits, and asyncio would complain
+        self._begin()
+
+    def _blame(self, process: Process, cause: Cause) -> None:
+        """Three strikes against the task that was worked on, where nobody from outside ended the renderer."""
+        task = process.pulse.task
+        held = self._tasks.get(task)
+        if held is None or cause in ("killed", "stopped"):
+            return
+        held.strikes += 1
+        held.struck_at = time.monotonic()
+        log.warning("task %d was worked on when the renderer was lost strikes=%d", task, held.strikes)
+        if held.strikes >= STRIKES:
+            del self._tasks[task]
+            self.statistics.gpu_s_of.pop(task, None)
+            held.record.close()
+            held.listener.lost(f"Rendering this scene brought the renderer down {STRIKES} times ({cause}).")
 
     def _fail_all(self, detail: str) -> None:
-        listeners = list(self._listeners.values())
-        self._listeners.clear()
-        for listener in listeners:
-            listener.lost(detail)
+        tasks = list(self._tasks.values())
+        self._tasks.clear()
+        self.statistics.gpu_s_of.clear()
+        for held in tasks:
+            held.record.close()
+            held.listener.lost(detail)
 
-
-def _spawn(end: socket.socket, device: int | None) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), "--server", str(os.getpid())]
-    command += ["--log-level", str(logging.getLogger().getEffectiveLevel())]
-    command += [] if device is None else ["--device", str(device)]
-    # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.
-    # stdout is the command line's, who may be read by a script that waits for its end.
-    return subprocess.Popen(
-        command,
-        pass_fds=[end.fileno()],
-        cwd=ROOT,
-        stdin=subprocess.DEVNULL,
-        stdout=subprocess.DEVNULL,
-        process_group=0,
-    )
-
-
-def _reap(process: subprocess.Popen[bytes], patience_s: float) -> None:
-    try:
-        process.wait(patience_s)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
+    def _do(self, work: Any) -> None:
+        chore = asyncio.get_running_loop().create_task(work)
+        self._chores.add(chore)
+        chore.add_done_callback(self._chores.discard)

@@ -102,9 +102,13 @@ class Flow:
             self._anyway, self._asked = True, False
             self._ask()
 
-    def fail(self) -> None:
-        """No frame of this generation will come."""
+    def fall_back(self, generation: int | None) -> None:
+        """The present generation failed; the picture goes on with that one."""
         self._answered.set()
+        if generation is not None:
+            self.generation = generation
+            self._anyway, self._asked = True, False
+            self._ask()
 
     async def settled(self) -> None:
         """Returns when the present generation has been seen, or can't be, or takes too long."""

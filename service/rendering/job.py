@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import contextlib
 import itertools
 import secrets
 import time
@@ -31,6 +32,7 @@ from service.rendering.reading import stop_rule, weight
 
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 
+PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 ID_BYTES = 16  # 128 bits: nobody guesses one
 PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
 
@@ -66,13 +68,15 @@ class Job:
         self._task: int | None = None
         self._reads: dict[int, asyncio.Future[Image]] = {}
         self._serials = itertools.count(1)
+        self._sampled = asyncio.Event()  # cleared while there are no samples any more, the renderer having been lost
+        self._sampled.set()
 
     async def run(self) -> None:
         """From queued to finished, whichever way."""
         if self._packed is None:
             return
         try:
-            self._task = self._engine.open(self, "render")
+            self._task = self._engine.open(self, "render", self.owner or "anybody")
             arrays, self._packed = self._packed.arrays, None
             settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
             update = Update(self._task, 1, arrays, settings, stop, denoise=self._settings.denoise)
@@ -82,7 +86,6 @@ class Job:
         except ServiceError as error:
             self._fail(error)
         await self.finished.wait()
-        self.ended_at = time.monotonic()
 
     def cancel(self) -> None:
         """Stops at once; the image so far stays."""
@@ -91,7 +94,7 @@ class Job:
         self.state, self._packed = "cancelled", None
         if self._task is not None:
             self._engine.send(Stop(self._task))
-        self.finished.set()
+        self._finish()
 
     def release(self) -> None:
         """Forgets the picture."""
@@ -125,6 +128,10 @@ class Job:
             raise self._error
         if self._task is None:
             raise Conflict("There is no sample yet.")
+        with contextlib.suppress(TimeoutError):
+            await asyncio.wait_for(self._sampled.wait(), PATIENCE_S)
+        if self._task is None:
+            raise self._error or Conflict("There is no sample yet.")
         serial = next(self._serials)
         self._reads[serial] = asyncio.get_running_loop().create_future()
         self._engine.send(Read(self._task, serial, view))
@@ -143,6 +150,8 @@ class Job:
                 self.state = "running"
         elif isinstance(message, Progressed):
             self._progress = message.progress
+            if message.progress.samples:
+                self._sampled.set()
         elif isinstance(message, Done):
             self._end(message)
         elif isinstance(message, Failed):
@@ -151,6 +160,13 @@ class Job:
                 self._answer(message.serial, error)
             else:
                 self._fail(error)
+
+    def again(self) -> None:
+        """Rendered again from the start. What had been cancelled stays as far as it was, once it is there again."""
+        if self._progress.samples:
+            self._sampled.clear()
+        if not self.finished.is_set():
+            self._progress = Progress()
 
     def lost(self, detail: str) -> None:
         self._task = None
@@ -161,19 +177,25 @@ class Job:
 
     def _end(self, done: Done) -> None:
         self._progress, self._reason = done.progress, done.reason
+        self._sampled.set()
         self._warnings += [warning for warning in done.warnings if warning not in self._warnings]
         if not self.finished.is_set():
             self.state = "cancelled" if done.reason == "stopped" else "done"
-            self.finished.set()
+            self._finish()
+
+    def _finish(self) -> None:
+        self.ended_at = time.monotonic()
+        self.finished.set()
 
     def _fail(self, error: ServiceError) -> None:
         self.state = "failed"
         self._engine.statistics.errors[answer(error).type] += 1
         self._forget(error)
-        self.finished.set()
+        self._finish()
 
     def _forget(self, error: ServiceError) -> None:
         self._error, self._packed = error, None
+        self._sampled.set()
         for serial in list(self._reads):
             self._answer(serial, error)
 

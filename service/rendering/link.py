@@ -93,6 +93,7 @@ class Link:
         self._receive = receive
         self._lost = lost
         self._waiting: deque[Encoded] = deque()
+        self.sent = 0  # that the other end can take
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(end, self._readable)
 
@@ -136,6 +137,7 @@ class Link:
                 return
             except ConnectionError:
                 return  # the reader hears of it after what was still said
+            self.sent += 1
             discard(self._waiting.popleft())
         self._loop.remove_writer(self._end)
 

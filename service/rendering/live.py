@@ -14,6 +14,8 @@ from service.rendering.messages import Update
 from service.rendering.reading import Reader, stop_rule
 from service.scene import Scene, merge_patch
 
+Origin = tuple[float, float, float]
+
 
 @dataclass(frozen=True)
 class Version:
@@ -26,6 +28,15 @@ class Version:
     settings: ResolvedSettings
 
 
+@dataclass(frozen=True)
+class Good:
+    """A version, and what the renderer's arrays of it are relative to."""
+
+    version: Version
+    origin: Origin
+    textures: Any
+
+
 class Live:
     """Not for the event loop: its methods parse and pack. One call at a time."""
 
@@ -35,7 +46,9 @@ class Live:
         self._task = task
         self._cache = PackCache()
         self._given: Version | None = None  # the last one that the renderer has
-        self._origin = (0.0, 0.0, 0.0)  # what its coordinates are relative to
+        self._good: dict[int, Good] = {}  # that the renderer may go back to, by generation
+        self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
+        self._origin: Origin = (0.0, 0.0, 0.0)  # what its coordinates are relative to
         self._textures: Any = None  # a gpu.TextureArrays: how its materials use textures
 
     def take(self, message: protocol.Start | protocol.Update) -> Update | None:
@@ -63,9 +76,19 @@ class Live:
             self.version = self._given
             raise
 
-    def forget(self) -> None:
-        """The renderer lost what it was given: the next update carries everything."""
+    def failed(self, generation: int, fallback: int | None) -> Update | None:
+        """The renderer failed at `generation` and goes on with `fallback`; what to tell it where newer is wanted."""
+        version, given = self.version, self._given
+        good = None if fallback is None else self._good.get(fallback)
         self._given = None
+        if good is not None:
+            self._given, self._origin, self._textures = good.version, good.origin, good.textures
+        if version is None or version.generation <= generation:
+            self.version = self._given
+        elif given is not None and given.generation > generation:  # it was told as a change of what failed
+            self._given = None
+            return self._give(version)
+        return None
 
     def _started(self, message: protocol.Start) -> Version:
         scene, settings = self._reader.both(message.scene, message.settings)
@@ -87,6 +110,10 @@ class Live:
     def _give(self, version: Version) -> Update:
         update = self._difference(version)
         self._given = version
+        newest = max((g for g in self._good if g <= self.works), default=None)
+        if newest is not None:
+            self._good = {g: kept for g, kept in self._good.items() if g >= newest}
+        self._good[version.generation] = Good(version, self._origin, self._textures)
         return update
 
     def _difference(self, new: Version) -> Update:
@@ -105,6 +132,7 @@ class Live:
         environment = new.scene.environment
         return replace(
             update,
+            base=None if old is None else old.generation,
             camera=pack_camera(new.scene.camera, self._origin) if touched.camera else None,
             materials=pack_materials(new.scene) if touched.materials else None,
             texture_words=repacked(self._textures, new.scene) if touched.materials and self._textures else None,

@@ -61,6 +61,8 @@ class Update:
     texture_words: np.ndarray | None = None
     environment: tuple[float, float] | None = None
     denoise: bool | None = None
+    base: int | None = None  # the generation that it changes; without one it is whole
+    client: str = ""  # whose; tasks of one client share its part of the GPU's time
     interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
 
     @property
@@ -121,6 +123,17 @@ class Stop:
 @dataclass(frozen=True)
 class Drop:
     task: int
+
+
+@dataclass(frozen=True)
+class Restore:
+    """The picture of a task whose scene was just sent again: finished, as it was when Done brought it."""
+
+    task: int
+    generation: int
+    saved: Any
+    reason: Reason
+    progress: Progress
 
 
 # --- from the renderer ---
@@ -186,6 +199,14 @@ class Done:
     reason: Reason
     progress: Progress
     warnings: list[str]
+    saved: Any = None  # the gpu.Saved picture of a render that nobody edits; None: no samples
+
+
+@dataclass(frozen=True)
+class Evicted:
+    """The renderer has this finished task no more; Restore brings it back."""
+
+    task: int
 
 
 @dataclass(frozen=True)
@@ -195,19 +216,24 @@ class Usage:
     gpu_s: dict[int, float]
     samples: int
     tasks: int
+    bytes: int  # on the device
     task: int = 0  # of nobody in particular
 
 
 @dataclass(frozen=True)
 class Failed:
-    """The task can't go on; an Update with a scene may revive it. `refused`: the scene asks for too much."""
+    """An update failed: the task goes on with generation `fallback`; None: not before there is a whole scene.
+
+    `refused`: the scene asks for too much.
+    """
 
     task: int
     generation: int
     detail: str
     refused: bool = False
     serial: int | None = None  # of the Read that failed, when only that did
+    fallback: int | None = None
 
 
-ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop
-FromRenderer = Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Done | Failed
+ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Restore
+FromRenderer = Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Done | Evicted | Failed

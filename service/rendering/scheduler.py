@@ -1,45 +1,75 @@
-"""Whose turn it is: everyone gets the same time on the GPU, a picture that nobody has seen yet goes first."""
+"""Whose turn it is: every client gets the same time on the GPU, a picture that nobody has seen yet goes first."""
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections import defaultdict
+from collections.abc import Collection, Hashable
 from typing import Protocol, TypeVar
 
-# How much more than the least served a task may have had and still be preferred for its first frame (s). Without a
+# How much more than the least served a client may have had and still be preferred for its first frame (s). Without a
 # bound, a slider that never rests starves the others; below some frames' worth, every drag stutters beside a render.
 FIRST_FRAME_LEAD_S = 0.25
 
 
 class Turn(Protocol):
-    used_s: float  # virtual: as much as everybody had when it joined, and what it used since
+    used_s: float  # virtual, within its client
+    client: str
 
     @property
     def ready(self) -> bool:
-        """Has something to trace."""
+        """Has something to do."""
 
     @property
     def unseen(self) -> bool:
-        """Has nothing to show yet."""
+        """Has nothing to show yet, and somebody waits for it."""
 
 
 T = TypeVar("T", bound=Turn)
 
 
 class Scheduler:
-    """Virtual time: the least served goes next. Who was idle starts level with the others and saves nothing up."""
+    """Virtual time: the client served least goes next, and of its tasks the one served least.
+
+    Who was idle starts level with the others and saves nothing up; what somebody had too much stays in the books
+    until the others have had it too.
+    """
 
     def __init__(self) -> None:
+        self._used_s: dict[str, float] = defaultdict(float)
         self._now_s = 0.0
-        self._waiting: set[int] = set()
+        self._waiting: set[Hashable] = set()
 
     def choose(self, tasks: Collection[T]) -> T | None:
-        ready = [task for task in tasks if task.ready]
-        for task in ready:
-            if id(task) not in self._waiting:
-                task.used_s = max(task.used_s, self._now_s)
-        self._waiting = {id(task) for task in ready}
+        ready: dict[str, list[T]] = defaultdict(list)
+        for task in tasks:
+            if task.ready:
+                ready[task.client].append(task)
+        self._level(ready)
         if not ready:
             return None
-        self._now_s = min(task.used_s for task in ready)
-        unseen = [task for task in ready if task.unseen and task.used_s <= self._now_s + FIRST_FRAME_LEAD_S]
-        return min(unseen or ready, key=lambda task: task.used_s)
+        self._now_s = min(self._used_s[client] for client in ready)
+        within = self._now_s + FIRST_FRAME_LEAD_S
+        first = [task for tasks in ready.values() for task in tasks if task.unseen]
+        eager = {task.client for task in first if self._used_s[task.client] <= within}
+        client = min(eager or ready, key=lambda name: self._used_s[name])
+        candidates = [task for task in ready[client] if task.unseen] if eager else ready[client]
+        return min(candidates, key=lambda task: task.used_s)
+
+    def charge(self, task: Turn, seconds: float) -> None:
+        task.used_s += seconds
+        self._used_s[task.client] += seconds
+
+    def _level(self, ready: dict[str, list[T]]) -> None:
+        """Who has just become ready starts where the others are."""
+        waiting: set[Hashable] = set()
+        for client, tasks in ready.items():
+            waiting |= {client, *map(id, tasks)}
+            if client not in self._waiting:
+                self._used_s[client] = max(self._used_s[client], self._now_s)
+            old = [task.used_s for task in tasks if id(task) in self._waiting]
+            for task in tasks:
+                if old and id(task) not in self._waiting:
+                    task.used_s = max(task.used_s, min(old))
+        self._waiting = waiting
+        for client in [name for name, used_s in self._used_s.items() if name not in ready and used_s <= self._now_s]:
+            del self._used_s[client]

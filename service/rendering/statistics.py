@@ -49,7 +49,7 @@ class Distribution:
 
 @dataclass
 class Statistics:
-    restarts: Counter[str] = field(default_factory=Counter)  # of the renderer: by "crashed", "hung"
+    restarts: Counter[str] = field(default_factory=Counter)  # of the renderer: by process.Cause
     recovery_s: Distribution = field(default_factory=Distribution)  # from a renderer's loss to the next one ready
     gpu_s: dict[Kind, float] = field(default_factory=lambda: defaultdict(float))
     gpu_s_of: dict[int, float] = field(default_factory=lambda: defaultdict(float))  # by task, while it is there

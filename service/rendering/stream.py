@@ -17,7 +17,7 @@ from service.rendering.engine import Engine
 from service.rendering.flow import Flow
 from service.rendering.job import error_of
 from service.rendering.live import Live
-from service.rendering.messages import Done, Failed, Frame, FromRenderer, Pause, Resume, Stop, Update
+from service.rendering.messages import Done, Failed, Frame, FromRenderer, Loaded, Pause, Resume, Stop, Update
 from service.rendering.reading import Reader
 from service.rendering.threads import Lane, encoding
 from service.scene import load_json
@@ -73,7 +73,7 @@ class Stream:
         self._paused = False  # by the client
         self._done: dict[str, Any] | None = None  # what was said last of the present generation
         self._attendance: Attendance | None = None
-        self._inbox: deque[protocol.Message | ServiceError] = deque()
+        self._inbox: deque[protocol.Message | ServiceError | Failed] = deque()
         self._outbox: deque[dict[str, Any] | Frame] = deque()
         self._speaking = False  # something of the outbox is being sent
         self._stirred = asyncio.Event()  # one of them has changed
@@ -168,9 +168,14 @@ class Stream:
                 self._done = {"type": "done", **said, "samples": progress.samples, "noise": progress.noise}
                 self._post(self._done)
         elif isinstance(message, Failed):
-            self._live.forget()
-            self._flow.fail()
             self._refuse(error_of(message), message.generation)
+            self._inbox.append(message)
+            self._stir()
+        elif isinstance(message, Loaded):
+            self._live.works = message.generation
+
+    def again(self) -> None:
+        """The same generation begins again, at one sample; who acknowledges frames sees nothing else of it."""
 
     def lost(self, detail: str) -> None:
         self._refuse(Internal(detail), self._flow.generation)
@@ -184,6 +189,8 @@ class Stream:
             self._stir()
             if isinstance(message, ServiceError):
                 self._refuse(message, self._flow.generation)
+            elif isinstance(message, Failed):
+                await self._fall_back(message)
             elif isinstance(message, Edit):
                 await self._flow.settled()
                 await self._take(message)
@@ -208,6 +215,17 @@ class Stream:
             await self._tell(await self._lane.run(self._live.settle), began)
         except ServiceError as error:
             self._refuse(error, message.generation)
+
+    async def _fall_back(self, failed: Failed) -> None:
+        """To the last scene that was good; a newer one is tried anew."""
+        try:
+            update = await self._lane.run(partial(self._live.failed, failed.generation, failed.fallback))
+        except ServiceError as error:
+            return self._refuse(error, failed.generation)
+        if update is not None:
+            await self._tell(update, asyncio.get_running_loop().time())
+        elif self._flow.generation is not None and self._flow.generation <= failed.generation:
+            self._flow.fall_back(failed.fallback)
 
     async def _tell(self, update: Update | None, began: float) -> None:
         if update is None:

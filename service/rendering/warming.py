@@ -51,5 +51,8 @@ class Warming:
         if isinstance(message, Frame | Failed):
             self._seen.set()
 
+    def again(self) -> None:
+        """A first picture is a first picture."""
+
     def lost(self, detail: str) -> None:
         self._seen.set()

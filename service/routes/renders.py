@@ -29,6 +29,8 @@ router = APIRouter(prefix="/v1", tags=["renders"])
 LONGEST_WAIT_S = 600.0  # many proxies cut idle connections long before
 Wait = Annotated[float, Query(ge=0, le=LONGEST_WAIT_S, allow_inf_nan=False, description="s")]
 DISPLAYED = ("png", "jpeg", "webp")
+
+
 class Bits(IntEnum):
     EIGHT = 8
     SIXTEEN = 16

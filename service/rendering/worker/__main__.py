@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import argparse
+import contextlib
 import logging
 import os
 import signal
 import socket
+from pathlib import Path
 
 from service import logs
 from service.rendering import link
 from service.rendering.messages import Ready, Unable
+from service.rendering.pulse import Pulse
 from service.rendering.worker.lifeline import end_with
 
+OOM_SCORE = 500  # of 1000
 NICENESS = 10  # the server's event loop and the encoders come first; llvmpipe's threads inherit it
 
 log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
@@ -21,6 +25,8 @@ log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m service.rendering.worker")
     parser.add_argument("descriptor", type=int)
+    parser.add_argument("pulse", type=int)
+    parser.add_argument("--memory", type=int, help="bytes that may be held on the device")
     parser.add_argument("--device", type=int)
     parser.add_argument("--log-level", type=int, default=logging.WARNING)
     parser.add_argument("--server", type=int, required=True, help="its process id")
@@ -29,17 +35,19 @@ def main() -> int:
     if not end_with(arguments.server):
         return 0
     os.nice(NICENESS)
+    _offer_itself()
     logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
-            return _serve(end, arguments.device)
+            return _serve(end, Pulse(arguments.pulse), arguments.device, arguments.memory)
         except link.Closed:
             return 0
 
 
-def _serve(end: socket.socket, device: int | None) -> int:
+def _serve(end: socket.socket, pulse: Pulse, device: int | None, memory: int | None) -> int:
     from gpu import GpuError, Renderer, denoise
     from service.rendering.worker.loop import Loop
+    from service.rendering.worker.memory import default_limit
 
     try:
         renderer = Renderer(device)
@@ -48,8 +56,14 @@ def _serve(end: socket.socket, device: int | None) -> int:
         return 1
     link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
-    Loop(end, renderer).run()
+    Loop(end, renderer, pulse, memory or default_limit(bool(renderer.info["software"]))).run()
     return 0
+
+
+def _offer_itself() -> None:
+    """Where memory runs out the kernel shall take this process, which is replaced, and not the server."""
+    with contextlib.suppress(OSError):
+        Path("/proc/self/oom_score_adj").write_text(str(OOM_SCORE))
 
 
 if __name__ == "__main__":

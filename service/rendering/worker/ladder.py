@@ -5,6 +5,8 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+from gpu import picture_bytes
+
 if TYPE_CHECKING:
     from gpu import Picture, Renderer, RenderSettings, Scene
 
@@ -30,6 +32,16 @@ class Ladder:
     @property
     def full(self) -> Picture:
         return self._pictures[1.0]
+
+    @property
+    def begun(self) -> dict[float, Picture]:
+        """The pictures with samples, by scale."""
+        return {scale: picture for scale, picture in self._pictures.items() if picture.samples}
+
+    @property
+    def bytes(self) -> int:
+        """On the device."""
+        return sum(picture_bytes(picture.settings, picture.guided) for picture in self._pictures.values())
 
     def picture(self, scale: float) -> Picture:
         if scale not in self._pictures:

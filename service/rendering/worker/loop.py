@@ -7,17 +7,17 @@ import socket
 import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
-from dataclasses import dataclass
 
 from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
 from service.rendering import link
 from service.rendering.messages import (
     Drop,
+    Evicted,
     Failed,
     FromRenderer,
     Pause,
     Read,
+    Restore,
     Resume,
     Stop,
     ToRenderer,
@@ -25,25 +25,25 @@ from service.rendering.messages import (
     Usage,
     Want,
 )
+from service.rendering.pulse import Pulse
 from service.rendering.scheduler import Scheduler
 from service.rendering.worker.denoiser import Denoiser
+from service.rendering.worker.memory import Memory
 from service.rendering.worker.task import Task
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
+COMPILING_S = 60.0  # no hang: some drivers take as long for a kernel with everything in it
 
 log = logging.getLogger(__name__)
 
 
-@dataclass
-class _Clock:
-    seconds: float = 0.0
-
-
 class Loop:
-    def __init__(self, end: socket.socket, renderer: Renderer) -> None:
+    def __init__(self, end: socket.socket, renderer: Renderer, pulse: Pulse, memory_limit: int) -> None:
         self._end = end
         self._renderer = renderer
+        self._pulse = pulse
         self._tasks: dict[int, Task] = {}
+        self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
         self._denoiser = Denoiser()
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
@@ -55,40 +55,18 @@ class Loop:
         busy = False
         while True:
             for message in coalesced(self._pending(wait=not busy)):
-                with self._charged(message.task):
-                    self._take(message)
+                self._take(message)
             self._denoiser.hear()
             task = self._scheduler.choose(self._tasks.values())
             if task is not None:
-                with self._charged(task.number) as clock:
-                    self._guard(task, task.step)
-                task.used_s += clock.seconds
-            for task in self._tasks.values():
-                if task.want is None:
-                    continue
-                with self._charged(task.number) as clock:
-                    answered = self._guard(task, task.answer)
-                if answered:
-                    task.used_s += clock.seconds
+                began = time.monotonic()
+                self._work(task, task.turn)
+                self._pulse.lasted(time.monotonic() - began)
+            for task in list(self._tasks.values()):
+                if task.want is not None:
+                    self._work(task, task.answer)
             busy = any(task.ready for task in self._tasks.values())
             self._account(at_once=not busy)
-
-    @contextmanager
-    def _charged(self, task: int) -> Iterator[_Clock]:
-        """Measures what is done inside, on the account of that task."""
-        clock, began = _Clock(), time.perf_counter()
-        yield clock
-        clock.seconds = time.perf_counter() - began
-        self._used_s[task] += clock.seconds
-
-    def _account(self, at_once: bool) -> None:
-        """Tells what was used, now and then; at once before there is nothing to do."""
-        now = time.monotonic()
-        if self._used_s and (at_once or now - self._reported >= REPORT_S):
-            traced = sum(task.traced for task in self._tasks.values())
-            self._send(Usage(dict(self._used_s), traced - self._traced, len(self._tasks)))
-            self._used_s.clear()
-            self._traced, self._reported = traced, now
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """What has come in by now; with `wait`, as soon as there is anything, or a picture was denoised."""
@@ -96,36 +74,73 @@ class Loop:
             self._denoiser.sleep(self._end)
         try:
             while True:
-                yield link.receive(self._end)
+                message = link.receive(self._end)
+                self._pulse.take()
+                yield message
         except BlockingIOError:
             return
+
+    def _work(self, task: Task, work: Callable[[], object], read: Read | None = None) -> None:
+        """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's."""
+        began = time.perf_counter()
+        with self._pulse.working(task.number, COMPILING_S if task.loads else 0.0):
+            self._guard(task, work, read)
+        seconds = time.perf_counter() - began
+        self._scheduler.charge(task, seconds)
+        self._used_s[task.number] += seconds
+
+    def _account(self, at_once: bool) -> None:
+        """Tells what was used, now and then; at once before there is nothing to do."""
+        now = time.monotonic()
+        if self._used_s and (at_once or now - self._reported >= REPORT_S):
+            traced = sum(task.traced for task in self._tasks.values())
+            used = dict(self._used_s)
+            self._send(Usage(used, traced - self._traced, len(self._tasks), self._memory.used))
+            self._used_s.clear()
+            self._traced, self._reported = traced, now
 
     def _take(self, message: ToRenderer) -> None:
         task = self._tasks.get(message.task)
         if isinstance(message, Update):
             if task is None:
-                task = self._tasks[message.task] = Task(self._renderer, message.task, self._send, self._denoiser)
-            self._guard(task, lambda: task.update(message))
+                task = self._new(message)
+                self._tasks[message.task] = task
+            task.update(message)
         elif task is None:
-            return  # dropped, and the server had not heard of it when it sent this
+            if isinstance(message, Read):  # evicted, and the server had not heard of it when it sent this
+                self._send(Evicted(message.task))
         elif isinstance(message, Want):
             task.want = message
         elif isinstance(message, Read):
-            self._guard(task, lambda: task.read(message), message)
+            self._work(task, lambda: task.read(message), message)
+        elif isinstance(message, Restore):
+            self._work(task, lambda: task.restore(message))
         elif isinstance(message, Pause):
             task.pause()
         elif isinstance(message, Resume):
             task.resume()
         elif isinstance(message, Stop):
-            self._guard(task, task.stop)
+            self._work(task, task.stop)
         elif isinstance(message, Drop):
-            self._traced -= task.traced
-            self._tasks.pop(message.task).release()
+            self._remove(task)
 
-    def _guard(self, task: Task, work: Callable[[], bool | None], read: Read | None = None) -> bool | None:
-        """Does the work; what goes wrong in it is this task's misfortune and nobody else's."""
+    def _new(self, first: Update) -> Task:
+        return Task(self._renderer, first.task, self._send, self._denoiser, first.client, self._memory, self._forget)
+
+    def _forget(self, task: Task) -> None:
+        """The server has this finished picture, and brings it back when somebody asks for it."""
+        self._remove(task)
+        self._send(Evicted(task.number))
+
+    def _remove(self, task: Task) -> None:
+        self._traced -= task.traced
+        del self._tasks[task.number]
+        task.release()
+
+    def _guard(self, task: Task, work: Callable[[], object], read: Read | None = None) -> None:
         try:
-            return work()
+            work()
+            return
         except link.Closed:
             raise
         except GpuError as error:
@@ -135,10 +150,8 @@ class Loop:
             log.exception("failed task=%d", task.number)
             detail, refused = "The renderer made a mistake; its log says which.", False
         if read is None:
-            task.release()
-        serial = read.serial if read else None
-        self._send(Failed(task.number, task.generation, detail, refused, serial))
-        return None
+            task.fail()
+        self._send(Failed(task.number, task.attempted, detail, refused, read.serial if read else None))
 
     def _send(self, message: FromRenderer) -> None:
         link.send(self._end, message)

@@ -27,6 +27,9 @@ class Clock:
         """A dispatch has ended."""
         self._ended = time.monotonic()
 
+    def set(self, elapsed_s: float) -> None:
+        self._banked_s, self._began = elapsed_s, None
+
     def pause(self) -> None:
         self._banked_s = self.elapsed_s
         self._began = None

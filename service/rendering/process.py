@@ -1,0 +1,147 @@
+"""One renderer's process, seen from the server: begun, watched, ended, and what it died of."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import signal
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Literal
+
+from service.rendering import link, pulse
+
+ROOT = Path(__file__).parents[2]
+TURNS = 10  # a piece of work may take so many times as long as the last one, and the patience on top
+STARTING_S = 60.0  # it imports, finds a driver and asks for a context before it can beat
+KILLS = {-signal.SIGKILL, -signal.SIGTERM}
+
+Cause = Literal["killed", "crashed", "hung", "stopped", "out of memory"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Options:
+    device: int | None = None
+    patience_s: float = 10.0  # without progress
+    memory: int | None = None  # bytes that may be held on the device; None: the worker decides
+
+
+class Process:
+    """`received` hears its messages; `lost`, once, that its end of the link is closed."""
+
+    def __init__(self, options: Options, received: Callable[[Any], None], lost: Callable[[], None]) -> None:
+        self.began = time.monotonic()
+        self.ready = False
+        self.pulse, self._options = _Watched(), options
+        self._condemned: Cause | None = None
+        self._oom_kills = _oom_kills()
+        ours, theirs = link.pair()
+        try:
+            self._process = _spawn(theirs, self.pulse.descriptor, options)
+        finally:
+            theirs.close()
+            os.close(self.pulse.descriptor)
+        self.link = link.Link(ours, received, lost)
+
+    @property
+    def lived_s(self) -> float:
+        return time.monotonic() - self.began
+
+    @property
+    def id(self) -> int:
+        return self._process.pid
+
+    def watch(self, excused: bool = False) -> None:
+        """To be called now and then: ends a renderer that owes something and makes no progress."""
+        if excused:
+            self.pulse.excuse()
+        silent_s = self.pulse.silent_s(self.link.sent)
+        limit_s = self._options.patience_s + TURNS * self.pulse.turn_s + self.pulse.allowance_s
+        limit_s += 0.0 if self.ready else STARTING_S
+        if silent_s > limit_s and self._condemned is None:
+            self._condemned = "stopped" if _is_stopped(self.id) else "hung"
+            log.error("renderer %s silent_s=%.1f task=%d", self._condemned, silent_s, self.pulse.task)
+            self._process.kill()
+
+    async def end(self, patience_s: float) -> Cause:
+        """Gives it that time to end, kills it, buries it; what it died of. The pulse still says where it was."""
+        self.link.close()
+        code = await asyncio.to_thread(_reap, self._process, patience_s)
+        self.pulse.read()
+        self.pulse.close()
+        if self._condemned is not None:
+            return self._condemned
+        if code not in KILLS:
+            return "crashed"
+        # The kernel kills too, where memory has run out; its counter is the machine's, and the best there is.
+        return "killed" if _oom_kills() == self._oom_kills else "out of memory"
+
+
+class _Watched(pulse.Pulse):
+    """A pulse with the time since it last beat, by the clock of whoever looks."""
+
+    def __init__(self) -> None:
+        self.descriptor = pulse.memory()
+        super().__init__(self.descriptor)
+        self._beats, self._since = -1, time.monotonic()
+
+    def excuse(self) -> None:
+        self._beats = -1
+
+    def silent_s(self, sent: int) -> float:
+        """Seconds without a beat while it owes something: work in hand, or messages not taken."""
+        self.read()
+        now = time.monotonic()
+        if self.beats != self._beats or (self.task == 0 and self.taken >= sent):
+            self._beats, self._since = self.beats, now
+        return now - self._since
+
+
+def _spawn(end: socket.socket, pulse_descriptor: int, options: Options) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(pulse_descriptor)]
+    command += ["--server", str(os.getpid()), "--log-level", str(logging.getLogger().getEffectiveLevel())]
+    command += [] if options.device is None else ["--device", str(options.device)]
+    command += [] if options.memory is None else ["--memory", str(options.memory)]
+    # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.
+    # stdout is the command line's, who may be read by a script that waits for its end.
+    return subprocess.Popen(
+        command,
+        pass_fds=[end.fileno(), pulse_descriptor],
+        cwd=ROOT,
+        stdin=subprocess.DEVNULL,
+        stdout=subprocess.DEVNULL,
+        process_group=0,
+    )
+
+
+def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int:
+    try:
+        return process.wait(patience_s)
+    except subprocess.TimeoutExpired:
+        process.kill()
+        return process.wait()
+
+
+def _is_stopped(pid: int) -> bool:
+    """Whether somebody has stopped the process (SIGSTOP, a debugger): then its work is not to blame."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] in "Tt"
+    except OSError:
+        return False
+
+
+def _oom_kills() -> int:
+    """How many processes the kernel has killed for want of memory since the machine began; 0 where it doesn't say."""
+    try:
+        lines = Path("/proc/vmstat").read_text().splitlines()
+    except OSError:
+        return 0
+    return next((int(line.split()[1]) for line in lines if line.startswith("oom_kill ")), 0)

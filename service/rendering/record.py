@@ -1,0 +1,155 @@
+"""What the renderer was told of a task, so that another one can be told it again."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass, replace
+
+from service.rendering import link
+from service.rendering.link import Encoded
+from service.rendering.messages import (
+    Done,
+    Failed,
+    Frame,
+    FromRenderer,
+    Image,
+    Loaded,
+    Pause,
+    Progressed,
+    Read,
+    Restore,
+    Resume,
+    Stop,
+    StopRule,
+    ToRenderer,
+    Update,
+    Want,
+)
+
+STATES = 4  # that wait to be seen working; of more than these, the middle ones are passed over
+
+
+@dataclass
+class _State:
+    """A scene as it was sent, in the memory that the renderer maps too, and what was changed of it since."""
+
+    began: int  # the generation that may have been too much for the renderer
+    scene: Encoded
+    whole: bool  # the scene was that generation's, and not an earlier one's
+    since: Update | None = None
+
+
+class Record:
+    """Closed, it gives back the scenes' memory."""
+
+    def __init__(self, task: int) -> None:
+        self.reads: dict[int, Read] = {}  # not answered yet
+        self.saved: Restore | None = None  # a finished picture
+        self._task = task
+        self._states: list[_State] = []  # the last one that was seen to work, and those after it
+        self._want: Want | None = None
+        self._paused = self._stopped = False
+        self._stopped_at: Done | None = None
+
+    def scene_told(self, update: Update, encoded: Encoded) -> None:
+        self._push(_State(update.generation, _another(encoded), whole=True))
+
+    def told(self, message: ToRenderer) -> None:
+        if isinstance(message, Update):
+            self._edited(message)
+        elif isinstance(message, Want):
+            self._want = message
+        elif isinstance(message, Read):
+            self.reads[message.serial] = message
+        elif isinstance(message, Pause | Resume):
+            self._paused = isinstance(message, Pause)
+        elif isinstance(message, Stop):
+            self._stopped = True
+
+    def heard(self, message: FromRenderer) -> FromRenderer:
+        """The message, as whoever opened the task should hear it."""
+        if isinstance(message, Failed):
+            if message.serial is not None:
+                self.reads.pop(message.serial, None)
+            else:
+                self._fall_back(message)
+        elif isinstance(message, Image):
+            self.reads.pop(message.serial, None)
+        elif isinstance(message, Loaded | Frame | Progressed | Done):
+            self._works(message.generation)
+        if isinstance(message, Frame) and self._want is not None and self._want.serial == message.serial:
+            self._want = None
+        return self._done(message) if isinstance(message, Done) else message
+
+    def again(self) -> list[Encoded | ToRenderer]:
+        """What to tell a new renderer, in order; the encoded ones are whoever's sends them."""
+        out: list[Encoded | ToRenderer] = []
+        for state in self._states:
+            out.append(_another(state.scene))
+            if state.since is not None:
+                out.append(state.since)
+        if not out or self.saved is not None:
+            return out
+        stopped = self._stopped_at
+        if stopped is not None and stopped.progress.samples:  # as far as it was seen, not further and not less
+            stop = StopRule(max_samples=stopped.progress.samples)
+            out.append(Update(self._task, stopped.generation, stop=stop, base=stopped.generation))
+        elif self._stopped:
+            out.append(Stop(self._task))
+        if self._paused:
+            out.append(Pause(self._task))
+        if self._want is not None:
+            out.append(self._want)
+        return [*out, *self.reads.values()]
+
+    def close(self) -> None:
+        while self._states:
+            link.discard(self._states.pop().scene)
+
+    def _push(self, state: _State) -> None:
+        self._states.append(state)
+        if len(self._states) > STATES:
+            link.discard(self._states.pop(1).scene)
+        self._stopped, self._stopped_at = False, None
+
+    def _edited(self, update: Update) -> None:
+        if not self._states:
+            return
+        last = self._states[-1]
+        since = last.since.then(update) if last.since is not None else update
+        if update.settings is not None:  # it may be too large, and then the state before it is the one that counts
+            self._push(_State(update.generation, _another(last.scene), whole=False, since=since))
+        else:
+            last.since = since
+            self._stopped, self._stopped_at = False, None
+
+    def _works(self, generation: int) -> None:
+        while len(self._states) > 1 and self._states[1].began <= generation:
+            link.discard(self._states.pop(0).scene)
+
+    def _fall_back(self, failed: Failed) -> None:
+        """Forgets what failed and what was built on it, but not a whole scene that was sent later."""
+        kept, later = [], False
+        for state in self._states:
+            later = later or (state.whole and state.began > failed.generation)
+            if later or (failed.fallback is not None and state.began <= failed.fallback):
+                kept.append(state)
+            else:
+                link.discard(state.scene)
+        self._states = kept
+
+    def _done(self, done: Done) -> Done:
+        if self._stopped_at is not None and self._stopped_at.generation == done.generation:
+            done = replace(done, reason="stopped")
+        if done.reason == "stopped":
+            self._stopped_at = done
+        if done.saved is not None:
+            self.saved = Restore(done.task, done.generation, done.saved, done.reason, done.progress)
+            self._stopped_at = None
+        return done
+
+
+def _another(encoded: Encoded) -> Encoded:
+    """The same message once more."""
+    datagram, descriptor = encoded
+    return datagram, None if descriptor is None else os.dup(descriptor)

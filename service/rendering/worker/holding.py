@@ -1,0 +1,88 @@
+"""A scene on the device with its pictures; and the same put aside in the machine's memory, to be taken up again."""
+
+from __future__ import annotations
+
+from collections.abc import Generator
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from gpu import RenderSettings, picture_bytes, save, scene_bytes
+from service.rendering.worker.ladder import Ladder
+
+if TYPE_CHECKING:
+    from gpu import Renderer, Saved, Scene, SceneArrays
+
+
+@dataclass(frozen=True)
+class Aside:
+    """What was on the device, in full: it goes on to the same bits."""
+
+    arrays: SceneArrays
+    settings: RenderSettings
+    editing: bool
+    pictures: dict[float, Saved]  # by scale, of those that had begun
+
+
+class Holding:
+    """Raises what the renderer raises, and then holds nothing."""
+
+    def __init__(
+        self, renderer: Renderer, arrays: SceneArrays, settings: RenderSettings, editing: bool, edits: dict[str, Any]
+    ) -> None:
+        self._renderer = renderer
+        self._editing = editing
+        self.scene: Scene = renderer.load(arrays, editing)
+        try:
+            if edits:
+                self.scene.edit(**edits)
+            self.ladder = Ladder(renderer, self.scene, settings)
+        except Exception:
+            self.scene.release()
+            raise
+
+    @property
+    def bytes(self) -> int:
+        return scene_bytes(self.scene.arrays) + self.ladder.bytes
+
+    def resize(self, settings: RenderSettings) -> None:
+        """Takes settings of another size; what there is stays when that can't be had."""
+        ladder = Ladder(self._renderer, self.scene, settings)
+        self.ladder.release()
+        self.ladder = ladder
+
+    def aside(self) -> Aside:
+        """Off the device; this holding is released."""
+        pictures = {scale: finished(save(made)) for scale, made in self.ladder.begun.items()}
+        out = Aside(self.scene.arrays, self.ladder.full.settings, self._editing, pictures)
+        self.release()
+        return out
+
+    @classmethod
+    def back(cls, renderer: Renderer, aside: Aside) -> Holding:
+        out = cls(renderer, aside.arrays, aside.settings, aside.editing, {})
+        try:
+            for scale, saved in aside.pictures.items():
+                out.ladder.picture(scale).restore(saved)
+        except Exception:
+            out.release()
+            raise
+        return out
+
+    def release(self) -> None:
+        self.ladder.release()
+        self.scene.release()
+
+
+def finished(saving: Generator[None, None, Saved]) -> Saved:
+    """What a saving comes to, all at once."""
+    while True:
+        try:
+            next(saving)
+        except StopIteration as end:
+            saved: Saved = end.value
+            return saved
+
+
+def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:
+    """About what a scene and its picture take on the device."""
+    return (0 if arrays is None else scene_bytes(arrays)) + picture_bytes(settings)

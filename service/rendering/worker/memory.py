@@ -1,0 +1,75 @@
+"""What the tasks hold on the device, and who makes room when it is too much: who has rested longest."""
+
+from __future__ import annotations
+
+import logging
+import os
+from collections.abc import Callable, Iterable
+from contextlib import suppress
+from pathlib import Path
+from typing import Protocol
+
+from gpu import OutOfMemory
+
+SHARE = 0.5  # of the machine's memory, where that is the device's: the other half is the server's and the system's
+UNLIMITED = 1 << 62
+
+log = logging.getLogger(__name__)
+
+
+class Holder(Protocol):
+    rested_since: float
+
+    @property
+    def bytes(self) -> int: ...
+
+    @property
+    def idle(self) -> bool:
+        """Can give back what it holds, and get it again."""
+
+    def evict(self) -> None: ...
+
+
+class Memory:
+    """Counted in what was asked of the driver, which doesn't say what it really takes."""
+
+    def __init__(self, limit: int, holders: Callable[[], Iterable[Holder]]) -> None:
+        self.limit = limit
+        self._holders = holders
+
+    @property
+    def used(self) -> int:
+        return sum(holder.bytes for holder in self._holders())
+
+    def make_room(self, needed: int, asking: Holder) -> None:
+        """Evicts the idle, the longest at rest first, until so many bytes more would fit. Raises OutOfMemory."""
+        while self.used + needed > self.limit and self.evict_one(asking):
+            pass
+        if self.used + needed > self.limit:
+            raise OutOfMemory(
+                f"this needs {_mib(needed)} MiB on the device; of {_mib(self.limit)} MiB (SUNBOX_GPU_MEMORY) "
+                f"{_mib(self.used)} are in use"
+            )
+
+    def evict_one(self, asking: Holder) -> bool:
+        idle = [holder for holder in self._holders() if holder.idle and holder.bytes and holder is not asking]
+        if not idle:
+            return False
+        oldest = min(idle, key=lambda holder: holder.rested_since)
+        log.info("evicted bytes=%d used=%d", oldest.bytes, self.used)
+        oldest.evict()
+        return True
+
+
+def default_limit(software: bool) -> int:
+    """Bytes. A GPU's driver says no by itself; where it is the machine's memory, the kernel would kill somebody."""
+    if not software:
+        return UNLIMITED
+    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    with suppress(OSError, ValueError):  # no such file, or "max"
+        total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
+    return int(SHARE * total)
+
+
+def _mib(size: int) -> int:
+    return -(-size // 2**20)
