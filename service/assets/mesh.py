@@ -9,6 +9,7 @@ import numpy as np
 
 from service.assets.data import AssetLimits, Floats, Indices, MeshData
 from service.assets.errors import ParseError
+from service.assets.oddities import oddities
 from service.assets.parts import Numbers, Parts, check, unit_colors, unit_normals
 
 
@@ -18,6 +19,7 @@ def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     check(parts, limits.max_triangles)
     vertices = np.ascontiguousarray(parts.vertices, np.float64)
     faces: Indices = np.ascontiguousarray(parts.faces, np.int32)
+    parts.warnings += oddities(vertices, faces)
     return MeshData(
         vertices,
         faces,

@@ -8,7 +8,7 @@ import re
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Protocol
 
@@ -190,8 +190,9 @@ class AssetStore:
         if not ID.fullmatch(id):
             return None
         try:
-            return AssetInfo(**json.loads(self._path(id, ".json").read_bytes()))
-        except (OSError, ValueError, TypeError):
+            info = AssetInfo(**json.loads(self._path(id, ".json").read_bytes()))
+            return replace(info, kind=KINDS[info.format])  # an older version took glTF for a mesh
+        except (OSError, ValueError, TypeError, KeyError):
             return None
 
     def _builtin_bytes(self, id: str) -> bytes:

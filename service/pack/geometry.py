@@ -52,7 +52,7 @@ def geometry(
 
     Raises InvalidDocument.
     """
-    placed, placed_meshes = place(shapes, names, emissive, assets, max_triangles, uv_sets)
+    placed, placed_meshes, odd = place(shapes, names, emissive, assets, max_triangles, uv_sets)
     analytic = _analytic(placed, np.zeros(3))
     low, high, owners, exact = _extents(analytic, placed_meshes)
     origin, radius = choose(low, high)
@@ -77,7 +77,7 @@ def geometry(
     _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
-    warnings = [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
+    warnings = odd + [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
     warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
     warnings += lost(low, high, owners, exact, origin)
     return Geometry(

@@ -7,23 +7,27 @@ from collections.abc import Collection, Mapping, Sequence
 import numpy as np
 
 from service.assets import Assets, MeshData
+from service.assets.oddities import oddities
 from service.pack import meshes
 from service.pack.meshes import PlacedMesh
 from service.pack.placed import Placed, check_reach
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
 
+MOST_ODD = 20  # warnings: a model of a thousand parts may have them all
+
 
 def place(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
     uv_sets: Mapping[str, frozenset[int]],
-) -> tuple[Placed, list[PlacedMesh]]:  # fmt: skip
-    """(analytic shapes, meshes) in the world; `names` and `emissive` are materials, `uv_sets` what they read.
+) -> tuple[Placed, list[PlacedMesh], list[str]]:  # fmt: skip
+    """(analytic shapes, meshes, what is odd about them) in the world; `names` and `emissive` are materials, `uv_sets`
+    what they read.
 
     Raises InvalidDocument.
     """
     materials = {name: i for i, name in enumerate(names)}
-    placed, placed_meshes, count = Placed(), [], 0
+    placed, placed_meshes, odd, count = Placed(), [], list[str](), 0
     for i, shape in enumerate(shapes):
         matrix = None if shape.transform is None else shape.transform.matrix4()
         used = materials[shape.material], i
@@ -38,17 +42,20 @@ def place(
             case BoxShape():
                 placed.box(shape.min, shape.max, matrix, used, shape.material in emissive)
             case MeshShape():
-                mesh = _mesh(shape, matrix, used, assets, max_triangles - count, sets)
+                data = _data(shape, i, assets)
+                odd += [f"/shapes/{i}: {warning}" for warning in data.warnings]
+                mesh = _mesh(shape, data, matrix, used, max_triangles - count, sets)
                 count += len(mesh.faces)
                 placed_meshes.append(mesh)
-    return placed, placed_meshes
+    if len(odd) > MOST_ODD:
+        odd[MOST_ODD:] = [f"and {len(odd) - MOST_ODD} more like these"]
+    return placed, placed_meshes, odd
 
 
 def _mesh(
-    shape: MeshShape, matrix: np.ndarray | None, used: tuple[int, int], assets: Assets, room: int,
+    shape: MeshShape, data: MeshData, matrix: np.ndarray | None, used: tuple[int, int], room: int,
     sets: frozenset[int],
 ) -> PlacedMesh:  # fmt: skip
-    data = _data(shape, used[1], assets)
     if len(data.faces) > room:
         detail = f"has {len(data.faces)} triangles; this server has room for {room} more in a scene"
         raise InvalidDocument([FieldError(f"/shapes/{used[1]}", detail)])
@@ -69,7 +76,8 @@ def _mesh(
 def _data(shape: MeshShape, number: int, assets: Assets) -> MeshData:
     if shape.asset is None:
         assert shape.vertices is not None and shape.faces is not None
-        return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors)
+        odd = tuple(oddities(shape.vertices, shape.faces))
+        return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors, odd)
     try:
         return assets.mesh(shape.asset)
     except AssetError as error:

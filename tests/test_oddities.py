@@ -1,0 +1,41 @@
+"""Meshes that are odd and rendered all the same: what is told of them."""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+import pytest
+
+from service.assets.oddities import oddities
+
+POINTS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+CUBE = np.array(
+    [[0, 1, 3], [0, 3, 2], [4, 6, 7], [4, 7, 5], [0, 4, 5], [0, 5, 1], [2, 3, 7], [2, 7, 6], [0, 2, 6], [0, 6, 4],
+     [1, 5, 7], [1, 7, 3]], np.int32)  # fmt: skip
+SEAMED = POINTS[CUBE].reshape(-1, 3), np.arange(36, dtype=np.int32).reshape(-1, 3)  # every corner a vertex of its own
+FIN = np.array([[0, 1, 4]], np.int32)
+
+
+@pytest.mark.parametrize(
+    ("vertices", "faces", "told"),
+    [
+        (POINTS, CUBE, []),
+        (*SEAMED, []),
+        (POINTS, CUBE[:-1], []),
+        (POINTS, CUBE[:, ::-1], ["faces inwards"]),
+        (SEAMED[0], SEAMED[1][:, ::-1], ["faces inwards"]),
+        (POINTS - 1e6, CUBE[:, ::-1], ["faces inwards"]),
+        (
+            POINTS,
+            np.concatenate([CUBE[:1, ::-1], CUBE[1:]]),
+            ["3 edges lie between triangles that face opposite ways"],
+        ),
+        (POINTS, np.concatenate([CUBE, CUBE[3:5, [1, 2, 0]]]), ["2 triangles stand where", "5 edges belong to more"]),
+        (POINTS, np.concatenate([CUBE, FIN]), ["2 edges belong to more"]),
+        (POINTS, np.array([[0, 0, 1], [1, 1, 1]], np.int32), []),
+    ],
+)
+def test_oddities(vertices: np.ndarray, faces: np.ndarray, told: list[str]) -> None:
+    found = oddities(vertices, np.ascontiguousarray(faces))
+    assert len(found) == len(told) and all(re.search(a, b) for a, b in zip(told, found, strict=True)), found
