@@ -6,7 +6,7 @@ import json
 import logging
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import closing, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 
@@ -97,7 +97,11 @@ class Documents:
     @property
     def bytes(self) -> int:
         """Of the file and its log."""
-        return sum(path.stat().st_size for path in self._path.parent.glob(self._path.name + "*"))
+        total = 0
+        for path in self._path.parent.glob(self._path.name + "*"):
+            with suppress(FileNotFoundError):  # the log goes when the last one who reads or writes has done so
+                total += path.stat().st_size
+        return total
 
     def _validate(self, kind: str, document: Any) -> None:
         if kind == "materials":

@@ -101,6 +101,13 @@ for i in range(10 ** 6):
         assert database.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
+def test_the_log_may_go_while_it_is_measured(saved: Documents, tmp_path: Path) -> None:
+    saved.put("materials", "m", MATERIAL)
+    size = saved.bytes
+    (tmp_path / "documents.sqlite3-wal").symlink_to("gone")  # listed, and not there when it is looked at
+    assert saved.bytes == size > 0
+
+
 def test_a_damaged_file_is_told_of(saved: Documents, tmp_path: Path) -> None:
     (tmp_path / "documents.sqlite3").write_bytes(b"no database at all" * 100)
     with pytest.raises(Unavailable, match="disk"):
