@@ -13,6 +13,7 @@ from gpu.picture import Picture
 from gpu.program import Kernels
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
+from gpu.texels import Texels
 
 
 class Renderer:
@@ -22,6 +23,7 @@ class Renderer:
         self._thread = threading.get_ident()
         self._context = contexts.create(device)
         self._kernels = Kernels(self._context)
+        self._texels = Texels()
         self._frame = self._context.buffer(reserve=layout.Frame.dtype.itemsize)
         self.info: dict[str, Any] = contexts.describe(self._context)
 
@@ -40,7 +42,7 @@ class Renderer:
             count = len(getattr(arrays, name))
             if count > layout.LEAF_FIRST_MASK:
                 raise SceneTooLarge(f"{count} {name}: at most {layout.LEAF_FIRST_MASK} of a kind")
-        return Scene(self._context, arrays, editing)
+        return Scene(self._context, arrays, editing, self._texels)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.
@@ -54,6 +56,7 @@ class Renderer:
         """Release the context with all that was made from it."""
         self._own()
         self._kernels.release()
+        self._texels.release()
         self._frame.release()
         contexts.release(self._context)
 

@@ -46,8 +46,8 @@ def save(picture: Picture) -> Generator[None, None, Saved]:
 
 def scene_bytes(scene: object) -> int:
     """About what a SceneArrays takes on the device."""
-    environment = getattr(scene, "environment", None)
-    arrays = [*vars(scene).values(), *(vars(environment).values() if environment is not None else ())]
+    parts = [scene, *(getattr(scene, name, None) for name in ("environment", "textures"))]
+    arrays = [array for part in parts if part is not None for array in vars(part).values()]
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 

@@ -15,6 +15,7 @@ from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
 from gpu.layout import LightKind, Slot
 from gpu.settings import RenderSettings
+from gpu.texels import Texels, rows
 
 log = logging.getLogger(__name__)
 
@@ -52,37 +53,20 @@ def upload_tables(context: Any) -> dict[int, Any]:
     return out
 
 
-def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
-    """A texture of `layout.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
-    flat = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
-    pitch = layout.TEXELS_A_ROW * channels * {"f1": 1, "f2": 2, "f4": 4}[dtype]
-    height, rest = divmod(len(flat), pitch)
-    size = (layout.TEXELS_A_ROW, height + (rest > 0))
-    try:
-        texture = context.texture(size, channels, dtype=dtype)
-    except Exception as error:
-        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures") from error
-    if height:
-        texture.write(flat[: height * pitch], viewport=(0, 0, layout.TEXELS_A_ROW, height))
-    if rest:
-        last = np.zeros(pitch, np.uint8)
-        last[:rest] = flat[height * pitch :]
-        texture.write(last, viewport=(0, height, layout.TEXELS_A_ROW, 1))
-    texture.filter = (context.NEAREST, context.NEAREST)
-    return texture
-
-
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
-    def __init__(self, context: Any, arrays: SceneArrays, editing: bool) -> None:
+    def __init__(self, context: Any, arrays: SceneArrays, editing: bool, texels: Texels) -> None:
         self._context = context
+        self._shared = texels
         self._editing = editing
         self._raised: frozenset[str] = frozenset()
         self.arrays = arrays
         self._raise_flags()
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
+        self._images: dict[int, Any] = {}  # those of images, perhaps shared
+        self._key = ""  # under which they are
         try:
             self._upload_all()
         except OutOfMemory:
@@ -117,12 +101,20 @@ class Scene:
             layout.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
             layout.COLORS_TEXTURE: (a.triangle_colors, 4, "f2"),
         }
-        if a.textures is not None:
-            asked[layout.BYTES_TEXTURE] = (a.textures.texels, 4, "f1")
-            asked[layout.FLOATS_TEXTURE] = (a.textures.floats, 4, "f4")
         for unit, (values, channels, dtype) in asked.items():
             if len(values):
                 self._details[unit] = rows(self._context, values, channels, dtype)
+        if a.textures is not None:
+            if a.textures.key:
+                self._images, self._key = self._shared.take(a.textures.key, self._upload_images), a.textures.key
+            else:
+                self._images = self._upload_images()
+
+    def _upload_images(self) -> dict[int, Any]:
+        textures = self.arrays.textures
+        assert textures is not None
+        asked = {layout.BYTES_TEXTURE: (textures.texels, "f1"), layout.FLOATS_TEXTURE: (textures.floats, "f4")}
+        return {u: rows(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)}
 
     def _raise_flags(self) -> None:
         raised = features.flags(self.arrays, self._editing)
@@ -195,7 +187,7 @@ class Scene:
             if slot in _BLOCKS:
                 buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
         self._texels.use(layout.ENVIRONMENT_TEXTURE)
-        for unit, texture in (*self._tables.items(), *self._details.items()):
+        for unit, texture in (*self._tables.items(), *self._details.items(), *self._images.items()):
             texture.use(unit)
 
     def write_frame(self, frame: np.ndarray) -> None:
@@ -236,5 +228,8 @@ class Scene:
         for buffer in self._buffers.values():
             buffer.release()
         self._texels.release()
-        for texture in (*self._tables.values(), *self._details.values()):
+        own = [] if self._key else self._images.values()
+        for texture in (*self._tables.values(), *self._details.values(), *own):
             texture.release()
+        if self._key:
+            self._shared.give_back(self._key)

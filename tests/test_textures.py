@@ -12,9 +12,11 @@ import pytest
 from gpu import Renderer, RenderSettings, features, layout
 from gpu.layout import Slot
 from gpu.program import SHADERS, Kernels, Source
-from service.pack import pack
+from service.pack import pack, pack_materials, repacked
 from service.problems import InvalidDocument
+from service.rendering.change import Change, change
 from service.scene import parse_scene
+from tests.documents import Few
 from tests.probing import PROBES
 from tests.rendering import Images, document, render
 
@@ -301,3 +303,36 @@ def test_a_scene_without_textures_has_nothing_of_them_in_its_kernel(entry: str) 
     done = subprocess.run(["cpp", "-P", "-"], input=text, capture_output=True, text=True, check=True).stdout
     for word in ("texture_", "Texture", "uv_1", "handed", "texels[", "mapped"):
         assert word not in done.replace("environment_texels", "").replace("energy_", ""), word
+
+
+def test_an_edit_of_a_factor_moves_numbers_only(gpu: Renderer) -> None:
+    """In place, to the bit what a scene packed anew shows; and a scene packed anew finds its images on the device."""
+    tone = {"t": {"asset": "sha256:rgb"}}
+    shelf = Images(**{"sha256:rgb": IMAGES["rgb"]})
+    scenes = [parse_scene(scene_of(tone, {"emission": 0.1, "albedo": {"texture": "t", "factor": f}},
+                                   environment={"type": "constant", "radiance": 1})) for f in (1, 0.25)]  # fmt: skip
+    assert change(*scenes) == Change(materials=True)
+    packs = [pack(scene, shelf).arrays for scene in scenes]
+    loaded = [gpu.load(arrays) for arrays in packs]
+    assert loaded[0]._images is loaded[1]._images, "the images stand on the device once"
+    loaded[0].edit(materials=pack_materials(scenes[1]), texture_words=repacked(packs[0].textures, scenes[1]))
+    images = []
+    for scene in loaded:
+        made = gpu.picture(scene, RenderSettings(16, 16, max_bounces=2))
+        made.trace(60.0, 4)
+        images.append(made.read())
+        made.release()
+        scene.release()
+    assert np.array_equal(*images) and images[0].std() > 0.01
+    other = parse_scene(scene_of({"t": {"asset": "sha256:rgb", "wrap": "clamp"}}, {"albedo": {"texture": "t"}}))
+    assert change(scenes[0], other).whole
+
+
+def test_a_server_bounds_the_texels_of_a_scene() -> None:
+    scene = parse_scene(scene_of({"t": {"asset": "rgb"}, "u": {"asset": "floats"}},
+                                 {"albedo": {"texture": "t"}, "alpha": {"texture": "u"}}))  # fmt: skip
+    pack(scene, Images(**IMAGES), limits=Few(max_texels=5 * 7 + 6 * 4))
+    with pytest.raises(InvalidDocument) as caught:
+        pack(scene, Images(**IMAGES), limits=Few(max_texels=5 * 7 + 6 * 4 - 1))
+    (error,) = caught.value.errors
+    assert error.pointer == "/textures/t/asset" and "room for 34 more" in error.detail

@@ -1,0 +1,75 @@
+"""Textures that hold numbers in a row: texels of images, coordinates of triangles; and those that scenes share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gpu import layout
+from gpu.errors import OutOfMemory
+
+BYTES = {"f1": 1, "f2": 2, "f4": 4}
+
+
+def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
+    """A texture of `layout.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
+    flat = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+    pitch = layout.TEXELS_A_ROW * channels * BYTES[dtype]
+    height, rest = divmod(len(flat), pitch)
+    size = (layout.TEXELS_A_ROW, height + (rest > 0))
+    context.error  # noqa: B018  # an older one is not this texture's
+    try:
+        texture = context.texture(size, channels, dtype=dtype)
+    except Exception as error:  # moderngl.Error is not importable without its binary parts
+        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures") from error
+    if context.error == "GL_OUT_OF_MEMORY":
+        texture.release()
+        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures")
+    if height:
+        texture.write(flat[: height * pitch], viewport=(0, 0, layout.TEXELS_A_ROW, height))
+    if rest:
+        last = np.zeros(pitch, np.uint8)
+        last[:rest] = flat[height * pitch :]
+        texture.write(last, viewport=(0, height, layout.TEXELS_A_ROW, 1))
+    texture.filter = (context.NEAREST, context.NEAREST)
+    return texture
+
+
+@dataclass
+class _Held:
+    textures: dict[int, Any]
+    users: int
+
+
+class Texels:
+    """Images on the device by `TextureArrays.key`. The last that a scene gave back stays, for the scene's next
+    version: an edit that packs a scene anew does not upload its images again.
+    """
+
+    def __init__(self) -> None:
+        self._held: dict[str, _Held] = {}
+
+    def take(self, key: str, make: Callable[[], dict[int, Any]]) -> dict[int, Any]:
+        """Textures by unit; to be given back."""
+        held = self._held.get(key)
+        if held is None:
+            held = self._held[key] = _Held(make(), 0)
+        held.users += 1
+        return held.textures
+
+    def give_back(self, key: str) -> None:
+        self._held[key].users -= 1
+        if self._held[key].users == 0:
+            for other in [k for k, held in self._held.items() if held.users == 0 and k != key]:
+                self._release(other)
+
+    def release(self) -> None:
+        for key in list(self._held):
+            self._release(key)
+
+    def _release(self, key: str) -> None:
+        for texture in self._held.pop(key).textures.values():
+            texture.release()
