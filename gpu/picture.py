@@ -20,7 +20,7 @@ from gpu.program import Kernels
 from gpu.saved import Saved
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
-from gpu.tiles import Tile, Tiles
+from gpu.tiles import MAX_SAMPLES_A_PASS, Tile, Tiles, samples_at_once
 
 _GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
 _GUIDE_PIXELS = 1 << 16  # traced at once for them: 25 ms on llvmpipe in a large mesh
@@ -93,8 +93,13 @@ class Picture:
 
     def _cut(self) -> None:
         s = self.settings
-        self._tiles = Tiles(s.width, s.height, self._most_pixels, s.max_bounces)
-        self._meter_tiles = Tiles(meter.LINE, self._meter.lines, self._most_pixels, s.max_bounces)
+        samples = MAX_SAMPLES_A_PASS
+        if contexts.describe(self.context)["software"]:
+            counts = features.counts(self.scene.arrays)
+            standing = sum(int(str(counts[name])) for name in features.COUNTS)
+            samples = samples_at_once(s.max_bounces, standing, len(self.scene.arrays.nodes) // 8)
+        self._tiles = Tiles(s.width, s.height, self._most_pixels, s.max_bounces, samples)
+        self._meter_tiles = Tiles(meter.LINE, self._meter.lines, self._most_pixels, s.max_bounces, samples)
 
     @property
     def state(self) -> list[Any]:
@@ -131,8 +136,11 @@ class Picture:
     @property
     def warnings(self) -> list[str]:
         contexts.use(self.context)
-        ended = int(np.frombuffer(self._ended.read(4), np.uint32)[0])
-        return [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
+        ended, cut = np.frombuffer(self._ended.read(8), np.uint32).tolist()
+        out = [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
+        if cut:
+            out.append(f"{cut} paths are short: this driver ends the loops of a kernel after 65 535 turns")
+        return out
 
     def trace(self, budget_s: float, max_samples: int) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""

@@ -32,8 +32,9 @@ class Renderer:
             raise WrongThread("a Renderer belongs to the thread that made it")
         contexts.use(self._context)
 
-    def load(self, arrays: SceneArrays, editing: bool = False) -> Scene:
-        """Upload a scene. `editing` keeps compiled what its materials' sliders could raise.
+    def load(self, arrays: SceneArrays, editing: bool = False, everything: bool = False) -> Scene:
+        """Upload a scene. `editing` keeps compiled what its materials' sliders could raise; `everything` raises every
+        flag, whatever the scene needs.
 
         Raises SceneTooLarge, OutOfMemory.
         """
@@ -42,7 +43,7 @@ class Renderer:
             count = len(getattr(arrays, name))
             if count > layout.LEAF_FIRST_MASK:
                 raise SceneTooLarge(f"{count} {name}: at most {layout.LEAF_FIRST_MASK} of a kind")
-        return Scene(self._context, arrays, editing, self._texels)
+        return Scene(self._context, arrays, editing, self._texels, everything)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.

@@ -53,13 +53,20 @@ def upload_tables(context: Any) -> dict[int, Any]:
     return out
 
 
+def _words(flags: frozenset[str]) -> tuple[str, ...]:
+    return tuple(sorted(flag.removeprefix("HAS_").lower() for flag in flags))
+
+
 class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
-    def __init__(self, context: Any, arrays: SceneArrays, editing: bool, texels: Texels) -> None:
+    def __init__(
+        self, context: Any, arrays: SceneArrays, editing: bool, texels: Texels, everything: bool = False
+    ) -> None:
         self._context = context
         self._shared = texels
         self._editing = editing
+        self._everything = everything
         self._raised: frozenset[str] = frozenset()
         self.arrays = arrays
         self._raise_flags()
@@ -117,7 +124,7 @@ class Scene:
         return {u: rows(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)}
 
     def _raise_flags(self) -> None:
-        raised = features.flags(self.arrays, self._editing)
+        raised = frozenset(features.FLAGS) if self._everything else features.flags(self.arrays, self._editing)
         self._raised = self._raised | raised if self._editing else raised
 
     def _upload(self, array: np.ndarray) -> Any:
@@ -147,6 +154,16 @@ class Scene:
     @property
     def flags(self) -> frozenset[str]:
         return self._raised
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """What its kernels are compiled for, in words: "bvh", "sun_disks"."""
+        return _words(self._raised)
+
+    @property
+    def spared(self) -> tuple[str, ...]:
+        """The features that they are not compiled for."""
+        return _words(frozenset(features.FLAGS) - self._raised)
 
     def edit(
         self,

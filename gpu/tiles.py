@@ -10,6 +10,7 @@ import numpy as np
 SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
 PASS_S = 0.2  # samples per pass aim at this, once there are some
 MAX_SAMPLES_A_PASS = 256
+LOOP_TURNS = 65_535  # llvmpipe ends all loops of an invocation after so many turns together
 BAND = 16  # rows
 _LEAST = 8  # columns of a tile: a work group's
 _LONG_BAND, _LONG_LEAST = 4, 16  # where paths may be so long that 128 pixels take a tenth of a second
@@ -22,8 +23,11 @@ Tile = tuple[int, int, int, int]  # x, y, width, height
 class Tiles:
     """Tiles of `width` x `height` pixels in order. No more than `most` pixels lie between a tile's first and last."""
 
-    def __init__(self, width: int, height: int, most: int, max_bounces: int = 0) -> None:
+    def __init__(
+        self, width: int, height: int, most: int, max_bounces: int = 0, most_samples: int = MAX_SAMPLES_A_PASS
+    ) -> None:
         self.size, self.max_bounces = (width, height), max_bounces
+        self._most_samples = most_samples
         self._caution = max(1.0, max_bounces / _USUAL_BOUNCES)
         band, self._least = (BAND, _LEAST) if self._caution < 4 else (_LONG_BAND, _LONG_LEAST)
         self._band = band if band * width <= most else max(1, most // width)
@@ -64,4 +68,14 @@ class Tiles:
             return 1
         width, height = self.size
         most = min(PASS_S / (self.cost_s * width * height), SLICE_S / (self._rates.max() * self._least * self._band))
-        return max(1, min(int(most), samples, MAX_SAMPLES_A_PASS))
+        return max(1, min(int(most), samples, self._most_samples))
+
+
+def samples_at_once(max_bounces: int, shapes: int, nodes: int) -> int:
+    """How many samples an invocation may take on llvmpipe without coming near the end of its loops.
+
+    Two rays a bounce, each past all shapes outside of the tree (`shapes`) and, in the tree, past 16 nodes for each
+    doubling of `nodes`: several times the mean over a mesh of 80 000 triangles.
+    """
+    turns = 2 * (max_bounces + 1) * (4 + shapes + 16 * max(nodes, 1).bit_length())
+    return max(1, min(MAX_SAMPLES_A_PASS, LOOP_TURNS // turns))

@@ -12,6 +12,8 @@ struct Radiance {
 // Stands for the density of a direction that only a mirror could have taken.
 const float PATH_CERTAIN = 1e30;
 
+bool path_was_cut; // of the last path: by the driver
+
 // Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
 float path_weight(float a, float b) {
     float r = b / a;
@@ -168,6 +170,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
     alive = alive && frame.max_bounces > 0u;
     vec3 throughput = vec3(1.0);
+    vec3 before = result.color; // light of all bounces but the last
     uint bounce = 0u;
 #if HAS_TRANSMISSION
     // Radiance over the square of the index is what passes a boundary unchanged: `dense` is that square here over
@@ -187,6 +190,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
     if (alive) {
         do {
+            before = result.color;
             vec3 wo_w = -d;
             vec3 front = dot(at.ng, wo_w) < 0.0 ? -at.ng : at.ng;
 #if HAS_TEXTURES
@@ -414,5 +418,8 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
     if (left) result.color += path_clamp(throughput * arriving, bounce > 1u);
 #endif
+    // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word.
+    path_was_cut = alive && bounce < frame.max_bounces;
+    if (path_was_cut) result.color = before; // what the last bounce has met may not be there
     return result;
 }

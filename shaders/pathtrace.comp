@@ -4,7 +4,10 @@ layout(local_size_x = 8, local_size_y = 8) in;
 layout(std430, binding = SLOT_SUM) buffer sum_buffer { vec4 sums[]; };
 layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 compensations[]; };
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };
-layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer { uint path_ended; };
+layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
+    uint path_ended; // by their throughput
+    uint path_cut;   // by the driver: see path.glsl
+};
 #include "constants.glsl"
 #include "sobol.glsl"
 #include "sampling.glsl"
@@ -37,7 +40,9 @@ void main() {
         vec3 delta = (r.color - before) * frame.moment_scale;
         vec3 after = (r.color - sum.rgb / moment.w) * frame.moment_scale;
         moment.rgb += max(delta * after, vec3(0.0));
+        if (path_was_cut) break; // as this loop is by now
     } while (++i < frame.sample_count);
+    if (i < frame.sample_count) atomicAdd(path_cut, frame.sample_count - i);
     sums[slot] = sum;
     compensations[slot] = lost;
     moments[slot] = moment;

@@ -66,6 +66,7 @@ class Tracing:
         self.settings = settings
         self._line = ProgressLine()
         self._reason: str | None = None
+        self._kernel: dict[str, Any] | None = None
         self._pixels: np.ndarray | None = None
         self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
@@ -113,6 +114,7 @@ class Tracing:
             "noise": self.progress.noise,
             "elapsed_s": self.progress.elapsed_s,
             "setup_s": setup_s,
+            "kernel": self._kernel,
             "eta_s": self.progress.eta_s,
             "warnings": self.warnings,
             "settings": self.settings.document(),
@@ -127,6 +129,8 @@ class Tracing:
         elif isinstance(message, messages.Failed):
             raise GpuError(message.detail)
         elif isinstance(message, Loaded | Done):
+            if isinstance(message, Loaded):
+                self._kernel = message.kernel
             self.warnings += [warning for warning in message.warnings if warning not in self.warnings]
             if isinstance(message, Done):
                 self.progress, self._reason = message.progress, message.reason

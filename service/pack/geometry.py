@@ -58,6 +58,7 @@ def geometry(
     origin, radius = choose(low, high)
     if origin.any():
         analytic = _analytic(placed, origin)
+    records.only_vast(analytic[ShapeKind.SPHERE][0], low, high)
     triangles, normals, degenerate, kept = meshes.triangles(placed_meshes, origin)
     corners = {name: meshes.at_corners(placed_meshes, kept, name) for name in ("uvs", "uvs_1", "colors")}
     found = {kind: array for kind, (array, _) in analytic.items()} | {ShapeKind.TRIANGLE: triangles}

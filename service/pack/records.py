@@ -9,7 +9,7 @@ import numpy as np
 from gpu import layout
 from service.pack.placed import Placed, Solids
 
-VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin
+VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin, and over the smallest shape
 
 Bounds = tuple[np.ndarray, np.ndarray]  # (n, 3) each, float64
 
@@ -27,6 +27,13 @@ def spheres(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     power = (away - radius) * (away + radius)
     records["power"] = np.where(np.abs(away - radius) * VAST < radius, power, layout.NOT_VAST)
     return records, (center - radius[:, None], center + radius[:, None])
+
+
+def only_vast(spheres: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
+    """Takes the power from those that are not vast beside the smallest of all shapes, which have boxes (n, 3)."""
+    if len(spheres):
+        least = (high - low).max(axis=1).min()
+        spheres["power"] = np.where(spheres["radius"] > VAST * least, spheres["power"], layout.NOT_VAST)
 
 
 def quads(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:

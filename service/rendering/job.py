@@ -64,6 +64,7 @@ class Job:
         self._setup_s = setup_s
         self._progress = Progress()
         self._reason: str | None = None
+        self._kernel: dict[str, Any] | None = None  # before it is compiled
         self._error: ServiceError | None = None
         self._task: int | None = None
         self._reads: dict[int, asyncio.Future[Image]] = {}
@@ -116,6 +117,7 @@ class Job:
             "noise": progress.noise,
             "elapsed_s": progress.elapsed_s,
             "setup_s": self._setup_s,
+            "kernel": self._kernel,
             "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
             "warnings": self._warnings,
             "settings": self._settings.document(),
@@ -145,6 +147,7 @@ class Job:
             self._answer(message.serial, message)
         elif isinstance(message, Loaded):
             self._setup_s += message.setup_s
+            self._kernel = message.kernel
             self._warnings += message.warnings
             if self.state == "queued":
                 self.state = "running"

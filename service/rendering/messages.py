@@ -157,7 +157,14 @@ class Loaded:
     generation: int
     setup_s: float
     compile_ms: float
+    raised: tuple[str, ...]  # features that the kernel was compiled with, and those that were left out
+    spared: tuple[str, ...]
     warnings: list[str]
+
+    @property
+    def kernel(self) -> dict[str, Any]:
+        """What a render's status says of its kernel."""
+        return {"raised": list(self.raised), "not_raised": list(self.spared), "compile_ms": self.compile_ms}
 
 
 @dataclass(frozen=True)

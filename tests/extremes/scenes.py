@@ -79,9 +79,10 @@ SKY = {"type": "constant", "radiance": 0.3}
 
 
 def everything(**changed: Any) -> dict[str, Any]:
-    """Every shape, material, light and a thin lens."""
-    out = {"version": 1, "camera": CAMERA, "environment": SKY, "lights": LIGHTS, "materials": MATERIALS}
-    return copy.deepcopy({**out, "shapes": SHAPES, **changed})
+    """Every shape, material, light and a thin lens; of the materials those that are used."""
+    out = {"version": 1, "camera": CAMERA, "environment": SKY, "lights": LIGHTS, "shapes": SHAPES, **changed}
+    used = {shape["material"] for shape in out["shapes"]}
+    return copy.deepcopy({**out, "materials": {name: m for name, m in MATERIALS.items() if name in used}})
 
 
 def placed(shape: dict[str, Any], matrix: np.ndarray) -> dict[str, Any]:

@@ -188,7 +188,8 @@ class Task:
             self._restart()
         if update.scene is not None or update.settings is not None:
             setup_s, warnings = time.monotonic() - began, self._warnings()
-            self._send(Loaded(self.number, self.generation, setup_s, self._full.compile_ms, warnings))
+            kernel = self._full.compile_ms, self._full.scene.features, self._full.scene.spared
+            self._send(Loaded(self.number, self.generation, setup_s, *kernel, warnings))
 
     def _hold(self, update: Update, settings: RenderSettings) -> None:
         """Has on the device what the update asks for; what was there goes only when that has come."""
