@@ -1,12 +1,13 @@
 # make run [PORT=8000]   set everything up and serve the editor
 # make test              set everything up and pass the tests
+# make extremes          every row of the tables of numerical stability, with a million samples
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
 export PYTHON
 
-.PHONY: run test bench gallery lint setup
+.PHONY: run test extremes bench gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -17,6 +18,9 @@ test:
 	.venv/bin/ruff check .
 	.venv/bin/mypy
 	.venv/bin/pytest
+
+extremes: setup
+	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json

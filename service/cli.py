@@ -93,12 +93,16 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "peers"],
+        choices=["speed", "peers", "hemisphere"],
         default="speed",
-        help="speed (default): paths per second, compile times, latencies; peers: error at equal time beside Mitsuba",
+        help="speed (default): paths per second, compile times, latencies; "
+        "peers: error at equal time beside Mitsuba; "
+        "hemisphere: error of uniform directions beside Sunbox's, over samples and time",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
+    add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
+    add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")
     add("--mesh", metavar="FILE", help="measure this mesh instead of the generated one")
     add("--mitsuba", metavar="PYTHON", help="peers: an interpreter that can import mitsuba")
     add("--environment", metavar="FILE", help="light the scenes with this HDR image instead of the generated one")

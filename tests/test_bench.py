@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -71,3 +72,19 @@ def test_command_prints_a_table_and_keeps_the_figures(
     assert "12.35" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
     assert json.loads(output.read_text()) == document
     assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2
+
+
+def test_uniform_directions_fall_with_the_root_of_samples(tmp_path: Path) -> None:
+    """The founding experiment, short: theory's slope, and Sunbox below it at equal samples and at equal time."""
+    out, drawn = tmp_path / "hemisphere.json", tmp_path / "hemisphere.svg"
+    given = ["--figure", str(drawn)] if find_spec("matplotlib") else []
+    assert main(["bench", "hemisphere", "--most", "64", "-o", str(out), *given]) == 0
+    curves = {(c["material"], c["way"]): c for c in json.loads(out.read_text())["curves"]}
+    assert len(curves) == 4
+    for material in ("diffuse", "metal r=.1"):
+        uniform, ours = curves[material, "uniform"], curves[material, "sunbox"]
+        assert uniform["samples"] == [1, 4, 16, 64] and all(s > 0 for s in ours["seconds"])
+        assert -0.7 < uniform["slope"] < (-0.4 if material == "diffuse" else -0.2)
+        assert ours["slope"] < -0.45
+        assert all(a > b for a, b in zip(uniform["error"], ours["error"], strict=True))
+    assert not given or "equal time" in drawn.read_text() or drawn.stat().st_size > 10_000

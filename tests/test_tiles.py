@@ -61,7 +61,7 @@ def test_a_picture_of_many_parts_is_the_same(gpu: Renderer, monkeypatch: pytest.
         assert np.array_equal(parts.read(aov), whole.read(aov)), aov
     assert np.array_equal(parts.display(), whole.display())
     assert np.array_equal(parts.display(dtype="f4"), whole.display(dtype="f4"))
-    assert parts.noise() == whole.noise()
+    assert parts.noise() == pytest.approx(whole.noise(), rel=1e-6)  # of its parts the sums are rounded
     for made in (whole, parts):
         made.release()
         made.scene.release()

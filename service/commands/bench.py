@@ -1,4 +1,4 @@
-"""`sunbox bench speed | peers`: measures and prints a table; `-o` keeps the figures as JSON."""
+"""`sunbox bench speed | peers | hemisphere`: measures and prints a table; `-o` keeps the figures as JSON."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import argparse
 import json
 import subprocess
 import sys
+from importlib.util import find_spec
 from pathlib import Path
 
 from service.commands import BadInput, Failed, files
@@ -14,7 +15,30 @@ from service.commands import BadInput, Failed, files
 def run(arguments: argparse.Namespace) -> int:
     if arguments.runs < 1:
         raise BadInput(f"--runs {arguments.runs}: at least one is needed")
-    return _peers(arguments) if arguments.what == "peers" else _speed(arguments)
+    return {"speed": _speed, "peers": _peers, "hemisphere": _hemisphere}[arguments.what](arguments)
+
+
+def _hemisphere(arguments: argparse.Namespace) -> int:
+    if arguments.most < 4:
+        raise BadInput(f"--most {arguments.most}: at least 4 samples make a curve")
+    output, figure = _output(arguments.output), _output(arguments.figure)
+    if figure and figure.suffix.lower() not in (".png", ".svg"):
+        raise BadInput(f"--figure {arguments.figure!r}: must end in .png or .svg")
+    if figure and find_spec("matplotlib") is None:
+        raise BadInput("--figure: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+    from gpu import GpuError
+    from service.bench import hemisphere
+
+    try:
+        document = hemisphere.measure(arguments.most, lambda what: print(what, file=sys.stderr))
+    except GpuError as error:
+        raise Failed(str(error)) from None
+    print(hemisphere.table(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    if figure:
+        hemisphere.figure(document, figure)
+    return 0
 
 
 def _speed(arguments: argparse.Namespace) -> int:
