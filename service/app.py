@@ -39,12 +39,11 @@ from service.routes import assets, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import respond, tell_errors
-from service.routes.house import House
+from service.routes.house import MESSAGE_BYTES, House
 
 WEB = Path(__file__).parents[1] / "web"
-MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 PING_S = 15.0  # proxies cut connections that are idle for a minute
-STUCK_S = 10.0  # for the last bytes of a closed connection
+STUCK_S = 10.0  # for the last bytes of a closed connection, and for the first request of an open one
 TICKS = 50  # of uvicorn, ten a second: how often closed connections are looked at
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
@@ -115,7 +114,10 @@ def run(config: Config) -> int:
 
 
 class Stuck:
-    """Ends connections that were closed but never close: a vanished client takes not even the last bytes."""
+    """Ends connections that were closed but never close, and those on which no whole request came.
+
+    A vanished client takes not even the last bytes; a hostile one sends a header a minute, on a thousand connections.
+    """
 
     def __init__(self) -> None:
         self._since: dict[Any, float] = {}
@@ -123,11 +125,16 @@ class Stuck:
     def abort(self, connections: Iterable[Any]) -> None:
         """To be called now and then with what is connected."""
         now = time.monotonic()
-        closing = [connection for connection in connections if connection.transport.is_closing()]
-        self._since = {connection: self._since.get(connection, now) for connection in closing}
+        stuck = [connection for connection in connections if _is_stuck(connection)]
+        self._since = {connection: self._since.get(connection, now) for connection in stuck}
         for connection, since in self._since.items():
             if now - since >= STUCK_S and since < now:
                 connection.transport.abort()
+
+
+def _is_stuck(connection: Any) -> bool:
+    """Of uvicorn's: `cycle` is the request under way, None before the first; a WebSocket has none."""
+    return connection.transport.is_closing() or getattr(connection, "cycle", True) is None
 
 
 class _Server(uvicorn.Server):

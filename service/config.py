@@ -12,6 +12,8 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 1 GiB
 MIB, GIB = 2**20, 2**30
 
+LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota")  # how the names of limits begin
+
 Words = Annotated[list[str], NoDecode]
 
 
@@ -78,6 +80,11 @@ class Config(BaseSettings):
     keep_renders: int = Field(64, ge=1, description="How many ended renders are kept for each key.")
     keep_bytes: int = Field(GIB, ge=1, description="Most bytes that the ended renders of all keys hold.")
     keep_seconds: float = Field(3600.0, gt=0, description="How long an ended render is kept (s).")
+
+    @property
+    def limits(self) -> dict[str, float | None]:
+        """What a caller may run into, by name; None: no such limit."""
+        return {name: getattr(self, name) for name in type(self).model_fields if name.startswith(LIMITS)}
 
     @field_validator("allowed_origins", "api_key", mode="before")
     @classmethod

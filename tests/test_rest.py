@@ -268,6 +268,8 @@ def test_every_preset_is_there(http: httpx.Client) -> None:
 def test_the_service_describes_itself(http: httpx.Client) -> None:
     assert http.get("/healthz").status_code == http.get("/readyz").status_code == 200
     info = http.get("/v1/info").json()
+    assert info["limits"]["max_message"] == 1 << 20 and info["limits"]["max_seconds"] is None
+    assert {"keep_seconds", "data_quota", "max_clients", "parse_memory"} <= info["limits"].keys()
     assert info["renderer"]["renderer"] and info["limits"]["max_pixels"] and info["quality"]["draft"]["max_samples"]
     schema = http.get("/v1/schema").json()
     assert schema.keys() == {"scene", "settings", "view"}

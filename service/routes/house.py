@@ -23,6 +23,7 @@ from service.rendering.reading import Reader
 from service.rendering.renders import Renders
 from service.rendering.sessions import Sessions
 
+MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
 GPU_S = 60.0  # ... when without one nothing is to be served at all
 FAREWELL_S = 2.0  # for a client that reads slowly to be told
@@ -51,16 +52,10 @@ class House:
             renderer: dict[str, Any] | None = await self.engine.ready(STARTING_S)
         except Unavailable:
             renderer = None
-        config = self.config
         return {
             "version": metadata.version("sunbox"),
             "renderer": renderer,
-            "limits": {
-                "max_pixels": config.max_pixels,
-                "max_triangles": config.max_triangles,
-                "max_body": config.max_body,
-                "max_clients": config.max_clients,
-            },
+            "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": PRESETS,
         }
 
