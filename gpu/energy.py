@@ -13,13 +13,12 @@ import numpy as np
 
 FILE = Path(__file__).with_name("energy.npz")
 
-MU_COUNT = 32  # cosines, as squares of equal steps
-ETA_COUNT = 16  # indices 1..4; (eta - 1) / (eta + 1) as squares of equal steps
-ROUGHNESS_END = 1.8  # the last node: a stretched lobe keeps as little as a round one beyond roughness 1
-ALBEDO_SHAPE = (ETA_COUNT, 32, MU_COUNT)  # eta, roughness, cosine
-ASPECT_SHAPE = (9, 16, 9, MU_COUNT)  # aspect, roughness, |cos phi|, cosine
-MEAN_SHAPE = (ETA_COUNT, ASPECT_SHAPE[0], ALBEDO_SHAPE[1])  # eta, aspect, roughness
-COMMON_ETA = 1.5  # what stretched glass loses is tabled for this index
+MU_COUNT = 40  # cosines, as squares of equal steps
+ETA_COUNT = 25  # indices 1..4; (eta - 1) / (eta + 1) as squares of equal steps
+ALBEDO_SHAPE = (ETA_COUNT, 40, MU_COUNT)  # eta, roughness, cosine
+STRETCHED_SHAPE = (13, 8, 13, 14, 18)  # eta (every other of the above), aspect, roughness, azimuth, cosine
+MEAN_SHAPE = (ETA_COUNT, STRETCHED_SHAPE[1], ALBEDO_SHAPE[1])  # eta, aspect, roughness
+AZIMUTH_POWER = 0.8  # azimuths from the short axis, as this power of equal steps: denser there
 SHEEN_SHAPE = (16, MU_COUNT)  # sheen roughness, cosine
 LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1
 LARGEST_ETA = 4.0
@@ -32,39 +31,46 @@ class Tables:
     """Shares of the light from a direction, float32.
 
     `albedo` (eta, roughness, mu, 4): reflected with Fresnel 1; with eta's, never too low; lost where glass is
-    entered; lost where it is left. `mean` (eta, aspect, roughness, 4): their cosine-weighted means.
-    `alike` (aspect, roughness, phi, mu, 4): the round roughness that stands for a stretched lobe, in units of
-    ROUGHNESS_END; what that reflects with Fresnel 1; what it loses at COMMON_ETA, entered and left.
-    `sheen` (roughness, mu): the sheen's, never too low.
+    entered; lost where it is left. `stretched` (eta, aspect, roughness, azimuth, mu, 4): the same
+    of stretched lobes.
+    `mean` (eta, aspect, roughness, 4): their cosine-weighted means. `sheen` (roughness, mu): the sheen's, the same.
     """
 
     albedo: np.ndarray
-    alike: np.ndarray
+    stretched: np.ndarray
     mean: np.ndarray
     sheen: np.ndarray
 
 
-def mu_nodes() -> np.ndarray:
-    return np.linspace(0, 1, MU_COUNT) ** 2
+def mu_nodes(count: int = MU_COUNT) -> np.ndarray:
+    return np.linspace(0, 1, count) ** 2
 
 
-def roughness_nodes(count: int = ALBEDO_SHAPE[1], end: float = ROUGHNESS_END) -> np.ndarray:
+def roughness_nodes(count: int = ALBEDO_SHAPE[1]) -> np.ndarray:
     """Denser where lobes are narrow."""
-    nodes: np.ndarray = np.linspace(0, 1, count) ** 1.5 * end
-    return nodes
+    return np.linspace(0, 1, count) ** 1.5
 
 
-def eta_nodes() -> np.ndarray:
-    x = np.linspace(0, 1, ETA_COUNT) ** 2 * _X_END
-    return (1 + x) / (1 - x)
+def eta_at(x: np.ndarray) -> np.ndarray:
+    """The index at a place 0..1 along the tables' axis: even steps of about the cosine at which all is reflected."""
+    y = x**2 * _X_END
+    return np.asarray((1 + y) / (1 - y))
 
 
-def sheen_nodes() -> np.ndarray:
-    return np.linspace(LEAST_SHEEN_ROUGHNESS, 1, SHEEN_SHAPE[0])
+def eta_nodes(count: int = ETA_COUNT) -> np.ndarray:
+    return eta_at(np.linspace(0, 1, count))
+
+
+def sheen_nodes(count: int = SHEEN_SHAPE[0]) -> np.ndarray:
+    return np.linspace(LEAST_SHEEN_ROUGHNESS, 1, count)
 
 
 @lru_cache(maxsize=1)
 def tables() -> Tables:
     """The tables that travel with the package."""
     with np.load(FILE) as kept:
-        return Tables(**{n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in kept.items()})
+        found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in kept.items()}
+    # What is reflected with Fresnel 1 is the same for every index: kept once.
+    one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)
+    found["stretched"] = np.concatenate([one[..., None], found["stretched"]], -1)
+    return Tables(**found)

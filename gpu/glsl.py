@@ -110,8 +110,9 @@ def _constants() -> str:
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
     out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in layout.ENERGY_TEXTURES.items()]
-    out.append(f"#define ENERGY_ASPECTS {energy.ASPECT_SHAPE[0]}")
-    for name in ("ROUGHNESS_END", "LEAST_ASPECT", "LARGEST_ETA", "COMMON_ETA", "LEAST_SHEEN_ROUGHNESS"):
+    sizes = ("ETAS", "ASPECTS", "STEPS", "AZIMUTHS", "COSINES")
+    out += [f"#define ENERGY_{name} {size}" for name, size in zip(sizes, energy.STRETCHED_SHAPE, strict=True)]
+    for name in ("LEAST_ASPECT", "LARGEST_ETA", "AZIMUTH_POWER", "LEAST_SHEEN_ROUGHNESS"):
         out.append(f"const float ENERGY_{name} = {getattr(energy, name)!r};")
     return "\n".join(out)
 

@@ -118,7 +118,7 @@ ENVIRONMENT_TEXTURE = 0  # texture units
 BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
 UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
 COLORS_TEXTURE = 12
-ENERGY_TEXTURES = {"albedo": 1, "alike": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
+ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
 
 
 class Record:

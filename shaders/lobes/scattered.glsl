@@ -15,13 +15,6 @@ float scattered_kept(vec4 kept, float share) { return min(1.0, kept.y + share * 
 #if HAS_TRANSMISSION
 bool scattered_glass(Surface s) { return !s.straight; }
 
-// What stretched glass loses is tabled for the common index only: farther from it more stays lost, so that none is
-// gained.
-float scattered_part(Surface s) {
-    float away = abs(s.eta_outside - ENERGY_COMMON_ETA) / (s.eta_outside + 1.0);
-    return s.aspect < 1.0 ? 0.96 * clamp(1.0 - 10.0 * away, 0.0, 1.0) : 1.0;
-}
-
 // Chance that lost light of a rough glass leaves on the other side. (1 - F) of both sides differ by eta^2, and so must
 // what both sides exchange: the lesser loss decides.
 float scattered_through(Surface s) {
@@ -36,7 +29,7 @@ float scattered_far(Surface s, vec4 kept) { return s.inside ? kept.z : kept.w; }
 vec3 scattered_transmit(Surface s, vec4 kept_i) {
     if (!scattered_glass(s)) return vec3(0.0);
     float f = scattered_near(s, s.kept) * scattered_far(s, kept_i) / max(scattered_far(s, s.kept_mean), SCATTERED_LEAST);
-    return (1.0 - s.metallic) * s.transmission * scattered_part(s) * scattered_through(s) * INV_PI * f * s.base_color;
+    return (1.0 - s.metallic) * s.transmission * scattered_through(s) * INV_PI * f * s.base_color;
 }
 #endif
 
@@ -46,7 +39,7 @@ vec3 scattered_reflect(Surface s, vec4 kept_i, vec3 share) {
 #if HAS_TRANSMISSION
     if (scattered_glass(s)) {
         float g = scattered_near(s, s.kept) * scattered_near(s, kept_i) / max(scattered_near(s, s.kept_mean), SCATTERED_LEAST);
-        r += (1.0 - s.metallic) * s.transmission * scattered_part(s) * (1.0 - scattered_through(s)) * INV_PI * g;
+        r += (1.0 - s.metallic) * s.transmission * (1.0 - scattered_through(s)) * INV_PI * g;
     }
 #endif
     return r;
