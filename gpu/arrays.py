@@ -32,7 +32,7 @@ class EnvironmentArrays:
     """Light from infinity: (h, w, 3) float32 radiance, row 0 at the top (v = 0), latitude-longitude.
 
     A constant environment is one texel. `probability` (h, w) float32 is the density per steradian with which
-    `alias` (h * w records of `layout.EnvironmentAlias`) picks a direction in that texel, at rotation 0.
+    `cells` (`layout.EnvironmentCell`) pick a direction in that texel, at rotation 0.
 
     With `cube` the map is six faces of n x n texels, (2 n, 3 n, 3): px nx py above ny pz nz, and `probability` is per
     unit of area of the cube from -1 to 1. A `sun` shines on top of the map and takes `sun_share` of the samples.
@@ -40,7 +40,7 @@ class EnvironmentArrays:
 
     texels: np.ndarray
     probability: np.ndarray
-    alias: np.ndarray
+    cells: np.ndarray
     rotation: float  # radians about +Y
     scale: float
     background: bool

@@ -1,10 +1,10 @@
-"""Weights -> alias tables: which light, which texel of the environment. Runs without GL."""
+"""Weights -> tables: which light, which texels of the environment. Runs without GL."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from gpu.layout import EnvironmentAlias
+from gpu.cells import draw_cells
 
 LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
 UNIFORM_SPHERE = 1.0 / (4.0 * np.pi)
@@ -75,8 +75,8 @@ def cube_solid_angles(n: int) -> np.ndarray:
 def cube_tables(texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """As `environment_tables`, for six faces (2 n, 3 n, 3); the probability is per unit of area of the cube -1..1.
 
-    A texel is drawn by the luminance of its bilinear footprint, which ends at the face's edge, times its solid
-    angle, then a place in it uniformly. A black map is drawn uniformly.
+    A block of texels is drawn by the luminance of its bilinear footprint, which ends at the face's edge, times its
+    solid angle, then a place in it uniformly. A black map is drawn uniformly.
     """
     n = texels.shape[0] // 2
     faces = (texels @ LUMINANCE).astype(np.float64).reshape(2, n, 3, n).transpose(1, 3, 0, 2)  # (n, n, 2, 3)
@@ -84,10 +84,16 @@ def cube_tables(texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     weights = _clamped(_clamped(faces).swapaxes(0, 1)).swapaxes(0, 1) * solid
     if not weights.sum() > 0.0:
         weights = np.broadcast_to(solid, weights.shape)
-    threshold, alias, probability = alias_table(weights.transpose(2, 0, 3, 1).reshape(-1))
-    table = np.empty(6 * n * n, EnvironmentAlias.dtype)
-    table["threshold"], table["alias"] = threshold, alias
-    return (probability * (n * n / 4.0)).astype(np.float32).reshape(2 * n, 3 * n), table
+    places = [(column, row) for row in range(2) for column in range(3)]
+    table, densities = draw_cells(
+        [weights[:, :, row, column] for column, row in places],
+        [(n * column, n * row) for column, row in places],
+        [np.full(n, 4.0 / (n * n))] * 6,
+    )
+    probability = np.empty((2, n, 3, n), np.float32)
+    for (column, row), density in zip(places, densities, strict=True):
+        probability[row, :, column] = density
+    return probability.reshape(2 * n, 3 * n), table
 
 
 def _clamped(values: np.ndarray) -> np.ndarray:
@@ -101,16 +107,16 @@ def _clamped(values: np.ndarray) -> np.ndarray:
 
 
 def environment_tables(texels: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(probability (h, w) float32, `layout.EnvironmentAlias` (h * w,)) for radiance (h, w, 3), not negative.
+    """(probability (h, w) float32, `layout.EnvironmentCell` (k,)) for radiance (h, w, 3), not negative.
 
-    A texel is drawn by the luminance of its bilinear footprint times its solid angle, then a direction in it
-    uniformly in u and in cos theta: the probability, per steradian, is constant within a texel. A black map
-    is drawn uniformly.
+    A block of texels is drawn by the luminance of its bilinear footprint times its solid angle, then a direction in
+    it uniformly in u and in cos theta: the probability, per steradian, is constant within a block. A black map is
+    drawn uniformly.
     """
     height, width = texels.shape[:2]
-    solid = np.repeat(solid_angles(height, width), width)
-    weights = _footprint((texels @ LUMINANCE).astype(np.float64)).reshape(-1) * solid
-    threshold, alias, probability = alias_table(weights if weights.sum() > 0.0 else solid)
-    table = np.empty(height * width, EnvironmentAlias.dtype)
-    table["threshold"], table["alias"] = threshold, alias
-    return (probability / solid).astype(np.float32).reshape(height, width), table
+    rows = solid_angles(height, width)
+    weights = _footprint((texels @ LUMINANCE).astype(np.float64)) * rows[:, None]
+    if not weights.sum() > 0.0:
+        weights = np.repeat(rows[:, None], width, axis=1)
+    table, (density,) = draw_cells([weights], [(0, 0)], [rows])
+    return density.astype(np.float32), table

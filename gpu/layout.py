@@ -101,7 +101,7 @@ class Slot(IntEnum):
     TRIANGLE_NORMALS = 6
     NODES = 7
     LIGHTS = 8
-    ENVIRONMENT_ALIAS = 9
+    ENVIRONMENT_CELLS = 9
     SUM = 10
     COMPENSATION = 11
     MOMENTS = 12
@@ -288,10 +288,14 @@ class Light(Record):
     spread: f32  # spot: see spot.glsl; directional: 1 - cos of the disk's half angle, 0: no disk
 
 
-class EnvironmentAlias(Record):
-    slot = Slot.ENVIRONMENT_ALIAS
-    threshold: f32
-    alias: u32
+class EnvironmentCell(Record):
+    """One of many drawn with equal chances: see `cells`."""
+
+    slot = Slot.ENVIRONMENT_CELLS
+    corner: u32  # of its block: x, y << 16, in texels
+    size: u32  # of its block: width, height << 16
+    first: u32  # the first of the block's cells ...
+    count: u32  # ... and how many there are
 
 
 class Frame(Record):
@@ -374,5 +378,5 @@ BUFFERS: dict[str, tuple[type[Record], Slot]] = {
     "triangle": (Triangle, Slot.TRIANGLES),
     "triangle_normals": (TriangleNormals, Slot.TRIANGLE_NORMALS),
     "light": (Light, Slot.LIGHTS),
-    "environment_alias": (EnvironmentAlias, Slot.ENVIRONMENT_ALIAS),
+    "environment_cell": (EnvironmentCell, Slot.ENVIRONMENT_CELLS),
 }

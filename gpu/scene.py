@@ -89,8 +89,8 @@ class Scene:
             self._buffers[slot] = self._upload(getattr(self.arrays, name))
         self._buffers[Slot.MATERIALS] = self._upload(self._materials())
         self._upload_details()
-        self._texels, alias = self._upload_environment()
-        self._buffers[Slot.ENVIRONMENT_ALIAS] = self._upload(alias)
+        self._texels, cells = self._upload_environment()
+        self._buffers[Slot.ENVIRONMENT_CELLS] = self._upload(cells)
 
     def _materials(self) -> np.ndarray:
         """Bytes of all materials, each followed by its slots and uses of textures."""
@@ -136,16 +136,16 @@ class Scene:
         e = self.arrays.environment
         texels = np.zeros((1, 1, 4), np.float32)
         self._scale_max = RADIANCE_MAX
-        alias = np.zeros(0, layout.EnvironmentAlias.dtype)
+        cells = np.zeros(0, layout.EnvironmentCell.dtype)
         if e is not None:
             texels = np.dstack([e.texels, e.probability]).astype(np.float32)
-            alias = e.alias
+            cells = e.cells
             peak = float(e.texels.max()) + (max(e.sun.radiance) if e.sun is not None else 0.0)
             self._scale_max = RADIANCE_MAX / max(peak, 1.0)
         height, width = texels.shape[:2]
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
-        return texture, alias
+        return texture, cells
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
         """What its kernels are compiled with."""

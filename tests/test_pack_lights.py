@@ -189,7 +189,7 @@ def test_image_environment_is_taken_as_it_is():
     environment = sky_of(pixels, rotation=450, scale=2, background=False).arrays.environment
     assert np.array_equal(environment.texels, pixels[..., :3])
     assert environment.rotation == pytest.approx(np.pi / 2) and environment.scale == 2 and not environment.background
-    assert environment.alias.shape == (32,) and environment.probability.shape == (4, 8)
+    assert len(environment.cells) >= 8 and environment.probability.shape == (4, 8)
     assert np.array_equal(sky_of(pixels[..., :1]).arrays.environment.texels, np.repeat(pixels[..., :1], 3, axis=2))
 
 

@@ -57,7 +57,7 @@ class Probe:
         self._scene.bind()
 
     def _run(self, asks: np.ndarray, sample: int) -> list[np.ndarray]:
-        inputs = {Slot.SUM: asks, Slot.ENVIRONMENT_ALIAS: self._scene.arrays.environment.alias}
+        inputs = {Slot.SUM: asks, Slot.ENVIRONMENT_CELLS: self._scene.arrays.environment.cells}
         outputs = (Slot.MOMENTS, Slot.OUTPUT)
         flags = self._scene.flags
         return self._prober.run(
@@ -127,10 +127,11 @@ def test_cube_tables_draw_by_footprint_and_every_lit_neighbour() -> None:
     lit[n : n + 3, n : n + 2] = True
     assert np.array_equal(density > 0, lit)
     assert density.sum() * (2 / n) ** 2 == pytest.approx(1, rel=1e-6)
-    assert len(table) == 6 * n * n
+    corners = {(int(c) & 0xFFFF, int(c) >> 16) for c in table["corner"]}
+    assert corners == {(x, y) for y, x in np.argwhere(lit)}
     black, _ = distribution.cube_tables(np.zeros_like(texels))
     solid = np.tile(distribution.cube_solid_angles(n), (2, 3))
-    np.testing.assert_allclose(black * (2 / n) ** 2, solid / (4 * np.pi), rtol=1e-6)
+    np.testing.assert_allclose(black * (2 / n) ** 2, solid / (4 * np.pi), rtol=0.01)  # in whole cells
 
 
 LIGHTS = {

@@ -61,7 +61,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
             scale = BRIGHTEST / sky.peak
             warnings.append(f"/environment/scale: lowered to {scale:.3g}, as radiance ends at {BRIGHTEST:g}")
         environment = EnvironmentArrays(
-            sky.texels, sky.probability, sky.alias, rotation, scale, scene.environment.background,
+            sky.texels, sky.probability, sky.cells, rotation, scale, scene.environment.background,
             sky.cube, sky.sun, sky.sun_share,
         )  # fmt: skip
         if scale > 0:  # what it sends through a disk around the scene

@@ -42,7 +42,7 @@ class Sky:
 
     texels: np.ndarray  # (h, w, 3) float32
     probability: np.ndarray
-    alias: np.ndarray
+    cells: np.ndarray
     irradiance: float  # luminance of radiance, integrated over all directions
     peak: float  # the greatest channel
     warnings: tuple[str, ...] = ()
@@ -107,11 +107,11 @@ def _cube(faces: CubeFaces, assets: Assets) -> Sky:
         raise InvalidDocument(errors)
     parts, warnings = zip(*(_clamped(_linear(image), pointers[name]) for name, image in images.items()), strict=True)
     texels = np.vstack([np.hstack(parts[:3]), np.hstack(parts[3:])]).astype(np.float32)
-    probability, alias = cube_tables(texels)
+    probability, cells = cube_tables(texels)
     solid = np.tile(cube_solid_angles(wanted), (2, 3))
     irradiance = float(((texels @ LUMINANCE) * solid).sum())
     peak = min(float(texels.max()), BRIGHTEST)
-    return Sky(texels, probability, alias, irradiance, peak, sum(warnings, ()), cube=True)
+    return Sky(texels, probability, cells, irradiance, peak, sum(warnings, ()), cube=True)
 
 
 def _clear(environment: SkyEnvironment) -> Sky:
@@ -128,7 +128,7 @@ def _clear(environment: SkyEnvironment) -> Sky:
     total = dome.irradiance + strength
     share = min(max(strength / total, low), high)
     peak = dome.peak + max(sun.radiance)
-    return Sky(dome.texels, dome.probability, dome.alias, total, peak, sun=sun, sun_share=share)
+    return Sky(dome.texels, dome.probability, dome.cells, total, peak, sun=sun, sun_share=share)
 
 
 def _linear(image: ImageData) -> np.ndarray:
@@ -152,8 +152,8 @@ def _clamped(texels: np.ndarray, pointer: str) -> tuple[np.ndarray, tuple[str, .
 
 def _sky(texels: np.ndarray, warnings: tuple[str, ...]) -> Sky:
     texels = np.ascontiguousarray(texels, np.float32)
-    probability, alias = environment_tables(texels)
+    probability, cells = environment_tables(texels)
     height, width = texels.shape[:2]
     rows = (texels @ LUMINANCE).sum(axis=1, dtype=np.float64)
     irradiance = float(rows @ solid_angles(height, width))
-    return Sky(texels, probability, alias, irradiance, min(float(texels.max()), BRIGHTEST), warnings)
+    return Sky(texels, probability, cells, irradiance, min(float(texels.max()), BRIGHTEST), warnings)

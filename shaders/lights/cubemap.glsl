@@ -38,10 +38,10 @@ vec4 cubemap_radiance(vec3 d) {
     return vec4(mix(mix(a.rgb, b.rgb, f.x), mix(e.rgb, g.rgb, f.x), f.y), here * r2 * sqrt(r2));
 }
 
-// Towards a place (0..1) inside a texel of the texture.
-vec3 cubemap_point(ivec2 texel, vec2 inside) {
-    int n = textureSize(environment_texels, 0).y / 2;
-    int column = (texel.x >= n ? 1 : 0) + (texel.x >= 2 * n ? 1 : 0), row = texel.y >= n ? 1 : 0;
-    vec2 ab = (vec2(texel - ivec2(column, row) * n) + inside) / float(n) * 2.0 - 1.0;
-    return normalize(cubemap_direction(ab, uint(column + 3 * row)));
+// Towards the place `inside` texels from a block's corner, which is a texel of the texture.
+vec3 cubemap_point(vec2 corner, vec2 inside) {
+    float n = float(textureSize(environment_texels, 0).y / 2);
+    uint column = (corner.x >= n ? 1u : 0u) + (corner.x >= 2.0 * n ? 1u : 0u), row = corner.y >= n ? 1u : 0u;
+    vec2 ab = (corner - vec2(column, row) * n + inside) / n * 2.0 - 1.0;
+    return normalize(cubemap_direction(ab, column + 3u * row));
 }

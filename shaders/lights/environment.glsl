@@ -1,5 +1,5 @@
-// Light from infinity. An image is latitude-longitude, picked texel by texel from an alias table; inside a texel
-// the direction is uniform in longitude and in the cosine of its colatitude, so its density is constant there.
+// Light from infinity. An image is latitude-longitude, drawn block by block of texels from equal cells (gpu/cells.py);
+// inside a block the direction is uniform in longitude and in the cosine of its colatitude, and its density constant.
 
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
     vec2 cs = frame.environment_turn;
@@ -63,33 +63,27 @@ LightSample environment_light_sample(uvec2 bits) {
 #endif
 #if HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE
     uvec2 size = uvec2(textureSize(environment_texels, 0));
-    // All 32 bits: a float's 24 would leave a large map three for the place inside the texel.
+    // All 32 bits: a float's 24 would leave a large map three for the place inside the block.
     uint i, low;
-    umulExtended(bits.x, size.x * size.y, i, low);
-    float rest = sobol_unit(low);
-    EnvironmentAlias e = environment_alias_load(i);
-    bool keep = rest < e.threshold;
-    i = keep ? i : e.alias;
-    // What is left of the first number after both choices is uniform again: it places the direction inside the texel.
-    float v = keep ? rest / e.threshold : (rest - e.threshold) / (1.0 - e.threshold);
-    // Row and column by float division, mended by one where it rounded: llvmpipe divides integers lane by lane.
-    int row = int(float(i) / float(size.x)), column = int(i) - row * int(size.x);
-    int carry = column < 0 ? -1 : column >= int(size.x) ? 1 : 0;
-    ivec2 at = ivec2(column - carry * int(size.x), row + carry);
+    umulExtended(bits.x, uint(environment_cell_words.length()), i, low);
+    EnvironmentCell e = environment_cell_load(i);
+    vec2 corner = vec2(e.corner & 0xffffu, e.corner >> 16u), block = vec2(e.size & 0xffffu, e.size >> 16u);
+    // What is left of the first number is uniform again: it places the direction inside the block.
+    float v = (float(i - e.first) + sobol_unit(low)) / float(e.count);
 #endif
 #if HAS_ENVIRONMENT_IMAGE
-    float phi = (float(at.x) + u.y) / float(size.x) * TWO_PI - PI;
-    // The row's band between two colatitudes, uniform in cosine; near a pole by sines, without cancelling.
-    float top = float(at.y) / float(size.y) * PI, bottom = float(at.y + 1) / float(size.y) * PI;
+    float phi = (corner.x + block.x * u.y) / float(size.x) * TWO_PI - PI;
+    // The block's band between two colatitudes, uniform in cosine; near a pole by sines, without cancelling.
+    float top = corner.y / float(size.y) * PI, bottom = (corner.y + block.y) / float(size.y) * PI;
     float s0 = sqr(sin(0.5 * top)), s1 = sqr(sin(0.5 * bottom));
-    float h = mix(s0, s1, clamp(v, 0.0, 1.0)); // sin^2 of half the colatitude
+    float h = mix(s0, s1, v); // sin^2 of half the colatitude
 #else
     float phi = TWO_PI * u.y - PI, h = u.x; // as an image of one texel
 #endif
     float y = 1.0 - 2.0 * h, r = 2.0 * sqrt(max(0.0, h * (1.0 - h)));
     vec3 d = vec3(r * sin(phi), y, -r * cos(phi));
 #if HAS_ENVIRONMENT_CUBE
-    if (frame.environment_cube != 0u) d = cubemap_point(at, vec2(u.y, clamp(v, 0.0, 1.0)));
+    if (frame.environment_cube != 0u) d = cubemap_point(corner, block * vec2(u.y, v));
 #endif
 #if HAS_SUN
     if (sunny) d = to_sun;

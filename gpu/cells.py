@@ -1,0 +1,122 @@
+"""A map of weights -> cells that are drawn with equal chances: how directions are drawn from an environment.
+
+An alias table draws texels exactly by weight but scatters neighbouring numbers over the whole map, and with them all
+that a stratified sampler had gained. Here the cells follow Morton's curve, so that near numbers draw near places:
+16 samples of a softly lit matte sphere are a third as noisy in variance, more samples more so. Runs without GL.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpu.layout import EnvironmentCell
+
+CELLS_A_TEXEL = 4  # a block's chance is a whole number of cells: with 4 its error is some percent
+FEWEST_CELLS, MOST_CELLS = 1 << 14, 1 << 20  # aimed at; large maps have more texels than a pixel gets samples
+FINEST = 1 << 22  # blocks looked at; a larger map is not halved down to its texels
+CONTRAST = 4.0  # a block holds no texel so much above its mean ...
+FAINT = 1 / 64  # ... unless all of it is so much less than a cell's share
+
+
+def draw_cells(
+    maps: list[np.ndarray], corners: list[tuple[int, int]], rows: list[np.ndarray]
+) -> tuple[np.ndarray, list[np.ndarray]]:
+    """(`layout.EnvironmentCell` (k,), density at each texel of each map, (h, w) float64) for weights (h, w), h and w
+    <= 16384: finite, >= 0, not all 0. Densities are per unit of what a texel measures, for each row in `rows` (h,).
+    Cells name texels of one picture, in which the maps have their `corners`, (x, y).
+
+    Each map is halved until a block is a texel (or there are FINEST) or its share of the weight is that of a cell or
+    less; a block gets as many cells as its share is worth, at least one, and is drawn uniformly over its area. Cells
+    lie in the order of the maps, those of a map along Morton's curve. Texels of weight above 0 can all be drawn.
+    """
+    total = sum(float(m.max()) for m in maps)
+    scaled = [np.asarray(m, np.float64) / total for m in maps]  # first, or the sum of tiny weights would be denormal
+    wanted = min(max(CELLS_A_TEXEL * sum(m.size for m in maps), FEWEST_CELLS), MOST_CELLS)
+    cell = sum(float(m.sum()) for m in scaled) / wanted  # what a cell is worth
+    blocks = [_blocks(m, cell) for m in scaled]
+    counts = [np.maximum(1, np.rint(b["weight"] / cell)).astype(np.int64) for b in blocks]
+    number = sum(int(c.sum()) for c in counts)
+    records, densities, first = [], [], 0
+    for m, (x, y), row, b, n in zip(maps, corners, rows, blocks, counts, strict=True):
+        ends = first + np.cumsum(n)
+        record = np.zeros(len(b), EnvironmentCell.dtype)
+        record["corner"], record["size"] = (b["x"] + x) | (b["y"] + y) << 16, b["width"] | b["height"] << 16
+        record["first"], record["count"] = ends - n, n
+        records.append(np.repeat(record, n))
+        first += int(n.sum())
+        upto = np.concatenate([[0.0], np.cumsum(row)])
+        measure = b["width"] * (upto[b["y"] + b["height"]] - upto[b["y"]])
+        densities.append(_painted(m.shape, b, n / number / measure))
+    return np.concatenate(records), densities
+
+
+_BLOCK = np.dtype([(name, np.int64) for name in ("x", "y", "width", "height")] + [("weight", np.float64)])
+
+
+def _blocks(weights: np.ndarray, cell: float) -> np.ndarray:
+    """The blocks of one map that have any weight, in Morton's order: `_BLOCK` (k,)."""
+    height, width = weights.shape
+    levels = _levels(weights)
+    top = levels[-1][0].shape
+    y, x = (a.ravel() for a in np.indices(top))
+    out = []
+    base = next(depth for depth, (sums, _, _) in enumerate(levels) if sums.size <= FINEST)
+    for depth in range(len(levels) - 1, base - 1, -1):
+        sums, peaks, (step_y, step_x) = levels[depth]
+        weight, peak = sums[y, x], peaks[y, x]
+        even = peak * (step_y * step_x) <= CONTRAST * weight
+        leaf = (weight <= cell) & (even | (weight <= FAINT * cell)) if depth > base else np.ones(len(x), bool)
+        keep = leaf & (weight > 0)
+        block = np.zeros(int(keep.sum()), _BLOCK)
+        block["x"], block["y"], block["weight"] = x[keep] * step_x, y[keep] * step_y, weight[keep]
+        block["width"] = np.minimum(step_x, width - block["x"])
+        block["height"] = np.minimum(step_y, height - block["y"])
+        out.append(block)
+        if depth > base:
+            y, x = _halves(y[~leaf], x[~leaf], levels[depth - 1][2][0] != step_y)
+            inside = (y < levels[depth - 1][0].shape[0]) & (x < levels[depth - 1][0].shape[1])
+            y, x = y[inside], x[inside]
+    blocks = np.concatenate(out)
+    return blocks[np.argsort(_morton(blocks["x"], blocks["y"]), kind="stable")]
+
+
+def _levels(weights: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, tuple[int, int]]]:
+    """From texels to the whole: sums and maxima over blocks, and a block's (rows, columns)."""
+    levels = [(weights, weights, (1, 1))]
+    rows, columns = 1, 1
+    while levels[-1][0].size > 1:
+        sums, peaks, _ = levels[-1]
+        # Columns before rows, in turns, as the bits of Morton's curve; a side that is one already waits.
+        axis = 1 if (columns <= rows and sums.shape[1] > 1) or sums.shape[0] == 1 else 0
+        rows, columns = (rows * 2, columns) if axis == 0 else (rows, columns * 2)
+        at = np.arange(0, sums.shape[axis], 2)
+        levels.append((np.add.reduceat(sums, at, axis), np.maximum.reduceat(peaks, at, axis), (rows, columns)))
+    return levels
+
+
+def _halves(y: np.ndarray, x: np.ndarray, by_rows: bool) -> tuple[np.ndarray, np.ndarray]:
+    if by_rows:
+        return np.concatenate([2 * y, 2 * y + 1]), np.concatenate([x, x])
+    return np.concatenate([y, y]), np.concatenate([2 * x, 2 * x + 1])
+
+
+def _morton(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+    """The bits of x and y (16 each) interleaved."""
+    code = []
+    for bits in (x, y):
+        for shift, mask in ((8, 0x00FF00FF), (4, 0x0F0F0F0F), (2, 0x33333333), (1, 0x55555555)):
+            bits = (bits | bits << shift) & mask
+        code.append(bits)
+    return np.asarray(code[0] | code[1] << 1)
+
+
+def _painted(shape: tuple[int, ...], blocks: np.ndarray, values: np.ndarray) -> np.ndarray:
+    """A map with each block's value in its texels, 0 elsewhere."""
+    out = np.zeros(shape)
+    size = blocks["width"] << 16 | blocks["height"]
+    for both in np.unique(size).tolist():
+        alike, width, height = size == both, both >> 16, both & 0xFFFF
+        y = blocks["y"][alike][:, None, None] + np.arange(height)[:, None]
+        x = blocks["x"][alike][:, None, None] + np.arange(width)
+        out[y, x] = values[alike][:, None, None]
+    return out
