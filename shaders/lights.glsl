@@ -67,7 +67,11 @@ Emitter lights_emitter(Light l) {
 #if !HAS_TEXTURED_LIGHTS
     e.radiance *= m.opacity;
 #endif
+#if HAS_TEXTURED_LIGHTS
+    e.veil = m.opacity < 1.0 ? 1.0 : 0.0; // by the place that is passed: lights_glow
+#else
     e.veil = 1.0 - m.opacity;
+#endif
 #endif
 #endif
     return e;
@@ -86,8 +90,26 @@ vec3 lights_glow(LightSample s, vec3 p) {
     }
 #endif
     Point at = shapes_point(n, q, vec3(0.0, 0.0, 1.0));
+    float share = 1.0;
+#if HAS_EMISSION_BOTH && HAS_OPACITY && (HAS_SPHERE_LIGHTS || HAS_ELLIPSOID_LIGHTS)
+    // The inside of a ball's far half, through what is open of the near one.
+    uint index = s.id & LEAF_FIRST_MASK, kind = s.id >> LEAF_KIND_SHIFT;
+    float near = 0.0;
+#if HAS_SPHERE_LIGHTS
+    if (kind == SHAPE_SPHERE) near = 2.0 * dot(sphere_pick(index).center - p, s.wi) - s.t;
+#endif
+#if HAS_ELLIPSOID_LIGHTS
+    if (kind == SHAPE_ELLIPSOID) {
+        Solid ball = ellipsoid_pick(index);
+        vec3 f = solid_rows(ball, ball.center - p), g = solid_rows(ball, s.wi);
+        near = 2.0 * dot(f, g) / dot(g, g) - s.t;
+    }
+#endif
+    Point through = shapes_point(n, p + near * s.wi, vec3(0.0, 0.0, 1.0));
+    if (near > 0.0 && dot(s.wi, at.ng) > 0.0) share = 1.0 - texture_opacity(through);
+#endif
 #if HAS_OPACITY
-    return texture_emission(at) * texture_opacity(at);
+    return texture_emission(at) * (share * texture_opacity(at));
 #else
     return texture_emission(at);
 #endif
