@@ -151,13 +151,14 @@ class AssetStore:
             if part.triangles is None:
                 return self.add(data).id
             info = AssetInfo(id, "mesh", "ply", len(data), vertices=part.vertices, triangles=part.triangles)
-            self._store(info, data)
+            self._store(info, data, lasting=False)
         return id
 
-    def _store(self, info: AssetInfo, data: bytes) -> None:
+    def _store(self, info: AssetInfo, data: bytes, lasting: bool = True) -> None:
+        """Not `lasting`: what can be made again needs no wait for the disk, 15 ms a part; a scene has thousands."""
         with self._storing(info.id):
-            self._write(self._path(info.id), data)
-            self._write(self._path(info.id, ".json"), json.dumps(asdict(info)).encode())
+            self._write(self._path(info.id), data, lasting)
+            self._write(self._path(info.id, ".json"), json.dumps(asdict(info)).encode(), lasting)
         log.info("asset stored id=%s format=%s bytes=%d", info.id, info.format, info.bytes)
 
     @contextmanager
@@ -191,6 +192,8 @@ class AssetStore:
             return None
         try:
             info = AssetInfo(**json.loads(self._path(id, ".json").read_bytes()))
+            if self._path(id).stat().st_size != info.bytes:
+                return None  # the power failed before the disk had it all
             return replace(info, kind=KINDS[info.format])  # an older version took glTF for a mesh
         except (OSError, ValueError, TypeError, KeyError):
             return None
@@ -204,18 +207,21 @@ class AssetStore:
     def _path(self, id: str, suffix: str = "") -> Path:
         return self._folder / (id.removeprefix("sha256:") + suffix)
 
-    def _write(self, path: Path, data: bytes) -> None:
-        """Whole or not at all, also when the power fails."""
+    def _write(self, path: Path, data: bytes, lasting: bool = True) -> None:
+        """Whole or not at all; where it is to last also when the power fails."""
         fd, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=self._folder)
         try:
             with open(fd, "wb") as file:
                 file.write(data)
                 file.flush()
-                os.fsync(fd)
+                if lasting:
+                    os.fsync(fd)
             os.replace(beside, path)
         except BaseException:
             os.unlink(beside)
             raise
+        if not lasting:
+            return
         folder = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(folder)

@@ -159,6 +159,10 @@ class _Importer:
         attributes = place.need("attributes")
         if part.colored and material.extension("KHR_materials_unlit") is not None:
             self.notes.add(attributes.at("COLOR_0"), "colours don't tint an unlit material")
+        if "TANGENT" in attributes and {"normalTexture", "KHR_materials_anisotropy"} & {
+            *material.value, *(material.object("extensions") or Place({}, "")).value
+        }:  # fmt: skip
+            self.notes.add(attributes.at("TANGENT"), "is not read: tangents follow the texture coordinates")
         primitive = self._read[place.pointer]
         colors = primitive.colors if primitive else None
         fading = colors is not None and colors.shape[1] == 4 and (colors[:, 3] != 1).any()

@@ -71,7 +71,11 @@ def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> d
         if chosen is not None:
             notes.add(node.place.at("camera"), "is not used: the scene's first camera is")
         elif place.text("type") == "perspective":
-            chosen = _perspective(place.need("perspective"), node, bounds)
+            lens = place.need("perspective")
+            chosen = _perspective(lens, node, bounds)
+            shape = lens.number("aspectRatio", 1, 1e-6, 1e6)
+            if shape != 1:
+                notes.add(lens.at("aspectRatio"), f"a picture {shape:.3g} times as wide as high frames what it does")
         else:
             notes.add(place.pointer, "an orthographic camera is not had: one in perspective is framed instead")
     return chosen or framed(bounds)
