@@ -1,13 +1,14 @@
 # make run [PORT=8000]   set everything up and serve the editor
 # make test              set everything up and pass the tests
 # make extremes          every row of the tables of numerical stability, with a million samples
+# make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/test_hostile.py
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
 export PYTHON
 
-.PHONY: run test extremes bench gallery lint setup
+.PHONY: run test extremes hostile bench gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -21,6 +22,10 @@ test:
 
 extremes: setup
 	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes
+
+hostile:
+	@.ci/setup test
+	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/test_hostile.py
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json
