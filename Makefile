@@ -21,7 +21,7 @@ test:
 	.venv/bin/pytest
 
 extremes: setup
-	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes
+	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/test_flags.py tests/test_furnace.py
 
 hostile:
 	@.ci/setup test

@@ -12,6 +12,7 @@ from scipy.stats import qmc
 from gpu import ESTIMATORS, Renderer
 from gpu.features import EDITED
 from gpu.layout import ABSENT, Model, Slot
+from tests.extremes.scenes import LONG
 from tests.probing import Prober, materials
 from tests.rendering import document, picture, render
 
@@ -59,17 +60,25 @@ def _albedo(prober: Prober, m: np.ndarray, asks: np.ndarray, samples: int) -> tu
 
 
 def _draws(kind: str) -> np.ndarray:
-    u = qmc.Sobol(len(NAMES), seed=1).random(4096)
+    bits = len(NAMES) - 8  # of what stands at a corner: all but colours and direction
+    u = qmc.Sobol(len(NAMES), seed=1).random(2 << bits if kind == "every corner" else 4096)
     colours = [NAMES.index(n) for n in ("r", "g", "b", "specular_r", "specular_g", "specular_b")]
-    if kind == "corners":
+    if "corner" in kind:
         keep = [NAMES.index("cosine"), NAMES.index("azimuth")]
         u = np.where(np.isin(np.arange(len(NAMES)), keep), u, np.round(u))
+        if kind == "every corner":  # 2^14 of them, each from outside and from inside
+            chosen = [i for i in range(len(NAMES)) if i not in keep and i not in colours]
+            u[:, chosen] = (np.arange(len(u))[:, None] // 2 >> np.arange(bits)) & 1
     if kind != "any":
         u[:, colours] = 1
     return u
 
 
-@pytest.mark.parametrize("kind", ["any", "white", "corners"])
+# Opaque, specular, roughness and anisotropic at 1, seen at a cosine of .02 to .035: 1.045.
+EVERY = pytest.param("every corner", marks=pytest.mark.xfail(reason="brushed plastic gains light", strict=True))
+
+
+@pytest.mark.parametrize("kind", ["any", "white", "corners", *([EVERY] if LONG else [])])
 def test_no_parameters_gain_light(prober: Prober, kind: str) -> None:
     m, asks = _materials(_draws(kind))
     albedo, _ = _albedo(prober, m, asks, 1024)
