@@ -72,7 +72,7 @@ export class Comparison {
 
   // Halves of the stage, where both stand beside each other.
   fit(box) {
-    return this.isOn && this.mode === "beside" ? { width: box.width / 2 - 1, height: box.height } : box;
+    return this.mode === "beside" ? { width: box.width / 2 - 1, height: box.height } : box;
   }
 
   // `wanted` for variant B as Stream.show takes it, or null: no comparison.

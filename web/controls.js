@@ -159,6 +159,7 @@ function color(field, id, { input, commit, refuse, restore }) {
     `${id}-strength`,
     { input: (value) => { strength = value ?? 0; give(); }, commit, refuse, restore },
   );
+  if (power) power.element.querySelector("input").setAttribute("aria-label", `${field.title}, strength`);
 
   return {
     element: power ? element("div", {}, row, power.element) : row,

@@ -10,7 +10,8 @@ const FLY_PER_S = 0.6; // distances to the target
 const ARROWS = { arrowleft: [-1, 0], arrowright: [1, 0], arrowup: [0, -1], arrowdown: [0, 1] };
 const FLIGHT = { w: [0, 0, 1], s: [0, 0, -1], a: [-1, 0, 0], d: [1, 0, 0], e: [0, 1, 0], q: [0, -1, 0] };
 const BUTTONS = "button, summary, a, [role=option], [role=tab], [role=listbox]";
-const WRITING = "input, select, textarea, [contenteditable]";
+const WRITING = "input:not([type=range], [type=checkbox]), select, textarea, [contenteditable]";
+const MOVING = ["arrowleft", "arrowright", "arrowup", "arrowdown", "home", "end", "pageup", "pagedown"];
 
 // Keys that are held: flying goes on with the display's beat.
 class Flight {
@@ -47,7 +48,10 @@ class Flight {
 // `acts`: [{key, shift, ctrl, does, says, group}]; a letter stands for itself, `says` explains it.
 export function watchKeys(move, acts) {
   const flight = new Flight(move);
-  const inText = ({ target }) => target instanceof Element && target.closest(WRITING) && target.type !== "range";
+  const inText = ({ target }) => target instanceof Element && target.closest(WRITING);
+  // Whether what has the focus needs the key itself.
+  const isTaken = (key, { target }) => inText({ target })
+    || (target.type === "range" && MOVING.includes(key)) || (target.type === "checkbox" && key === " ");
 
   document.addEventListener("keydown", (event) => {
     const key = event.key.toLowerCase();
@@ -58,7 +62,7 @@ export function watchKeys(move, acts) {
     if (act?.ctrl) {
       if (event.target.dataset?.dirty || (act.notInText && inText(event))) return;
     } else {
-      if (ctrl || event.target.closest?.(WRITING)) return;
+      if (ctrl || isTaken(key, event)) return;
       if ((key === " " || key === "enter" || ARROWS[key]) && event.target.closest(BUTTONS)) return;
     }
     const arrow = !ctrl && ARROWS[key];

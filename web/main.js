@@ -83,7 +83,6 @@ const viewport = new Viewport(find("picture"), {
     status.frame(header, limit());
     stage.painted(frame);
     comparison.painted();
-    if (stream.isNewest(painted)) root.setAttribute("aria-busy", "false");
     tellState();
   },
 });
@@ -174,10 +173,13 @@ const isCheckered = () => desk.state.checker ?? editor.state.scene.environment?.
 
 function size() {
   const area = Math.min(info.renderer?.software === false ? AREA.hardware : AREA.software, info.limits.max_pixels);
-  return pictureSize(comparison.fit(root.getBoundingClientRect()), window.devicePixelRatio, comparison.isOn ? area / 2 : area);
+  const box = root.getBoundingClientRect();
+  if (!editor.sceneB) return pictureSize(box, window.devicePixelRatio, area);
+  return pictureSize(comparison.fit(box), window.devicePixelRatio, area / 2); // two variants share what one may cost
 }
 
 function tellState() {
+  root.setAttribute("aria-busy", String(!stream.isNewest(painted)));
   const busy = isWaiting ? "Preparing" : "Rendering";
   status.state(!isConnected ? "Offline" : isPaused ? "Paused" : ended === painted && !isWaiting ? "Done" : busy);
 }
@@ -199,7 +201,6 @@ function push() {
 
 let keeping = 0;
 function refresh() {
-  root.setAttribute("aria-busy", "true");
   const { quality = schema.settings.properties.quality.default, time_limit, target_noise } = editor.state.settings;
   const preset = info?.quality[quality] ?? {};
   knobs = time_limit || target_noise ? { ...preset, max_samples: null } : preset;
@@ -209,7 +210,6 @@ function refresh() {
   find("redo").disabled = !editor.canRedo;
   find("paste-material").disabled = clip === null && !navigator.clipboard?.readText;
   push();
-  if (stream.isNewest(painted)) root.setAttribute("aria-busy", "false");
   clearTimeout(keeping);
   if (editor.canUndo || left) keeping = setTimeout(() => keepWork(essence(editor.state)), KEEP_REST_MS);
 }
@@ -277,6 +277,10 @@ const acts = [
   { keys: ["y"], ctrl: true, does: () => travel(() => editor.redo()), says: "redo", group: "Work" },
   { keys: ["c"], ctrl: true, notInText: true, does: copyMaterial, says: "copy the material", group: "Work" },
   { keys: ["v"], ctrl: true, notInText: true, does: pasteMaterial, says: "paste a material or a scene", group: "Work" },
+  {
+    keys: ["delete"], group: "Work", says: "delete the selected thing",
+    does: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
+  },
   { keys: ["o"], ctrl: true, does: () => find("file").click(), says: "open files", group: "Work" },
   { keys: [" "], does: togglePause, says: "pause, resume", group: "Work" },
   { keys: ["p"], does: download, says: "the picture as a PNG", group: "Work" },

@@ -68,9 +68,8 @@ export class Outliner {
     const all = this.#shown.map(({ thing }) => thing);
     const now = all.indexOf(this.thing);
     const to = { ArrowDown: now + 1, ArrowUp: now - 1, Home: 0, End: all.length - 1 }[event.key];
-    if (event.key === "Delete") this.acts.removable(this.thing) && this.acts.remove(this.thing);
-    else if (to === undefined) return;
-    else this.acts.select(all[Math.min(Math.max(to, 0), all.length - 1)]);
+    if (to === undefined) return;
+    this.acts.select(all[Math.min(Math.max(to, 0), all.length - 1)]);
     event.preventDefault();
   }
 

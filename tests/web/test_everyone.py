@@ -1,0 +1,170 @@
+"""Everybody can work here: keys, names, contrast, small windows; and what a server may say instead of a picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from axe_playwright_python.sync_playwright import Axe
+from playwright.sync_api import Browser, BrowserContext
+
+from gpu import Renderer
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.test_picture import camera
+
+SERIOUS = {"serious", "critical"}
+
+
+def findings(editor: Editor) -> list[str]:
+    response = Axe().run(editor.page).response
+    return [
+        f"{found['id']}: {node['html'][:120]}"
+        for found in response["violations"]
+        if found["impact"] in SERIOUS
+        for node in found["nodes"]
+    ]
+
+
+@pytest.mark.parametrize("scheme", ["dark", "light"])
+def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any) -> None:
+    editor = Editor(browser.new_page(viewport={"width": 1280, "height": 800}, color_scheme=scheme))
+    editor.open(server.url)
+    for tab in ("scene", "render", "keep", "material"):
+        editor.tab(tab)
+        assert findings(editor) == [], tab
+    editor.page.keyboard.press("c")
+    editor.page.keyboard.press("4")
+    editor.wait("both", lambda: editor.page.is_visible("#comparison") and editor.page.is_visible("#probe"))
+    assert findings(editor) == []
+    editor.page.keyboard.press("?")
+    assert findings(editor) == []
+    editor.page.close()
+
+
+@pytest.mark.parametrize("size", [(390, 844), (640, 400), (844, 390), (1280, 800), (1920, 1080)])
+def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, int]) -> None:
+    """Among them a phone both ways, and a laptop at 200 %."""
+    editor = Editor(browser.new_page(viewport={"width": size[0], "height": size[1]}))
+    editor.open(server.url)
+    for tab in ("scene", "render", "keep", "material"):
+        editor.tab(tab)
+        script = """() => [...document.querySelectorAll("button, input, select, [role=option]")]
+            .filter((each) => each.checkVisibility() && !each.closest(".presets, .outline, .unseen") && !each.matches(".unseen"))
+            .filter((each) => {
+                const box = each.getBoundingClientRect();
+                return box.left < -1 || box.right > innerWidth + 1 || box.width < 8;
+            }).map((each) => each.outerHTML.slice(0, 100))"""
+        assert editor.page.evaluate(script) == [], tab
+    box = editor.page.locator("#stage").bounding_box()
+    assert box is not None and box["width"] * box["height"] > 0.2 * size[0] * size[1], "the picture has room"
+    assert editor.page.evaluate("document.documentElement.scrollWidth") <= size[0]
+    editor.page.close()
+
+
+def test_the_keyboard_reaches_everything(editor: Editor) -> None:
+    before = editor.settled()
+    editor.page.keyboard.press("?")
+    assert editor.page.is_visible("#keys-dialog")
+    assert editor.page.locator("#keys dt").count() > 20
+    editor.page.keyboard.press("Escape")
+    assert editor.page.is_hidden("#keys-dialog")
+    editor.page.locator("#tab-material").focus()
+    editor.page.keyboard.press("ArrowRight")
+    assert editor.page.is_visible("#page-scene")
+    editor.page.locator("#outline-list").focus()
+    editor.page.keyboard.press("Home")
+    assert editor.text("#thing-title") == "Camera"
+    editor.page.keyboard.press("ArrowDown")
+    assert editor.text("#thing-title") == "Environment"
+    # What has the focus shows it.
+    editor.page.keyboard.press("Tab")
+    outline = editor.page.evaluate("getComputedStyle(document.activeElement).outlineStyle")
+    assert outline != "none"
+    position = camera(editor)["position"]
+    editor.page.locator("#stage").focus()
+    editor.page.keyboard.press("ArrowLeft")
+    editor.wait_for_change(before, 0.5)
+    assert camera(editor)["position"] != position
+
+
+def test_live_regions_do_not_chatter(editor: Editor) -> None:
+    editor.settled()
+    editor.page.evaluate("""() => {
+        window.spoken = 0;
+        for (const region of document.querySelectorAll("[role=status], [role=alert], [aria-live]")) {
+            new MutationObserver(() => { window.spoken += 1; }).observe(region, { childList: true, subtree: true });
+        }
+    }""")
+    samples = editor.samples()
+    editor.wait("more samples", lambda: editor.samples() > samples + 10)
+    assert editor.page.evaluate("window.spoken") == 0, "samples are not read out"
+    assert editor.page.get_attribute("#announcer", "role") == "status"
+
+
+def test_motion_and_theme(context: BrowserContext, server: Server) -> None:
+    editor = Editor(context.new_page())
+    editor.page.emulate_media(reduced_motion="reduce", color_scheme="dark")
+    editor.open(server.url)
+    style = "getComputedStyle(document.getElementById('outline')).transitionDuration"
+    assert editor.page.evaluate(style) == "0s"
+    panel = "getComputedStyle(document.getElementById('panel')).backgroundColor"
+    dark = editor.page.evaluate(panel)
+    editor.page.click("#theme")
+    light = editor.page.evaluate(panel)
+    assert light != dark
+    editor.page.reload()
+    editor.wait("a picture", lambda: editor.samples() >= 1)
+    assert editor.page.evaluate(panel) == light, "the choice is kept"
+
+
+@pytest.fixture
+def strict(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    """A server with a key and room for one."""
+    served = Server(tmp_path_factory.mktemp("strict"), SUNBOX_API_KEY="sesame", SUNBOX_MAX_CLIENTS="1")
+    served.wait()
+    yield served
+    served.stop()
+
+
+def test_a_key_is_asked_for_and_a_full_server_waited_out(strict: Server, browser: Browser) -> None:
+    def enter(editor: Editor, key: str) -> None:
+        editor.wait("the question", lambda: editor.page.is_visible("#key-dialog"))
+        editor.page.fill("#key-entry", key)
+        editor.page.keyboard.press("Enter")
+
+    first = Editor(browser.new_page())
+    first.page.goto(strict.url + "/")
+    enter(first, "wrong")
+    first.wait("the answer", lambda: first.page.is_visible("#key-dialog .trouble"))
+    enter(first, "sesame")
+    first.wait("a picture", lambda: first.samples() >= 1)
+
+    second = Editor(browser.new_page())
+    second.page.goto(strict.url + "/")
+    enter(second, "sesame")
+    second.wait("the reason", lambda: "The server is full" in second.text("#messages"))
+    first.page.close()
+    second.page.click("text=Try now")
+    second.wait("a picture", lambda: second.samples() >= 1)
+    assert second.text("#messages") == ""
+    second.page.close()
+
+
+def test_a_cut_connection_takes_its_session_up_again(context: BrowserContext, server: Server) -> None:
+    editor = Editor(context.new_page())
+    editor.page.add_init_script("""
+        window.sockets = [];
+        window.WebSocket = class extends WebSocket {
+            constructor(...all) { super(...all); window.sockets.push(this); }
+        };
+    """)
+    editor.open(server.url)
+    editor.wait("samples", lambda: editor.samples() >= 8)
+    samples = editor.samples()
+    editor.page.evaluate("window.sockets.at(-1).close()")
+    editor.wait("another connection", lambda: editor.page.evaluate("window.sockets.length") > 1)
+    editor.wait("the picture", lambda: editor.samples() > samples and editor.text("#messages") == "")
+    assert "session=" in editor.page.evaluate("window.sockets.at(-1).url")
+    assert editor.page.evaluate("window.sockets.length") == 2

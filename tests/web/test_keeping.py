@@ -1,0 +1,174 @@
+"""What is kept and what leaves the page: files, links, commands, autosave, names on the server, imports."""
+
+from __future__ import annotations
+
+import io
+import json
+import shlex
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import OpenImageIO as oiio
+from PIL import Image
+from playwright.sync_api import BrowserContext
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.test_picture import overlay
+
+TRIANGLE = b"v -1 0.2 1.2\nv 1 0.2 1.2\nv 0 1.9 1.2\nf 1 2 3\n"
+
+
+def finish(editor: Editor, samples: int) -> None:
+    editor.tab("render")
+    entry = editor.page.locator("#settings-form [data-field=max_samples] input")
+    entry.fill(str(samples))
+    entry.press("Enter")
+    editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == samples)
+
+
+def read_exr(path: Path) -> tuple[list[str], np.ndarray]:
+    image = oiio.ImageInput.open(str(path))
+    assert image is not None
+    pixels = image.read_image("float")
+    return list(image.spec().channelnames), np.asarray(pixels)
+
+
+def test_files_hold_the_picture(editor: Editor, tmp_path: Path) -> None:
+    finish(editor, 6)
+    editor.tab("keep")
+    flat = np.asarray(Image.open(io.BytesIO(editor.shot("text=PNG >> nth=1"))).convert("RGB"), int)
+    deep = editor.shot("text=PNG, 16 bit")
+    assert deep[24] == 16
+    assert np.abs(np.asarray(Image.open(io.BytesIO(deep)).convert("RGB"), int) - flat).max() <= 1
+    path = tmp_path / "layers.exr"
+    path.write_bytes(editor.shot("text=EXR, all layers"))
+    names, pixels = read_exr(path)
+    assert {"R", "A", "albedo.R", "normal.X", "depth.Z", "variance.G"} <= set(names)
+    assert pixels.shape[:2] == flat.shape[:2]
+    depth = pixels[..., names.index("depth.Z")]
+    assert 3.5 < depth[depth > 0].min() < 5
+    height, width = depth.shape
+    middle = pixels[height // 2, width // 2]
+    assert middle[names.index("normal.Z")] > 0.9 and middle[names.index("R")] > 2 * middle[names.index("B")]
+
+    # The command makes the same picture, byte for byte.
+    editor.page.click("#copy-curl")
+    editor.wait("the command", lambda: editor.page.input_value(".command").startswith("curl"))
+    command = shlex.split(editor.page.input_value(".command"))
+    command[command.index("-o") + 1] = str(tmp_path / "again.png")
+    subprocess.run(command, check=True, timeout=60)
+    again = np.asarray(Image.open(tmp_path / "again.png").convert("RGB"), int)
+    assert np.array_equal(again, flat)
+
+
+def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: BrowserContext) -> None:
+    before = editor.settled()
+    editor.page.click("#material-presets [data-name=gold]")
+    editor.page.keyboard.press("ArrowLeft")
+    editor.page.keyboard.press("ArrowLeft")
+    editor.wait_for_change(before)
+    shown = editor.settled()
+    editor.tab("keep")
+    editor.page.click("#copy-link")
+    editor.wait("the link", lambda: "#v=" in editor.page.input_value(".command"))
+    link = editor.page.input_value(".command")
+
+    stranger = Editor(context.browser.new_page(viewport={"width": 800, "height": 560}))  # type: ignore[union-attr]
+    stranger.page.goto(link)
+    stranger.wait("a picture", lambda: stranger.samples() >= 4)
+    stranger.settled()
+    assert not stranger.differs(shown, 8)
+    stranger.page.close()
+
+    editor.page.wait_for_timeout(800)
+    editor.page.reload()
+    editor.wait("the work", lambda: "last work" in editor.text("#messages"))
+    editor.settled()
+    assert not editor.differs(shown, 8)
+    editor.page.click("text=Start afresh")
+    editor.wait("the first scene", lambda: not editor.differs(before, 8))
+
+
+def test_snapshots_and_names(editor: Editor, server: Server) -> None:
+    before = editor.settled()
+    editor.tab("keep")
+    editor.page.click("text=Take a snapshot")
+    editor.wait("a snapshot", lambda: editor.page.locator(".snapshot img").count() == 1)
+    editor.page.fill("#page-keep .entry >> nth=1", "my red")
+    editor.page.click("#page-keep .group:nth-of-type(2) >> text=Save")
+    editor.wait("its name", lambda: "my red" in editor.text("#page-keep"))
+    assert server.http.get("/v1/documents/materials/my%20red").json()["type"] == "principled"
+    editor.tab("material")
+    editor.page.click("#material-presets [data-name=gold]")
+    editor.wait_for_change(before)
+    editor.tab("keep")
+    editor.page.click("#page-keep .kept .open >> text=my red")
+    editor.wait("red again", lambda: not editor.differs(before, 8))
+    editor.page.click("[aria-label='Delete my red']")
+    editor.wait("its end", lambda: "my red" not in editor.text("#page-keep"))
+    editor.page.keyboard.press("Control+z")
+    editor.wait_for_change(before)
+    editor.page.click(".snapshot .open")
+    editor.wait("the snapshot's view", lambda: not editor.differs(before, 8))
+
+
+def test_json_leaves_and_comes_back(editor: Editor) -> None:
+    before = editor.settled()
+    editor.tab("keep")
+    scene = editor.shot("text=Scene as JSON")
+    document = json.loads(scene)
+    document["materials"]["subject"] = {"type": "diffuse", "albedo": [0, 0.6, 0]}
+    editor.drop("#stage", {"green.json": json.dumps(document).encode()})
+    editor.wait_for_change(before)
+    editor.drop("#stage", {"old.json": scene})
+    editor.wait("the old scene", lambda: not editor.differs(before, 8))
+    editor.drop("#stage", {"note.txt": b"hello"})
+    editor.wait("a refusal", lambda: "note.txt was not taken" in editor.text("#messages"))
+
+
+def test_dropped_files_find_their_places(editor: Editor) -> None:
+    editor.settled()
+    things = editor.page.locator("#outline-list [role=option]")
+    editor.drop("#stage", {"triangle.obj": TRIANGLE})
+    editor.tab("scene")
+    editor.wait("the mesh", lambda: things.count() == 5 and editor.text("#thing-title") == "Mesh")
+    editor.settled()
+    editor.page.evaluate("document.activeElement.blur()")
+    editor.page.keyboard.press("Delete")
+    editor.wait("its end", lambda: things.count() == 4)
+
+    red = io.BytesIO()
+    Image.new("RGB", (8, 8), (0, 200, 0)).save(red, "PNG")
+    editor.page.click("#outline-list [data-thing='/shapes/0']")
+    editor.tab("material")
+    before = editor.settled()
+    editor.drop("#material-form [data-field=base_color]", {"green.png": red.getvalue()})
+    editor.wait("the texture", lambda: "green" in editor.text("[data-field=base_color] .texture"))
+    editor.wait_for_change(before, 8)
+    height, width = overlay(editor, "picture").shape[:2]
+    editor.settled()
+    r, g, _, _ = overlay(editor, "picture")[height * 6 // 10, width // 2]
+    assert g > r, "the ball is green"
+    editor.page.click("[data-field=base_color] .texture button")
+    editor.wait("no texture", lambda: editor.page.is_hidden("[data-field=base_color] .texture"))
+    editor.drop("#stage", {"broken.glb": b"glTF nonsense"})
+    editor.wait("a refusal", lambda: "broken.glb was not taken" in editor.text("#messages"))
+
+
+def test_things_are_added_moved_and_removed(editor: Editor) -> None:
+    before = editor.settled()
+    editor.tab("scene")
+    editor.page.select_option("#add", label="Point light")
+    editor.wait_for_change(before)
+    assert editor.text("#thing-title") == "Point light"
+    editor.page.click("#thing-acts >> text=Delete")
+    editor.wait("the light's end", lambda: not editor.differs(before, 8))
+    editor.page.click("#outline-list [data-thing='/shapes/0']")
+    entry = editor.page.locator("#thing-form [data-field=translate] input >> nth=0")
+    entry.fill("0.8")
+    entry.press("Enter")
+    editor.wait_for_change(before)
+    editor.page.keyboard.press("Control+z")
+    editor.wait("the ball's place", lambda: not editor.differs(before, 8))

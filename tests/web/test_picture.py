@@ -1,0 +1,167 @@
+"""The picture under the hand: picking, framing, focus, flying, reading pixels, layers and overlays."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tests.web.conftest import Editor
+
+
+def point(editor: Editor, x: float, y: float) -> tuple[float, float]:
+    """A place of the stage, 0..1, on the page."""
+    box = editor.page.locator("#stage").bounding_box()
+    assert box is not None
+    return box["x"] + x * box["width"], box["y"] + y * box["height"]
+
+
+def click(editor: Editor, x: float, y: float) -> None:
+    editor.page.mouse.click(*point(editor, x, y))
+
+
+def camera(editor: Editor) -> dict[str, Any]:
+    """The camera's numbers, as the panel shows them."""
+    editor.tab("scene")
+    editor.page.click("#outline-list [data-thing='/camera']")
+    script = """() => Object.fromEntries([...document.querySelectorAll("#thing-form [data-field]")].map((row) =>
+        [row.dataset.field, [...row.querySelectorAll("input[type=number]")].map((each) => Number(each.value))]))"""
+    found: dict[str, Any] = editor.page.evaluate(script)
+    return found
+
+
+def overlay(editor: Editor, id: str) -> np.ndarray:
+    """(height, width, 4) of one of the canvases."""
+    script = """(id) => {
+        const { width, height } = document.getElementById(id);
+        const data = document.getElementById(id).getContext("2d").getImageData(0, 0, width, height).data;
+        return [width, height, [...data]];
+    }"""
+    width, height, values = editor.page.evaluate(script, id)
+    return np.asarray(values, np.uint8).reshape(height, width, 4)
+
+
+def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
+    editor.settled()
+    click(editor, 0.1, 0.9)
+    editor.wait("the floor", lambda: editor.page.input_value("#material") == "floor")
+    editor.wait("its outline", lambda: overlay(editor, "outline")[..., 3].any())
+    rows = np.flatnonzero(overlay(editor, "outline")[..., 3].any(axis=1))
+    assert rows.min() > 0.2 * editor.page.evaluate("picture.height"), "the floor ends at the horizon"
+    click(editor, 0.5, 0.5)
+    editor.wait("the ball", lambda: editor.page.input_value("#material") == "subject")
+    editor.tab("scene")
+    assert editor.page.get_attribute("#outline-list [data-thing='/shapes/0']", "aria-selected") == "true"
+    click(editor, 0.5, 0.02)
+    editor.wait("the sky", lambda: editor.text("#thing-title") == "Environment")
+    assert editor.samples() > 4, "picking costs no sample"
+
+
+def test_frame_focus_and_fly(editor: Editor) -> None:
+    first = editor.settled()
+    editor.page.keyboard.press("3")
+    click(editor, 0.5, 0.55)
+    editor.wait("a focus", lambda: camera(editor)["aperture_radius"][0] > 0)
+    distance = camera(editor)["focus_distance"][0]
+    assert 4 < distance < 4.6, "the ball's front, 5.2 m away with a radius of 1"
+    editor.page.keyboard.press("Escape")
+    editor.page.click("#outline-list [data-thing='/shapes/0']")
+    editor.page.click("#thing-acts button >> nth=0")  # Frame
+    editor.wait("the ball in the middle", lambda: camera(editor)["target"] == [0, 1, 0])
+    editor.wait_for_change(first)
+    before = camera(editor)["position"]
+    editor.page.evaluate("document.activeElement.blur()")
+    editor.page.keyboard.down("w")
+    editor.page.wait_for_timeout(300)
+    editor.page.keyboard.up("w")
+    after = camera(editor)
+    assert after["position"][2] < before[2] - 0.1 and after["target"][2] < -0.1, "eye and target went forward"
+    editor.page.click("#undo")
+    assert camera(editor)["position"] == before, "a flight is one step of undo"
+
+
+def test_pixels_under_the_glass(editor: Editor) -> None:
+    editor.settled()
+    editor.page.keyboard.press("Space")
+    editor.page.keyboard.press("4")
+    editor.page.mouse.move(*point(editor, 0.5, 0.5))
+    editor.wait("the linear value", lambda: "…" not in editor.text("#probe"))
+    lines = dict(zip(*[iter(editor.text("#probe").split("\n"))] * 2, strict=True))
+    shown = [int(x) for x in lines["Display"].split()[:3]]
+    linear = [float(x) for x in lines["Radiance"].split()[:3]]
+    x, y = (int(part) for part in lines["Pixel"].split(","))
+    assert shown == overlay(editor, "picture")[y, x, :3].tolist()
+    assert linear[0] > 2 * linear[2] > 0, "the ball is red"
+    for _ in range(12):
+        editor.page.mouse.wheel(0, -400)
+    zoom = editor.page.evaluate("new DOMMatrix(getComputedStyle(sheet).transform).a")
+    assert zoom > 16 and editor.page.evaluate("sheet.classList.contains('pixels')")
+    editor.page.keyboard.press("ArrowRight")
+    assert f"{x + 1}, {y}" in editor.text("#probe")
+    editor.page.keyboard.press("Escape")
+    assert editor.page.evaluate("new DOMMatrix(getComputedStyle(sheet).transform).a") == 1
+
+
+@pytest.mark.parametrize("layer", ["normal", "depth", "material_id"])
+def test_layers_have_a_legend(editor: Editor, layer: str) -> None:
+    before, samples = editor.settled(), editor.samples()
+    editor.tab("render")
+    editor.page.select_option("#layer", layer)
+    editor.wait_for_change(before, 15)
+    assert editor.samples() >= samples, "a layer costs no sample"
+    legend = editor.text("#legend")
+    if layer == "depth":
+        near, far = (float(word) for word in legend.split() if word.replace(".", "").isdigit())
+        assert 3.5 < near < far
+    if layer == "material_id":
+        assert {"Subject", "Floor"} <= set(legend.split("\n"))
+        colors = np.unique(overlay(editor, "picture").reshape(-1, 4), axis=0)
+        assert len(colors) == 3, "two materials and nothing"
+    editor.page.select_option("#layer", "color")
+    editor.wait("the picture", lambda: editor.page.is_hidden("#legend") and not editor.differs(before, 8))
+
+
+def test_histogram_and_clipping_follow_the_exposure(editor: Editor) -> None:
+    editor.settled()
+    editor.page.keyboard.press("h")
+    editor.page.keyboard.press("x")
+    editor.wait("a histogram", lambda: overlay(editor, "histogram")[..., 3].any())
+    editor.tab("render")
+    entry = editor.page.locator(editor.field("exposure", "number"))
+    entry.fill("8")
+    entry.press("Enter")
+
+    def share(color: list[int]) -> float:
+        return float((overlay(editor, "clipping")[..., :3] == color).all(axis=2).mean())
+
+    editor.wait("white pixels", lambda: share([255, 60, 60]) > 0.5)
+    entry.fill("-20")
+    entry.press("Enter")
+    editor.wait("black pixels", lambda: share([60, 110, 255]) > 0.9)
+
+
+def test_a_checker_stands_behind_transparency(editor: Editor) -> None:
+    editor.settled()
+    editor.tab("scene")
+    editor.page.click("#outline-list [data-thing='/environment']")
+    editor.page.click("#thing-form [data-field=background] input")
+    editor.wait("alpha", lambda: (overlay(editor, "picture")[..., 3] == 0).mean() > 0.1)
+    assert "checker" in (editor.page.get_attribute("#stage", "class") or "")
+    editor.page.keyboard.press("k")
+    editor.wait("no alpha", lambda: (overlay(editor, "picture")[..., 3] == 255).all())
+
+
+def test_alt_and_a_drag_turn_the_environment(editor: Editor) -> None:
+    before = editor.settled()
+    editor.page.keyboard.down("Alt")
+    x, y = point(editor, 0.5, 0.5)
+    editor.page.mouse.move(x, y)
+    editor.page.mouse.down()
+    editor.page.mouse.move(x + 200, y, steps=4)
+    editor.page.mouse.up()
+    editor.page.keyboard.up("Alt")
+    editor.wait_for_change(before)
+    editor.tab("scene")
+    editor.page.click("#outline-list [data-thing='/environment']")
+    assert float(editor.page.input_value(editor.field("rotation", "number"))) > 20

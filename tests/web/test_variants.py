@@ -1,0 +1,77 @@
+"""Two variants of a material: swipe, side by side, difference; and the models of the same object."""
+
+from __future__ import annotations
+
+import math
+import re
+
+import numpy as np
+
+from tests.web.conftest import Editor
+from tests.web.test_picture import overlay, point
+
+
+def metric(editor: Editor) -> float:
+    """In percent; not a number before there is one."""
+    found = re.search(r"RMSE ([\d.]+) %", editor.text("#comparison"))
+    return float(found[1]) if found else math.nan
+
+
+def test_a_b(editor: Editor) -> None:
+    editor.settled()
+    editor.page.click("#compare")
+    editor.wait("equal variants", lambda: metric(editor) < 3)
+    editor.page.select_option("#comparison select", "blinn_phong")
+    editor.wait("a difference", lambda: metric(editor) > 4)
+    # Left of the divider there is A, right of it B.
+    clip = editor.page.evaluate("getComputedStyle(document.getElementById('picture-b')).clipPath")
+    assert clip == "inset(0px 0px 0px 50%)"
+    editor.page.locator("#divider").focus()
+    for _ in range(10):
+        editor.page.keyboard.press("ArrowLeft")
+    assert "40%" in editor.page.evaluate("getComputedStyle(document.getElementById('picture-b')).clipPath")
+
+    editor.page.click("#comparison [data-value=difference]")
+    editor.wait("its picture", lambda: overlay(editor, "difference")[..., :3].max() > 60)
+    sky, ball = overlay(editor, "difference")[:20, :, :3].mean(), overlay(editor, "difference")[..., :3].mean()
+    assert ball > 2 * sky, "only the ball differs"
+
+    editor.page.click("#comparison [data-value=b]")
+    assert editor.page.input_value("#model") == "blinn_phong"
+    editor.page.select_option("#model", "disney")
+    editor.page.click("#comparison [data-value=a]")
+    assert editor.page.input_value("#model") == "principled", "A is as it was"
+
+    editor.page.click("#comparison [data-value=beside]")
+    half = editor.page.locator("#picture-b").bounding_box()
+    assert half is not None and half["x"] > point(editor, 0.49, 0)[0]
+    editor.page.click("#comparison >> text=Done")
+    assert editor.page.is_hidden("#comparison") and editor.page.is_hidden("#picture-b")
+    editor.page.keyboard.press("Control+z")
+    assert editor.page.is_visible("#comparison"), "comparing is undone like everything"
+
+
+def test_materials_are_copied_and_pasted(editor: Editor) -> None:
+    before = editor.settled()
+    editor.page.click("#material-presets [data-name=gold]")
+    editor.wait_for_change(before)
+    gold = editor.settled()
+    editor.page.click("#copy-material")
+    editor.page.keyboard.press("Control+z")
+    editor.wait("the first material", lambda: editor.page.input_value(editor.field("metallic", "number")) == "0")
+    editor.page.click("#paste-material")
+    editor.wait("gold again", lambda: editor.page.input_value(editor.field("metallic", "number")) == "1")
+    editor.settled()
+    assert not editor.differs(gold, 8)
+
+
+def test_presets_are_pictures_taken_by_the_service(editor: Editor) -> None:
+    editor.settled()
+    script = """() => [...document.querySelectorAll("#material-presets img")].map((image) => {
+        const small = new OffscreenCanvas(1, 1).getContext("2d");
+        small.drawImage(image, 0, 0, 1, 1);
+        return [image.naturalWidth, ...small.getImageData(0, 0, 1, 1).data];
+    })"""
+    editor.wait("pictures", lambda: all(width for width, *_ in editor.page.evaluate(script)))
+    colors = np.asarray(editor.page.evaluate(script))[:, 1:4]
+    assert len(np.unique(colors, axis=0)) > len(colors) / 2
