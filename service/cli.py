@@ -93,11 +93,12 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "peers", "hemisphere"],
+        choices=["speed", "peers", "hemisphere", "hand"],
         default="speed",
         help="speed (default): paths per second, compile times, latencies; "
         "peers: error at equal time beside Mitsuba; "
-        "hemisphere: error of uniform directions beside Sunbox's, over samples and time",
+        "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
+        "hand: from a slider to other pixels, in a browser",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")

@@ -83,6 +83,7 @@ const viewport = new Viewport(find("picture"), {
     status.frame(header, limit());
     stage.painted(frame);
     comparison.painted();
+    if (desk.state.tab === "render") showPrices();
     tellState();
   },
 });
@@ -168,6 +169,8 @@ const keep = new Keep(find("page-keep"), {
 const limit = () => editor.state.settings.max_samples ?? knobs.max_samples ?? null;
 const shownView = () => ({ ...displayDefaults, ...editor.state.view });
 
+const showPrices = () => panel.showQualities(info.quality, editor.state.settings, header);
+
 // Transparency shows where the scene asks for it, or the person does.
 const isCheckered = () => desk.state.checker ?? editor.state.scene.environment?.background === false;
 
@@ -205,7 +208,7 @@ function refresh() {
   const preset = info?.quality[quality] ?? {};
   knobs = time_limit || target_noise ? { ...preset, max_samples: null } : preset;
   panel.show(editor.state, knobs);
-  if (info) panel.showQualities(info.quality, editor.state.settings);
+  if (info) showPrices();
   find("undo").disabled = !editor.canUndo;
   find("redo").disabled = !editor.canRedo;
   find("paste-material").disabled = clip === null && !navigator.clipboard?.readText;

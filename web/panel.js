@@ -115,8 +115,9 @@ export class Panel {
     this.#forms.material.show(material);
   }
 
-  showQualities(presets, settings) {
-    this.#qualities(presets, settings.quality ?? this.schema.settings.properties.quality.default);
+  // `live`: the header of the newest frame, from which the presets' prices for this scene follow.
+  showQualities(presets, settings, live) {
+    this.#qualities(presets, settings.quality ?? this.schema.settings.properties.quality.default, live);
   }
 
   // Says at the control for this place what is wrong with it: the control's place, or null where there is none.

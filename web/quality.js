@@ -1,35 +1,48 @@
-// The quality presets with what they cost and how far they come, as the server measured it.
+// The quality presets with what they cost: as the server measured it, and as this scene goes here and now.
 
 import { element } from "./dom.js";
 import { watchChoice } from "./tabs.js";
-import { count, inWords } from "./words.js";
+import { count, duration, inWords, percent } from "./words.js";
 
-const FIGURES = {
-  cost: (x) => `${Number(x.toPrecision(2))}× the time`,
-  seconds: (x) => `${Number(x.toPrecision(2))} s`,
-  error: (x) => `error ${Number((100 * x).toPrecision(2))} %`,
-};
+const TRUSTED = 4; // samples before a forecast is worth something
 
-// What a preset says of its price, in whatever of these terms the server measured.
-export function price(preset) {
-  return Object.entries(FIGURES)
-    .filter(([name]) => typeof preset[name] === "number")
-    .map(([name, words]) => words(preset[name])).join(" · ");
+// The time and noise that a number of samples comes to, from what the picture has taken so far.
+export function forecast(target, { samples, elapsed_s, noise }) {
+  return {
+    seconds: (elapsed_s * target) / samples,
+    noise: noise === null ? null : noise * Math.sqrt(samples / target),
+  };
 }
 
-const bounces = (n) => (n === undefined ? "" : `, ${n} bounces`);
+function price(preset, live) {
+  const known = live?.samples >= TRUSTED && live.scale === 1;
+  const { seconds, noise } = known ? forecast(preset.max_samples, live) : preset.cost ?? {};
+  if (typeof seconds !== "number") return "";
+  return [`≈ ${duration(seconds)}`, typeof noise === "number" ? `${percent(noise)} noise` : ""].filter(Boolean).join(", ");
+}
+
+const basics = ({ max_samples, max_bounces }) => `${count(max_samples)} samples, ${max_bounces} bounces`;
 
 export function qualityChoice(root, pick) {
   const mark = watchChoice(root, ".quality", (button) => pick(button.dataset.name));
+  const prices = new Map();
   let made = null;
-  return (presets, chosen) => {
+  return (presets, chosen, live) => {
     if (presets !== made) {
       made = presets;
-      root.replaceChildren(...Object.entries(presets).map(([name, preset]) => element(
-        "button", { type: "button", role: "radio", class: "quality", "data-name": name },
-        element("span", {}, inWords(name)), element("span", { class: "price" }, price(preset)),
-        element("span", { class: "what" }, `${count(preset.max_samples)} samples${bounces(preset.max_bounces)}`),
-      )));
+      prices.clear();
+      root.replaceChildren(...Object.entries(presets).map(([name, preset]) => {
+        prices.set(name, element("span", { class: "price" }));
+        return element(
+          "button", { type: "button", role: "radio", class: "quality", "data-name": name },
+          element("span", {}, inWords(name)), prices.get(name),
+          element("span", { class: "what" }, [basics(preset), preset.gives_up].filter(Boolean).join(". ")),
+        );
+      }));
+    }
+    for (const [name, place] of prices) {
+      const text = price(presets[name], live);
+      if (place.textContent !== text) place.textContent = text;
     }
     mark((button) => button.dataset.name === chosen);
   };

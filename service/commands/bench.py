@@ -1,4 +1,4 @@
-"""`sunbox bench speed | peers | hemisphere`: measures and prints a table; `-o` keeps the figures as JSON."""
+"""`sunbox bench speed | peers | hemisphere | hand`: measures and prints a table; `-o` keeps the figures as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from service.commands import BadInput, Failed, files
 def run(arguments: argparse.Namespace) -> int:
     if arguments.runs < 1:
         raise BadInput(f"--runs {arguments.runs}: at least one is needed")
-    return {"speed": _speed, "peers": _peers, "hemisphere": _hemisphere}[arguments.what](arguments)
+    return {"speed": _speed, "peers": _peers, "hemisphere": _hemisphere, "hand": _hand}[arguments.what](arguments)
 
 
 def _hemisphere(arguments: argparse.Namespace) -> int:
@@ -38,6 +38,20 @@ def _hemisphere(arguments: argparse.Namespace) -> int:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     if figure:
         hemisphere.figure(document, figure)
+    return 0
+
+
+def _hand(arguments: argparse.Namespace) -> int:
+    output = _output(arguments.output)
+    from service.bench import hand
+
+    try:
+        figures = hand.measure()
+    except ImportError:
+        raise Failed("playwright is not installed: it comes with the extra `dev`") from None
+    print(hand.table(figures))
+    if output:
+        files.write(output, (json.dumps(figures, indent=1) + "\n").encode())
     return 0
 
 

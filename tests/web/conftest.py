@@ -19,7 +19,7 @@ from gpu import Renderer
 from tests.serving import Server
 
 CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
-PATIENCE_S = 30.0  # two cores that other tests may share
+PATIENCE_S = 60.0  # two cores that other tests may share
 
 
 def free_port() -> int:

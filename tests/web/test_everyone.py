@@ -51,7 +51,7 @@ def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, i
     for tab in ("scene", "render", "keep", "material"):
         editor.tab(tab)
         script = """() => [...document.querySelectorAll("button, input, select, [role=option]")]
-            .filter((each) => each.checkVisibility() && !each.closest(".presets, .outline, .unseen") && !each.matches(".unseen"))
+            .filter((each) => each.checkVisibility() && !each.closest(".presets, .outline, .unseen"))
             .filter((each) => {
                 const box = each.getBoundingClientRect();
                 return box.left < -1 || box.right > innerWidth + 1 || box.width < 8;

@@ -141,6 +141,25 @@ def test_histogram_and_clipping_follow_the_exposure(editor: Editor) -> None:
     editor.wait("black pixels", lambda: share([60, 110, 255]) > 0.9)
 
 
+def test_quality_has_a_price(editor: Editor) -> None:
+    editor.settled()
+    editor.tab("render")
+
+    def seconds(name: str) -> float:
+        words = editor.text(f".quality[data-name={name}] .price").replace(",", "").split()
+        return float(words[1]) * {"s": 1, "min": 60, "h": 3600}[words[2]] if words else 0.0
+
+    editor.wait("a forecast", lambda: seconds("reference") > 0)
+    assert seconds("reference") > 100 * seconds("draft") > 0
+    editor.page.click(".quality[data-name=draft]")
+    editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == 16)
+    entry = editor.page.locator("#settings-form [data-field=time_limit] input")
+    entry.fill("1000")
+    entry.press("Enter")
+    editor.wait("more than the preset's samples", lambda: editor.samples() > 16)
+    assert "/" not in editor.text("#samples")
+
+
 def test_a_checker_stands_behind_transparency(editor: Editor) -> None:
     editor.settled()
     editor.tab("scene")
