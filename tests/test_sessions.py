@@ -146,6 +146,26 @@ class Stuck:
         self.aborted = True
 
 
+def test_two_variants_count_as_one_client() -> None:
+    async def test() -> None:
+        engine: Any = Engine()
+        engine.open = lambda listener: 1
+        kept = Sessions(engine, None, most=1)  # type: ignore[arg-type]
+        first = kept.enter(None)
+        second = kept.enter(None, first.id)
+        assert kept.attended == 1
+        for beside in (None, first.id, second.id, "nobody"):
+            with pytest.raises(TooManyRequests):
+                kept.enter(None, beside)
+        kept.leave(second)
+        assert kept.enter(second.id) is second
+        kept.leave(first)
+        assert kept.attended == 1, "the first is gone: now the second is the client"
+        kept.close("the end")
+
+    asyncio.run(test())
+
+
 def test_vanished_clients_are_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(app, "STUCK_S", 0.0)
     gone, there = Stuck(closing=True), Stuck(closing=False)

@@ -36,9 +36,10 @@ export class Comparison {
   #paused = false;
 
   // `places`: {root, stage, divider, canvas, difference}; `first` the viewport of A; `acts` the editor;
-  // `changed()` when the picture's size may be another one; `models` those that B can be turned into.
-  constructor(places, { first, acts, models, changed, names, lost }) {
-    Object.assign(this, places, { first, acts, changed, names, lost });
+  // `changed()` when the picture's size may be another one; `models` those that B can be turned into;
+  // `beside()` the session of A.
+  constructor(places, { first, acts, models, changed, names, lost, beside }) {
+    Object.assign(this, places, { first, acts, changed, names, lost, beside });
     this.#build(models);
     this.divider.addEventListener("input", () => this.#split());
   }
@@ -105,7 +106,7 @@ export class Comparison {
       hello: () => this.#viewport?.restart(),
       frame: (header, bytes, view, acknowledge) => this.#viewport?.show(header, bytes, view, acknowledge),
       done: () => this.painted(), waiting() {}, refused() {}, lost: (reason) => this.lost(reason),
-    });
+    }, this.beside);
     this.#stream.connect();
   }
 

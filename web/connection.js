@@ -41,8 +41,10 @@ export class Connection {
   #closed = false;
 
   // `on` has text(message), bytes(buffer), lost(reason {title, detail, key}, wait_ms; null: no further try).
-  constructor(on) {
+  // `beside()` is the session of the stream that this one is compared with.
+  constructor(on, beside) {
     this.#on = on;
+    this.beside = beside;
     this.watch = setInterval(() => this.#watch(), WATCH_MS);
     window.addEventListener("online", () => this.retry());
     window.addEventListener("pageshow", (event) => { if (event.persisted) this.retry(); });
@@ -51,7 +53,7 @@ export class Connection {
 
   open() {
     clearTimeout(this.#timer);
-    const socket = new WebSocket(streamUrl(this.#session), streamProtocols());
+    const socket = new WebSocket(streamUrl(this.#session, this.beside?.()), streamProtocols());
     socket.binaryType = "arraybuffer";
     socket.onmessage = ({ data }) => {
       if (socket !== this.#socket) return;

@@ -144,7 +144,7 @@ const panel = new Panel(find("panel"), {
 });
 const comparison = new Comparison(
   { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },
-  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {} },
+  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {}, beside: () => stream.session },
 );
 
 const keep = new Keep(find("page-keep"), {

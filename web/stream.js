@@ -36,15 +36,18 @@ export class Stream {
 
   // `on` has hello(info), frame(header, bytes, view, acknowledge), waiting(bool), refused(problem, valid),
   // done(message), lost(reason, wait_ms or null).
-  constructor(on) {
+  // `beside()`: the session of the same page's other stream, where there is one.
+  constructor(on, beside) {
     this.#on = on;
     this.#connection = new Connection({
       text: (heard) => this.#hear(heard),
       bytes: (buffer) => this.#receive(buffer),
       lost: (reason, wait) => this.#lose(reason, wait),
-    });
+    }, beside);
     document.addEventListener("visibilitychange", this.#hide);
   }
+
+  get session() { return this.#session; }
 
   connect() { this.#connection.open(); }
 

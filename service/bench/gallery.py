@@ -96,18 +96,41 @@ PICTURES: dict[str, tuple[Callable[[], dict[str, Any]], tuple[int, int, int], fl
 }
 
 
-def photograph_editor(sunbox: Path, port: int = 8765, wait_s: float = 25) -> None:
-    """The editor with its first scene, converged, in a headless browser (a development dependency)."""
+# Of the editor: the window, light or dark, and what is done before the picture is taken.
+STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
+    "editor": ((1400, 900), "dark", []),
+    "editor-compare": (
+        (1280, 800), "dark",
+        [("key", "c", ""), ("select", "#comparison select", "blinn_phong")],
+    ),
+    "editor-scene": ((1280, 800), "light", [("click", "#tab-scene", ""), ("key", "h", ""), ("key", "4", "")]),
+    "editor-phone": ((390, 844), "dark", [("click", "#material-presets [data-name=copper]", "")]),
+}  # fmt: skip
+
+
+def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: float = 25) -> None:
+    """The editor's states, converged, in a headless browser (a development dependency)."""
     from playwright.sync_api import sync_playwright
 
     flags = ["--no-sandbox", "--disable-dev-shm-usage"]
     with subprocess.Popen([sunbox, "serve", "--port", str(port)]) as server, sync_playwright() as playwright:
         time.sleep(3)
         browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=flags)
-        page = browser.new_page(viewport={"width": 1400, "height": 900}, color_scheme="dark")
-        page.goto(f"http://127.0.0.1:{port}/")
-        page.wait_for_timeout(1000 * wait_s)
-        page.screenshot(path=OUT / "editor.png")
+        for name in names:
+            (width, height), scheme, acts = STATES[name]
+            page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)  # type: ignore[arg-type]
+            page.goto(f"http://127.0.0.1:{port}/")
+            page.wait_for_selector("#stage.live")
+            for act, what, value in acts:
+                if act == "key":
+                    page.keyboard.press(what)
+                elif act == "click":
+                    page.click(what)
+                else:
+                    page.select_option(what, value)
+            page.wait_for_timeout(1000 * wait_s)
+            page.screenshot(path=OUT / f"{name}.png")
+            page.close()
         browser.close()
         server.terminate()
 
@@ -115,13 +138,15 @@ def photograph_editor(sunbox: Path, port: int = 8765, wait_s: float = 25) -> Non
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("data", type=Path)
-    parser.add_argument("names", nargs="*", default=[*PICTURES, "editor"], metavar="NAME")
+    parser.add_argument("names", nargs="*", default=[*PICTURES, *STATES], metavar="NAME")
     wanted = parser.parse_args()
     OUT.mkdir(exist_ok=True)
     sunbox = Path(sys.executable).with_name("sunbox")
+    states = [name for name in wanted.names if name in STATES]
+    if states:
+        photograph_editor(sunbox, states)
     for name in wanted.names:
-        if name == "editor":
-            photograph_editor(sunbox)
+        if name in STATES:
             continue
         document, (width, height, samples), exposure = PICTURES[name]
         with tempfile.NamedTemporaryFile("w", suffix=".json") as file:

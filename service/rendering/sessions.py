@@ -23,6 +23,7 @@ class Session:
         self.id = secrets.token_urlsafe(ID_BYTES)
         self.stream = stream
         self.connections = 0  # being served; while one takes another's place there are two
+        self.beside: Session | None = None  # whose second variant this is: a client's two count as one
         self.running = asyncio.create_task(stream.run())
         self.timer: asyncio.TimerHandle | None = None
 
@@ -36,31 +37,43 @@ class Sessions:
 
     @property
     def attended(self) -> int:
-        return sum(session.connections > 0 for session in self._kept.values())
+        return sum(session.connections > 0 and not _is_second(session) for session in self._kept.values())
 
     @property
     def waiting(self) -> int:
         """Sessions whose clients may come back."""
         return len(self._kept) - self.attended
 
-    def enter(self, id: str | None) -> Session:
+    def enter(self, id: str | None, beside: str | None = None) -> Session:
         """A new session, or the one of that id; `leave` ends what this begins.
+
+        `beside`: the session of the same client whose picture this one is compared with. Each has its turn, and the
+        two count as one client.
 
         Raises NotFound when it is gone, TooManyRequests when there is no room, Unavailable without a renderer.
         """
         session = self._kept.get(id) if id is not None else None
         if id is not None and session is None:
             raise NotFound("This session is gone: start anew.")
-        if (session is None or not session.connections) and self.attended >= self._most:
+        first = self._first(beside) if session is None else session.beside
+        is_second = first is not None and first.connections > 0
+        if (session is None or not session.connections) and not is_second and self.attended >= self._most:
             raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
         if session is None:
             session = Session(Stream(self._engine, self._reader))
+            session.beside = first
             self._kept[session.id] = session
         if session.timer is not None:
             session.timer.cancel()
             session.timer = None
         session.connections += 1
         return session
+
+    def _first(self, id: str | None) -> Session | None:
+        """The session of that id, if it may have another one beside it: not a second one, and one at a time."""
+        first = self._kept.get(id) if id is not None else None
+        taken = any(each.beside is first and each.connections for each in self._kept.values())
+        return None if first is None or first.beside is not None or taken else first
 
     def leave(self, session: Session) -> None:
         """The connection is over; the session waits for another, unless the stream has ended."""
@@ -89,3 +102,8 @@ class Sessions:
             session.timer.cancel()
         session.running.cancel()
         log.info("session ended sessions=%d", len(self._kept))
+
+
+def _is_second(session: Session) -> bool:
+    """Whether it is the second of a client that is still there."""
+    return session.beside is not None and session.beside.connections > 0

@@ -26,7 +26,7 @@ async def stream(socket: WebSocket) -> None:
     try:
         info = await own.info()
         try:
-            session = own.sessions.enter(socket.query_params.get("session"))
+            session = own.sessions.enter(socket.query_params.get("session"), socket.query_params.get("beside"))
         except ServiceError as error:
             code = CLOSE_CODES.get(type(error), LOST)
             return await socket.close(code, error.detail[:REASON_CHARACTERS])
