@@ -106,6 +106,7 @@ class Client:
     """The other end of the stream. Acknowledges what it receives unless told otherwise."""
 
     def __init__(self, url: str, origin: str | None = None, session: str | None = None) -> None:
+        self.url = url
         address = url.replace("http://", "ws://") + "/v1/stream"
         address += "" if session is None else f"?session={session}"
         offered = None if origin is None else Origin(origin)

@@ -113,6 +113,7 @@ def test_estimators_agree_under_maps_on_base_and_coat(gpu: Renderer, maps: Any) 
 
 def test_a_coats_map_leaves_the_base_alone_and_the_other_way_round(gpu: Renderer) -> None:
     """A lamp mirrored in the coat moves with the coat's map only; light on a matte base with the base's only."""
+
     def shot(lamp: list[float], **material: Any) -> float:
         base = {**COATED, "base_color": 0, "clearcoat_roughness": 0, "specular": 0, **material}
         ball = {"type": "sphere", "center": lamp, "radius": 0.2, "material": "lamp"}

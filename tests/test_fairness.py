@@ -1,0 +1,96 @@
+"""Everybody's part of the GPU, in measured seconds of it: clients, not tasks; streams and renders alike."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+import pytest
+
+from gpu import Renderer
+from service.pack import pack
+from service.rendering.engine import Engine
+from service.rendering.messages import FromRenderer, Pause, StopRule, Update
+from service.rendering.statistics import Kind
+from service.scene import parse_scene
+from tests.documents import Shelf
+from tests.serving import SCENE
+
+SIDE = {"width": 64, "height": 64}
+
+
+class Deaf:
+    def heard(self, message: FromRenderer) -> None: ...
+
+    def again(self) -> None: ...
+
+    def lost(self, detail: str) -> None: ...
+
+
+def jain(shares: list[float]) -> float:
+    """1 where all are equal, 1/n where one has everything. Jain, Chiu and Hawe 1984, eq. 2."""
+    return sum(shares) ** 2 / (len(shares) * sum(share**2 for share in shares))
+
+
+@pytest.fixture(scope="module")
+def arrays(gpu: Renderer) -> Any:
+    return pack(parse_scene(SCENE), Shelf()).arrays
+
+
+def sharing(
+    arrays: Any, clients: list[tuple[Kind, str]], seconds: float, act: Callable[..., None] | None = None
+) -> Any:
+    """What each task used of so many seconds of GPU time. `act` is called all the while with engine, tasks, count."""
+
+    async def run() -> list[float]:
+        engine = Engine()
+        engine.start()
+        await engine.ready(30)
+        tasks = [engine.open(Deaf(), kind, client) for kind, client in clients]
+        for task, (kind, _) in zip(tasks, clients, strict=True):
+            await engine.send_scene(Update(task, 1, arrays, SIDE, StopRule(), interactive=kind == "stream"))
+        used = engine.statistics.gpu_s_of
+        while not all(used[task] for task in tasks):  # everybody is loaded
+            await asyncio.sleep(0.02)
+        before, count = dict(used), 0
+        while sum(used[task] - before[task] for task in tasks) < seconds:
+            await asyncio.sleep(0.005)
+            if act is not None:
+                act(engine, tasks, count := count + 1)
+        shares = [used[task] - before[task] for task in tasks]
+        await engine.close()
+        return shares
+
+    return asyncio.run(run())
+
+
+def test_thirty_two_equal_clients(arrays: Any) -> None:
+    """Streams and renders: Jain's index, over about as many turns as it takes to tell."""
+    clients: list[tuple[Kind, str]] = [("stream" if n % 2 else "render", f"client {n}") for n in range(32)]
+    shares = sharing(arrays, clients, 6.0)
+    assert jain(shares) >= 0.95, shares
+
+
+def test_many_renders_of_one_caller_are_one_client(arrays: Any) -> None:
+    shares = sharing(arrays, [("render", "busy")] * 6 + [("stream", "")], 2.5)
+    assert 0.4 < shares[-1] / sum(shares) < 0.6, shares
+    assert jain(shares[:-1]) > 0.8, shares
+
+
+def test_a_flood_of_edits_takes_no_more_than_its_part(arrays: Any) -> None:
+    """Whole scenes, one after the other: to load them is work like any other."""
+
+    def flood(engine: Engine, tasks: list[int], count: int) -> None:
+        engine.send(Update(tasks[0], 1 + count, materials=arrays.materials, settings=SIDE | {"seed": count}))
+
+    shares = sharing(arrays, [("stream", "hostile"), ("stream", "kind"), ("render", "other")], 3.0, flood)
+    assert shares[0] / sum(shares) < 0.5, shares
+
+
+def test_who_pauses_uses_nothing(arrays: Any) -> None:
+    def pause(engine: Engine, tasks: list[int], count: int) -> None:
+        engine.send(Pause(tasks[0]))
+
+    shares = sharing(arrays, [("stream", "hidden"), ("stream", "seen")], 1.5, pause)
+    assert shares[0] < 0.1 * shares[1], shares
