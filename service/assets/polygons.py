@@ -10,9 +10,7 @@ from service.assets.data import Doubles
 Longs = npt.NDArray[np.int64]
 
 
-def triangulate(
-    points: npt.NDArray[np.floating], corners: npt.NDArray[np.signedinteger], counts: Longs
-) -> Longs:
+def triangulate(points: npt.NDArray[np.floating], corners: npt.NDArray[np.signedinteger], counts: Longs) -> Longs:
     """Triangles in file order, (m, 3), as places in `corners`: whatever else a corner carries follows along.
 
     `corners` are the vertex indices of all faces, one face after the other; `counts` how many each has, at least 3.

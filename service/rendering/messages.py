@@ -105,7 +105,10 @@ class Read:
 
 @dataclass(frozen=True)
 class Pause:
+    """No samples but a first look at what is new; with `away` not even that: nobody is there to look."""
+
     task: int
+    away: bool = False
 
 
 @dataclass(frozen=True)

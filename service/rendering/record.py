@@ -48,7 +48,8 @@ class Record:
         self._task = task
         self._states: list[_State] = []  # the last one that was seen to work, and those after it
         self._want: Want | None = None
-        self._paused = self._stopped = False
+        self._stopped = False
+        self._paused: Pause | Resume | None = None
         self._stopped_at: Done | None = None
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
@@ -62,7 +63,7 @@ class Record:
         elif isinstance(message, Read):
             self.reads[message.serial] = message
         elif isinstance(message, Pause | Resume):
-            self._paused = isinstance(message, Pause)
+            self._paused = message
         elif isinstance(message, Stop):
             self._stopped = True
 
@@ -96,8 +97,8 @@ class Record:
             out.append(Update(self._task, stopped.generation, stop=stop, base=stopped.generation))
         elif self._stopped:
             out.append(Stop(self._task))
-        if self._paused:
-            out.append(Pause(self._task))
+        if self._paused is not None:
+            out.append(self._paused)
         if self._want is not None:
             out.append(self._want)
         return [*out, *self.reads.values()]

@@ -119,8 +119,7 @@ class Stream:
             self._outbox = deque(said for said in self._outbox if said is not self._done)
             self._post(self._done)
         self._flow.attach()
-        if not self._paused:
-            self._engine.send(Resume(self._task))
+        self._engine.send(Pause(self._task) if self._paused else Resume(self._task))
         return self._attendance
 
     async def attend(self, attendance: Attendance) -> None:
@@ -149,7 +148,7 @@ class Stream:
         self._attendance = None
         self._outbox = deque(item for item in self._outbox if not isinstance(item, Frame))
         self._flow.detach()
-        self._engine.send(Pause(self._task))
+        self._engine.send(Pause(self._task, away=True))
 
     def end(self, code: int, reason: str) -> None:
         """For good: who attends is told, and who comes later too."""
@@ -235,7 +234,7 @@ class Stream:
         else:
             self._engine.send(update)
         if not self.attended:  # its task may not have been there to be paused
-            self._engine.send(Pause(self._task))
+            self._engine.send(Pause(self._task, away=True))
         async with self._writing:
             self._done = None
             self._flow.update(update.generation, began)
@@ -250,7 +249,7 @@ class Stream:
         else:
             if message.type in ("pause", "resume"):
                 self._paused = message.type == "pause"
-            if message.type != "resume" or self.attended:
+            if message.type == "stop" or self.attended:
                 self._engine.send(ORDERS[message.type](self._task))
 
     async def _send_all(self, socket: Socket) -> None:

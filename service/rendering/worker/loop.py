@@ -116,7 +116,7 @@ class Loop:
         elif isinstance(message, Restore):
             self._work(task, lambda: task.restore(message))
         elif isinstance(message, Pause):
-            task.pause()
+            task.pause(message.away)
         elif isinstance(message, Resume):
             task.resume()
         elif isinstance(message, Stop):

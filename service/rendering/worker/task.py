@@ -74,7 +74,7 @@ class Task:
         self._settings: RenderSettings | None = None
         self._stop = StopRule()
         self._interactive = False
-        self._paused = False
+        self._paused = self._away = False
         self._reason: Reason | None = None  # why it ended
         self._saving: Generator[None, None, Saved] | None = None  # a finished picture, for the server to keep
         self._pixel_s: float | None = None  # what a sample of a pixel took lately
@@ -90,6 +90,8 @@ class Task:
 
     @property
     def ready(self) -> bool:
+        if self._away:
+            return False
         if self._pending is not None:
             return True
         if self._holding is None and self._aside is None:
@@ -398,12 +400,12 @@ class Task:
             self._say_done(end.value)
         return True
 
-    def pause(self) -> None:
-        self._paused = True
+    def pause(self, away: bool = False) -> None:
+        self._paused, self._away = True, away
         self._clock.pause()
 
     def resume(self) -> None:
-        self._paused = False
+        self._paused = self._away = False
 
     def stop(self) -> None:
         pending = self._pending
