@@ -15,7 +15,7 @@ from websockets.exceptions import ConnectionClosed
 from tests.serving import ENDLESS, SCENE, Client, Server
 from tests.serving import client as opened
 
-MOVES = 12
+MOVES = 6
 GROWTH = 400 << 20  # bytes: what five clients may make the server hold, their scenes included
 
 
@@ -44,11 +44,12 @@ def babbling(client: Client, ended: threading.Event) -> None:
     while not ended.is_set():
         client.socket.send(nonsense[: 1 << 20])
         client.socket.send("[" * 2000)
+        ended.wait(0.1)
 
 
 def rude(client: Client, ended: threading.Event) -> None:
     """Comes, starts something large, and is gone without a word, over and over."""
-    while not ended.wait(0.1):
+    while not ended.wait(0.3):
         with suppress(OSError, ConnectionClosed):
             client.start(settings={**ENDLESS, "width": 1024, "height": 1024})
             client.socket.socket.shutdown(socket.SHUT_RDWR)

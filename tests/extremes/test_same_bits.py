@@ -49,9 +49,7 @@ MODES = list(itertools.product(ESTIMATORS, SAMPLERS))
 
 
 @pytest.mark.parametrize(("estimator", "sampler"), MODES if LONG else [("mis", "sobol"), ("uniform", "independent")])
-def test_the_cut_never_shows(
-    gpu: Renderer, monkeypatch: pytest.MonkeyPatch, estimator: str, sampler: str
-) -> None:
+def test_the_cut_never_shows(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, estimator: str, sampler: str) -> None:
     whole = _bits(gpu, "whole", monkeypatch, estimator=estimator, sampler=sampler)
     for cut in CUTS:
         parts = _bits(gpu, cut, monkeypatch, estimator=estimator, sampler=sampler)
