@@ -1,0 +1,95 @@
+"""Mixed clients for a long time while renderers are killed: `python -m service.bench.soak --minutes 60`.
+
+Prints a table of what they went through. The exit code is 1 when anything was lost, leaked or unfair.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import random
+import signal
+import sys
+import tempfile
+import threading
+import time
+from collections.abc import Callable
+from pathlib import Path
+
+from service.bench import soak_clients as clients
+from service.bench.soak_server import Server, descriptors, resident
+from service.bench.soak_tally import Tally
+
+STREAMS, RENDERS = 4, 2
+KILL_EVERY_S = (3.0, 12.0)  # a renderer lives so long
+WATCH_S = 2.0
+SETTLED_S = 20.0  # after which memory is compared with what it is at the end
+GROWTH = 1.5  # ... times that, and no more
+FAIR = 0.95
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m service.bench.soak", description=__doc__)
+    parser.add_argument("--minutes", type=float, default=60.0)
+    parser.add_argument("--seed", type=int, default=1)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory(prefix="sunbox-soak-") as folder:
+        tally = Tally()
+        server = Server(Path(folder))
+        try:
+            _run(server, tally, 60.0 * arguments.minutes, random.Random(arguments.seed))
+            tally.jain = clients.share_alike(server, tally)
+            tally.end(server)
+        finally:
+            tally.exit_code, tally.orphans = server.stop()
+    print(tally.table())
+    return 0 if tally.good(GROWTH, FAIR) else 1
+
+
+def _run(server: Server, tally: Tally, seconds: float, chance: random.Random) -> None:
+    """All of them at once, until the time is over."""
+    over = threading.Event()
+    acts: list[Callable[[Server, Tally, threading.Event, random.Random], None]] = [
+        *[clients.drag] * STREAMS,
+        *[clients.render] * RENDERS,
+        clients.upload,
+        clients.cancel,
+        clients.vanish,
+        _kill,
+        _watch,
+    ]
+    threads = [
+        threading.Thread(target=act, args=(server, tally, over, random.Random(chance.random())), daemon=True)
+        for act in acts
+    ]
+    for thread in threads:
+        thread.start()
+    until = time.monotonic() + seconds
+    while (left := until - time.monotonic()) > 0:
+        time.sleep(min(left, 30.0))
+        sys.stderr.write(f"soak: {left / 60:.1f} min left, {tally.kills} kills, {tally.frames} frames\n")
+    over.set()
+    for thread in threads:
+        thread.join(60)
+        tally.stuck += thread.is_alive()
+
+
+def _kill(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
+    while not over.wait(chance.uniform(*KILL_EVERY_S)):
+        pid = server.renderer()
+        if pid is not None:
+            os.kill(pid, signal.SIGKILL)
+            tally.kill()
+
+
+def _watch(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
+    """Memory and descriptors while it lasts."""
+    began = time.monotonic()
+    while not over.wait(WATCH_S):
+        pid = server.renderer()
+        settled = time.monotonic() - began > SETTLED_S
+        tally.seen(resident(server.pid), resident(pid), descriptors(server.pid), settled)
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

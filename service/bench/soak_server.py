@@ -1,0 +1,88 @@
+"""The server that is soaked: its process, and what the system says of it."""
+
+from __future__ import annotations
+
+import json
+import os
+import subprocess
+import sys
+import urllib.error
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+PAGE = os.sysconf("SC_PAGE_SIZE")
+PATIENCE_S = 60.0
+
+
+class Server:
+    """`sunbox serve` on a free port."""
+
+    def __init__(self, folder: Path) -> None:
+        environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
+        environment |= {"SUNBOX_DATA_DIR": str(folder), "SUNBOX_LOG_LEVEL": "error"}
+        command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
+        with (folder / "server.log").open("wb") as log:
+            self._process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
+        assert self._process.stdout is not None
+        said = self._process.stdout.readline()
+        if "http://" not in said:
+            raise RuntimeError((folder / "server.log").read_text()[-1000:])
+        self.url = said[said.index("http://") :].strip().rstrip("/")
+
+    @property
+    def pid(self) -> int:
+        return self._process.pid
+
+    def ask(self, method: str, path: str, body: bytes | Any = None) -> tuple[int, bytes]:
+        """Status and body; 0 when there was no answer."""
+        data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
+        request = urllib.request.Request(self.url + path, data, method=method)
+        request.add_header(
+            "content-type", "application/octet-stream" if isinstance(body, bytes) else "application/json"
+        )
+        try:
+            with urllib.request.urlopen(request, timeout=PATIENCE_S) as answer:
+                return answer.status, answer.read()
+        except urllib.error.HTTPError as error:
+            return error.code, error.read()
+        except OSError:
+            return 0, b""
+
+    def children(self) -> list[int]:
+        found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(self.pid)], capture_output=True, text=True)
+        return [int(pid) for pid in found.stdout.split()]
+
+    def renderer(self) -> int | None:
+        for pid in self.children():
+            try:
+                if b"service.rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    return pid
+            except OSError:
+                continue
+        return None
+
+    def stop(self) -> tuple[int, int]:
+        """The exit code after SIGTERM, and how many children were left."""
+        children = self.children()
+        self._process.terminate()
+        try:
+            code = self._process.wait(20)
+        except subprocess.TimeoutExpired:
+            self._process.kill()
+            code = -9
+        return code, sum(Path(f"/proc/{pid}").exists() for pid in children)
+
+
+def resident(pid: int | None) -> int:
+    try:
+        return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE
+    except (OSError, IndexError):
+        return 0
+
+
+def descriptors(pid: int) -> int:
+    try:
+        return len(os.listdir(f"/proc/{pid}/fd"))
+    except OSError:
+        return 0

@@ -1,0 +1,116 @@
+"""What the clients of a soak went through, counted from many threads, and its table."""
+
+from __future__ import annotations
+
+import threading
+import time
+from collections import Counter
+from statistics import median
+
+from service.bench.soak_server import Server, descriptors, resident
+
+MIB = 2**20
+
+
+class Tally:
+    def __init__(self) -> None:
+        self._lock = threading.Lock()
+        self.kills = self.frames = self.renders = self.cancelled = self.uploads = self.vanished = self.stuck = 0
+        self.lost: Counter[str] = Counter()  # what should not have happened, by what
+        self.errors: Counter[str] = Counter()  # what was refused, and meant to be
+        self.first_frames_s: list[float] = []
+        self.recoveries_s: list[float] = []
+        self.jain: float | None = None
+        self.exit_code, self.orphans = 0, 0
+        self._killed_at: dict[str, float] = {}
+        self._watchers: set[str] = set()
+        self._memory: list[tuple[int, int, int]] = []  # server's, renderer's bytes, descriptors
+        self._ended: tuple[int, int, int] = (0, 0, 0)
+
+    def count(self, name: str, more: int = 1) -> None:
+        with self._lock:
+            setattr(self, name, getattr(self, name) + more)
+
+    def lose(self, what: str) -> None:
+        with self._lock:
+            self.lost[what] += 1
+
+    def refuse(self, what: str) -> None:
+        with self._lock:
+            self.errors[what] += 1
+
+    def kill(self) -> None:
+        """A renderer was killed: who watches frames says when the next one comes."""
+        with self._lock:
+            self.kills += 1
+            for watcher in self._watchers:
+                self._killed_at.setdefault(watcher, time.monotonic())
+
+    def frame(self, watcher: str, began_again: bool) -> None:
+        with self._lock:
+            self.frames += 1
+            self._watchers.add(watcher)
+            if began_again and watcher in self._killed_at:
+                self.recoveries_s.append(time.monotonic() - self._killed_at.pop(watcher))
+
+    def moved(self, watcher: str, first_frame_s: float) -> None:
+        with self._lock:
+            self.first_frames_s.append(first_frame_s)
+            self._killed_at.pop(watcher, None)
+
+    def seen(self, server: int, renderer: int, open_files: int, settled: bool) -> None:
+        if settled and renderer:
+            self._memory.append((server, renderer, open_files))
+
+    def end(self, server: Server) -> None:
+        self._ended = resident(server.pid), resident(server.renderer()), descriptors(server.pid)
+
+    def good(self, growth: float, fair: float) -> bool:
+        early, late = self._halves(0)
+        return not (
+            self.lost
+            or self.stuck
+            or self.exit_code
+            or self.orphans
+            or late > growth * early
+            or (self.jain is not None and self.jain < fair)
+        )
+
+    def table(self) -> str:
+        rows: list[tuple[str, str]] = [
+            ("renderers killed", str(self.kills)),
+            ("kill to next frame, median / p95 (s)", _quantiles(self.recoveries_s)),
+            ("frames", str(self.frames)),
+            ("update to first frame, median / p95 (s)", _quantiles(self.first_frames_s)),
+            ("renders done / cancelled", f"{self.renders} / {self.cancelled}"),
+            ("uploads", str(self.uploads)),
+            ("clients that vanished", str(self.vanished)),
+            ("lost or wrong", _counts(self.lost)),
+            ("refused, and meant to be", _counts(self.errors)),
+            ("clients stuck", str(self.stuck)),
+            ("Jain's index of equal streams", "-" if self.jain is None else f"{self.jain:.3f}"),
+            ("server's memory, first / second half / end (MiB)", self._grown(0)),
+            ("renderer's memory, likewise (MiB)", self._grown(1)),
+            ("server's descriptors, likewise", self._grown(2)),
+            ("exit code, orphans", f"{self.exit_code}, {self.orphans}"),
+        ]
+        width = max(len(name) for name, _ in rows)
+        return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
+
+    def _halves(self, which: int) -> tuple[float, float]:
+        values = [seen[which] for seen in self._memory]
+        middle = len(values) // 2
+        return (median(values[:middle]), median(values[middle:])) if middle else (0.0, 0.0)
+
+    def _grown(self, which: int) -> str:
+        scale = 1 if which == 2 else MIB
+        return " / ".join(f"{value / scale:.0f}" for value in (*self._halves(which), self._ended[which]))
+
+
+def _quantiles(values: list[float]) -> str:
+    ordered = sorted(values)
+    return f"{median(ordered):.3f} / {ordered[int(0.95 * (len(ordered) - 1))]:.3f}" if ordered else "-"
+
+
+def _counts(counted: Counter[str]) -> str:
+    return ", ".join(f"{what} {count}" for what, count in sorted(counted.items())) or "none"

@@ -1,0 +1,31 @@
+"""What a soak makes of what it saw. The soak itself takes an hour: `make soak`."""
+
+from __future__ import annotations
+
+from service.bench.soak_tally import Tally
+
+
+def test_recovery_is_from_a_kill_to_the_next_frame_that_begins_again() -> None:
+    tally = Tally()
+    tally.kill()  # nobody watched yet
+    tally.frame("a", began_again=False)
+    tally.frame("a", began_again=True)
+    assert not tally.recoveries_s
+    tally.kill()
+    tally.frame("a", began_again=False)  # was on its way
+    tally.frame("a", began_again=True)
+    tally.frame("a", began_again=True)
+    assert len(tally.recoveries_s) == 1 and tally.kills == 2 and tally.frames == 5
+
+
+def test_what_is_not_good_enough() -> None:
+    tally = Tally()
+    for growth in (1, 1, 1, 2):
+        tally.seen(growth << 20, 1, 10, settled=True)
+    assert tally.good(growth=1.6, fair=0.95) and not tally.good(growth=1.4, fair=0.95)
+    tally.jain = 0.9
+    assert not tally.good(growth=1.6, fair=0.95)
+    tally.jain = 0.99
+    tally.lose("render failed")
+    assert not tally.good(growth=1.6, fair=0.95)
+    assert "render failed 1" in tally.table() and "0.990" in tally.table()
