@@ -89,7 +89,8 @@ class SceneArrays:
     triangle_uvs_1: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # of set 1
     triangle_colors: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 4), np.float16))
     lights: np.ndarray = field(default_factory=lambda: _empty(layout.Light))
-    nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # 8 octants' orders, one after the other
+    nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # as by gpu.bvh.thread
+    node_count: int = 0  # of one octant's order
     node_origin: Vec3 = (0.0, 0.0, 0.0)
     node_scale: Vec3 = (0.0, 0.0, 0.0)
     bvh_kinds: frozenset[ShapeKind] = frozenset()

@@ -13,15 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu.bvh_grow import WORDS, grow, measure
-from gpu.bvh_threads import thread_octant
+from gpu.bvh_threads import lay_treelets, thread_octant, top_sizes
 from gpu.errors import SceneTooLarge
-from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, Node
+from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, TREELET_MAX_NODES, Node
 
 LEAF_SIZE = 4  # at most so many primitives in a leaf; the surface area heuristic splits most of them further
 LEAF_SIZE_LARGE = 8  # exactly that many wherever counts allow, for scenes whose eight orders would pass 2 GiB
 LARGE = 6_000_000
 MAX_PRIMITIVES = LEAF_FIRST_MASK + 1
 OCTANTS = 8
+WHOLE = 4096  # nodes; a smaller tree is all top: half a megabyte in eight orders
 WORTH_THREADS = 32_768  # boxes; below it starting threads costs more than they save
 
 Vec3 = tuple[float, float, float]
@@ -120,24 +121,25 @@ def _ranks(kinds: np.ndarray, mixed: bool) -> np.ndarray:
     return ranks
 
 
-def thread(tree: Tree) -> np.ndarray:
-    """(8 * count,) `layout.Node`: octant o's order at [o * count, (o + 1) * count).
+def thread(tree: Tree, treelet: int | None = None) -> tuple[np.ndarray, int]:
+    """(`layout.Node` records, count): octant o's order of the top at [o * count, (o + 1) * count), treelets after.
 
     Bit i of the octant is set where the ray's direction is negative on axis i. An order is depth first, the
     child nearer along the split axis first. An inner node's link is the place in the whole array to go on at
-    when its box is missed, the octant's end being (o + 1) * count. After a hit or a leaf, it is i + 1.
+    when its box is missed, the octant's end being (o + 1) * count. After a hit or a leaf, it is i + 1. A treelet
+    whose box is met is walked from its first node to its last, then on at i + 1. `treelet`: the most nodes in one.
     """
-    count = tree.count
-    nodes = np.empty((OCTANTS, count, 4), np.uint32)
-
-    def octant(o: int) -> None:
-        thread_octant(tree.rows, tree.regions, tree.ranks, o, o * count, nodes[o])
-
-    workers = min(OCTANTS, os.cpu_count() or 1)
-    if count > WORTH_THREADS and workers > 1:
-        with ThreadPoolExecutor(workers) as pool:
-            list(pool.map(octant, range(OCTANTS)))
-    else:
-        for o in range(OCTANTS):
-            octant(o)
-    return nodes.reshape(-1).view(Node.dtype)
+    most = 0 if tree.count <= WHOLE else TREELET_MAX_NODES
+    most = 1 + (most if treelet is None else treelet)
+    sizes, place = np.empty(len(tree.rows), np.uint32), np.empty(len(tree.rows), np.uint32)
+    top_sizes(tree.rows, tree.regions, most, sizes)
+    count = int(sizes[0])
+    top = np.empty(count, np.uint32)
+    nodes = np.empty((OCTANTS * count + tree.count, 4), np.uint32)
+    used = lay_treelets(
+        tree.rows, tree.regions, tree.ranks, most, OCTANTS * count, place, top, nodes[OCTANTS * count :]
+    )
+    for o in range(OCTANTS):
+        order = nodes[o * count : (o + 1) * count]
+        thread_octant(tree.rows, top, tree.ranks, sizes, most, place, o, o * count, order)
+    return nodes[: OCTANTS * count + used].reshape(-1).view(Node.dtype), count

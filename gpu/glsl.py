@@ -107,6 +107,8 @@ def _constants() -> str:
         "LEAF_KIND_SHIFT",
         "LEAF_COUNT_SHIFT",
         "LEAF_FIRST_MASK",
+        "TREELET_BIT",
+        "TREELET_MAX_NODES",
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
     out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in layout.ENERGY_TEXTURES.items()]

@@ -271,7 +271,7 @@ class Node(Record):
     x: u32  # low half: lower bound; high half: upper bound, in units of the grid
     y: u32
     z: u32
-    link: u32  # inner: index to go on at when the box is missed. Leaf: see LEAF_*
+    link: u32  # inner: index to go on at when the box is missed. Leaf: see LEAF_*; treelet: see TREELET_*
 
 
 class Light(Record):
@@ -320,7 +320,7 @@ class Frame(Record):
     node_origin: vec3  # world position of grid coordinate 0
     seed: u32
     node_scale: vec3  # world size of one grid step
-    node_count: u32  # of one octant's order
+    node_count: u32  # of one octant's order of the top
     light_count: u32
     replicate: u32  # which independent scramble of the sampler
     clamp_radiance: f32  # of indirect light; 0: off
@@ -368,6 +368,9 @@ LEAF_KIND_SHIFT = 28
 LEAF_COUNT_SHIFT = 24
 LEAF_FIRST_MASK = 0x00FFFFFF
 LEAF_MAX_COUNT = 16
+# A treelet's link: bit 31 not set, bit 30 set, nodes << LEAF_COUNT_SHIFT, first: from where the octants' orders end
+TREELET_BIT = 0x40000000
+TREELET_MAX_NODES = 63
 
 BUFFERS: dict[str, tuple[type[Record], Slot]] = {
     "material": (Material, Slot.MATERIALS),

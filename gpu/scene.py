@@ -219,7 +219,7 @@ class Scene:
         frame["focus_distance"] = c.focus_distance
         frame["node_origin"] = a.node_origin
         frame["node_scale"] = a.node_scale
-        frame["node_count"] = len(a.nodes) // 8
+        frame["node_count"] = a.node_count
         frame["light_count"] = len(a.lights)
         suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
         frame["sun_first"], frame["sun_count"] = suns.min(initial=len(a.lights)), len(suns)

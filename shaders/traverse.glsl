@@ -1,5 +1,6 @@
 // The tree, threaded: one depth-first order for each octant of ray directions, nearer children first, so that a
-// walk needs no stack: a missed box names where to go on, a met one goes on at the next node. Boxes are 16-bit
+// walk needs no stack: a missed box names where to go on, a met one goes on at the next node. Small subtrees, treelets,
+// are kept once for all octants, and walked in one order; a register remembers where to go on after. Boxes are 16-bit
 // coordinates on the scene's grid, rounded outwards.
 //
 // Two loops, one to find a leaf and one to test it: llvmpipe runs both sides of every `if`, but ends loops early.
@@ -49,6 +50,9 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
     uint octant = (safe.x < 0.0 ? 1u : 0u) | (safe.y < 0.0 ? 2u : 0u) | (safe.z < 0.0 ? 4u : 0u);
     uint i = octant * frame.node_count;
     uint end = i + (any && n.id != NONE ? 0u : frame.node_count); // the loops may have met something already
+    uint treelets = 8u * frame.node_count;
+    uint after = 0u, last = NONE; // where to go on after a treelet, and where it ends; NONE: in none
+    bool more;
     float start = n.t;
     float reach = any && skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
     do {
@@ -62,8 +66,20 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
             bool met = near <= far;
             bool is_leaf = (w.w & LEAF_BIT) != 0u;
             if (met && is_leaf) leaf = w.w;
-            i = met || is_leaf ? i + 1u : w.w;
-        } while (leaf == 0u && i < end);
+            bool is_treelet = (w.w & (LEAF_BIT | TREELET_BIT)) == TREELET_BIT;
+            uint next = met || is_leaf || is_treelet ? i + 1u : w.w;
+            if (met && is_treelet) {
+                after = next;
+                next = treelets + (w.w & LEAF_FIRST_MASK);
+                last = next + ((w.w >> LEAF_COUNT_SHIFT) & TREELET_MAX_NODES);
+            }
+            if (next == last) {
+                next = after;
+                last = NONE;
+            }
+            i = next;
+            more = i < end || last != NONE;
+        } while (leaf == 0u && more);
         uint kind = (leaf >> LEAF_KIND_SHIFT) & 7u;
         uint index = leaf & LEAF_FIRST_MASK;
         uint stop = index + ((leaf >> LEAF_COUNT_SHIFT) & 15u) + 1u;
@@ -73,5 +89,5 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
                 index++;
             } while (index < stop && !(any && n.t < start));
         }
-    } while (i < end && !(any && n.t < start));
+    } while (more && !(any && n.t < start));
 }

@@ -7,7 +7,16 @@ import pytest
 
 from gpu import bvh, bvh_grow
 from gpu.errors import SceneTooLarge
-from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_FIRST_MASK, LEAF_KIND_SHIFT, LEAF_MAX_COUNT, ShapeKind
+from gpu.layout import (
+    LEAF_BIT,
+    LEAF_COUNT_SHIFT,
+    LEAF_FIRST_MASK,
+    LEAF_KIND_SHIFT,
+    LEAF_MAX_COUNT,
+    TREELET_BIT,
+    TREELET_MAX_NODES,
+    ShapeKind,
+)
 
 RNG_SEED = 7
 
@@ -55,10 +64,10 @@ def boxes(triangles):
     return triangles.min(axis=1), triangles.max(axis=1)
 
 
-def build(triangles, **options):
+def build(triangles, treelet=0, **options):
     kinds = np.full(len(triangles), ShapeKind.TRIANGLE, np.uint8)
     tree = bvh.build(*boxes(triangles), kinds, **options)
-    return tree, bvh.thread(tree)
+    return tree, bvh.thread(tree, treelet)[0]
 
 
 def unpack(tree, nodes):
@@ -87,14 +96,16 @@ def hits(origin, direction, triangles):
         return np.where((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & np.isfinite(t), t, np.inf)
 
 
-def trace(tree, nodes, lower, upper, ordered, origin, direction):
+def trace(tree, nodes, lower, upper, ordered, origin, direction, count=None):
     """(nearest distance, nodes visited): the shader's traversal, its box tests in float32."""
     octant = sum(1 << k for k in range(3) if direction[k] < 0)
-    at, end = octant * tree.count, (octant + 1) * tree.count
+    count = tree.count if count is None else count
+    at, end = octant * count, (octant + 1) * count
+    after = last = None
     start = np.float32(origin)
     inverse = np.float32(1) / np.where(direction == 0, np.float32(1e-30), np.float32(direction))
     nearest, visited = np.inf, 0
-    while at < end:
+    while last or at < end:
         visited += 1
         link = int(nodes["link"][at])
         with np.errstate(over="ignore"):
@@ -106,8 +117,15 @@ def trace(tree, nodes, lower, upper, ordered, origin, direction):
                 _, first, count = leaf(link)
                 nearest = min(nearest, hits(origin, direction, ordered[first : first + count]).min())
             at += 1
+        elif link & TREELET_BIT:
+            at += 1
+            if hit:
+                after, at = at, 8 * count + (link & LEAF_FIRST_MASK)
+                last = at + (link >> LEAF_COUNT_SHIFT & TREELET_MAX_NODES)
         else:
             at = at + 1 if hit else link
+        if at == last:
+            at, last = after, None
     return nearest, visited
 
 
@@ -163,16 +181,18 @@ def rays(triangles, count):
         yield np.float32(origin).astype(np.float64), unit
 
 
+@pytest.mark.parametrize("treelet", [0, 6])
 @pytest.mark.parametrize("name", [n for n in TRIANGLES if n != "needles"])
-def test_traversal_finds_what_brute_force_finds(name):
+def test_traversal_finds_what_brute_force_finds(name, treelet):
     triangles = TRIANGLES[name]
-    tree, nodes = build(triangles)
+    tree, _ = build(triangles)
+    nodes, count = bvh.thread(tree, treelet)
     lower, upper = unpack(tree, nodes)
     ordered = triangles[tree.order].astype(np.float64)
     met = 0
     for origin, direction in rays(triangles, 60):
         expected = hits(origin, direction, ordered).min()
-        found, _ = trace(tree, nodes, lower, upper, ordered, origin, direction)
+        found, _ = trace(tree, nodes, lower, upper, ordered, origin, direction, count)
         assert found == expected
         met += np.isfinite(expected)
     assert met > 20
@@ -235,7 +255,7 @@ def test_leaves_hold_one_kind_and_count_in_its_own_array():
     triangles = np.concatenate([soup(150), np.repeat(soup(1), 50, axis=0)])
     kinds = np.random.default_rng(RNG_SEED).integers(0, len(ShapeKind), len(triangles)).astype(np.uint8)
     tree = bvh.build(*boxes(triangles), kinds)
-    nodes = bvh.thread(tree)
+    nodes, _ = bvh.thread(tree)
     lower, upper = unpack(tree, nodes)
     own = {kind: [i for i in tree.order if kinds[i] == kind] for kind in ShapeKind}
     seen = []
@@ -258,6 +278,31 @@ def test_does_not_depend_on_threads(monkeypatch):
     assert len(alone.regions) == 1 < len(shared.regions)
     assert np.array_equal(alone.order, shared.order)
     assert np.array_equal(alone_nodes, shared_nodes)
+
+
+@pytest.mark.parametrize("name", ["soup", "terrain", "same", "needles"])
+def test_treelets_are_kept_once(name):
+    tree, _ = build(TRIANGLES[name])
+    for treelet in (2, 9, TREELET_MAX_NODES):
+        nodes, count = bvh.thread(tree, treelet)
+        links = nodes["link"].astype(np.int64)
+        below = links[8 * count :]
+        for top in links[: 8 * count].reshape(8, -1):
+            roots = top[(top & (LEAF_BIT | TREELET_BIT)) == TREELET_BIT]
+            firsts, sizes = roots & LEAF_FIRST_MASK, roots >> LEAF_COUNT_SHIFT & TREELET_MAX_NODES
+            assert sizes.max(initial=2) <= treelet
+            assert sorted(np.concatenate([np.arange(a, a + n) for a, n in zip(firsts, sizes, strict=True)], dtype=int)
+                          if len(roots) else []) == list(range(len(below)))  # fmt: skip
+            leaves = np.concatenate([top, below])
+            places = [np.arange(f, f + n) for _, f, n in map(leaf, leaves[leaves & LEAF_BIT != 0])]
+            assert sorted(np.concatenate(places)) == list(range(len(TRIANGLES[name])))
+
+
+def test_large_trees_take_few_bytes():
+    tree = bvh.build(*boxes(soup(20_000)), np.full(20_000, ShapeKind.TRIANGLE, np.uint8))
+    nodes, count = bvh.thread(tree)
+    assert tree.count > bvh.WHOLE and nodes.nbytes < 0.2 * 8 * 16 * tree.count
+    assert len(nodes) > 8 * count
 
 
 def test_large_scenes_fill_their_leaves(monkeypatch):

@@ -35,6 +35,7 @@ class Geometry:
     lights: np.ndarray  # layout.Light of the shapes that shine, not yet weighted
     areas: np.ndarray  # of these, m^2
     nodes: np.ndarray
+    node_count: int
     node_origin: Vec3
     node_scale: Vec3
     bvh_kinds: frozenset[ShapeKind]
@@ -67,9 +68,10 @@ def geometry(
         bounds[ShapeKind.TRIANGLE] = triangle_bounds(triangles)
     nodes, node_origin, node_scale = np.zeros(0, Node.dtype), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     standing: dict[ShapeKind, np.ndarray] = {}
+    node_count = 0
     if bounds:
         standing = stand_out(bounds)
-        nodes, order, node_origin, node_scale = plant(bounds, standing)
+        nodes, node_count, order, node_origin, node_scale = plant(bounds, standing)
         found |= {kind: found[kind][places] for kind, places in order.items()}
         if len(normals) and ShapeKind.TRIANGLE in order:
             normals = normals[order[ShapeKind.TRIANGLE]]
@@ -82,9 +84,9 @@ def geometry(
     warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
     warnings += lost(low, high, owners, exact, origin)
     return Geometry(
-        found, normals, corners["uvs"], corners["uvs_1"], corners["colors"], shining, areas, nodes, node_origin,
-        node_scale, frozenset(bounds), {kind: len(places) for kind, places in standing.items()}, vec3(origin), radius,
-        tuple(warnings),
+        found, normals, corners["uvs"], corners["uvs_1"], corners["colors"], shining, areas, nodes, node_count,
+        node_origin, node_scale, frozenset(bounds), {kind: len(places) for kind, places in standing.items()},
+        vec3(origin), radius, tuple(warnings),
     )  # fmt: skip
 
 

@@ -91,6 +91,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
             np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power
         ),
         nodes=built.nodes,
+        node_count=built.node_count,
         node_origin=built.node_origin,
         node_scale=built.node_scale,
         bvh_kinds=built.bvh_kinds,

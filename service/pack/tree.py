@@ -63,8 +63,8 @@ def _areas(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 def plant(
     bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.ndarray]
-) -> tuple[np.ndarray, dict[ShapeKind, np.ndarray], Vec3, Vec3]:
-    """(nodes, each kind's order: the `large` ones and then those of the leaves, grid origin, grid scale).
+) -> tuple[np.ndarray, int, dict[ShapeKind, np.ndarray], Vec3, Vec3]:
+    """(nodes, nodes of one octant, each kind's order: the `large` ones, then the leaves'; grid origin and scale).
 
     Raises InvalidDocument.
     """
@@ -79,11 +79,11 @@ def plant(
         tree = bvh.build(low, high, kinds, firsts={int(k): len(places) for k, places in large.items() if len(places)})
     except SceneTooLarge as error:
         raise InvalidDocument([FieldError("/shapes", str(error))]) from None
-    nodes = bvh.thread(tree)
+    nodes, count = bvh.thread(tree)
     starts = np.cumsum([0, *counts])
     leaf_kinds = kinds[tree.order]
     order = {
         kind: np.concatenate([large[kind], places[(tree.order[leaf_kinds == kind] - start).astype(np.int64)]])
         for (kind, places), start in zip(small.items(), starts, strict=False)
     }
-    return nodes, order, tree.origin, tree.scale
+    return nodes, count, order, tree.origin, tree.scale
