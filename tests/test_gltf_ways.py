@@ -84,6 +84,40 @@ def test_render(gpu: Any, tmp_path: Path, data_dir: Path, capsys: pytest.Capture
     assert np.array_equal(np.asarray(Image.open(first)), np.asarray(Image.open(again)))
 
 
+COLORS = np.array([[[255, 0, 0], [0, 255, 0]], [[0, 0, 255], [255, 255, 0]]], np.uint8)  # as the image has them
+
+
+@pytest.mark.parametrize("mirrored", [False, True])
+@pytest.mark.parametrize(
+    ("transform", "expected"),
+    [
+        ({}, COLORS),
+        ({"offset": [0.5, 0]}, COLORS[:, ::-1]),
+        ({"offset": [0, 0.5]}, COLORS[::-1]),
+        # Counter-clockwise in the plane of u and v, v downwards: the picture turns clockwise about its top left.
+        ({"rotation": np.pi / 2}, np.rot90(COLORS, -1)),
+        ({"scale": [0.5, 0.5]}, COLORS[[0, 0]][:, [0, 0]]),
+    ],
+)
+def test_a_picture_is_the_right_way_round(
+    gpu: Any, tmp_path: Path, data_dir: Path, transform: dict[str, Any], expected: np.ndarray, mirrored: bool
+) -> None:
+    """An unlit square of four colours, as a rasteriser shows it; a mirroring node swaps left and right."""
+    file = Gltf()
+    sampler = file.add("samplers", {"wrapS": 10497, "wrapT": 10497})
+    info = {"index": file.texture(np.kron(COLORS, np.ones((8, 8, 1), np.uint8)), sampler=sampler)}
+    info |= {"extensions": {"KHR_texture_transform": transform}}
+    file.of({"pbrMetallicRoughness": {"baseColorTexture": info}, "extensions": {"KHR_materials_unlit": {}}})
+    if mirrored:
+        file.tree["nodes"][0]["scale"] = [-1, 1, 1]
+        expected = expected[:, ::-1]
+    model, picture = tmp_path / "m.glb", tmp_path / "a.png"
+    model.write_bytes(file.glb())
+    assert main(["render", str(model), "-o", str(picture), *SMALL, "--set", "filter=box"]) == 0
+    pixels = np.asarray(Image.open(picture).convert("RGB"))
+    assert np.abs(pixels[[[7], [16]], [7, 16]].astype(int) - expected).max() < 6
+
+
 def test_import(gpu: Any, tmp_path: Path, data_dir: Path) -> None:
     """A document that stands on its own feet: nothing in the data folder."""
     model, document = tmp_path / "m.glb", tmp_path / "s.json"
