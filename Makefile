@@ -1,22 +1,15 @@
 # make run [PORT=8000]   set everything up and serve the editor
 # make test              set everything up and pass the tests
-<<<<<<< Updated upstream
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/test_hostile.py
-=======
-# make soak [MINUTES=60]  mixed clients while renderers are killed, and a table of what came of it
->>>>>>> Stashed changes
+# make soak [MINUTES=]   mixed clients while renderers are killed, and a table of what came of it
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
 export PYTHON
 
-<<<<<<< Updated upstream
-.PHONY: run test extremes hostile bench gallery lint setup
-=======
-.PHONY: run test soak bench gallery lint setup
->>>>>>> Stashed changes
+.PHONY: run test extremes hostile soak bench gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -28,17 +21,15 @@ test:
 	.venv/bin/mypy
 	.venv/bin/pytest
 
-<<<<<<< Updated upstream
 extremes: setup
 	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/test_flags.py tests/test_furnace.py
 
 hostile:
 	@.ci/setup test
 	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/test_hostile.py
-=======
+
 soak: setup
 	.venv/bin/python -m service.bench.soak --minutes $(or $(MINUTES),60)
->>>>>>> Stashed changes
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json
