@@ -105,9 +105,17 @@ export class Comparison {
     this.#stream = new Stream({
       hello: () => this.#viewport?.restart(),
       frame: (header, bytes, view, acknowledge) => this.#viewport?.show(header, bytes, view, acknowledge),
-      done: () => this.painted(), waiting() {}, refused() {}, lost: (reason) => this.lost(reason),
+      done: () => this.painted(), waiting() {}, refused: (problem, valid) => this.#takeBack(problem, valid), lost: (reason) => this.lost(reason),
     }, this.beside);
     this.#stream.connect();
+  }
+
+  // What the server did not take of B goes back to what it has.
+  #takeBack(problem, valid) {
+    const { compare } = this.acts.state;
+    this.acts.complain(problem);
+    const document = valid?.scene.materials[compare?.material];
+    if (document) this.acts.amend({ compare: { ...compare, document } });
   }
 
   #close() {

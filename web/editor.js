@@ -3,8 +3,9 @@
 
 import { fetchPreset } from "./api.js";
 import * as moving from "./camera.js";
+import { linear } from "./color.js";
 import { OWN } from "./library.js";
-import { at, pointer, put } from "./patch.js";
+import { at, isObject, pointer, put } from "./patch.js";
 import { defaults, environmentModels, fields, materialModels, model } from "./schema.js";
 import { Store } from "./store.js";
 
@@ -12,6 +13,21 @@ import { Store } from "./store.js";
 function subject({ shapes }) {
   const index = shapes.findIndex(({ type }) => type !== "quad");
   return Math.max(index, 0);
+}
+
+// Blinn and Phong's highlight for a roughness: its exponent 2 / alpha^2 - 2, alpha being roughness^2, and the
+// reflectance at normal incidence times (exponent + 8) / 8, the normalisation that this model leaves out
+// [Akenine-Moeller et al., Real-Time Rendering].
+function highlight({ roughness, base_color = 0.5, metallic = 0 }) {
+  if (isObject(roughness) || isObject(base_color) || isObject(metallic)) return {};
+  const shininess = Number(Math.max(0, 2 / Math.max(roughness, 0.05) ** 4 - 2).toPrecision(3));
+  const color = linear(base_color);
+  const tidy = (x) => Number(Math.min(1, x).toPrecision(4));
+  return {
+    shininess,
+    specular: color.map((x) => tidy((0.04 * (1 - metallic) + x * metallic) * (shininess + 8) / 8)),
+    diffuse: color.map((x) => tidy(x * (1 - metallic))),
+  };
 }
 
 const picked = (name, scene) => ({
@@ -126,6 +142,11 @@ export class Editor extends Store {
     for (const { name } of after) if (old[name] !== undefined) material[name] = old[name];
     const [from, to] = [before, after].map((all) => all.find(({ widget }) => widget === "color"));
     if (from && to) material[to.name] = old[from.name] ?? from.initial;
+    if (type === "blinn_phong" && old.roughness !== undefined) Object.assign(material, highlight(old));
+    // What a model asks for and no other has: the middle of its slider.
+    for (const { name, required, widget, soft } of after) {
+      if (required && material[name] === undefined && widget !== "choice") material[name] = (soft.min + soft.max) / 2;
+    }
     return material;
   }
 

@@ -33,6 +33,7 @@ export class Inspector {
     if (!on) this.#place(1, 0, 0);
     else this.#at ??= { x: 0.5, y: 0.5 };
     this.crosshair.hidden = !on;
+    this.#aim();
     this.refresh();
   }
 

@@ -148,7 +148,7 @@ export class Stream {
     if (!this.#pending && (patch.scene !== undefined || patch.settings !== undefined)) {
       this.#sent = { ...this.#sent, scene, settings };
       this.#connection.send(message.update(this.#expect(), patch));
-    }
+    } else if (!this.#pending) this.#sent = { ...this.#sent, scene, settings }; // the same in other words
     if (diff(this.#sent.view, view)) {
       this.#sent = { ...this.#sent, view };
       this.#tellView();

@@ -23,6 +23,7 @@ def test_a_b(editor: Editor) -> None:
     editor.wait("equal variants", lambda: metric(editor) < 3)
     editor.page.select_option("#comparison select", "blinn_phong")
     editor.wait("a difference", lambda: metric(editor) > 4)
+    assert editor.text("#messages") == "", "the other model was taken"
     # Left of the divider there is A, right of it B.
     clip = editor.page.evaluate("getComputedStyle(document.getElementById('picture-b')).clipPath")
     assert clip == "inset(0px 0px 0px 50%)"
@@ -49,6 +50,16 @@ def test_a_b(editor: Editor) -> None:
     assert editor.page.is_hidden("#comparison") and editor.page.is_hidden("#picture-b")
     editor.page.keyboard.press("Control+z")
     assert editor.page.is_visible("#comparison"), "comparing is undone like everything"
+
+
+def test_every_model_is_taken(editor: Editor) -> None:
+    editor.settled()
+    for model in editor.page.eval_on_selector_all("#model option", "all => all.map((each) => each.value)"):
+        editor.page.select_option("#model", "principled")
+        editor.page.select_option("#model", model)
+        editor.settled()
+        assert editor.page.input_value("#model") == model
+        assert editor.text("#messages") == "", model
 
 
 def test_materials_are_copied_and_pasted(editor: Editor) -> None:
