@@ -4,12 +4,13 @@
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/test_hostile.py
 # make soak [MINUTES=]   mixed clients while renderers are killed, and a table of what came of it
 # make gallery DATA=...  render the README's pictures, from the folder with the models
+# make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
 export PYTHON
 
-.PHONY: run test extremes hostile soak bench gallery lint setup
+.PHONY: run test extremes hostile soak bench tradeoff gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -33,6 +34,9 @@ soak: setup
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json
+
+tradeoff: setup
+	.venv/bin/sunbox bench tradeoff --publish
 
 gallery: setup
 	.venv/bin/python -m service.bench.gallery "$(or $(DATA),$(error name the folder with the models: make gallery DATA=...))"

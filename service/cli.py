@@ -93,14 +93,17 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "peers", "hemisphere", "hand"],
+        choices=["speed", "peers", "hemisphere", "hand", "tradeoff"],
         default="speed",
         help="speed (default): paths per second, compile times, latencies; "
         "peers: error at equal time beside Mitsuba; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
-        "hand: from a slider to other pixels, in a browser",
+        "hand: from a slider to other pixels, in a browser; "
+        "tradeoff: the price list, what every knob that buys speed costs in error",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
+    add("--publish", action="store_true", help="tradeoff: write docs/tradeoff.* and the price list that is served")
+    add("--quick", action="store_true", help="tradeoff: try it out on one scene; its figures mean nothing")
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
     add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
     add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")

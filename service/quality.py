@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import asdict, dataclass
+from functools import cache
+from pathlib import Path
 from typing import Any
 
 from service.scene.settings import BALANCED, Settings
@@ -17,6 +20,9 @@ PRESETS: dict[str, dict[str, Any]] = {
     "high": {"max_samples": 1024, "max_bounces": 16, "roulette_depth": 5, "resolution_scale": 1.0},
     "reference": {"max_samples": 4096, "max_bounces": 64, "roulette_depth": 16, "resolution_scale": 1.0},
 }
+
+PRICES_FILE = Path(__file__).with_name("prices.json")  # written by `sunbox bench tradeoff --publish`
+TRUSTED_SAMPLES = 16  # from which on the noise meter tells the truth
 
 
 @dataclass(frozen=True)
@@ -74,3 +80,51 @@ def resolve(settings: Settings) -> ResolvedSettings:
         if values[name] is None:
             values[name] = preset
     return ResolvedSettings(**values)
+
+
+@cache
+def price_list() -> dict[str, Any]:
+    """What presets and knobs cost, as measured: on which machine it says itself. Empty where nobody measured."""
+    return dict(json.loads(PRICES_FILE.read_text())) if PRICES_FILE.exists() else {}
+
+
+def priced() -> dict[str, Any]:
+    """The presets, each with what it was measured to cost and what it gives up."""
+    prices = price_list()
+    if not prices:
+        return PRESETS
+    return {
+        name: knobs | {"cost": prices["presets"][name], "gives_up": text(name, prices)}
+        for name, knobs in PRESETS.items()
+    }
+
+
+def text(name: str, prices: dict[str, Any]) -> str:
+    """One line about a preset, for a menu."""
+    cost, size = prices["presets"][name], prices["told_size"]
+    worst = cost["worst_missing_light"]
+    line = f"{_short(cost['seconds'])} s to {100 * cost['noise']:.1f} % noise at {size} x {size}; "
+    line += f"light beyond {PRESETS[name]['max_bounces']} bounces is missing"
+    if worst["share"] < 0.0005:
+        return line + ", less than 0.05 % of it in any scene measured"
+    return line + f", {100 * cost['missing_light']:.1f} % of it, {100 * worst['share']:.1f} % in {worst['scene']}"
+
+
+def _short(seconds: float) -> str:
+    return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}"
+
+
+def forecast(samples: int, noise: float | None, elapsed_s: float) -> dict[str, Any] | None:
+    """Of each preset's number of samples the seconds from the start and the noise, for the scene at hand with its own
+    bounces, from what it has taken so far; None before that can be told. Noise is taken to fall with the root of the
+    samples: what a low-discrepancy sampler gains beyond that comes on top."""
+    if samples < TRUSTED_SAMPLES or noise is None or elapsed_s <= 0:
+        return None
+    return {
+        name: {
+            "samples": knobs["max_samples"],
+            "seconds": elapsed_s * knobs["max_samples"] / samples,
+            "noise": noise * (samples / knobs["max_samples"]) ** 0.5,
+        }
+        for name, knobs in PRESETS.items()
+    }

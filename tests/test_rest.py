@@ -118,7 +118,7 @@ def test_the_same_request_gives_the_same_bits(http: httpx.Client) -> None:
 def test_every_format_of_every_aov(http: httpx.Client, running: str, format: str, mime: str, aov: str) -> None:
     answer = http.get(f"/v1/renders/{running}/image", params={"format": format, "aov": aov})
     assert answer.status_code == 200 and answer.headers["content-type"] == mime
-    assert len(answer.content) > 100
+    assert len(answer.content) > 50  # the WebP of a picture that is black but for one pixel has 64
 
 
 def test_image_shapes_and_depths(http: httpx.Client) -> None:

@@ -15,13 +15,17 @@ def describe(renderer: dict[str, Any]) -> dict[str, Any]:
     """Processor, cores, driver and commit; `renderer` is Renderer.info."""
     return {
         "processor": processor(),
-        "cores": len(os.sched_getaffinity(0)),
+        "cores": cores(),
         "system": platform.platform(),
         "python": platform.python_version(),
         "renderer": renderer["renderer"],
         "driver": renderer["version"],
         "commit": commit(),
     }
+
+
+def cores() -> int:
+    return len(os.sched_getaffinity(0))
 
 
 def commit() -> str | None:

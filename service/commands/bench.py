@@ -1,4 +1,4 @@
-"""`sunbox bench speed | peers | hemisphere | hand`: measures and prints a table; `-o` keeps the figures as JSON."""
+"""`sunbox bench speed | peers | hemisphere | hand | tradeoff`: prints a table; `-o` keeps the figures as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,8 @@ from service.commands import BadInput, Failed, files
 def run(arguments: argparse.Namespace) -> int:
     if arguments.runs < 1:
         raise BadInput(f"--runs {arguments.runs}: at least one is needed")
-    return {"speed": _speed, "peers": _peers, "hemisphere": _hemisphere, "hand": _hand}[arguments.what](arguments)
+    measures = {"speed": _speed, "peers": _peers, "hemisphere": _hemisphere, "hand": _hand, "tradeoff": _tradeoff}
+    return measures[arguments.what](arguments)
 
 
 def _hemisphere(arguments: argparse.Namespace) -> int:
@@ -87,6 +88,28 @@ def _peers(arguments: argparse.Namespace) -> int:
     print(peers.table(document["scenes"]))
     if output:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    return 0
+
+
+def _tradeoff(arguments: argparse.Namespace) -> int:
+    if arguments.publish and arguments.quick:
+        raise BadInput("--publish --quick: figures that mean nothing are not for publishing")
+    output = _output(arguments.output)
+    from gpu import GpuError
+    from service.bench import tradeoff, tradeoff_report
+
+    try:
+        options = tradeoff.Options(quick=arguments.quick)
+        document = tradeoff.measure(options, lambda what: print(what, file=sys.stderr))
+    except ImportError as error:
+        raise Failed(f"the price list needs the extra `bench`: {error}") from None
+    except GpuError as error:
+        raise Failed(str(error)) from None
+    print(tradeoff_report.markdown(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    if arguments.publish:
+        tradeoff_report.publish(document)
     return 0
 
 

@@ -13,6 +13,7 @@ import numpy as np
 from gpu import GpuError
 from service.commands import Failed
 from service.commands.progress import ProgressLine
+from service.quality import forecast
 from service.rendering import messages
 from service.rendering.messages import (
     Done,
@@ -116,6 +117,7 @@ class Tracing:
             "setup_s": setup_s,
             "kernel": self._kernel,
             "eta_s": self.progress.eta_s,
+            "forecast": forecast(self.progress.samples, self.progress.noise, self.progress.elapsed_s),
             "warnings": self.warnings,
             "settings": self.settings.document(),
         }

@@ -13,7 +13,7 @@ import numpy as np
 
 from service.pack import Packed
 from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocument, ServiceError, answer, problem
-from service.quality import ResolvedSettings
+from service.quality import ResolvedSettings, forecast
 from service.rendering.engine import Engine
 from service.rendering.messages import (
     Done,
@@ -119,6 +119,7 @@ class Job:
             "setup_s": self._setup_s,
             "kernel": self._kernel,
             "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
+            "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s),
             "warnings": self._warnings,
             "settings": self._settings.document(),
         }

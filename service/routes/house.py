@@ -15,7 +15,7 @@ from service.config import Config
 from service.documents import Documents
 from service.metrics import Traffic
 from service.problems import Unavailable
-from service.quality import PRESETS
+from service.quality import priced
 from service.quota import Quota
 from service.readiness import SOFTWARE, Readiness
 from service.rendering.engine import Engine
@@ -56,7 +56,7 @@ class House:
             "version": metadata.version("sunbox"),
             "renderer": renderer,
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
-            "quality": PRESETS,
+            "quality": priced(),
         }
 
     async def gpu_missing(self) -> str | None:

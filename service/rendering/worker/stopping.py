@@ -4,11 +4,10 @@ from __future__ import annotations
 
 import time
 
+from service.quality import TRUSTED_SAMPLES
 from service.rendering.messages import Reason, StopRule
 
 MAX_SAMPLES = 1 << 24  # of the contract: where float32 sums stop counting
-# The meter tells the truth from 16 samples on; stopping on an earlier reading would be stopping by luck.
-TRUSTED_SAMPLES = 16
 
 
 class Clock:
