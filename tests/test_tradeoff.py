@@ -69,6 +69,19 @@ def test_figures_that_mean_nothing_are_not_published() -> None:
     assert main(["bench", "tradeoff", "--quick", "--publish"]) == 2
 
 
+def test_the_published_list_is_whole() -> None:
+    prices = quality.price_list()
+    assert set(prices["presets"]) == set(quality.PRESETS) and prices["machine"]["processor"]
+    costs = [cost["seconds"] for cost in prices["presets"].values()]
+    errors = [cost["relmse"] for cost in prices["presets"].values()]
+    assert costs == sorted(costs) and errors == sorted(errors, reverse=True)
+    for name, preset in quality.priced().items():
+        assert quality.PRESETS[name].items() <= preset.items()
+        assert "noise" in preset["gives_up"] and str(preset["max_bounces"]) in preset["gives_up"]
+    readme = (Path(__file__).parent.parent / "README.md").read_text()
+    assert all(quality.text(name, prices) in readme for name in quality.PRESETS), "run `make tradeoff`"
+
+
 def test_forecast_measures_the_scene_at_hand() -> None:
     assert quality.forecast(15, 0.1, 1.0) is None and quality.forecast(20, None, 1.0) is None
     found = quality.forecast(64, 0.1, 2.0)
