@@ -194,8 +194,10 @@ export class Editor extends Store {
     this.amend({ chosen: { ...chosen, thing, material: shape?.material ?? chosen.material } });
   }
 
-  add(kind, document) {
-    const { scene, chosen } = this.state;
+  // `members`: what else of the scene becomes another with it.
+  add(kind, document, members = {}) {
+    const { chosen } = this.state;
+    const scene = { ...this.state.scene, ...members };
     const all = scene[kind] ?? [];
     this.change({
       scene: { ...scene, [kind]: [...all, document] },
@@ -229,8 +231,14 @@ export class Editor extends Store {
       .map(({ pointer: wrong, detail }) => mark(wrong, detail));
     if (!valid || !places.length) return;
     const { scene, settings } = valid;
-    if (places.includes(null)) this.amend({ scene, settings: this.#own(settings) });
+    if (places.includes(null)) this.amend({ scene, settings: this.#own(settings), chosen: this.#chosenIn(scene) });
     else this.amend(places.reduce((state, place) => put(state, place, at(valid, place)), this.state));
+  }
+
+  // What is chosen, as far as the scene has it.
+  #chosenIn(scene) {
+    const { chosen } = this.state;
+    return chosen.material in scene.materials ? chosen : { ...picked(chosen.scene, scene).chosen };
   }
 
   #own({ width, height, ...settings }) {

@@ -95,7 +95,11 @@ export class Importer {
     const subject = state.scene.shapes.map(ball).filter(Boolean).sort((a, b) => a.radius - b.radius)[0];
     const place = subject ?? { center: camera.target, radius: this.acts.radius() };
     const transform = fitting(bounds, place);
-    this.acts.add("shapes", { type: "mesh", asset: id, material: state.chosen.material, ...(transform ? { transform } : {}) });
+    // Images need coordinates that a mesh may lack: it gets a plain material of its own then.
+    const isTextured = JSON.stringify(this.acts.material).includes('"texture":');
+    const material = isTextured ? fresh(stem(file), state.scene.materials) : state.chosen.material;
+    const materials = isTextured ? { ...state.scene.materials, [material]: { type: "principled" } } : state.scene.materials;
+    this.acts.add("shapes", { type: "mesh", asset: id, material, ...(transform ? { transform } : {}) }, { materials });
     this.#tell(file, warnings);
   }
 

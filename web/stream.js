@@ -24,6 +24,7 @@ export class Stream {
   #wanted = null; // {scene, settings, view}: what the user wants to see
   #sent = null; // the same, as the server was told; null: it must be told everything
   #valid = null; // the last of which a frame came
+  #previous = null; // what an update on its way changes: the server goes on with that if it refuses
   #refused = null; // what the server did not take: not offered again unchanged
   #pending = null; // the timer of an update without an answer
   #halted = { user: false, hidden: document.hidden };
@@ -146,6 +147,7 @@ export class Stream {
     const { scene, settings, view } = this.#wanted;
     const patch = { scene: diff(this.#sent.scene, scene), settings: diff(this.#sent.settings, settings) };
     if (!this.#pending && (patch.scene !== undefined || patch.settings !== undefined)) {
+      this.#previous = this.#sent;
       this.#sent = { ...this.#sent, scene, settings };
       this.#connection.send(message.update(this.#expect(), patch));
     } else if (!this.#pending) this.#sent = { ...this.#sent, scene, settings }; // the same in other words
@@ -157,6 +159,7 @@ export class Stream {
 
   #start() {
     if (this.#refused && diff(this.#refused, this.#wanted) === undefined) return;
+    this.#previous = null;
     this.#sent = this.#wanted;
     this.#connection.send(message.start(this.#expect(), this.#sent));
     this.#tellView();
@@ -193,7 +196,8 @@ export class Stream {
       this.#sent = null;
       this.#on.waiting(false);
       this.#endCaptures(new Error("The server did not take the scene."));
-      this.#on.refused(new Problem(heard.problem), this.#valid);
+      this.#on.refused(new Problem(heard.problem), (isNewest && this.#previous) || this.#valid);
+      this.#previous = null;
       this.#settle();
     } else if (heard.type === "done" && isNewest && this.#sent) {
       this.#answered();
