@@ -2,7 +2,6 @@
 // images textures, glTF a scene, JSON what it says it is.
 
 import { fetchAssetScene, upload } from "./api.js";
-import { ball } from "./bounds.js";
 import { equal, pointer, put } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
@@ -20,15 +19,6 @@ function fresh(wanted, taken) {
   let name = wanted;
   for (let i = 2; name in taken; i += 1) name = `${wanted}-${i}`;
   return name;
-}
-
-// A transform that stands what has these bounds where the ball is; undefined without bounds.
-export function fitting(bounds, { center, radius }) {
-  if (!bounds) return undefined;
-  const [low, high] = bounds;
-  const size = Math.hypot(...high.map((x, i) => x - low[i])) / 2;
-  const scale = Number((radius / size).toPrecision(4));
-  return { scale, translate: center.map((x, i) => Number((x - (scale * (low[i] + high[i])) / 2).toPrecision(6))) };
 }
 
 export class Importer {
@@ -90,16 +80,13 @@ export class Importer {
     this.messages.show("import", { title: `${file.name}: not everything was taken.`, list });
   }
 
-  #addMesh({ id, bounds, warnings = [] }, file) {
-    const { state, camera } = this.acts;
-    const subject = state.scene.shapes.map(ball).filter(Boolean).sort((a, b) => a.radius - b.radius)[0];
-    const place = subject ?? { center: camera.target, radius: this.acts.radius() };
-    const transform = fitting(bounds, place);
+  #addMesh({ id, warnings = [] }, file) {
+    const { state } = this.acts;
     // Images need coordinates that a mesh may lack: it gets a plain material of its own then.
     const isTextured = JSON.stringify(this.acts.material).includes('"texture":');
     const material = isTextured ? fresh(stem(file), state.scene.materials) : state.chosen.material;
     const materials = isTextured ? { ...state.scene.materials, [material]: { type: "principled" } } : state.scene.materials;
-    this.acts.add("shapes", { type: "mesh", asset: id, material, ...(transform ? { transform } : {}) }, { materials });
+    this.acts.add("shapes", { type: "mesh", asset: id, material }, { materials });
     this.#tell(file, warnings);
   }
 
