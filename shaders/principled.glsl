@@ -75,9 +75,18 @@ PrincipledWeights principled_weights(Surface s, vec3 wo) {
 #if HAS_TRANSMISSION
     facets += luminance(facets_through(s, wo.z));
     if (scattered_glass(s)) {
-        float t = scattered_through(s), lost = (1.0 - s.metallic) * s.transmission * scattered_near(s, s.kept);
+        float glass = (1.0 - s.metallic) * s.transmission;
+        float t = scattered_through(s), lost = glass * scattered_near(s, s.kept);
         w.matte += lost * (1.0 - t);
         w.through = lost * t * luminance(s.base_color);
+        facets *= 1.0 - lost;
+        // Where nearly all directions are wholly reflected, all of a rough lobe is nearly diffuse, and light stays for
+        // many bounces: facets that lead nowhere would make weights grow with each.
+        float share = s.inside ? s.eta * s.eta : 1.0; // of the directions inside, those that lead out
+        float spread = 0.6 * glass * sqr(sqr(s.roughness * (1.0 - share))) * facets;
+        facets -= spread;
+        w.matte += spread * (1.0 - share);
+        w.through += spread * share * luminance(s.base_color);
     }
 #endif
     // The floor keeps the lobe sampled where it is faint from here: it rises to 1 towards grazing.
@@ -105,9 +114,12 @@ Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) 
     vec3 f = scattered_transmit(s, principled_kept(s, wi));
     float pdf = w.through * INV_PI * -wi.z;
     vec3 wm = facets_between(s, wo_t, wi_t);
-    if (!s.mirror && !s.straight && wm.z > 0.0) {
-        f += facets_transmit(s, wo_t, wi_t, wm);
-        pdf += w.facets * facets_transmit_pdf(s, wo_t, wi_t, wm);
+    if (!s.mirror && !s.straight) {
+        pdf += w.facets * facets_transmit_folded(s, wo_t, wi_t);
+        if (wm.z > 0.0) {
+            f += facets_transmit(s, wo_t, wi_t, wm);
+            pdf += w.facets * facets_transmit_pdf(s, wo_t, wi_t, wm);
+        }
     }
     float coat_i = s.inside ? principled_coat_kept(s, principled_coat_cosine(s, wi)) : 0.0;
     float sheen_i = s.inside ? principled_sheen_kept(s, wi.z) : 0.0;
@@ -135,6 +147,9 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     if (!s.mirror) {
         f += facets_reflect(s, wo_t, wi_t, wm_t, cos_d);
         pdf += w.facets * facets_reflect_pdf(s, wo_t, wm_t, cos_d);
+#if HAS_TRANSMISSION
+        pdf += w.facets * facets_reflect_folded(s, wo_t, wi_t);
+#endif
     }
     if (!s.inside) {
         float coat_i = principled_coat_kept(s, principled_coat_cosine(s, wi)), sheen_i = principled_sheen_kept(s, wi.z);

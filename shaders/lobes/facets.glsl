@@ -67,7 +67,25 @@ float facets_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
 }
 #endif
 
-// Reflected or refracted at a visible facet, by v; 0 where the one ends below the surface or the other above it.
+#if HAS_TRANSMISSION
+vec3 facets_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
+
+// Density of wi as the image of a direction on the wrong side.
+float facets_reflect_folded(Surface s, vec3 wo, vec3 wi) {
+    vec3 wm = wo + facets_image(wi);
+    if (wm.z <= 0.0) return 0.0;
+    wm = normalize(wm);
+    return facets_reflect_pdf(s, wo, wm, dot(wo, wm));
+}
+
+float facets_transmit_folded(Surface s, vec3 wo, vec3 wi) {
+    vec3 image = facets_image(wi), wm = facets_between(s, wo, image);
+    return wm.z > 0.0 ? facets_transmit_pdf(s, wo, image, wm) : 0.0;
+}
+#endif
+
+// Reflected or refracted at a visible facet, by v. Where the one ends below the surface, or the other above it, light
+// meets another facet: with glass, where many such losses would add up, its image on the right side stands for that.
 vec3 facets_sample(Surface s, vec3 wo, float v, vec2 u) {
     vec3 wm = s.mirror ? vec3(0.0, 0.0, 1.0) : microfacet_visible_normal(wo, s.alpha, u);
     float c = dot(wo, wm);
@@ -77,10 +95,14 @@ vec3 facets_sample(Surface s, vec3 wo, float v, vec2 u) {
         float k = 1.0 / s.eta;
         float cos_t = sqrt(max(0.0, 1.0 - k * k * (1.0 - c * c)));
         vec3 refracted = (k * c - cos_t) * wm - k * wo;
-        return refracted.z < 0.0 ? refracted : vec3(0.0);
+        return vec3(refracted.xy, -abs(refracted.z));
     }
 #endif
     vec3 reflected = 2.0 * c * wm - wo;
+#if HAS_TRANSMISSION
+    return vec3(reflected.xy, abs(reflected.z));
+#else
     return reflected.z > 0.0 ? reflected : vec3(0.0);
+#endif
 }
 #endif
