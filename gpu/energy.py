@@ -17,7 +17,7 @@ MU_COUNT = 40  # cosines, as squares of equal steps
 ETA_COUNT = 25  # indices 1..4; (eta - 1) / (eta + 1) as squares of equal steps
 ALBEDO_SHAPE = (ETA_COUNT, 40, MU_COUNT)  # eta, roughness, cosine
 STRETCHED_SHAPE = (13, 8, 13, 14, 18)  # eta (every other of the above), aspect, roughness, azimuth, cosine
-MEAN_SHAPE = (ETA_COUNT, STRETCHED_SHAPE[1], ALBEDO_SHAPE[1])  # eta, aspect, roughness
+MEAN_SHAPE = (2 * ETA_COUNT - 1, STRETCHED_SHAPE[1], 2 * ALBEDO_SHAPE[1] - 1)  # eta, aspect, roughness
 AZIMUTH_POWER = 0.8  # azimuths from the short axis, as this power of equal steps: denser there
 SHEEN_SHAPE = (16, MU_COUNT)  # sheen roughness, cosine
 LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1
@@ -33,7 +33,8 @@ class Tables:
     `albedo` (eta, roughness, mu, 4): reflected with Fresnel 1; with eta's, never too low; lost where glass is
     entered; lost where it is left. `stretched` (eta, aspect, roughness, azimuth, mu, 4): the same
     of stretched lobes.
-    `mean` (eta, aspect, roughness, 4): their cosine-weighted means. `sheen` (roughness, mu): the sheen's, the same.
+    `mean` (eta, aspect, roughness, 4): their cosine-weighted means; of what is lost divided by how much more is lost
+    in truth, as `energy_tables` says. `sheen` (roughness, mu): the sheen's, the same.
     """
 
     albedo: np.ndarray
