@@ -292,7 +292,8 @@ def test_a_failure_is_the_tasks_own(rendering: Any, arrays: Any) -> None:
         failed = await bad.next(Failed)
         assert failed.generation == 1 and failed.detail and failed.serial is None
         before = (await good.next(Progressed)).progress.samples
-        assert (await good.next(Progressed)).progress.samples > before
+        while (await good.next(Progressed)).progress.samples <= before:  # a pass takes longer than a report
+            pass
         engine.send(Update(other, 2, materials=arrays.materials))  # in vain, and harmless
         await engine.send_scene(Update(other, 3, arrays, settings(), StopRule(2)))
         assert (await bad.next(Done)).generation == 3
