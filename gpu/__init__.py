@@ -1,5 +1,6 @@
 """Arrays in, images out. Knows no HTTP, no JSON, no scene document; all names not listed here are private."""
 
+from gpu.ahead import Recipe
 from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays
 from gpu.errors import (
     CompileError,
@@ -30,6 +31,7 @@ __all__ = [
     "NothingRendered",
     "OutOfMemory",
     "Picture",
+    "Recipe",
     "RenderSettings",
     "Renderer",
     "Saved",

@@ -56,7 +56,8 @@ def _serve(end: socket.socket, pulse: Pulse, device: int | None, memory: int | N
         return 1
     link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
-    Loop(end, renderer, pulse, memory or default_limit(bool(renderer.info["software"]))).run()
+    limit = memory or default_limit(bool(renderer.info["software"]))
+    Loop(end, renderer, pulse, limit, device).run()
     return 0
 
 

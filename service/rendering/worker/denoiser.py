@@ -58,6 +58,11 @@ class Denoiser:
     def busy(self) -> bool:
         return self._told is not None
 
+    @property
+    def ends(self) -> list[socket.socket]:
+        """Where it may be heard from."""
+        return [] if self._end is None else [self._end]
+
     def ask(self, order: Order, told: Callable[[Delivery], None]) -> None:
         """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
         self._told = told

@@ -6,11 +6,12 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from gpu import RenderSettings, picture_bytes, save, scene_bytes
+from gpu import RenderSettings, ahead, features, picture_bytes, save, scene_bytes
+from service.rendering.messages import Update
 from service.rendering.worker.ladder import Ladder
 
 if TYPE_CHECKING:
-    from gpu import Renderer, Saved, Scene, SceneArrays
+    from gpu import Recipe, Renderer, Saved, Scene, SceneArrays
 
 
 @dataclass(frozen=True)
@@ -39,6 +40,10 @@ class Holding:
         except Exception:
             self.scene.release()
             raise
+
+    @property
+    def editing(self) -> bool:
+        return self._editing
 
     @property
     def bytes(self) -> int:
@@ -86,3 +91,30 @@ def finished(saving: Generator[None, None, Saved]) -> Saved:
 def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:
     """About what a scene and its picture take on the device."""
     return (0 if arrays is None else scene_bytes(arrays)) + picture_bytes(settings)
+
+
+def kernel_of(
+    update: Update, old: RenderSettings | None, holding: Holding | None, aside: Aside | None
+) -> Recipe | None:
+    """The kernel of the picture that the update makes; None: the one there is, or nothing can come of it."""
+    settings = old if update.settings is None else RenderSettings(**update.settings)
+    edits, raised = update.edits, frozenset[str]()
+    if settings is None:
+        return None
+    if update.scene is not None:
+        arrays, editing = update.scene, update.interactive
+        raised = features.flags(arrays, editing)
+    elif holding is not None:
+        arrays, editing, raised = holding.scene.arrays, holding.editing, holding.scene.flags
+        aperture = update.camera is None or update.camera.aperture_radius == arrays.camera.aperture_radius
+        if update.settings is None and aperture and not edits.keys() & {"materials", "texture_words"}:
+            return None
+    elif aside is not None:
+        arrays, editing = aside.arrays, aside.editing
+    else:
+        return None
+    if edits or update.scene is None:
+        arrays = ahead.edited(arrays, edits)
+        more = features.flags(arrays, editing)
+        raised = raised | more if editing else more
+    return ahead.recipe(arrays, settings, raised)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import select
 import socket
 import time
 from collections import defaultdict
@@ -27,6 +28,7 @@ from service.rendering.messages import (
 )
 from service.rendering.pulse import Pulse
 from service.rendering.scheduler import Scheduler
+from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.memory import Memory
 from service.rendering.worker.task import Task
@@ -38,7 +40,9 @@ log = logging.getLogger(__name__)
 
 
 class Loop:
-    def __init__(self, end: socket.socket, renderer: Renderer, pulse: Pulse, memory_limit: int) -> None:
+    def __init__(
+        self, end: socket.socket, renderer: Renderer, pulse: Pulse, memory_limit: int, device: int | None
+    ) -> None:
         self._end = end
         self._renderer = renderer
         self._pulse = pulse
@@ -46,6 +50,7 @@ class Loop:
         self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
         self._denoiser = Denoiser()
+        self._compiler = Compiler(renderer.info, device, self._crowded)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = 0
         self._reported = 0.0
@@ -57,6 +62,7 @@ class Loop:
             for message in coalesced(self._pending(wait=not busy)):
                 self._take(message)
             self._denoiser.hear()
+            self._compiler.hear()
             task = self._scheduler.choose(self._tasks.values())
             if task is not None:
                 began = time.monotonic()
@@ -69,9 +75,10 @@ class Loop:
             self._account(at_once=not busy)
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
-        """What has come in by now; with `wait`, as soon as there is anything, or a picture was denoised."""
+        """What has come in by now; with `wait`, as soon as there is anything, or a helper has spoken."""
         if wait:
-            self._denoiser.sleep(self._end)
+            ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
+            select.select(ends, [], [], self._compiler.left_s)
         try:
             while True:
                 message = link.receive(self._end)
@@ -88,6 +95,9 @@ class Loop:
         seconds = time.perf_counter() - began
         self._scheduler.charge(task, seconds)
         self._used_s[task.number] += seconds
+
+    def _crowded(self) -> bool:
+        return sum(task.awaited for task in self._tasks.values()) > 1
 
     def _account(self, at_once: bool) -> None:
         """Tells what was used, now and then; at once before there is nothing to do."""
@@ -125,7 +135,8 @@ class Loop:
             self._remove(task)
 
     def _new(self, first: Update) -> Task:
-        return Task(self._renderer, first.task, self._send, self._denoiser, first.client, self._memory, self._forget)
+        shared = self._denoiser, first.client, self._memory, self._forget, self._compiler
+        return Task(self._renderer, first.task, self._send, *shared)
 
     def _forget(self, task: Task) -> None:
         """The server has this finished picture, and brings it back when somebody asks for it."""

@@ -27,8 +27,9 @@ from service.rendering.messages import (
     View,
     Want,
 )
+from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.denoiser import Denoiser
-from service.rendering.worker.holding import Aside, Holding, needed
+from service.rendering.worker.holding import Aside, Holding, kernel_of, needed
 from service.rendering.worker.ladder import FULL_S, Ladder
 from service.rendering.worker.memory import UNLIMITED, Memory
 from service.rendering.worker.meter import Meter
@@ -55,8 +56,11 @@ class Task:
         client: str = "",
         memory: Memory | None = None,
         forget: Callable[[Task], None] | None = None,
+        compiler: Compiler | None = None,
     ) -> None:
-        """With `forget`, Done brings the picture of a render to the server; what is forgotten it can bring back."""
+        """With `compiler`, others need not wait for its kernels.
+
+        With `forget`, Done brings the picture of a render to the server; what is forgotten it can bring back."""
         self.number, self.client = number, client
         self.generation = self.attempted = 0  # of what is there, and of the last update
         self.used_s = 0.0
@@ -69,6 +73,9 @@ class Task:
         self._scale = 1.0  # of what is traced
         self._pending: Update | None = None  # not applied yet
         self._stopping = False  # when that was applied
+        self._compiler = compiler
+        self._compiling = False  # what waits to be applied waits for its kernel
+        self._compiled_ms = 0.0  # what that took elsewhere
         self._holding: Holding | None = None  # None: nothing loaded, or it failed, or it was put aside
         self._aside: Aside | None = None
         self._settings: RenderSettings | None = None
@@ -93,7 +100,7 @@ class Task:
         if self._away:
             return False
         if self._pending is not None:
-            return True
+            return not self._compiling
         if self._holding is None and self._aside is None:
             return False
         if self._guided is not None or self._saving is not None or self._smoothed or self._smooth_due:
@@ -113,6 +120,14 @@ class Task:
         return self._pending is not None
 
     @property
+    def awaited(self) -> bool:
+        """Somebody would notice if the loop stood still: there is work, or a person who may edit at any moment."""
+        if self._pending is not None:
+            return True
+        there = self._holding is not None or self._aside is not None
+        return there and not self._away and (self._interactive or self.ready)
+
+    @property
     def idle(self) -> bool:
         return self._holding is not None and not self.ready and not self._smoothing.pending
 
@@ -125,12 +140,14 @@ class Task:
         if update.base is not None and update.base != (self._pending or self).generation:
             return  # it changes what failed, which the server will hear, and say what it wants now
         self._pending = self._pending.then(update) if self._pending is not None else update
-        self._stopping = False
+        self._stopping = self._compiling = False
 
     def turn(self) -> None:
         """Applies what has changed, traces a slice, and ends the render when that was the last."""
         if self._pending is not None:
-            self._apply(self._pending)
+            self._compile_and_apply(self._pending)
+            if self._compiling:
+                return
         if self._stopping:
             self.stop()
         self._wake()
@@ -163,6 +180,22 @@ class Task:
             if not self._end_if_reached():
                 self._report()
 
+    def _compile_and_apply(self, update: Update) -> None:
+        """Applies the update, or has its kernel compiled first: then this turn was for nothing more."""
+        self.attempted = update.generation
+        kernel = None
+        if self._compiler is not None:
+            kernel = kernel_of(update, self._settings, self._holding, self._aside)
+            self._compiling = kernel is not None and self._compiler.waits(kernel, self._hear_compiled)
+            if self._compiling:
+                return
+        self._apply(update)
+        if kernel is not None and self._compiler is not None and self.generation == update.generation:
+            self._compiler.met(kernel)
+
+    def _hear_compiled(self, milliseconds: float) -> None:
+        self._compiling, self._compiled_ms = False, milliseconds
+
     def _apply(self, update: Update) -> None:
         """Makes the update true, or says that it failed and leaves everything as it was."""
         began = time.monotonic()
@@ -190,7 +223,8 @@ class Task:
             self._restart()
         if update.scene is not None or update.settings is not None:
             setup_s, warnings = time.monotonic() - began, self._warnings()
-            kernel = self._full.compile_ms, self._full.scene.features, self._full.scene.spared
+            compile_ms, self._compiled_ms = self._full.compile_ms + self._compiled_ms, 0.0
+            kernel = compile_ms, self._full.scene.features, self._full.scene.spared
             self._send(Loaded(self.number, self.generation, setup_s, *kernel, warnings))
 
     def _hold(self, update: Update, settings: RenderSettings) -> None:
@@ -428,6 +462,8 @@ class Task:
         self._reads, self._smooth_reads = [], []
         self._smoothing.restart()
         self._owes_done = self._smoothed = False
+        if self._compiler is not None:
+            self._compiler.forget(self._hear_compiled)
         for read in reads:
             self.read(read)
         if holding is not None:

@@ -1,0 +1,136 @@
+"""Kernels compiled ahead: in another process, into the driver's disk cache, from where loading takes some ms."""
+
+from __future__ import annotations
+
+import time
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+
+from gpu import context as contexts
+from gpu import features, layout
+from gpu.arrays import SceneArrays
+from gpu.errors import CompileError
+from gpu.program import Source
+from gpu.settings import RenderSettings
+from gpu.texels import BYTES
+
+ENTRY = "pathtrace.comp"
+_BUFFER = 1 << 16  # bytes; zeros for whatever is bound, and no pixel looks at it
+_QUICK_S = 0.04  # of processor time: no compiler was at work
+_LOOKS = 8  # for a kernel in the disk cache, which drivers write behind our back
+
+
+@dataclass(frozen=True)
+class Recipe:
+    """All that the machine code of a picture's kernel depends on, but the driver.
+
+    `textures` are (unit, channels, dtype, width, height): code for sides that are powers of two differs, their
+    length does not matter, so that they are given as 1 or 3.
+    """
+
+    defines: tuple[tuple[str, object], ...]
+    textures: tuple[tuple[int, int, str, int, int], ...]
+
+    @property
+    def text(self) -> str:
+        return Source(ENTRY, dict(self.defines)).text
+
+    def digest(self, driver: str) -> str:
+        return sha256(repr((driver, self.text, self.textures)).encode()).hexdigest()[:32]
+
+
+def recipe(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]) -> Recipe:
+    """What a picture of `arrays` needs compiled where these flags are raised."""
+    defines = features.defines(raised, settings, features.counts(arrays))
+    return Recipe(tuple(defines.items()), _textures(arrays))
+
+
+def _textures(a: SceneArrays) -> tuple[tuple[int, int, str, int, int], ...]:
+    height, width = (1, 1) if a.environment is None else a.environment.texels.shape[:2]
+    out = [(layout.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
+    rows = [
+        (layout.UVS_TEXTURES[0], a.triangle_uvs, 2, "f4"),
+        (layout.UVS_TEXTURES[1], a.triangle_uvs_1, 2, "f4"),
+        (layout.COLORS_TEXTURE, a.triangle_colors, 4, "f2"),
+    ]
+    if a.textures is not None:
+        rows += [(layout.BYTES_TEXTURE, a.textures.texels, 4, "f1")]
+        rows += [(layout.FLOATS_TEXTURE, a.textures.floats, 4, "f4")]
+    for unit, values, channels, dtype in rows:
+        if len(values):
+            height = -(-values.nbytes // (layout.TEXELS_A_ROW * channels * BYTES[dtype]))
+            out.append((unit, channels, dtype, _side(layout.TEXELS_A_ROW), _side(height)))
+    return tuple(out)
+
+
+def _side(length: int) -> int:
+    return 1 if length & (length - 1) == 0 else 3
+
+
+def edited(arrays: SceneArrays, edits: dict[str, Any]) -> SceneArrays:
+    """The arrays as far as flags look at them after `Scene.edit` of these."""
+    changes: dict[str, Any] = {name: edits[name] for name in ("camera", "materials") if name in edits}
+    if "texture_words" in edits and arrays.textures is not None:
+        changes["textures"] = replace(arrays.textures, words=edits["texture_words"])
+    return replace(arrays, **changes)
+
+
+class Ahead:
+    """A context in a process of its own that only compiles. Raises ContextError where there is none to be had."""
+
+    def __init__(self, device: int | None = None) -> None:
+        self._context = contexts.create(device)
+        self._zeros = self._context.buffer(bytes(_BUFFER))
+        self._tables: dict[int, Any] = {}
+
+    def compile(self, wanted: Recipe) -> tuple[float, bool]:
+        """Milliseconds, and whether the next one finds it in the driver's disk cache. Raises CompileError."""
+        began = time.perf_counter()
+        first_s = self._once(wanted)
+        milliseconds = (time.perf_counter() - began) * 1e3
+        if first_s < _QUICK_S:
+            return milliseconds, True
+        for look in range(_LOOKS):
+            time.sleep(0.002 * 2**look)
+            if self._once(wanted) < max(_QUICK_S, first_s / 4):
+                return milliseconds, True
+        return milliseconds, False
+
+    def _once(self, wanted: Recipe) -> float:
+        """Compiles to machine code by running over no pixel; the processor time that it took (s)."""
+        text = wanted.text
+        textures = [self._texture(*kind) for kind in wanted.textures]
+        if dict(wanted.defines).get("HAS_PRINCIPLED"):
+            for unit, table in self._energy().items():
+                table.use(unit)
+        start = time.process_time()
+        try:
+            kernel = self._context.compute_shader(text)
+        except Exception as error:  # moderngl.Error is not importable without its binary parts
+            raise CompileError(str(error)) from error
+        for slot in range(len(layout.Slot)):
+            self._zeros.bind_to_storage_buffer(slot)
+        for block in (layout.FRAME_BLOCK, layout.FILTER_BLOCK, *layout.COUNTED.values()):
+            self._zeros.bind_to_uniform_block(block)
+        kernel.run(1, 1)
+        self._context.finish()
+        seconds = time.process_time() - start
+        for thing in (kernel, *textures):
+            thing.release()
+        return seconds
+
+    def _texture(self, unit: int, channels: int, dtype: str, width: int, height: int) -> Any:
+        zeros = np.zeros((height, width, channels * BYTES[dtype]), np.uint8)
+        texture = self._context.texture((width, height), channels, zeros, alignment=1, dtype=dtype)
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        texture.use(unit)
+        return texture
+
+    def _energy(self) -> dict[int, Any]:
+        from gpu.scene import upload_tables
+
+        self._tables = self._tables or upload_tables(self._context)
+        return self._tables

@@ -1,0 +1,201 @@
+"""The renderer's hold on the process that compiles: one kernel at a time, while all other clients are traced."""
+
+from __future__ import annotations
+
+import logging
+import os
+import socket
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from service.rendering import link
+
+if TYPE_CHECKING:
+    from gpu import Recipe
+
+ROOT = Path(__file__).parents[3]
+TRIES = 3  # misfortunes in a row; then everything is compiled in the loop
+LIMIT_S = 60.0  # for one kernel, the helper's start included
+DISABLED = {"1", "true", "yes", "y", "t"}
+
+Told = Callable[[float], None]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Compiled:
+    """What the helper answers; `cached`: it is in the driver's disk cache."""
+
+    milliseconds: float
+    cached: bool
+    detail: str = ""
+
+
+@dataclass
+class _Order:
+    recipe: Recipe
+    told: set[Told] = field(default_factory=set)
+
+
+class Compiler:
+    """Its process starts with the first order and ends when idle for a while."""
+
+    def __init__(self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool]) -> None:
+        """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop."""
+        self._driver = f"{info['renderer']} {info['version']}"
+        self._device, self._crowded = device, crowded
+        self._able = _has_cache()
+        self._records = _records()
+        self._known: set[Recipe] = set()  # what needs no helper any more, or was not helped
+        self._met: set[Recipe] = set()
+        self._orders: list[_Order] = []  # the first is under way
+        self._process: subprocess.Popen[bytes] | None = None
+        self._end: socket.socket | None = None
+        self._until = 0.0
+        self._failures = 0
+
+    @property
+    def ends(self) -> list[socket.socket]:
+        """Where it may be heard from."""
+        return [] if self._end is None else [self._end]
+
+    @property
+    def left_s(self) -> float | None:
+        """How long it makes sense to wait for that."""
+        return max(0.0, self._until - time.monotonic()) if self._orders else None
+
+    def waits(self, recipe: Recipe, told: Told) -> bool:
+        """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
+        it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop.
+        """
+        self.forget(told)
+        if recipe in self._known:
+            return False
+        order = next((order for order in self._orders if order.recipe == recipe), None)
+        if order is None:
+            if not self._able or not self._crowded() or (self._records / recipe.digest(self._driver)).exists():
+                return False
+            order = _Order(recipe)
+            self._orders.append(order)
+            if len(self._orders) == 1:
+                self._begin()
+        if order not in self._orders:  # no helper is to be had
+            return False
+        order.told.add(told)
+        return True
+
+    def met(self, recipe: Recipe) -> None:
+        """The renderer has this kernel: the driver's disk cache too."""
+        if recipe in self._met:
+            return
+        self._known.add(recipe)
+        self._met.add(recipe)
+        if self._able:
+            try:
+                self._records.mkdir(parents=True, exist_ok=True)
+                (self._records / recipe.digest(self._driver)).touch()
+            except OSError as error:
+                log.info("not recorded: %s", error)
+
+    def forget(self, told: Told) -> None:
+        """Nobody waits there any more; what nobody waits for is not begun."""
+        for order in self._orders:
+            order.told.discard(told)
+        self._orders[1:] = [order for order in self._orders[1:] if order.told]
+
+    def hear(self) -> None:
+        """Tells who waits, if there is anything to tell, and begins the next."""
+        if self._end is None:
+            return
+        try:
+            answer: Compiled = link.receive(self._end)
+        except BlockingIOError:
+            if not self._orders or time.monotonic() < self._until:
+                return
+            self._ended(f"it took more than {LIMIT_S:.0f} s")
+        except link.Closed:
+            self._ended("the compiler's process ended unexpectedly")
+        else:
+            self._failures = 0 if answer.cached else self._failures + 1
+            if not answer.cached:
+                log.warning("compiled ahead in vain: the driver has no disk cache to write to")
+            log.info("compiled ahead ms=%.0f %s", answer.milliseconds, answer.detail)
+            self._tell(answer.milliseconds)
+        if self._orders:
+            self._begin()
+
+    def close(self) -> None:
+        if self._end is not None:
+            self._end.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._end = self._process = None
+
+    def _ended(self, detail: str) -> None:
+        self.close()
+        if self._orders:
+            self._failures += 1
+            log.warning("compiling in the loop: %s", detail)
+            self._tell(0.0)
+
+    def _tell(self, milliseconds: float) -> None:
+        order = self._orders.pop(0)
+        self._known.add(order.recipe)
+        for told in order.told:
+            told(milliseconds)
+
+    def _begin(self) -> None:
+        """Sends the first order; where that can't be, all are told to do without."""
+        for _ in range(2):
+            try:
+                if self._failures < TRIES:
+                    self._start()
+                    assert self._end is not None
+                    link.send(self._end, self._orders[0].recipe)
+                    self._until = time.monotonic() + LIMIT_S
+                    return
+            except (link.Closed, OSError) as error:  # it had just ended, being idle; or it can't be started
+                log.info("no compiler: %s", error or "it had ended")
+                self.close()
+        self._able = False
+        log.warning("compiling in the loop from now on")
+        while self._orders:
+            self._tell(0.0)
+
+    def _start(self) -> None:
+        if self._end is not None:
+            return
+        self._end, theirs = link.pair()
+        with theirs:
+            command = [sys.executable, "-m", "service.rendering.worker.compiling", str(theirs.fileno())]
+            command += ["--parent", str(os.getpid())]
+            command += [] if self._device is None else ["--device", str(self._device)]
+            self._process = subprocess.Popen(
+                command,
+                pass_fds=[theirs.fileno()],
+                cwd=ROOT,
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                process_group=0,  # Ctrl-C in a terminal is for the server
+            )
+
+
+def _has_cache() -> bool:
+    """As far as the environment says; the helper finds out the rest."""
+    disabled = ("MESA_SHADER_CACHE_DISABLE", "MESA_GLSL_CACHE_DISABLE")
+    if any(os.environ.get(name, "").lower() in DISABLED for name in disabled):
+        return False
+    return os.environ.get("__GL_SHADER_DISK_CACHE") != "0"
+
+
+def _records() -> Path:
+    """Where an empty file says of a kernel that it is in the driver's cache: beside that."""
+    base = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
+    return Path(base) / "sunbox" / "kernels"

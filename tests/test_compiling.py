@@ -1,0 +1,212 @@
+"""Kernels that nobody has compiled yet: whoever needs one waits for it, and nobody else does."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings
+from service.pack import pack
+from service.rendering.engine import Engine
+from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
+from service.scene import parse_scene
+from tests.documents import Shelf
+from tests.serving import SCENE
+
+SIZE = {"width": 32, "height": 32}
+COLD = {**SIZE, "clamp": 5.0}  # compiled in
+LINEAR = View(encoding="linear")
+
+AHEAD = """
+import sys
+from gpu import features
+from gpu.ahead import Ahead, recipe
+from tests.test_compiling import SETTINGS, arrays_of
+a = arrays_of(sys.argv[1])
+print(Ahead().compile(recipe(a, SETTINGS, features.flags(a)))[1])
+"""
+RENDERER = """
+import sys
+from gpu import Renderer
+from tests.test_compiling import SETTINGS, arrays_of
+with Renderer() as renderer:
+    renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS).trace(9.0, 2)
+"""
+SETTINGS = RenderSettings(32, 32, max_bounces=2)
+SCENES: dict[str, Any] = {
+    "plain": SCENE,
+    "rich": {
+        **SCENE,
+        "environment": {"type": "sky", "sun_elevation": 30, "sun_azimuth": 0},
+        "textures": {"t": {"type": "checker", "a": 0.1, "b": 0.8}},
+        "materials": {
+            "ball": {"type": "principled"},
+            "floor": {"type": "diffuse", "albedo": {"texture": "t"}},
+        },
+    },
+}
+
+
+def arrays_of(name: str) -> Any:
+    return pack(parse_scene(SCENES[name]), Shelf()).arrays
+
+
+@pytest.fixture(scope="module")
+def arrays(gpu: Renderer) -> Any:
+    return arrays_of("plain")
+
+
+class Ears:
+    """Hears what becomes of several tasks, in order."""
+
+    def __init__(self) -> None:
+        self.messages: asyncio.Queue[Any] = asyncio.Queue()
+
+    def heard(self, message: Any) -> None:
+        self.messages.put_nowait(message)
+
+    def again(self) -> None:
+        self.messages.put_nowait("again")
+
+    def lost(self, detail: str) -> None:
+        self.messages.put_nowait(detail)
+
+    async def next(self, task: int, *kinds: type) -> Any:
+        while True:
+            message = await asyncio.wait_for(self.messages.get(), 60)
+            assert not isinstance(message, str), message
+            if message.task == task and isinstance(message, kinds):
+                return message
+
+
+def helpers(parent: int | None) -> list[int]:
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            if of == parent and b"compiling" in (path / "cmdline").read_bytes():
+                found.append(int(path.name))
+        except OSError:
+            continue
+    return found
+
+
+def with_engine(test: Callable[[Engine], Awaitable[None]]) -> None:
+    async def run() -> None:
+        engine = Engine()
+        engine.start()
+        try:
+            await engine.ready(30)
+            await test(engine)
+        finally:
+            await engine.close()
+
+    asyncio.run(run())
+
+
+@pytest.fixture
+def cold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+async def beside(engine: Engine, arrays: Any, kill: bool = False, newer: bool = False) -> tuple[int, np.ndarray]:
+    """How often somebody else's picture had grown before a cold kernel was there; and what that one made."""
+    ears, other = Ears(), Ears()
+    busy, late = engine.open(other), engine.open(ears)
+    await engine.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
+    await other.next(busy, Loaded)
+    await engine.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
+    loaded = asyncio.create_task(ears.next(late, Loaded))
+    seen: list[int] = []
+    while not loaded.done():
+        engine.send(Read(busy, len(seen), LINEAR))
+        seen.append((await other.next(busy, Image)).progress.samples)
+        await asyncio.sleep(0)
+        if newer and len(seen) == 3:
+            engine.send(Update(late, 2, stop=StopRule(6), base=1))
+        if kill:
+            for helper in helpers(engine.process_id):
+                os.kill(helper, signal.SIGKILL)
+                kill = False
+    assert not kill
+    assert (await loaded).generation == 1 + newer and not engine.statistics.restarts
+    assert (await ears.next(late, Done)).reason == "max_samples"
+    engine.send(Read(late, 1, LINEAR))
+    pixels = np.array((await ears.next(late, Image)).pixels)
+    engine.drop(busy)
+    engine.drop(late)
+    return len(set(seen)), pixels
+
+
+def in_the_loop(gpu: Renderer, arrays: Any, samples: int = 4) -> np.ndarray:
+    scene = gpu.load(arrays)
+    picture = gpu.picture(scene, RenderSettings(32, 32, clamp=5.0))
+    picture.trace(60.0, samples)
+    pixels = picture.read()
+    picture.release()
+    scene.release()
+    return pixels
+
+
+def test_others_are_traced_meanwhile(gpu: Renderer, arrays: Any, cold: Path) -> None:
+    async def test(engine: Engine) -> None:
+        grown, pixels = await beside(engine, arrays, newer=True)
+        assert grown >= 5
+        assert np.array_equal(pixels, in_the_loop(gpu, arrays, samples=6))
+        assert len(helpers(engine.process_id)) == 1
+
+    with_engine(test)
+
+    async def again(engine: Engine) -> None:
+        await beside(engine, arrays)
+        assert helpers(engine.process_id) == []  # what is in the disk cache needs none
+
+    with_engine(again)
+
+
+def test_a_helper_that_dies_is_done_without(gpu: Renderer, arrays: Any, cold: Path) -> None:
+    async def test(engine: Engine) -> None:
+        _, pixels = await beside(engine, arrays, kill=True)
+        assert np.array_equal(pixels, in_the_loop(gpu, arrays))
+
+    with_engine(test)
+
+
+def test_without_a_cache_nobody_is_asked(
+    gpu: Renderer, arrays: Any, cold: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "true")
+
+    async def test(engine: Engine) -> None:
+        _, pixels = await beside(engine, arrays)
+        assert helpers(engine.process_id) == [] and np.array_equal(pixels, in_the_loop(gpu, arrays))
+
+    with_engine(test)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_the_renderer_finds_all_of_it(gpu: Renderer, cold: Path, name: str) -> None:
+    def run(program: str) -> str:
+        done = subprocess.run([sys.executable, "-c", program, name], capture_output=True, text=True, timeout=120)
+        assert done.returncode == 0, done.stderr
+        return done.stdout.strip()
+
+    def files() -> int:
+        return sum(path.is_file() for path in cold.rglob("*"))
+
+    if not gpu.info["software"]:
+        pytest.skip("other drivers keep their caches elsewhere")
+    assert run(AHEAD) == "True"
+    before = files()
+    run(RENDERER)
+    assert files() == before > 0
