@@ -70,7 +70,8 @@ function slider(field, id, events) {
 }
 
 function choice(field, id, { input, commit }) {
-  const select = element("select", { id, onchange: () => { input(select.value); commit(); } });
+  const select = element("select", { id, onchange: () => { input(select.value || undefined); commit(); } });
+  if (field.initial === undefined && !field.required) select.append(element("option", { value: "" }, "Automatic"));
   for (const name of field.choices.filter((option) => option !== null)) {
     select.append(element("option", { value: name }, inWords(name)));
   }
@@ -84,10 +85,11 @@ function toggle(field, id, { input, commit }) {
   return { element: box, show: (value) => { box.checked = Boolean(value); } };
 }
 
-// Three numbers in a row; a single one in the document stands for all three.
+// Numbers in a row, three or as two for u and v; a single one in the document stands for all.
 function vector(field, id, { input, commit, refuse, restore }) {
-  let latest = [0, 0, 0];
-  const entries = ["X", "Y", "Z"].map((axis, i) => {
+  const names = field.length === 2 ? ["U", "V"] : ["X", "Y", "Z"];
+  let latest = names.map(() => 0);
+  const entries = names.map((axis, i) => {
     const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
       input: (value) => input(latest.map((x, k) => (k === i ? value : x))), commit, refuse, restore,
     });
@@ -97,7 +99,7 @@ function vector(field, id, { input, commit, refuse, restore }) {
   return {
     element: element("div", { class: "vector" }, ...entries.map((entry) => entry.element)),
     show(value) {
-      latest = Array.isArray(value) ? value : [value ?? 0, value ?? 0, value ?? 0];
+      latest = Array.isArray(value) ? value : names.map(() => value ?? 0);
       entries.forEach((entry, i) => entry.show(latest[i]));
     },
   };

@@ -13,8 +13,7 @@ export function acceptFiles(node, take) {
     node.classList.remove("over");
     const [file] = event.dataTransfer.files;
     if (!file) return;
-    event.preventDefault();
-    event.stopPropagation();
+    event.preventDefault(); // the page sees it too, and only puts its own hint away
     take(file);
   });
 }

@@ -8,6 +8,7 @@ import { equal } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
 import { qualityChoice } from "./quality.js";
+import { TextureForm } from "./texturing.js";
 import { inWords } from "./words.js";
 
 // The settings that stand open; the others are a click away. The picture's size is the window's business.
@@ -73,14 +74,20 @@ export class Panel {
 
   // Puts a form for some fields of the place in the document into the panel.
   #mount(id, chosen, place) {
+    const textures = [];
     const form = schemaForm(chosen, {
       change: (name, value) => this.acts.edit(`${place}/${name}`, value),
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
       takeFile: (name, file) => this.acts.takeTexture(`${place}/${name}`, file),
+      beneath: (field) => {
+        const made = new TextureForm(field, { schema: this.schema.scene, place: `${place}/${field.name}`, acts: this.acts });
+        textures.push(made);
+        return made;
+      },
     });
     this.#find(`${id}-form`).replaceChildren(form.element);
-    return { place, ...form };
+    return { place, textures, ...form };
   }
 
   // `knobs`: what the chosen quality makes of the settings that are not given.
@@ -120,9 +127,15 @@ export class Panel {
     this.#qualities(presets, settings.quality ?? this.schema.settings.properties.quality.default, live);
   }
 
+  // The forms with their places, those inside of others first.
+  #places() {
+    const forms = Object.values(this.#forms);
+    return [...forms.flatMap(({ textures }) => textures.flatMap(({ parts }) => parts)), ...forms];
+  }
+
   // Says at the control for this place what is wrong with it: the control's place, or null where there is none.
   mark(wrong, text) {
-    for (const { place, mark } of Object.values(this.#forms)) {
+    for (const { place, mark } of this.#places()) {
       if (!wrong.startsWith(`${place}/`)) continue;
       const [name] = wrong.slice(place.length + 1).split("/");
       if (mark(name, text)) return `${place}/${name}`;
@@ -132,7 +145,7 @@ export class Panel {
 
   // Takes all such words away.
   forgive() {
-    for (const form of Object.values(this.#forms)) form.forgive();
+    for (const form of this.#places()) form.forgive();
     this.outliner.forgive();
   }
 }

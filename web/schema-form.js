@@ -24,13 +24,14 @@ function textureChip(field, { drop }) {
 
 const isTexture = (value) => isObject(value) && value.texture !== undefined;
 
-function row(field, { change, commit, forgive, takeFile }) {
+function row(field, { change, commit, forgive, takeFile, beneath }) {
   const id = freshId(field.name);
   const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
   const mark = (text) => {
     trouble.hidden = !text;
     trouble.textContent = text ?? "";
     for (const input of node.querySelectorAll("input, select")) {
+      if (under?.element.contains(input)) continue; // has words of its own
       if (text) input.setAttribute("aria-invalid", "true");
       else input.removeAttribute("aria-invalid");
     }
@@ -53,7 +54,8 @@ function row(field, { change, commit, forgive, takeFile }) {
   }
   const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
   const chip = field.takesTexture && textureChip(field, { drop: () => { change(field.name, undefined); commit(); } });
-  const parts = [label, widget.element, chip?.element, reset, hint, trouble].filter(Boolean);
+  const under = chip ? beneath?.(field) : undefined;
+  const parts = [label, widget.element, chip?.element, reset, under?.element, hint, trouble].filter(Boolean);
   const node = element("div", { class: "field", "data-field": field.name }, ...parts);
   if (chip && takeFile) acceptFiles(node, (file) => takeFile(field.name, file));
   for (const input of node.querySelectorAll("input, select")) {
@@ -69,6 +71,7 @@ function row(field, { change, commit, forgive, takeFile }) {
         chip.element.hidden = !textured;
         widget.element.hidden = textured;
         if (textured) chip.show(latest);
+        under?.show(latest);
       }
       if (trouble.hidden && !textured) widget.show(latest); // else what was refused stays in sight
       reset.hidden = textured || field.required || value === undefined || isSame(field, value, initial);
@@ -78,7 +81,8 @@ function row(field, { change, commit, forgive, takeFile }) {
 
 // Calls `change(name, value)` with each new value (undefined: the default again), `commit()` when the
 // hand comes to rest, `forgive()` when something refused is taken back by hand, `takeFile(name, file)` when an
-// image is dropped onto a field that takes textures.
+// image is dropped onto a field that takes textures; `beneath(field)` may make {element, show} for what such a
+// field has to say of its image.
 export function schemaForm(fields, acts) {
   const rows = new Map(fields.map((field) => [field.name, row(field, acts)]));
   return {

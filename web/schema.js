@@ -39,6 +39,11 @@ export const materialModels = (schema) => variants(schema, property(schema, sche
 export const environmentModels = (schema) => variants(schema, schema.properties.environment);
 export const shapeModels = (schema) => variants(schema, schema.properties.shapes.items);
 export const lightModels = (schema) => variants(schema, schema.properties.lights.items);
+// Of a texture: one that is made from nothing says its type, the other is an image.
+export function textureModel(schema, { type }) {
+  const union = property(schema, schema, "textures").additionalProperties;
+  return variants(schema, union)[type] ?? branches(schema, resolve(schema, union)).find((node) => !node.properties?.type);
+}
 export const transformModel = (schema) =>
   branches(schema, property(schema, Object.values(shapeModels(schema))[0], "transform")).find((node) => node.properties?.translate);
 
@@ -56,7 +61,7 @@ function field(schema, name, raw, required) {
   const nodes = [top, ...options];
   const color = bound(nodes, "x-widget") === "color";
   const numeric = options.find((node) => ["number", "integer"].includes(node.type));
-  const vector = !color && options.find((node) => node.type === "array" && node.maxItems === 3 && node.items?.type === "number");
+  const vector = !color && options.find((node) => node.type === "array" && [2, 3].includes(node.maxItems) && node.items?.type === "number");
   const reference = options.find((node) => node.properties?.texture);
   const whole = !options.some((node) => node.type === "number");
   const limits = [top, ...(numeric ? [numeric] : [])];
@@ -73,7 +78,8 @@ function field(schema, name, raw, required) {
     : reference ? "texture" : null;
   if (!widget || bound(nodes, "const") !== undefined) return null;
   return {
-    name, widget, choices, min, max, open, required, takesTexture: reference !== undefined,
+    name, widget, choices, min, max, open, required, takesTexture: reference !== undefined, reference,
+    length: vector?.maxItems,
     title: top.title ?? name,
     hint: bound(nodes, "description") ?? "",
     unit: bound(nodes, "x-unit") ?? "",

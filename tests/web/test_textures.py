@@ -1,0 +1,90 @@
+"""How an image lies, and how a parameter reads it, from the controls beneath the parameter."""
+
+from __future__ import annotations
+
+import io
+import json
+
+from PIL import Image
+
+from tests.web.conftest import Editor
+
+BENEATH = "#material-form [data-field=base_color] .beneath"
+
+
+def halves() -> bytes:
+    """Green at the left, dark blue at the right."""
+    image = Image.new("RGB", (16, 16), (0, 220, 0))
+    image.paste((0, 0, 40), (8, 0, 16, 16))
+    file = io.BytesIO()
+    image.save(file, "PNG")
+    return file.getvalue()
+
+
+def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
+    page = editor.page
+    plain = editor.settled()
+    assert page.is_hidden(BENEATH)
+    editor.drop("#material-form [data-field=base_color]", {"halves.png": halves()})
+    editor.wait("the texture", lambda: page.is_visible(BENEATH))
+    editor.wait_for_change(plain, 8)
+    assert page.is_hidden("#drop"), "what the page would do with a file is said no more"
+    before = editor.settled()
+    page.click(f"{BENEATH} > summary")
+    for name in ("channel", "factor", "color_space", "wrap", "scale", "rotation", "offset"):
+        assert page.is_visible(f"{BENEATH} [data-field={name}]"), name
+
+    offset = page.locator(f"{BENEATH} [data-field=offset] input").first
+    offset.fill("0.5")
+    offset.press("Enter")
+    editor.wait_for_change(before, 8)
+    page.keyboard.press("Control+z")
+    editor.wait("the image's place", lambda: not editor.differs(before, 6))
+    assert float(offset.input_value()) == 0
+
+    page.select_option(f"{BENEATH} [data-field=channel] select", "b")
+    editor.wait_for_change(before, 8)  # no blue in one half, little in the other
+    page.click(f"{BENEATH} [data-field=channel] .reset")
+    editor.wait("its colours", lambda: not editor.differs(before, 6))
+
+    page.select_option(f"{BENEATH} [data-field=wrap] select", "mirror")
+    page.select_option(f"{BENEATH} [data-field=color_space] select", "linear")
+    turn = page.locator(f"{BENEATH} [data-field=rotation] input[type=number]")
+    turn.fill("30")
+    turn.press("Enter")
+    across = page.locator(f"{BENEATH} [data-field=scale] input").first
+    across.fill("3")
+    across.press("Enter")
+    power = page.locator(f"{BENEATH} [data-field=factor] input[type=text]")
+    power.fill("0.5 0.5 0.5")
+    power.press("Enter")
+    editor.wait_for_change(before)
+    editor.settled()
+    assert editor.text("#messages") == ""
+    editor.tab("keep")
+    document = json.loads(editor.shot("text=Scene as JSON"))
+    assert document["materials"]["subject"]["base_color"] == {"texture": "halves", "factor": [0.5, 0.5, 0.5]}
+    lies = {key: value for key, value in document["textures"]["halves"].items() if key != "asset"}
+    assert lies == {"wrap": "mirror", "color_space": "linear", "rotation": 30, "scale": [3, 1]}
+
+    editor.tab("material")
+    page.click("[data-field=base_color] .texture button")
+    editor.wait("no texture", lambda: page.is_hidden(BENEATH) and page.is_hidden("[data-field=base_color] .texture"))
+    page.keyboard.press("Control+z")
+    editor.wait("the texture again", lambda: page.is_visible(f"{BENEATH} [data-field=wrap]"))
+    assert page.input_value(f"{BENEATH} [data-field=wrap] select") == "mirror"
+
+
+def test_what_is_wrong_with_a_texture_is_said_at_its_control(editor: Editor) -> None:
+    page = editor.page
+    editor.drop("#material-form [data-field=base_color]", {"halves.png": halves()})
+    editor.wait("the texture", lambda: page.is_visible(BENEATH))
+    page.click(f"{BENEATH} > summary")
+    second = page.locator(f"{BENEATH} [data-field=uv] input")
+    second.fill("7")
+    second.press("Enter")
+    editor.wait("the refusal", lambda: page.is_visible(f"{BENEATH} [data-field=uv] .trouble"))
+    assert page.locator("#material-form [aria-invalid=true]").count() == 1
+    second.fill("1")
+    second.press("Enter")
+    editor.wait("forgiveness", lambda: page.is_hidden(f"{BENEATH} [data-field=uv] .trouble"))
