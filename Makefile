@@ -29,7 +29,8 @@ hostile:
 	@.ci/setup test
 	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/test_hostile.py
 
-soak: setup
+soak:
+	@.ci/setup test
 	.venv/bin/python -m service.bench.soak --minutes $(or $(MINUTES),60)
 
 bench: setup

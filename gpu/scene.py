@@ -14,6 +14,7 @@ from gpu import energy, features, layout
 from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
 from gpu.layout import LightKind, Slot
+from gpu.pinned import pin
 from gpu.settings import RenderSettings
 from gpu.texels import Texels, rows
 
@@ -86,7 +87,8 @@ class Scene:
 
     def _upload_all(self) -> None:
         for slot, name in _BUFFERS.items():
-            self._buffers[slot] = self._upload(getattr(self.arrays, name))
+            array = getattr(self.arrays, name)
+            self._buffers[slot] = pin(self._context, array) or self._upload(array)
         self._buffers[Slot.MATERIALS] = self._upload(self._materials())
         self._upload_details()
         self._texels, cells = self._upload_environment()

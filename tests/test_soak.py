@@ -22,10 +22,21 @@ def test_what_is_not_good_enough() -> None:
     tally = Tally()
     for growth in (1, 1, 1, 2):
         tally.seen(growth << 20, 1, 10, settled=True)
-    assert tally.good(growth=1.6, fair=0.95) and not tally.good(growth=1.4, fair=0.95)
+    assert tally.good(growth=1.6, fair=0.95, page_growth=1.25) and not tally.good(
+        growth=1.4, fair=0.95, page_growth=1.25
+    )
     tally.jain = 0.9
-    assert not tally.good(growth=1.6, fair=0.95)
+    assert not tally.good(growth=1.6, fair=0.95, page_growth=1.25)
     tally.jain = 0.99
     tally.lose("render failed")
-    assert not tally.good(growth=1.6, fair=0.95)
+    assert not tally.good(growth=1.6, fair=0.95, page_growth=1.25)
     assert "render failed 1" in tally.table() and "0.990" in tally.table()
+
+
+def test_a_page_that_grows_is_not_good_enough() -> None:
+    tally = Tally()
+    for heap in (900, 4, 4, 5, 5):
+        tally.weighed(heap << 20, 1000, settled=heap < 900)
+    assert tally.good(growth=1.5, fair=0.95, page_growth=1.3)
+    assert not tally.good(growth=1.5, fair=0.95, page_growth=1.2)
+    assert "4.0 / 5.0" in tally.table()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import threading
 import time
 from collections import Counter
+from collections.abc import Sequence
 from statistics import median
 
 from service.bench.soak_server import Server, descriptors, resident
@@ -16,6 +17,7 @@ class Tally:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.kills = self.frames = self.renders = self.cancelled = self.uploads = self.vanished = self.stuck = 0
+        self.drags = 0  # by a hand on the page
         self.lost: Counter[str] = Counter()  # what should not have happened, by what
         self.errors: Counter[str] = Counter()  # what was refused, and meant to be
         self.first_frames_s: list[float] = []
@@ -26,6 +28,7 @@ class Tally:
         self._watchers: set[str] = set()
         self._memory: list[tuple[int, int, int]] = []  # server's, renderer's bytes, descriptors
         self._ended: tuple[int, int, int] = (0, 0, 0)
+        self._page: list[tuple[int, int]] = []  # bytes of heap, nodes
 
     def count(self, name: str, more: int = 1) -> None:
         with self._lock:
@@ -62,17 +65,23 @@ class Tally:
         if settled and renderer:
             self._memory.append((server, renderer, open_files))
 
+    def weighed(self, heap: int, nodes: int, settled: bool) -> None:
+        if settled:
+            self._page.append((heap, nodes))
+
     def end(self, server: Server) -> None:
         self._ended = resident(server.pid), resident(server.renderer()), descriptors(server.pid)
 
-    def good(self, growth: float, fair: float) -> bool:
-        early, late = self._halves(0)
+    def good(self, growth: float, fair: float, page_growth: float) -> bool:
+        early, late = _halves(self._memory, 0)
+        early_page, late_page = _halves(self._page, 0)
         return not (
             self.lost
             or self.stuck
             or self.exit_code
             or self.orphans
             or late > growth * early
+            or late_page > page_growth * early_page
             or (self.jain is not None and self.jain < fair)
         )
 
@@ -83,6 +92,9 @@ class Tally:
             ("frames", str(self.frames)),
             ("update to first frame, median / p95 (s)", _quantiles(self.first_frames_s)),
             ("renders done / cancelled", f"{self.renders} / {self.cancelled}"),
+            ("drags in a browser", str(self.drags) if self._page else "-"),
+            ("its page's heap, first / second half (MiB)", self._page_grown(0, MIB)),
+            ("its page's nodes, likewise", self._page_grown(1, 1)),
             ("uploads", str(self.uploads)),
             ("clients that vanished", str(self.vanished)),
             ("lost or wrong", _counts(self.lost)),
@@ -97,14 +109,22 @@ class Tally:
         width = max(len(name) for name, _ in rows)
         return "\n".join(f"{name:<{width}}  {value}" for name, value in rows)
 
-    def _halves(self, which: int) -> tuple[float, float]:
-        values = [seen[which] for seen in self._memory]
-        middle = len(values) // 2
-        return (median(values[:middle]), median(values[middle:])) if middle else (0.0, 0.0)
-
     def _grown(self, which: int) -> str:
         scale = 1 if which == 2 else MIB
-        return " / ".join(f"{value / scale:.0f}" for value in (*self._halves(which), self._ended[which]))
+        return " / ".join(f"{value / scale:.0f}" for value in (*_halves(self._memory, which), self._ended[which]))
+
+    def _page_grown(self, which: int, scale: int) -> str:
+        decimals = 0 if scale == 1 else 1
+        return (
+            " / ".join(f"{value / scale:.{decimals}f}" for value in _halves(self._page, which)) if self._page else "-"
+        )
+
+
+def _halves(seen: Sequence[tuple[int, ...]], which: int) -> tuple[float, float]:
+    """Medians of the first and the second half of what was seen."""
+    values = [each[which] for each in seen]
+    middle = len(values) // 2
+    return (median(values[:middle]), median(values[middle:])) if middle else (0.0, 0.0)
 
 
 def _quantiles(values: list[float]) -> str:

@@ -42,6 +42,18 @@ class Named(BaseModel):
     title: str
 
 
+class Kernel(BaseModel):
+    raised: list[str] = Field(description="Features of the scene that the kernel was compiled with.")
+    not_raised: list[str] = Field(description="Features that it was spared.")
+    compile_ms: float
+
+
+class Forecast(BaseModel):
+    samples: int
+    seconds: float = Field(description="From the render's start, as this scene goes on this machine.")
+    noise: float
+
+
 class Render(BaseModel):
     id: str
     state: Literal["queued", "running", "done", "cancelled", "failed"]
@@ -50,7 +62,9 @@ class Render(BaseModel):
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
     elapsed_s: float = Field(description="From the first dispatch to the end of the last sample.")
     setup_s: float = Field(description="Loading, building and compiling before that.")
+    kernel: Kernel | None = Field(description="Null until the scene is loaded.")
     eta_s: float | None
+    forecast: dict[str, Forecast] | None = Field(description="By quality preset; null until 16 samples tell.")
     warnings: list[str]
     settings: dict[str, Any] = Field(description="What each knob became; null is no such limit.")
 
