@@ -65,6 +65,7 @@ def test_what_an_upload_is_told(store: AssetStore) -> None:
     info = store.add(OBJ)
     assert re.fullmatch("sha256:[0-9a-f]{64}", info.id)
     assert (info.kind, info.bytes, info.vertices, info.triangles, info.width) == ("mesh", len(OBJ), 3, 1, None)
+    assert info.bounds == [np.min(TRIANGLE, axis=0).tolist(), np.max(TRIANGLE, axis=0).tolist()]
     info = store.add(EXR)
     assert (info.kind, info.width, info.height, info.channels, info.triangles) == ("image", 16, 8, 3, None)
 

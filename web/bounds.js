@@ -1,4 +1,5 @@
-// The ball around a shape, as far as its document tells; files of triangles are measured in the picture.
+// The ball around a shape, as far as its document or what was uploaded here tells; other files of triangles are
+// measured in the picture.
 
 import { add, length, mix, scale, subtract } from "./vector.js";
 
@@ -23,6 +24,11 @@ export function place(point, transform) {
 
 const corners = (low, high) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high : low)[k]));
 
+const measured = new Map(); // the corners of uploaded meshes, by asset
+
+// `bounds`: least and greatest coordinates, as the server answers an upload.
+export const measure = (asset, [low, high]) => measured.set(asset, corners(low, high));
+
 function points(shape) {
   if (shape.type === "sphere") {
     return [0, 1, 2].flatMap((k) => [-1, 1].map((side) => shape.center.map((x, i) => x + (i === k ? side * shape.radius : 0))));
@@ -32,7 +38,7 @@ function points(shape) {
     const { origin, u, v } = shape;
     return [origin, add(origin, u), add(origin, v), add(add(origin, u), v)];
   }
-  return shape.vertices ?? null;
+  return shape.vertices ?? measured.get(shape.asset) ?? null;
 }
 
 // {center, radius} of a cloud of points: around the middle of its box.
@@ -46,6 +52,16 @@ export function around(cloud) {
 export function ball(shape) {
   const cloud = points(shape);
   return cloud?.length ? around(cloud.map((point) => place(point, shape.transform))) : null;
+}
+
+// How far to move a ball along a direction to get it out of a sphere or box that holds its middle; null: it's free.
+export function wayOut({ center, radius }, shapes, direction) {
+  const solid = shapes.filter(({ type }) => type === "sphere" || type === "box").map(ball)
+    .find((each) => length(subtract(each.center, center)) < each.radius);
+  if (!solid) return null;
+  const offset = subtract(solid.center, center);
+  const along = offset.reduce((sum, x, i) => sum + x * direction[i], 0);
+  return scale(direction, Math.max(0, along) + solid.radius + 1.1 * radius);
 }
 
 // Of several balls, the box around them.

@@ -2,6 +2,8 @@
 // images textures, glTF a scene, JSON what it says it is.
 
 import { fetchAssetScene, upload } from "./api.js";
+import { ball, measure, wayOut } from "./bounds.js";
+import { axes } from "./camera.js";
 import { equal, pointer, put } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
@@ -80,13 +82,22 @@ export class Importer {
     this.messages.show("import", { title: `${file.name}: not everything was taken.`, list });
   }
 
-  #addMesh({ id, warnings = [] }, file) {
+  // In sight: the camera goes where it fills the picture, and what lies inside of something else is put beside it.
+  #addMesh({ id, bounds, warnings = [] }, file) {
     const { state } = this.acts;
     // Images need coordinates that a mesh may lack: it gets a plain material of its own then.
     const isTextured = JSON.stringify(this.acts.material).includes('"texture":');
     const material = isTextured ? fresh(stem(file), state.scene.materials) : state.chosen.material;
     const materials = isTextured ? { ...state.scene.materials, [material]: { type: "principled" } } : state.scene.materials;
-    this.acts.add("shapes", { type: "mesh", asset: id, material }, { materials });
+    let shape = { type: "mesh", asset: id, material };
+    let { camera } = state.scene;
+    if (bounds) {
+      measure(id, bounds);
+      const out = wayOut(ball(shape), state.scene.shapes, axes(this.acts.camera).right);
+      if (out) shape = { ...shape, transform: { translate: out.map((x) => Number(x.toPrecision(4))) } };
+      if (ball(shape).radius > 0) camera = { ...camera, ...this.acts.framed(ball(shape)) };
+    }
+    this.acts.add("shapes", shape, { materials, camera });
     this.#tell(file, warnings);
   }
 

@@ -138,6 +138,7 @@ const thumbnails = new Thumbnails(() => isConnected && ended === painted && !isP
 const importer = new Importer({ schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y) });
 editor.takeTexture = (place, file) => importer.texture(place, file);
 editor.frame = (thing) => stage.frame(thing);
+editor.framed = (around) => stage.framed(around);
 editor.radius = () => stage.radius();
 const panel = new Panel(find("panel"), {
   schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch),

@@ -131,6 +131,9 @@ export class Stage {
     this.say(`Focus at ${along.toPrecision(3)} metres${lens.aperture_radius ? ", aperture opened" : ""}`);
   }
 
+  // What of the camera has to change for a ball to fill the picture.
+  framed(around) { return frame(this.acts.camera, around, this.aspect); }
+
   // Brings a thing into the middle; without one, everything that is not endless.
   async frame(thing = this.acts.state.chosen.thing) {
     const { scene } = this.acts.state;
@@ -139,7 +142,7 @@ export class Stage {
       const around = shape
         ? ball(shape) ?? (await this.picker.ball(scene, this.acts.camera, Number(thing.split("/")[2])))
         : together(scene.shapes.filter(({ type }) => type !== "quad").map(ball).filter(Boolean));
-      if (around?.radius > 0) this.acts.setCamera(frame(this.acts.camera, around, this.aspect));
+      if (around?.radius > 0) this.acts.setCamera(this.framed(around));
       else this.say("It can't be seen from here");
     } catch (error) {
       this.complain(error);

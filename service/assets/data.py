@@ -78,6 +78,7 @@ class AssetInfo:
     channels: int | None = None
     vertices: int | None = None
     triangles: int | None = None
+    bounds: list[list[float]] | None = None  # of an uploaded mesh's triangles: least and greatest x, y, z, m
     warnings: list[dict[str, str]] | None = None
 
 

@@ -12,6 +12,8 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import Protocol
 
+import numpy as np
+
 from service.assets.data import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
 from service.assets.errors import ParseError
 from service.assets.importing import Imported, take_apart
@@ -251,6 +253,13 @@ def _describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
         height, width, channels = parsed.pixels.shape
         return AssetInfo(id, KINDS[format], format, size, width=width, height=height, channels=channels)
     warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
-    return AssetInfo(
-        id, KINDS[format], format, size, vertices=len(parsed.vertices), triangles=len(parsed.faces), warnings=warnings
-    )  # fmt: skip
+    counts = {"vertices": len(parsed.vertices), "triangles": len(parsed.faces)}
+    return AssetInfo(id, KINDS[format], format, size, **counts, bounds=_bounds(parsed), warnings=warnings)
+
+
+def _bounds(mesh: MeshData) -> list[list[float]]:
+    """Corners of the box around its triangles; a vertex of none does not count."""
+    used = np.zeros(len(mesh.vertices), bool)
+    used[mesh.faces] = True
+    corners = mesh.vertices[used]
+    return [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]

@@ -138,6 +138,7 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.page.evaluate("document.activeElement.blur()")
     editor.page.keyboard.press("Delete")
     editor.wait("its end", lambda: things.count() == 4)
+    editor.page.keyboard.press("Home")
 
     red = io.BytesIO()
     Image.new("RGB", (8, 8), (0, 200, 0)).save(red, "PNG")
@@ -155,6 +156,21 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.wait("no texture", lambda: editor.page.is_hidden("[data-field=base_color] .texture"))
     editor.drop("#stage", {"broken.glb": b"glTF nonsense"})
     editor.wait("a refusal", lambda: "broken.glb was not taken" in editor.text("#messages"))
+
+
+def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
+    """Of a few centimetres, and inside of the ball where its file has it."""
+    before = editor.settled()
+    tiny = b"v -.02 .98 0\nv .02 .98 0\nv 0 1.02 0\nv 0 1 .03\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    editor.drop("#stage", {"tiny.obj": tiny})
+    editor.tab("scene")
+    editor.wait("the mesh", lambda: editor.text("#thing-title") == "Mesh")
+    editor.settled()
+    editor.page.click("#outline-list [data-thing='/camera']")
+    editor.page.click("#stage")
+    editor.wait("what is in the middle", lambda: editor.text("#thing-title") == "Mesh")
+    editor.page.keyboard.press("Control+z")
+    editor.wait("all as before", lambda: not editor.differs(before, 6))
 
 
 def test_things_are_added_moved_and_removed(editor: Editor) -> None:
