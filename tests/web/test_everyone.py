@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import json
 from collections.abc import Iterator
 from typing import Any
 
 import pytest
 from axe_playwright_python.sync_playwright import Axe
-from playwright.sync_api import Browser, BrowserContext
+from playwright.sync_api import Browser, BrowserContext, WebSocketRoute
+from websockets.sync.client import connect
+from websockets.typing import Subprotocol
 
 from gpu import Renderer
 from tests.serving import Server
@@ -168,3 +171,48 @@ def test_a_cut_connection_takes_its_session_up_again(context: BrowserContext, se
     editor.wait("the picture", lambda: editor.samples() > samples and editor.text("#messages") == "")
     assert "session=" in editor.page.evaluate("window.sockets.at(-1).url")
     assert editor.page.evaluate("window.sockets.length") == 2
+
+
+def test_a_session_that_another_tab_took_goes_on_when_asked(context: BrowserContext, server: Server) -> None:
+    editor = Editor(context.new_page())
+    greetings: list[str] = []
+
+    def listen(data: str | bytes) -> None:
+        if isinstance(data, str) and (said := json.loads(data))["type"] == "hello":
+            greetings.append(said["session"])
+
+    editor.page.on("websocket", lambda socket: socket.on("framereceived", listen))
+    editor.open(server.url)
+    url = f"{server.url.replace('http', 'ws')}/v1/stream?session={greetings[0]}"
+    with connect(url, subprotocols=[Subprotocol("sunbox.v1")], max_size=None):
+        editor.wait("what happened", lambda: "goes on in another tab" in editor.text("#messages"))
+        assert editor.text("#state") == "Offline" and editor.page.is_visible("text=Try again")
+        editor.page.wait_for_timeout(500)
+        assert len(greetings) == 1, "two tabs must not take it from one another in turn"
+        editor.page.click("text=Try again")
+        editor.wait("a picture", lambda: len(greetings) == 2 and editor.text("#messages") == "")
+    assert greetings[0] != greetings[1]
+    editor.settled()
+
+
+def test_a_lost_renderer_is_told_and_waited_for(context: BrowserContext, server: Server) -> None:
+    editor = Editor(context.new_page())
+    routes: list[WebSocketRoute] = []
+
+    def pass_on(route: WebSocketRoute) -> None:
+        route.connect_to_server()
+        routes.append(route)
+
+    editor.page.route_web_socket("**/v1/stream**", pass_on)
+    editor.open(server.url)
+    editor.page.evaluate("""() => {
+        window.told = [];
+        const root = document.querySelector("#messages");
+        const watch = new MutationObserver(() => window.told.push(root.innerText));
+        watch.observe(root, { childList: true, subtree: true });
+    }""")
+    routes[-1].close(code=4500, reason="The renderer fell three times.")
+    editor.wait("the picture", lambda: len(routes) == 2 and editor.text("#messages") == "")
+    told = " ".join(editor.page.evaluate("window.told"))
+    assert "The server lost its renderer. Your scene is safe here. Trying to reconnect" in told
+    editor.settled()
