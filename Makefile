@@ -2,7 +2,7 @@
 # make test              set everything up and pass the tests
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/test_hostile.py
-# make soak [MINUTES=]   mixed clients while renderers are killed, and a table of what came of it
+# make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
 # make bench | lint | setup [PYTHON=python3.12]

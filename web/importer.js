@@ -73,13 +73,13 @@ export class Importer {
   async #openScene({ id, warnings = [] }, file) {
     const document = await fetchAssetScene(id);
     this.acts.openScene(document, stem(file));
-    this.#tell(file, warnings);
+    this.#tell(file, warnings, "not everything was taken.");
   }
 
-  #tell(file, warnings) {
+  #tell(file, warnings, what) {
     if (!warnings.length) return;
     const list = warnings.map((each) => (typeof each === "string" ? each : [each.pointer, each.detail].filter(Boolean).join(": ")));
-    this.messages.show("import", { title: `${file.name}: not everything was taken.`, list });
+    this.messages.show("import", { title: `${file.name}: ${what}`, list });
   }
 
   // In sight: the camera goes where it fills the picture, and what lies inside of something else is put beside it.
@@ -98,7 +98,7 @@ export class Importer {
       if (ball(shape).radius > 0) camera = { ...camera, ...this.acts.framed(ball(shape)) };
     }
     this.acts.add("shapes", shape, { materials, camera });
-    this.#tell(file, warnings);
+    this.#tell(file, warnings, "taken as it is.");
   }
 
   #colorField() {

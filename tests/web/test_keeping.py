@@ -165,6 +165,7 @@ def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
     editor.drop("#stage", {"tiny.obj": tiny})
     editor.tab("scene")
     editor.wait("the mesh", lambda: editor.text("#thing-title") == "Mesh")
+    assert "tiny.obj: taken as it is. 3 edges" in " ".join(editor.text("#messages").split())
     editor.settled()
     editor.page.click("#outline-list [data-thing='/camera']")
     editor.page.click("#stage")
