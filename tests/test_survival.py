@@ -104,6 +104,17 @@ def test_kills_in_a_row_leave_nothing_behind(fragile: Server) -> None:
         assert fragile.http.delete(f"/v1/renders/{job}").status_code == 204
 
 
+def test_renderers_that_are_killed_before_they_could_start_cost_nobody_his_stream(fragile: Server) -> None:
+    with opened(fragile) as stream:
+        stream.start(settings=ENDLESS)
+        stream.frame()
+        for _ in range(5):  # more in a row than may fail by themselves
+            pid = kill(fragile)
+            until(lambda pid=pid: fragile.renderer() != pid)
+        stream.say("update", generation=2, scene={"materials": {"ball": {"roughness": 0.8}}})
+        assert stream.frame(generation=2).generation == 2
+
+
 def test_a_renderer_that_hangs_is_replaced(fragile: Server) -> None:
     with opened(fragile) as stream:
         stream.start(settings=ENDLESS)

@@ -167,7 +167,8 @@ def vanish(server: Server, tally: Tally, over: threading.Event, chance: random.R
             else:
                 silent.append(stream)
         while len(silent) > 3:
-            silent.pop(0).socket.socket.shutdown(socket.SHUT_RDWR)
+            with suppress(OSError):  # the server had had enough of it
+                silent.pop(0).socket.socket.shutdown(socket.SHUT_RDWR)
         tally.count("vanished")
     for stream in silent:
         with suppress(OSError):

@@ -33,6 +33,8 @@ from service.rendering.record import Record
 from service.rendering.statistics import Kind, Statistics
 
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
+BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start
+SHOTS = 10  # killed before it could render, so many times as often, it is given up all the same
 BETWEEN_TRIES_S = 0.5
 HOPELESS_S = 15.0  # ... between those that come then, and find nobody waiting
 STRIKES = 3  # renderers that a task may bring down
@@ -75,7 +77,7 @@ class Engine:
         self._ready: asyncio.Future[dict[str, Any]] | None = None
         self._process: Process | None = None
         self._lost_at: float | None = None
-        self._failures = 0
+        self._failures = 0.0
         self._detail = "The renderer has not been started."
         self._chores: set[asyncio.Task[None]] = set()
         self._closed = False
@@ -278,9 +280,10 @@ class Engine:
 
     async def _replace(self, process: Process) -> None:
         cause = await process.end(0.0)
-        self._failures = 0 if process.ready else self._failures + 1
+        by_others = cause in BY_OTHERS
+        self._failures = 0 if process.ready else self._failures + (1 / SHOTS if by_others else 1)
         self.statistics.restarts[cause] += 1
-        log.error("renderer lost cause=%s lived_s=%.1f failures=%d", cause, process.lived_s, self._failures)
+        log.error("renderer lost cause=%s lived_s=%.1f failures=%.1f", cause, process.lived_s, self._failures)
         self._blame(process, cause)
         if self.hopeless:
             self._fail_all(self._detail)
@@ -297,7 +300,7 @@ class Engine:
         """Three strikes against the task that was worked on, where nobody from outside ended the renderer."""
         task = process.pulse.task
         held = self._tasks.get(task)
-        if held is None or cause in ("killed", "stopped"):
+        if held is None or cause in BY_OTHERS:
             return
         held.strikes += 1
         held.struck_at = time.monotonic()
