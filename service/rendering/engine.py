@@ -35,6 +35,7 @@ from service.rendering.statistics import Kind, Statistics
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
 BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start
 SHOTS = 10  # killed before it could render, so many times as often, it is given up all the same
+LAST_WORDS_S = 1.0  # for a renderer whose end of the link is closed to be gone: then its exit code tells why
 BETWEEN_TRIES_S = 0.5
 HOPELESS_S = 15.0  # ... between those that come then, and find nobody waiting
 STRIKES = 3  # renderers that a task may bring down
@@ -279,7 +280,7 @@ class Engine:
         self._do(self._replace(process))
 
     async def _replace(self, process: Process) -> None:
-        cause = await process.end(0.0)
+        cause = await process.end(LAST_WORDS_S)
         by_others = cause in BY_OTHERS
         self._failures = 0 if process.ready else self._failures + (1 / SHOTS if by_others else 1)
         self.statistics.restarts[cause] += 1
