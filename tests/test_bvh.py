@@ -114,8 +114,8 @@ def trace(tree, nodes, lower, upper, ordered, origin, direction, count=None):
         hit = enter <= leave and leave >= 0 and enter <= nearest
         if link & LEAF_BIT:
             if hit:
-                _, first, count = leaf(link)
-                nearest = min(nearest, hits(origin, direction, ordered[first : first + count]).min())
+                _, first, size = leaf(link)
+                nearest = min(nearest, hits(origin, direction, ordered[first : first + size]).min())
             at += 1
         elif link & TREELET_BIT:
             at += 1
