@@ -158,6 +158,7 @@ class Stream:
 
     def heard(self, message: FromRenderer) -> None:
         if isinstance(message, Frame):
+            self._live.works = max(self._live.works, message.generation)  # else every edit's documents are kept
             if self._flow.welcome(message):
                 self._post(message)
         elif isinstance(message, Done):
