@@ -8,6 +8,7 @@ import select
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
@@ -18,6 +19,8 @@ from gpu import denoise
 from service.rendering import link
 
 ROOT = Path(__file__).parents[3]
+# How long a stream waits for its denoised frame, and in times of what the last one took; then it goes on without.
+PATIENCE_S, PATIENCE = 3.0, 3.0
 TRIES = 3  # deaths in a row; then nothing is denoised any more, and the reason is told
 NOT_INSTALLED = "Open Image Denoise (the Python package pyoidn) is not installed"
 DIED = "the denoiser ended unexpectedly"
@@ -53,10 +56,22 @@ class Denoiser:
         self._end: socket.socket | None = None
         self._told: Callable[[Delivery], None] | None = None
         self._deaths = 0
+        self._asked_at = self._took_s = 0.0
 
     @property
     def busy(self) -> bool:
         return self._told is not None
+
+    @property
+    def left_s(self) -> float | None:
+        """How much longer its answer is worth waiting for, at least 0; None when there is none to come."""
+        patience_s = max(PATIENCE_S, PATIENCE * self._took_s)
+        return max(self._asked_at + patience_s - time.monotonic(), 0.0) if self.busy else None
+
+    @property
+    def late(self) -> bool:
+        """Busier machines starve it, as it runs at the lowest priority: what waits for it is to go on."""
+        return self.left_s == 0.0
 
     @property
     def ends(self) -> list[socket.socket]:
@@ -65,7 +80,7 @@ class Denoiser:
 
     def ask(self, order: Order, told: Callable[[Delivery], None]) -> None:
         """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
-        self._told = told
+        self._told, self._asked_at = told, time.monotonic()
         try:
             link.send(self._begin(), order)
         except link.Closed:  # it had just ended, being idle
@@ -88,6 +103,7 @@ class Denoiser:
             delivery = Delivery(None, DIED, missing=self._deaths >= TRIES)
         else:
             self._deaths = 0
+            self._took_s = time.monotonic() - self._asked_at
         if delivery.detail:
             log.warning("not denoised: %s", delivery.detail)
         if delivery.missing:

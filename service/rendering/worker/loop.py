@@ -78,7 +78,8 @@ class Loop:
         """What has come in by now; with `wait`, as soon as there is anything, or a helper has spoken."""
         if wait:
             ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
-            select.select(ends, [], [], self._compiler.left_s)
+            waits = [self._compiler.left_s, None if self._denoiser.late else self._denoiser.left_s]
+            select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
         try:
             while True:
                 message = link.receive(self._end)

@@ -57,12 +57,12 @@ class Smoothing:
     @property
     def holds(self) -> bool:
         """The denoiser needs the processor that would trace this picture."""
-        return self.pending and self._yields
+        return self.pending and self._yields and not self._denoiser.late
 
     @property
     def under_way(self) -> bool:
         """A denoised picture will be there soon."""
-        return self.pending or not self._denoiser.busy
+        return (self.pending or not self._denoiser.busy) and not self._denoiser.late
 
     def covers(self, aov: str, noise: float | None) -> bool:
         """Whether such a picture is shown denoised: not when it is clean, nor when nothing can denoise it."""

@@ -336,11 +336,13 @@ class Task:
         return True
 
     def _smooth_frame(self) -> Smooth | None:
-        """The newest denoised picture, unless the client has seen more samples than are in it."""
-        latest, seen = self._smoothing.latest, self._served[:2] == (self.generation, 1.0)
-        if latest is None or (seen and latest.progress.samples < int(str(self._served[2]))):
-            return None
-        return latest
+        """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
+        latest = self._smoothing.latest
+        if latest is None or self._served[:2] != (self.generation, 1.0):
+            return latest
+        samples, seen = latest.progress.samples, int(str(self._served[2]))
+        stale = samples == seen < self._full.samples and not self._smoothing.under_way
+        return None if samples < seen or stale else latest
 
     def _holds_frame(self, want: Want) -> bool:
         """Whether the client has something to look at until the denoised picture comes, which can't be long."""
