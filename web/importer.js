@@ -4,7 +4,7 @@
 import { fetchAssetScene, upload } from "./api.js";
 import { ball, measure, wayOut } from "./bounds.js";
 import { axes } from "./camera.js";
-import { equal, pointer, put } from "./patch.js";
+import { at, equal, isObject, pointer, put } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 
@@ -122,10 +122,15 @@ export class Importer {
     if (kind !== "image") throw new Error("An image is needed here: PNG, JPEG, WebP, EXR or HDR.");
     const { state } = this.acts;
     const textures = state.scene.textures ?? {};
-    const same = Object.keys(textures).find((name) => equal(textures[name], { asset: id }));
+    // An image that takes another's place is read as that one was, and lies as it lay.
+    const before = at(state, place);
+    const reading = isObject(before) ? before : {};
+    const { type, ...lying } = textures[reading.texture] ?? {};
+    const texture = { ...(type ? {} : lying), asset: id };
+    const same = Object.keys(textures).find((name) => equal(textures[name], texture));
     const name = same ?? fresh(stem(file), textures);
-    const scene = { ...state.scene, textures: { ...textures, [name]: { asset: id } } };
-    this.acts.change(put({ ...state, scene }, place, { texture: name }));
+    const scene = { ...state.scene, textures: { ...textures, [name]: texture } };
+    this.acts.change(put({ ...state, scene }, place, { ...reading, texture: name }));
   }
 }
 

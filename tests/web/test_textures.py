@@ -12,9 +12,9 @@ from tests.web.conftest import Editor
 BENEATH = "#material-form [data-field=base_color] .beneath"
 
 
-def halves() -> bytes:
-    """Green at the left, dark blue at the right."""
-    image = Image.new("RGB", (16, 16), (0, 220, 0))
+def halves(left: tuple[int, int, int] = (0, 220, 0)) -> bytes:
+    """Green at the left unless told, dark blue at the right."""
+    image = Image.new("RGB", (16, 16), left)
     image.paste((0, 0, 40), (8, 0, 16, 16))
     file = io.BytesIO()
     image.save(file, "PNG")
@@ -73,6 +73,35 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     page.keyboard.press("Control+z")
     editor.wait("the texture again", lambda: page.is_visible(f"{BENEATH} [data-field=wrap]"))
     assert page.input_value(f"{BENEATH} [data-field=wrap] select") == "mirror"
+
+
+def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> None:
+    page = editor.page
+    for parameter in ("roughness", "base_color"):
+        editor.drop(f"#material-form [data-field={parameter}]", {"halves.png": halves()})
+        editor.wait("the texture", lambda name=parameter: page.is_visible(f"[data-field={name}] .beneath"))
+    page.click(f"{BENEATH} > summary")
+    shared = f"{BENEATH} > p"
+    assert editor.text(shared) == "How it lies holds for all 2 parameters that show halves."
+    turn = page.locator(f"{BENEATH} [data-field=rotation] input[type=number]")
+    turn.fill("30")
+    turn.press("Enter")
+    page.select_option(f"{BENEATH} [data-field=channel] select", "r")
+    power = page.locator(f"{BENEATH} [data-field=factor] input[type=text]")
+    power.fill("0.5 0.5 0.5")
+    power.press("Enter")
+    before = editor.settled()
+    editor.drop("#material-form [data-field=base_color]", {"other.png": halves((220, 0, 0))})
+    editor.wait("the other image", lambda: "other" in editor.text("[data-field=base_color] .texture"))
+    editor.wait_for_change(before, 8)  # the first has no red
+    assert page.is_hidden(shared), "nothing else shows the other image"
+    assert float(turn.input_value()) == 30
+    editor.tab("keep")
+    document = json.loads(editor.shot("text=Scene as JSON"))
+    coat, textures = document["materials"]["subject"], document["textures"]
+    assert coat["base_color"] == {"texture": "other", "channel": "r", "factor": [0.5, 0.5, 0.5]}
+    assert coat["roughness"] == {"texture": "halves"}
+    assert textures["other"]["rotation"] == textures["halves"]["rotation"] == 30
 
 
 def test_what_is_wrong_with_a_texture_is_said_at_its_control(editor: Editor) -> None:
