@@ -21,11 +21,14 @@ from service.pack.tree import LINEAR, plant, stand_out, triangle_bounds
 from service.pack.values import vec3
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
+from service.shared import LEAST, Shelf, trim
+
+MANY = 100_000  # triangles, after which what was needed on the way is worth giving back
 
 
 @dataclass(frozen=True)
 class Geometry:
-    """Records by kind, in final order: of a kind in `bvh_kinds` that of the leaves."""
+    """Records by kind, in final order: of a kind in `bvh_kinds` that of the leaves. Large ones are shared memory."""
 
     shapes: dict[ShapeKind, np.ndarray]
     triangle_normals: np.ndarray
@@ -61,33 +64,47 @@ def geometry(
         analytic = _analytic(placed, origin)
     records.only_vast(analytic[ShapeKind.SPHERE][0], low, high)
     triangles, normals, degenerate, kept = meshes.triangles(placed_meshes, origin)
-    corners = {name: meshes.at_corners(placed_meshes, kept, name) for name in ("uvs", "uvs_1", "colors")}
     found = {kind: array for kind, (array, _) in analytic.items()} | {ShapeKind.TRIANGLE: triangles}
     bounds = {kind: bounds for kind, (_, bounds) in analytic.items() if len(found[kind]) > LINEAR[kind]}
     if len(triangles) > LINEAR[ShapeKind.TRIANGLE]:
         bounds[ShapeKind.TRIANGLE] = triangle_bounds(triangles)
     nodes, node_origin, node_scale = np.zeros(0, Node.dtype), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
-    standing: dict[ShapeKind, np.ndarray] = {}
+    standing, order = dict[ShapeKind, np.ndarray](), dict[ShapeKind, np.ndarray]()
     node_count = 0
     if bounds:
         standing = stand_out(bounds)
         nodes, node_count, order, node_origin, node_scale = plant(bounds, standing)
-        found |= {kind: found[kind][places] for kind, places in order.items()}
-        if len(normals) and ShapeKind.TRIANGLE in order:
-            normals = normals[order[ShapeKind.TRIANGLE]]
-        if ShapeKind.TRIANGLE in order:
-            corners = {n: a[order[ShapeKind.TRIANGLE]] if len(a) else a for n, a in corners.items()}
+    kinds = frozenset(bounds)
+    del triangles, bounds
+    rows = order.get(ShapeKind.TRIANGLE)
+    shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes, normals)))
+    nodes = shelf.put(nodes)
+    for kind in found:  # one after the other, so that only one is there twice
+        found[kind] = shelf.put(found[kind], order.get(kind))
+    normals = shelf.put(normals, rows if len(normals) else None)
+    uvs, uvs_1, colors = (
+        _shelved(meshes.at_corners(placed_meshes, kept, name), rows) for name in ("uvs", "uvs_1", "colors")
+    )
     _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
     warnings = odd + [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
     warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
     warnings += lost(low, high, owners, exact, origin)
+    for array in (*found.values(), nodes, normals, uvs, uvs_1, colors):
+        array.flags.writeable = array.nbytes < LEAST  # others may have it mapped
+    if len(found[ShapeKind.TRIANGLE]) > MANY:
+        trim()
     return Geometry(
-        found, normals, corners["uvs"], corners["uvs_1"], corners["colors"], shining, areas, nodes, node_count,
-        node_origin, node_scale, frozenset(bounds), {kind: len(places) for kind, places in standing.items()},
+        found, normals, uvs, uvs_1, colors, shining, areas, nodes, node_count,
+        node_origin, node_scale, kinds, {kind: len(places) for kind, places in standing.items()},
         vec3(origin), radius, tuple(warnings),
     )  # fmt: skip
+
+
+def _shelved(corners: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
+    """What triangles have at their corners, in final order."""
+    return Shelf(corners.nbytes).put(corners, rows if len(corners) else None)
 
 
 def _hide(records: dict[ShapeKind, np.ndarray], shapes: Sequence[Shape]) -> None:

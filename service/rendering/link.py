@@ -1,8 +1,9 @@
 """Messages between the server and the renderer's process: a datagram each, its arrays in one piece of shared memory.
 
 A message is pickled (both ends are this program, on a private socket pair). Its arrays stay out of the pickle: they
-are laid one after the other into a memfd, whose descriptor travels with the datagram. The receiver maps it and gets
-read-only arrays without a copy. (A memfd, and not /dev/shm: a container's holds 64 MB.)
+are laid one after the other into a memfd, whose descriptor travels with the datagram; those that lie in a
+`service.shared` block already stay there, and its descriptor goes along. The receiver maps them and gets read-only
+arrays without a copy. (A memfd, and not /dev/shm: a container's holds 64 MB.)
 """
 
 from __future__ import annotations
@@ -17,13 +18,17 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
+from service import shared
+
 INLINE = 32 * 1024  # bytes of a pickle; a longer one goes to memory: a datagram must fit the socket's buffer
 ALIGNMENT = 64  # a cache line, and more than any dtype asks for
 RECEIVED = 2 * INLINE
 DESCRIPTOR = struct.Struct("i")
-ROOM = socket.CMSG_SPACE(DESCRIPTOR.size)  # for one descriptor
+MOST = 8  # descriptors that go with a datagram
+ROOM = socket.CMSG_SPACE(MOST * DESCRIPTOR.size)
 
-Encoded = tuple[bytes, int | None]  # a datagram, and the descriptor of the memory that goes with it
+Encoded = tuple[bytes, tuple[int, ...]]  # a datagram, and the descriptors of the memory that goes with it
+Place = tuple[int, int, int]  # which descriptor, the first byte there, how many
 
 
 class Closed(Exception):
@@ -42,21 +47,26 @@ def encode(message: object) -> Encoded:
     spilled = len(body) > INLINE
     if spilled:
         parts.append(memoryview(body))
-    sizes = [part.nbytes for part in parts]
-    datagram = pickle.dumps((b"" if spilled else body, sizes))
-    return datagram, _shared(parts) if any(sizes) else None
-
-
-def decode(datagram: bytes, descriptor: int | None) -> Any:
-    """The message; its arrays are read-only views of the mapped memory. Closes the descriptor."""
-    body, sizes = pickle.loads(datagram)
-    parts = [memoryview(b"")] * len(sizes)
-    if descriptor is not None:
+    places, own, blocks = _places(parts)
+    datagram = pickle.dumps((b"" if spilled else body, places))
+    held = [os.dup(block.descriptor) for block in blocks]
+    if own:
         try:
-            memory = memoryview(mmap.mmap(descriptor, 0, prot=mmap.PROT_READ))
-        finally:
-            os.close(descriptor)
-        parts = [memory[start : start + size] for start, size in zip(_starts(sizes), sizes, strict=True)]
+            held.append(_shared(own))
+        except BaseException:
+            discard((datagram, tuple(held)))
+            raise
+    return datagram, tuple(held)
+
+
+def decode(datagram: bytes, descriptors: tuple[int, ...]) -> Any:
+    """The message; its arrays are read-only views of the mapped memory. Closes the descriptors."""
+    body, places = pickle.loads(datagram)
+    try:
+        maps = [memoryview(mmap.mmap(each, 0, prot=mmap.PROT_READ)) for each in descriptors]
+    finally:
+        discard((datagram, descriptors))
+    parts = [maps[which][at : at + size] if size else memoryview(b"") for which, at, size in places]
     if not body:
         body = parts.pop()
     return pickle.loads(body, buffers=parts)
@@ -70,7 +80,7 @@ def receive(end: socket.socket, wait: bool = False) -> Any:
         raise Closed from error
     if not datagram:
         raise Closed
-    return decode(datagram, DESCRIPTOR.unpack(passed[0][2])[0] if passed else None)
+    return decode(datagram, tuple(each for (each,) in DESCRIPTOR.iter_unpack(passed[0][2])) if passed else ())
 
 
 def send(end: socket.socket, message: object) -> None:
@@ -146,37 +156,53 @@ class Link:
         self._lost()
 
 
-def _transmit(end: socket.socket, datagram: bytes, descriptor: int | None) -> None:
-    if descriptor is None:
-        end.send(datagram)
+def _transmit(end: socket.socket, datagram: bytes, descriptors: tuple[int, ...]) -> None:
+    if descriptors:
+        socket.send_fds(end, [datagram], list(descriptors))
     else:
-        socket.send_fds(end, [datagram], [descriptor])
+        end.send(datagram)
+
+
+def another(message: Encoded) -> Encoded:
+    """The same message once more, with descriptors of its own."""
+    return message[0], tuple(os.dup(each) for each in message[1])
 
 
 def discard(message: Encoded) -> None:
     """Gives back what an encoded message holds."""
-    if message[1] is not None:
-        os.close(message[1])
+    for each in message[1]:
+        os.close(each)
 
 
-def _starts(sizes: list[int]) -> list[int]:
-    starts, end = [], 0
-    for size in sizes:
-        starts.append(end)
-        end += -(-size // ALIGNMENT) * ALIGNMENT
-    return starts
+def _places(parts: list[memoryview]) -> tuple[list[Place], list[memoryview], list[shared.Block]]:
+    """Where each part will be found, those that must be copied, and the blocks in which the others lie."""
+    blocks: list[shared.Block] = []
+    found = [shared.whereabouts(part) for part in parts]
+    for known in found:
+        if known is not None and len(blocks) < MOST - 1 and all(known[0] is not block for block in blocks):
+            blocks.append(known[0])
+    places, own, end = list[Place](), list[memoryview](), 0
+    for part, known in zip(parts, found, strict=True):
+        which = next((i for i, block in enumerate(blocks) if known is not None and known[0] is block), None)
+        if known is not None and which is not None:
+            places.append((which, known[1], part.nbytes))
+        else:
+            places.append((len(blocks), end, part.nbytes))
+            if part.nbytes:
+                own.append(part)
+            end += -(-part.nbytes // ALIGNMENT) * ALIGNMENT
+    return places, own, blocks
 
 
 def _shared(parts: list[memoryview]) -> int:
     descriptor = os.memfd_create("sunbox", os.MFD_CLOEXEC)
-    sizes = [part.nbytes for part in parts]
-    starts = _starts(sizes)
     try:
-        os.ftruncate(descriptor, starts[-1] + sizes[-1] or 1)
-        for start, part in zip(starts, parts, strict=True):
+        start = 0
+        for part in parts:
             written = 0
             while written < part.nbytes:  # a write stops at 2 GiB
                 written += os.pwrite(descriptor, part[written:], start + written)
+            start += -(-part.nbytes // ALIGNMENT) * ALIGNMENT
     except BaseException:
         os.close(descriptor)
         raise

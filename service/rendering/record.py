@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass, replace
 
 from service.rendering import link
@@ -53,7 +52,7 @@ class Record:
         self._stopped_at: Done | None = None
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
-        self._push(_State(update.generation, _another(encoded), whole=True))
+        self._push(_State(update.generation, link.another(encoded), whole=True))
 
     def told(self, message: ToRenderer) -> None:
         if isinstance(message, Update):
@@ -86,7 +85,7 @@ class Record:
         """What to tell a new renderer, in order; the encoded ones are whoever's sends them."""
         out: list[Encoded | ToRenderer] = []
         for state in self._states:
-            out.append(_another(state.scene))
+            out.append(link.another(state.scene))
             if state.since is not None:
                 out.append(state.since)
         if not out or self.saved is not None:
@@ -119,7 +118,7 @@ class Record:
         last = self._states[-1]
         since = last.since.then(update) if last.since is not None else update
         if update.settings is not None:  # it may be too large, and then the state before it is the one that counts
-            self._push(_State(update.generation, _another(last.scene), whole=False, since=since))
+            self._push(_State(update.generation, link.another(last.scene), whole=False, since=since))
         else:
             last.since = since
             self._stopped, self._stopped_at = False, None
@@ -148,9 +147,3 @@ class Record:
             self.saved = Restore(done.task, done.generation, done.saved, done.reason, done.progress)
             self._stopped_at = None
         return done
-
-
-def _another(encoded: Encoded) -> Encoded:
-    """The same message once more."""
-    datagram, descriptor = encoded
-    return datagram, None if descriptor is None else os.dup(descriptor)

@@ -1,0 +1,84 @@
+"""Arrays in memory that another process may map: laid there once, and not copied on their way to the renderer."""
+
+from __future__ import annotations
+
+import ctypes
+import mmap
+import os
+import weakref
+from contextlib import suppress
+
+import numpy as np
+
+LEAST = 1 << 18  # bytes of arrays; fewer are not worth a descriptor
+ALIGNMENT = 64  # a cache line, and more than any dtype asks for
+
+
+class Block(mmap.mmap):
+    """Zeros at first. It has a descriptor, and lasts as long as an array in it."""
+
+    descriptor: int
+
+
+_blocks: weakref.WeakValueDictionary[int, Block] = weakref.WeakValueDictionary()  # by address
+
+
+def block(size: int) -> Block:
+    descriptor = os.memfd_create("sunbox", os.MFD_CLOEXEC)
+    try:
+        os.ftruncate(descriptor, size)
+        made = Block(descriptor, size)
+    except BaseException:
+        os.close(descriptor)
+        raise
+    made.descriptor = descriptor
+    weakref.finalize(made, os.close, descriptor)
+    _blocks[_address(np.frombuffer(made, np.uint8))] = made
+    return made
+
+
+def whereabouts(part: memoryview) -> tuple[Block, int] | None:
+    """The block in which these bytes lie, and from which of its bytes on."""
+    if not part.nbytes:
+        return None
+    at = _address(np.frombuffer(part, np.uint8))
+    for address, found in list(_blocks.items()):
+        if address <= at < address + len(found):
+            return found, at - address
+    return None
+
+
+class Shelf:
+    """Room for arrays side by side, in one block where they are large."""
+
+    def __init__(self, *sizes: int) -> None:
+        """`sizes`: bytes of each array that will be put here."""
+        room = sum(-(-size // ALIGNMENT) * ALIGNMENT for size in sizes)
+        self._block = block(room) if room >= LEAST else None
+        self._end = 0
+
+    def put(self, array: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
+        """The array, or the rows of it in that order: on the shelf, where there is one."""
+        if self._block is None:
+            return array if rows is None else array[rows]
+        shape = (len(array) if rows is None else len(rows), *array.shape[1:])
+        count = int(np.prod(shape))
+        if not count:
+            return np.zeros(shape, array.dtype)
+        out = np.frombuffer(self._block, array.dtype, count, self._end).reshape(shape)
+        self._end += -(-out.nbytes // ALIGNMENT) * ALIGNMENT
+        if rows is None:
+            out[...] = array
+        else:
+            np.take(array, rows, axis=0, out=out, mode="clip")  # in range; otherwise numpy buffers it all
+        return out
+
+
+def trim() -> None:
+    """Gives the system what the C library keeps for later: after hundreds of megabytes of numpy's temporaries."""
+    with suppress(OSError, AttributeError):  # only glibc has it
+        ctypes.CDLL(None).malloc_trim(0)
+
+
+def _address(array: np.ndarray) -> int:
+    return int(array.__array_interface__["data"][0])

@@ -1,0 +1,81 @@
+"""Arrays that lie in shared memory already: sent by reference, given back with the last who holds them."""
+
+from __future__ import annotations
+
+import gc
+import os
+
+import numpy as np
+
+from service import shared
+from service.rendering import link
+from service.shared import LEAST, Shelf, whereabouts
+
+
+def descriptors() -> int:
+    gc.collect()
+    return len(os.listdir("/proc/self/fd"))
+
+
+def shelved() -> tuple[np.ndarray, np.ndarray]:
+    large, small = np.arange(LEAST, dtype=np.uint8), np.arange(12.0).reshape(4, 3)
+    shelf = Shelf(large.nbytes, small.nbytes)
+    return shelf.put(large), shelf.put(small, np.array([3, 0]))
+
+
+def test_a_shelf_holds_what_is_put_there() -> None:
+    large, small = shelved()
+    assert np.array_equal(large, np.arange(LEAST, dtype=np.uint8))
+    assert small.tolist() == [[9, 10, 11], [0, 1, 2]]
+    found = whereabouts(memoryview(small).cast("B"))
+    assert found is not None and found[1] == LEAST
+    assert whereabouts(memoryview(np.zeros(9)).cast("B")) is None
+
+
+def test_few_bytes_need_no_descriptor() -> None:
+    before, array = descriptors(), np.arange(9)
+    assert Shelf(array.nbytes).put(array) is array
+    assert descriptors() == before
+
+
+def test_shelved_arrays_are_sent_without_a_copy() -> None:
+    before = descriptors()
+    large, small = shelved()
+    other = np.arange(5)
+    ours, theirs = link.pair()
+    with ours, theirs:
+        encoded = link.encode([large, other, small, other[:0]])
+        assert sorted(os.fstat(each).st_size for each in encoded[1]) == [other.nbytes, LEAST + 128]
+        link.discard(link.another(encoded))
+        link.discard(encoded)
+        link.send(ours, [large, other, small, other[:0]])
+        received = link.receive(theirs, wait=True)
+    assert [a.tolist() for a in received[1:]] == [other.tolist(), small.tolist(), []]
+    large[7] = 99  # seen on the other side: it is the same memory
+    assert received[0][7] == 99 and not received[0].flags.writeable
+    del large, small
+    gc.collect()
+    assert received[0][8] == 8
+    del received
+    assert descriptors() == before
+
+
+def test_more_blocks_than_a_message_takes() -> None:
+    before = descriptors()
+    arrays = [shelved()[0] for _ in range(2 * link.MOST)]
+    ours, theirs = link.pair()
+    with ours, theirs:
+        link.send(ours, arrays)
+        received = link.receive(theirs, wait=True)
+    assert all(np.array_equal(a, b) for a, b in zip(arrays, received, strict=True))
+    del arrays, received
+    assert descriptors() == before
+
+
+def test_nothing_is_left_of_a_block() -> None:
+    known = len(shared._blocks)
+    kept = shelved()
+    assert len(shared._blocks) == known + 1
+    del kept
+    gc.collect()
+    assert len(shared._blocks) == known
