@@ -2,6 +2,7 @@
 
 from gpu.ahead import Recipe
 from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays
+from gpu.beyond import bounced_paths, missing_light
 from gpu.errors import (
     CompileError,
     ContextError,
@@ -40,6 +41,8 @@ __all__ = [
     "SceneTooLarge",
     "TextureArrays",
     "WrongThread",
+    "bounced_paths",
+    "missing_light",
     "picture_bytes",
     "save",
     "scene_bytes",
