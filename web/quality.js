@@ -18,7 +18,12 @@ function price(preset, live) {
   const known = live?.samples >= TRUSTED && live.scale === 1;
   const { seconds, noise } = known ? forecast(preset.max_samples, live) : preset.cost ?? {};
   if (typeof seconds !== "number") return "";
-  return [`≈ ${duration(seconds)}`, typeof noise === "number" ? `${percent(noise)} noise` : ""].filter(Boolean).join(", ");
+  const missing = known ? live.missing_light?.[preset.max_bounces] : undefined; // of this scene's light, once measured
+  return [
+    `≈ ${duration(seconds)}`,
+    typeof noise === "number" ? `${percent(noise)} noise` : "",
+    typeof missing === "number" ? (missing < 0.0005 ? "no light missing" : `${percent(missing)} of the light missing`) : "",
+  ].filter(Boolean).join(", ");
 }
 
 const basics = ({ max_samples, max_bounces }) => `${count(max_samples)} samples, ${max_bounces} bounces`;

@@ -108,16 +108,17 @@ class Tracing:
 
     def status(self, setup_s: float) -> dict[str, Any]:
         """What GET /v1/renders/{id} says of a render at its end."""
+        now = self.progress
         return {
             "state": "cancelled" if self._reason == "stopped" else "done",
             "reason": self._reason,
-            "samples": self.progress.samples,
-            "noise": self.progress.noise,
-            "elapsed_s": self.progress.elapsed_s,
+            "samples": now.samples,
+            "noise": now.noise,
+            "elapsed_s": now.elapsed_s,
             "setup_s": setup_s,
             "kernel": self._kernel,
-            "eta_s": self.progress.eta_s,
-            "forecast": forecast(self.progress.samples, self.progress.noise, self.progress.elapsed_s),
+            "eta_s": now.eta_s,
+            "forecast": forecast(now.samples, now.noise, now.elapsed_s, now.missing),
             "warnings": self.warnings,
             "settings": self.settings.document(),
         }

@@ -119,7 +119,7 @@ class Job:
             "setup_s": self._setup_s,
             "kernel": self._kernel,
             "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
-            "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s),
+            "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
             "warnings": self._warnings,
             "settings": self._settings.document(),
         }

@@ -27,6 +27,7 @@ from service.rendering.messages import (
     View,
     Want,
 )
+from service.rendering.worker.beyond import Beyond
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.holding import Aside, Holding, kernel_of, needed
@@ -83,6 +84,7 @@ class Task:
         self._interactive = False
         self._paused = self._away = False
         self._reason: Reason | None = None  # why it ended
+        self._beyond = Beyond(renderer)
         self._saving: Generator[None, None, Saved] | None = None  # a finished picture, for the server to keep
         self._pixel_s: float | None = None  # what a sample of a pixel took lately
         self._served: tuple[object, ...] = ()
@@ -155,7 +157,7 @@ class Task:
             return
         if self._reason is not None:
             return
-        if not self._end_if_reached():
+        if not (self._end_if_reached() or self._beyond.step(self._full)):
             self._trace()
         self.rested_since = time.monotonic()
 
@@ -264,6 +266,7 @@ class Task:
             if self._holding is None or not whole:
                 raise
             self._guided = None
+            self._beyond.restart()
             self._aside, self._holding = self._holding.aside(), None
             self._memory.make_room(size, self)
             return self._insist(make)
@@ -289,6 +292,7 @@ class Task:
         """Leaves the device: to the machine's memory, or where the server has it already, altogether."""
         assert self._holding is not None
         self._guided = None
+        self._beyond.restart()
         if not self._interactive and self._forget is not None:
             self._forget(self)
         else:
@@ -459,6 +463,7 @@ class Task:
         """Gives the GPU's memory back; the task can be loaded again."""
         holding, self._holding = self._holding, None
         self._guided = self._aside = self._saving = None
+        self._beyond.restart()
         self._shown = None
         reads = self._reads + self._smooth_reads
         self._reads, self._smooth_reads = [], []
@@ -483,7 +488,8 @@ class Task:
         noise = self._meter.read(self._full) if scale == 1.0 else None
         done = self._reason is not None and self._reason != "stopped"
         eta = 0.0 if done else eta_s(self._stop, self._full.samples, noise, elapsed_s)
-        return Progress(samples, noise, elapsed_s, None if self._reason == "stopped" else eta)
+        missing = self._beyond.shares
+        return Progress(samples, noise, elapsed_s, None if self._reason == "stopped" else eta, missing)
 
     @property
     def _ladder(self) -> Ladder:
@@ -496,6 +502,7 @@ class Task:
 
     def _restart(self) -> None:
         self._guided = None
+        self._beyond.restart()
         self._smoothing.restart()
         self._smoothed = False
         self._clock = Clock()

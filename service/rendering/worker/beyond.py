@@ -1,0 +1,50 @@
+"""The share of this scene's light that bounces beyond each preset's would add: measured when a picture affords it."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Generator
+from typing import TYPE_CHECKING
+
+from gpu import GpuError, bounced_paths, missing_light
+
+if TYPE_CHECKING:
+    from gpu import Picture, Renderer
+
+LIMITS = (3, 5, 8, 16, 64)  # of the quality presets
+WORTH = 50  # as many times its own paths are to be in the picture first: 2 % of its time, as some are longer
+
+log = logging.getLogger(__name__)
+
+
+class Beyond:
+    def __init__(self, renderer: Renderer) -> None:
+        self.shares: dict[int, float] | None = None  # by bounces; None: not known yet
+        self._renderer = renderer
+        self._steps: Generator[None, None, dict[int, float]] | None = None
+        self._given_up = False
+
+    def restart(self) -> None:
+        """Another picture, or none: what is under way is let go of."""
+        if self._steps is not None:
+            self._steps.close()
+        self.shares, self._steps, self._given_up = None, None, False
+
+    def step(self, picture: Picture) -> bool:
+        """A slice of measuring, where that is due."""
+        if self.shares is not None or self._given_up:
+            return False
+        settings = picture.settings
+        if self._steps is None:
+            limits = {*LIMITS, settings.max_bounces}
+            if picture.samples * settings.width * settings.height < WORTH * bounced_paths(limits):
+                return False
+            self._steps = missing_light(self._renderer, picture.scene, settings, limits)
+        try:
+            next(self._steps)
+        except StopIteration as end:
+            self.shares, self._steps = end.value, None
+        except GpuError as error:
+            log.warning("light beyond the bounces not measured: %s", error)
+            self._given_up, self._steps = True, None
+        return True
