@@ -16,8 +16,8 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import features
+from gpu.kernels import Kernels
 from gpu.layout import Slot
-from gpu.program import Kernels
 
 FROM = 8  # samples of each pixel, from which on the meter runs; before, the samples' own variance must do
 LINE = 64  # metered pixels in a row of their buffers

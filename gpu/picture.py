@@ -14,9 +14,9 @@ import numpy as np
 from gpu import context as contexts
 from gpu import display, features, filters, layout, meter
 from gpu.errors import NothingRendered
+from gpu.kernels import Kernels
 from gpu.layout import Slot
 from gpu.meter import Meter
-from gpu.program import Kernels
 from gpu.saved import Saved
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
@@ -66,7 +66,12 @@ class Picture:
         contexts.use(self.context)
         kernel = self._kernels.get("pathtrace.comp", self.scene.defines(self.settings))
         self.compile_ms += self._kernels.last_compile_ms
-        if kernel is not self._kernel or self._tiles.max_bounces != self.settings.max_bounces:
+        changed = kernel is not self._kernel
+        if changed:
+            self._kernels.hold(kernel)
+            if self._kernel is not None:
+                self._kernels.let_go(self._kernel)
+        if changed or self._tiles.max_bounces != self.settings.max_bounces:
             self._kernel = kernel
             self._cut()
         if self._kernels.last_compile_ms:
@@ -360,3 +365,6 @@ class Picture:
         for buffer in (*self.state, *self._guides.values()):
             buffer.release()
         self._filter.release()
+        if self._kernel is not None:
+            self._kernels.let_go(self._kernel)
+            self._kernel = None

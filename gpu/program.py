@@ -1,18 +1,13 @@
-"""Shader text: includes, flags, errors by file and line, and a cache of compiled kernels."""
+"""Shader text: includes, flags, errors by file and line."""
 
 from __future__ import annotations
 
-import logging
 import re
-import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
 
 from gpu import glsl
 from gpu.errors import CompileError
-
-log = logging.getLogger(__name__)
 
 SHADERS = Path(__file__).resolve().parent.parent / "shaders"
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
@@ -76,38 +71,3 @@ class Source:
             return f"{file}:{match.group(2)}"
 
         return "\n".join(_WHERE.sub(named, line, count=1) for line in message.splitlines() if line.strip())
-
-
-class Kernels:
-    """Compiled kernels by entry and defines; `compile_ms` of the last one is in `last_compile_ms`."""
-
-    def __init__(self, context: Any, folders: Sequence[Path] = (SHADERS,)) -> None:
-        self._context = context
-        self._folders = folders
-        self._cache: dict[tuple[str, tuple[tuple[str, object], ...]], Any] = {}
-        self.last_compile_ms = 0.0
-
-    def get(self, entry: str, defines: Mapping[str, object]) -> Any:
-        """The kernel `entry` (a file of shaders/) with these defines. Raises CompileError naming file and line."""
-        key = (entry, tuple(sorted(defines.items())))
-        self.last_compile_ms = 0.0
-        if key not in self._cache:
-            self._cache[key] = self._compile(entry, defines)
-        return self._cache[key]
-
-    def _compile(self, entry: str, defines: Mapping[str, object]) -> Any:
-        source = Source(entry, defines, self._folders)
-        start = time.perf_counter()
-        try:
-            kernel = self._context.compute_shader(source.text)
-        except Exception as error:  # moderngl.Error is not importable without its binary parts
-            raise CompileError(f"{entry}: {source.explain(str(error))}") from error
-        self.last_compile_ms = (time.perf_counter() - start) * 1e3
-        on = sorted(name[4:].lower() for name, value in defines.items() if name.startswith("HAS_") and value)
-        log.info("compiled %s flags=%s ms=%.0f", entry, "+".join(on) or "none", self.last_compile_ms)
-        return kernel
-
-    def release(self) -> None:
-        for kernel in self._cache.values():
-            kernel.release()
-        self._cache.clear()

@@ -9,8 +9,8 @@ from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.errors import SceneTooLarge, WrongThread
+from gpu.kernels import Kernels
 from gpu.picture import Picture
-from gpu.program import Kernels
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
 from gpu.texels import Texels
@@ -52,6 +52,21 @@ class Renderer:
         """
         self._own()
         return Picture(self._context, self._kernels, self._frame, scene, settings)
+
+    def tidy(self) -> float | None:
+        """Lets go of kernels that nobody has used for long; in how many seconds to call again, None: no need."""
+        self._own()
+        return self._kernels.tidy()
+
+    @property
+    def kernels(self) -> int:
+        """How many are compiled and in memory."""
+        return len(self._kernels)
+
+    @property
+    def kernels_evicted(self) -> int:
+        """How many had to go, since the renderer was made."""
+        return self._kernels.evicted
 
     def close(self) -> None:
         """Release the context with all that was made from it."""

@@ -92,6 +92,9 @@ def _collector(house: House, traffic: Traffic) -> Collector:
             yield counters("gpu_seconds", "GPU time, by whose work it was.", ("client",), used)
             yield histogram("compile_seconds", "Compiling kernels that were not in memory.", seen.compile_s)
             yield counter("kernel_cache_hits", "Loads whose kernel was in memory.", seen.kernels_found)
+            yield gauge("kernels", "Compiled kernels in the renderer's memory.", seen.kernels)
+            let_go = "Kernels that made room for others or were long unused."
+            yield counter("kernels_evicted", let_go, seen.kernels_evicted)
             yield histogram("setup_seconds", "Uploading a scene and compiling for it.", seen.setup_s)
             restarts = {(reason,): float(count) for reason, count in seen.restarts.items()}
             yield counters("renderer_restarts", "Renderers lost, by how.", ("reason",), restarts)

@@ -9,8 +9,9 @@ from typing import Any
 import numpy as np
 
 from gpu import Renderer, features, filters, layout
+from gpu.kernels import Kernels
 from gpu.layout import Slot
-from gpu.program import SHADERS, Kernels
+from gpu.program import SHADERS
 from gpu.scene import upload_tables
 
 PROBES = Path(__file__).parent / "probes"

@@ -7,7 +7,8 @@ from pathlib import Path
 import pytest
 
 from gpu import CompileError, Renderer, features
-from gpu.program import SHADERS, Kernels, Source
+from gpu.kernels import Kernels
+from gpu.program import SHADERS, Source
 
 
 def _folder(tmp_path: Path, **files: str) -> tuple[Path, ...]:

@@ -10,8 +10,9 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, features, layout
+from gpu.kernels import Kernels
 from gpu.layout import Slot
-from gpu.program import SHADERS, Kernels, Source
+from gpu.program import SHADERS, Source
 from service.pack import pack, pack_materials, repacked
 from service.problems import InvalidDocument
 from service.rendering.change import Change, change

@@ -246,6 +246,7 @@ class Engine:
         statistics = self.statistics
         statistics.samples += usage.samples
         statistics.tasks, statistics.gpu_bytes = usage.tasks, usage.bytes
+        statistics.kernels, statistics.kernels_evicted = usage.kernels, statistics.kernels_evicted + usage.evicted
         for task, seconds in usage.gpu_s.items():
             held = self._tasks.get(task)
             if held is not None:

@@ -228,6 +228,8 @@ class Usage:
     samples: int
     tasks: int
     bytes: int  # on the device
+    kernels: int
+    evicted: int  # kernels, since the last one
     task: int = 0  # of nobody in particular
 
 

@@ -63,3 +63,5 @@ class Statistics:
     errors: Counter[str] = field(default_factory=Counter)  # told on streams and of failed renders, by problem type
     tasks: int = 0  # that the renderer holds
     gpu_bytes: int = 0  # what they hold there
+    kernels: int = 0  # compiled ones, there
+    kernels_evicted: int = 0

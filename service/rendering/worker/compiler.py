@@ -9,6 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 ROOT = Path(__file__).parents[3]
 TRIES = 3  # misfortunes in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
+REMEMBERED = 256  # kernels; of thousands that were asked for the records tell
+RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
 DISABLED = {"1", "true", "yes", "y", "t"}
 
 Told = Callable[[float], None]
@@ -94,6 +97,10 @@ class Compiler:
         """The renderer has this kernel: the driver's disk cache too."""
         if recipe in self._met:
             return
+        if len(self._known) >= REMEMBERED:  # the records know them, too
+            self._known.clear()
+            self._met.clear()
+            _prune(self._records)
         self._known.add(recipe)
         self._met.add(recipe)
         if self._able:
@@ -193,6 +200,14 @@ def _has_cache() -> bool:
     if any(os.environ.get(name, "").lower() in DISABLED for name in disabled):
         return False
     return os.environ.get("__GL_SHADER_DISK_CACHE") != "0"
+
+
+def _prune(records: Path) -> None:
+    """Forgets the older half of too many."""
+    with suppress(OSError):  # another server's renderer prunes them as well
+        found = sorted(records.iterdir(), key=lambda path: path.stat().st_mtime)
+        for path in found[: len(found) - RECORDS // 2] if len(found) > RECORDS else []:
+            path.unlink(missing_ok=True)
 
 
 def _records() -> Path:

@@ -52,7 +52,7 @@ class Loop:
         self._denoiser = Denoiser()
         self._compiler = Compiler(renderer.info, device, self._crowded)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
-        self._traced = 0
+        self._traced = self._evicted = 0
         self._reported = 0.0
 
     def run(self) -> None:
@@ -79,6 +79,7 @@ class Loop:
         if wait:
             ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
             waits = [self._compiler.left_s, None if self._denoiser.late else self._denoiser.left_s]
+            waits.append(self._renderer.tidy())
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
         try:
             while True:
@@ -106,8 +107,12 @@ class Loop:
         if self._used_s and (at_once or now - self._reported >= REPORT_S):
             traced = sum(task.traced for task in self._tasks.values())
             used = dict(self._used_s)
-            self._send(Usage(used, traced - self._traced, len(self._tasks), self._memory.used))
+            self._renderer.tidy()
+            kernels, evicted = self._renderer.kernels, self._renderer.kernels_evicted
+            now_held = len(self._tasks), self._memory.used, kernels
+            self._send(Usage(used, traced - self._traced, *now_held, evicted - self._evicted))
             self._used_s.clear()
+            self._evicted = evicted
             self._traced, self._reported = traced, now
 
     def _take(self, message: ToRenderer) -> None:
