@@ -5,12 +5,13 @@
 # make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
+# make bench-compare [REV=HEAD]  this checkout beside a revision, in turns: speed, error, same bits or not
 # make bench | lint | setup [PYTHON=python3.12]
 
 PORT ?= 8000
 export PYTHON
 
-.PHONY: run test extremes hostile soak bench tradeoff gallery lint setup
+.PHONY: run test extremes hostile soak bench bench-compare tradeoff gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -35,6 +36,9 @@ soak:
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json
+
+bench-compare: setup
+	.venv/bin/sunbox bench compare --revision $(or $(REV),HEAD) -o out/compare.json
 
 tradeoff: setup
 	.venv/bin/sunbox bench tradeoff --publish

@@ -93,9 +93,10 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "peers", "hemisphere", "hand", "tradeoff"],
+        choices=["speed", "compare", "peers", "hemisphere", "hand", "tradeoff"],
         default="speed",
         help="speed (default): paths per second, compile times, latencies; "
+        "compare: this checkout beside an earlier revision; "
         "peers: error at equal time beside Mitsuba; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
         "hand: from a slider to other pixels, in a browser; "
@@ -107,6 +108,7 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
     add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
     add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")
+    add("--revision", default="HEAD", metavar="REV", help="compare: with this one (default: HEAD)")
     add("--mesh", metavar="FILE", help="measure this mesh instead of the generated one")
     add("--mitsuba", metavar="PYTHON", help="peers: an interpreter that can import mitsuba")
     add("--environment", metavar="FILE", help="light the scenes with this HDR image instead of the generated one")

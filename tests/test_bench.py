@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.bench import latency, machine, scenes, speed
+from service.bench import compare, latency, machine, scenes, speed
 from service.cli import main
 from service.pack import pack
 from service.scene import parse_scene
@@ -72,6 +72,25 @@ def test_command_prints_a_table_and_keeps_the_figures(
     assert "12.35" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
     assert json.loads(output.read_text()) == document
     assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2
+
+
+def test_a_revision_is_the_same_as_itself(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """And not as one without what the scene needs. Where this is no checkout, that is said."""
+    monkeypatch.setattr(compare, "cases", lambda: scenes.cases()[2:3])
+    options = compare.Options("HEAD", 1, 32, 2, 16, 4, 2, 64)
+    try:
+        commit = compare.unpack("HEAD", tmp_path)
+    except compare.NoRevision:
+        assert main(["bench", "compare"]) == 2
+        return
+    assert (tmp_path / "pyproject.toml").exists()
+    document = compare.measure(options, lambda what: None)
+    (row,) = document["scenes"]
+    assert document["machine"]["before"] == commit and row["rel_mse"]["before"] > 0
+    if str(document["machine"]["after"]) == commit:  # nothing has been changed since
+        assert row["same_bits"] and row["rel_mse"]["ratio"] == 1
+    assert scenes.cases()[2].name in compare.table(document) and "ratio" in compare.table(document)
+    assert main(["bench", "compare", "--revision", "no-such-thing"]) == 2
 
 
 def test_uniform_directions_fall_with_the_root_of_samples(tmp_path: Path) -> None:

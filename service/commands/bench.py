@@ -1,4 +1,4 @@
-"""`sunbox bench speed | peers | hemisphere | hand | tradeoff`: prints a table; `-o` keeps the figures as JSON."""
+"""`sunbox bench speed | compare | peers | hemisphere | hand | tradeoff`: a table; `-o` keeps the figures as JSON."""
 
 from __future__ import annotations
 
@@ -15,7 +15,14 @@ from service.commands import BadInput, Failed, files
 def run(arguments: argparse.Namespace) -> int:
     if arguments.runs < 1:
         raise BadInput(f"--runs {arguments.runs}: at least one is needed")
-    measures = {"speed": _speed, "peers": _peers, "hemisphere": _hemisphere, "hand": _hand, "tradeoff": _tradeoff}
+    measures = {
+        "speed": _speed,
+        "compare": _compare,
+        "peers": _peers,
+        "hemisphere": _hemisphere,
+        "hand": _hand,
+        "tradeoff": _tradeoff,
+    }
     return measures[arguments.what](arguments)
 
 
@@ -69,6 +76,21 @@ def _speed(arguments: argparse.Namespace) -> int:
     except GpuError as error:
         raise Failed(str(error)) from None
     print(speed.table(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    return 0
+
+
+def _compare(arguments: argparse.Namespace) -> int:
+    output = _output(arguments.output)
+    from service.bench import compare
+
+    try:
+        options = compare.Options(arguments.revision, arguments.runs)
+        document = compare.measure(options, lambda what: print(what, file=sys.stderr))
+    except compare.NoRevision as error:
+        raise BadInput(f"--revision: {error}") from None
+    print(compare.table(document))
     if output:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     return 0

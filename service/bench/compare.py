@@ -1,0 +1,158 @@
+"""What a change did: this checkout beside an earlier revision, in turns, in speed and in error at equal samples."""
+
+from __future__ import annotations
+
+import io
+import json
+import os
+import statistics
+import subprocess
+import sys
+import tarfile
+import tempfile
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from service.bench import machine
+from service.bench.peers import rel_mse
+from service.bench.scenes import cases
+
+SCRIPT = Path(__file__).parent / "compare_run.py"
+
+
+@dataclass(frozen=True)
+class Options:
+    revision: str
+    runs: int = 5
+    size: int = 512
+    samples: int = 8  # of a run that is timed
+    error_size: int = 128
+    error_samples: int = 16
+    seeds: int = 4  # pictures whose errors are averaged
+    reference_samples: int = 2048
+
+
+class NoRevision(Exception):
+    """This is no checkout, or it has no such revision."""
+
+
+class Side:
+    """A process that renders with one tree."""
+
+    def __init__(self, tree: Path, folder: Path) -> None:
+        command = [sys.executable, "-P", str(SCRIPT), str(folder / "cases.json")]
+        environment = os.environ | {"PYTHONPATH": str(tree)}
+        self._out = folder / "picture.npy"
+        pipe = subprocess.PIPE
+        self._process = subprocess.Popen(command, cwd=tree, env=environment, text=True, stdin=pipe, stdout=pipe)
+
+    def time(self, case: int, size: int, samples: int) -> dict[str, float]:
+        """Raises EOFError when the tree can't render it; stderr says why."""
+        return self._ask({"case": case, "size": size, "samples": samples, "seed": 0})
+
+    def picture(self, case: int, size: int, samples: int, seed: int) -> np.ndarray:
+        """(size, size, 3) float32."""
+        self._ask({"case": case, "size": size, "samples": samples, "seed": seed, "out": str(self._out)})
+        pixels: np.ndarray = np.load(self._out)
+        return pixels
+
+    def _ask(self, order: dict[str, Any]) -> dict[str, float]:
+        assert self._process.stdin is not None and self._process.stdout is not None
+        try:
+            self._process.stdin.write(json.dumps(order) + "\n")
+            self._process.stdin.flush()
+        except BrokenPipeError:
+            raise EOFError from None
+        line = self._process.stdout.readline()
+        if not line:
+            raise EOFError
+        answer: dict[str, float] = json.loads(line)
+        return answer
+
+    def close(self) -> None:
+        self._process.kill()
+        self._process.wait()
+
+
+def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
+    """Machine, revisions, and a row for each scene of the speed bench. Raises NoRevision."""
+    rows = []
+    with ExitStack() as stack:
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sunbox-compare-")))
+        commit = unpack(options.revision, folder / "before")
+        listed = [{"scene": case.scene, "max_bounces": case.max_bounces} for case in cases()]
+        (folder / "cases.json").write_text(json.dumps(listed))
+        for number, case in enumerate(cases()):
+            told(f"{case.name}, {case.max_bounces} bounces")
+            with _sides(folder) as sides:
+                row = {"name": case.name, "max_bounces": case.max_bounces}
+                rows.append(row | _compared(number, sides, options))
+    about = {"processor": machine.processor(), "before": commit, "after": machine.commit()}
+    return {"machine": about, "scenes": rows}
+
+
+def unpack(revision: str, to: Path) -> str:
+    """Puts the tree of that revision there; its commit."""
+    root = str(machine.ROOT)
+    found = subprocess.run(["git", "-C", root, "rev-parse", f"{revision}^{{commit}}"], capture_output=True, text=True)
+    if found.returncode:
+        raise NoRevision(f"{revision!r} is no revision of a checkout here: {found.stderr.strip()}")
+    commit = found.stdout.strip()
+    tree = subprocess.run(["git", "-C", root, "archive", commit], capture_output=True, check=True).stdout
+    with tarfile.open(fileobj=io.BytesIO(tree)) as archive:
+        archive.extractall(to, filter="data")
+    return commit
+
+
+@contextmanager
+def _sides(folder: Path) -> Iterator[tuple[Side, Side]]:
+    before, after = Side(folder / "before", folder), Side(machine.ROOT, folder)
+    try:
+        yield before, after
+    finally:
+        before.close()
+        after.close()
+
+
+def _compared(case: int, sides: tuple[Side, Side], options: Options) -> dict[str, Any]:
+    try:
+        runs = [[side.time(case, options.size, options.samples) for side in sides] for _ in range(options.runs)]
+    except EOFError:
+        return {"failed": "one of the two can't render it"}
+    row: dict[str, Any] = {}
+    for key in ("wall", "cpu"):
+        times = [[1e3 * side[f"{key}_s"] / options.samples for side in run] for run in runs]
+        before, after = (statistics.median(column) for column in zip(*times, strict=True))
+        ratio = statistics.median(b / a for a, b in times)
+        row[f"{key}_ms_per_sample"] = {"before": before, "after": after, "ratio": ratio}
+    size, count = options.error_size, options.error_samples
+    reference = sides[1].picture(case, size, options.reference_samples, 1_000_000)
+    pictures = [[side.picture(case, size, count, 1 + seed) for side in sides] for seed in range(options.seeds)]
+    errors = np.mean([[rel_mse(picture, reference) for picture in pair] for pair in pictures], axis=0)
+    row["rel_mse"] = {"before": errors[0], "after": errors[1], "ratio": errors[1] / errors[0]}
+    row["same_bits"] = all(np.array_equal(a, b) for a, b in pictures)
+    return row
+
+
+def table(document: dict[str, Any]) -> str:
+    rows = document["scenes"]
+    name = max(len(row["name"]) for row in rows)
+    lines = [f"{'':{name}}  bounces  ms/sample: before   after  ratio (CPU)   relMSE: before    after  ratio"]
+    for row in rows:
+        head = f"{row['name']:{name}}  {row['max_bounces']:7}"
+        if "failed" in row:
+            lines.append(f"{head}  {row['failed']}")
+            continue
+        wall, cpu, error = row["wall_ms_per_sample"], row["cpu_ms_per_sample"], row["rel_mse"]
+        lines.append(
+            f"{head}  {wall['before']:17.1f} {wall['after']:7.1f} {wall['ratio']:6.2f} ({cpu['ratio']:4.2f})"
+            f"  {error['before']:15.2e} {error['after']:8.1e} {error['ratio']:6.2f}"
+            + ("  same bits" if row["same_bits"] else "")
+        )
+    lines += ["", *(f"{key:10} {value}" for key, value in document["machine"].items())]
+    return "\n".join(lines)

@@ -1,0 +1,56 @@
+"""One side of `compare`: `python -P compare_run.py CASES.json`, with the tree that is to be measured on the path.
+
+Uses only what every revision has. Answers each line {"case", "size", "samples", "seed", "out"?} with the seconds that
+took, of the clock and of the processors; the picture goes to `out`.
+"""
+
+from __future__ import annotations
+
+import json
+import sys
+import time
+from typing import Any
+
+import numpy as np
+
+from gpu import Picture, Renderer, RenderSettings
+from service.bench.scenes import BenchAssets
+from service.pack import pack
+from service.scene import parse_scene
+
+
+def main() -> None:
+    with open(sys.argv[1]) as file:
+        cases = json.load(file)
+    pictures: dict[tuple[int, int, int], Picture] = {}
+    with Renderer() as renderer:
+        for line in sys.stdin:
+            order = json.loads(line)
+            key = order["case"], order["size"], order["seed"]
+            if key not in pictures:
+                for old in pictures.values():
+                    old.release()
+                    old.scene.release()
+                pictures = {key: _picture(renderer, cases[order["case"]], order["size"], order["seed"])}
+            print(json.dumps(_trace(pictures[key], order)), flush=True)
+
+
+def _picture(renderer: Renderer, case: dict[str, Any], size: int, seed: int) -> Picture:
+    scene = renderer.load(pack(parse_scene(case["scene"]), BenchAssets()).arrays)
+    picture = renderer.picture(scene, RenderSettings(size, size, case["max_bounces"], filter="box", seed=seed))
+    picture.trace(60.0, 2)  # compiles, and finds the size of its slices
+    return picture
+
+
+def _trace(picture: Picture, order: dict[str, Any]) -> dict[str, float]:
+    picture.reset()
+    wall, cpu = time.perf_counter(), time.process_time()
+    while picture.samples < order["samples"]:
+        picture.trace(60.0, order["samples"])
+    spent = {"wall_s": time.perf_counter() - wall, "cpu_s": time.process_time() - cpu}
+    if "out" in order:
+        np.save(order["out"], picture.read()[..., :3])
+    return spent
+
+
+main()
