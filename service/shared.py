@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import ctypes
+import math
 import mmap
 import os
 import weakref
 from contextlib import suppress
+from typing import Any
 
 import numpy as np
 
@@ -57,16 +59,20 @@ class Shelf:
         self._block = block(room) if room >= LEAST else None
         self._end = 0
 
+    def room(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> np.ndarray:
+        """Zeros to be written over."""
+        count = math.prod(shape)
+        if self._block is None or not count:
+            return np.zeros(shape, dtype)
+        out = np.frombuffer(self._block, dtype, count, self._end).reshape(shape)
+        self._end += -(-out.nbytes // ALIGNMENT) * ALIGNMENT
+        return out
+
     def put(self, array: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
         """The array, or the rows of it in that order: on the shelf, where there is one."""
         if self._block is None:
             return array if rows is None else array[rows]
-        shape = (len(array) if rows is None else len(rows), *array.shape[1:])
-        count = int(np.prod(shape))
-        if not count:
-            return np.zeros(shape, array.dtype)
-        out = np.frombuffer(self._block, array.dtype, count, self._end).reshape(shape)
-        self._end += -(-out.nbytes // ALIGNMENT) * ALIGNMENT
+        out = self.room((len(array) if rows is None else len(rows), *array.shape[1:]), array.dtype)
         if rows is None:
             out[...] = array
         else:

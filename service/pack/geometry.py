@@ -8,16 +8,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu import layout
-from gpu.layout import Node, ShapeKind
+from gpu.layout import Node, ShapeKind, Triangle, TriangleNormals
 from service.assets import Assets
 from service.pack import lights, meshes, records
-from service.pack.meshes import PlacedMesh
+from service.pack.meshes import PlacedMesh, Triangles
 from service.pack.origin import choose
 from service.pack.origin import warnings as lost
 from service.pack.placed import Placed
 from service.pack.placing import place
 from service.pack.records import Bounds
-from service.pack.tree import LINEAR, plant, stand_out, triangle_bounds
+from service.pack.tree import LINEAR, plant, stand_out
 from service.pack.values import vec3
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
@@ -63,11 +63,11 @@ def geometry(
     if origin.any():
         analytic = _analytic(placed, origin)
     records.only_vast(analytic[ShapeKind.SPHERE][0], low, high)
-    triangles, normals, degenerate, kept = meshes.triangles(placed_meshes, origin)
-    found = {kind: array for kind, (array, _) in analytic.items()} | {ShapeKind.TRIANGLE: triangles}
+    triangles, boxes = meshes.survey(placed_meshes, origin)
+    found = {kind: array for kind, (array, _) in analytic.items()}
     bounds = {kind: bounds for kind, (_, bounds) in analytic.items() if len(found[kind]) > LINEAR[kind]}
     if len(triangles) > LINEAR[ShapeKind.TRIANGLE]:
-        bounds[ShapeKind.TRIANGLE] = triangle_bounds(triangles)
+        bounds[ShapeKind.TRIANGLE] = boxes[:, :3], boxes[:, 3:]
     nodes, node_origin, node_scale = np.zeros(0, Node.dtype), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     standing, order = dict[ShapeKind, np.ndarray](), dict[ShapeKind, np.ndarray]()
     node_count = 0
@@ -75,20 +75,25 @@ def geometry(
         standing = stand_out(bounds)
         nodes, node_count, order, node_origin, node_scale = plant(bounds, standing)
     kinds = frozenset(bounds)
-    del triangles, bounds
-    rows = order.get(ShapeKind.TRIANGLE)
-    shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes, normals)))
+    del boxes, bounds
+    if len(triangles) > MANY:
+        trim()
+    count, smooth = len(triangles), len(triangles) if triangles.any_smooth else 0
+    sizes = count * Triangle.dtype.itemsize, smooth * TriangleNormals.dtype.itemsize
+    shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes)), *sizes)
     nodes = shelf.put(nodes)
-    for kind in found:  # one after the other, so that only one is there twice
-        found[kind] = shelf.put(found[kind], order.get(kind))
-    normals = shelf.put(normals, rows if len(normals) else None)
-    uvs, uvs_1, colors = (
-        _shelved(meshes.at_corners(placed_meshes, kept, name), rows) for name in ("uvs", "uvs_1", "colors")
-    )
+    found = {kind: shelf.put(array, order.get(kind)) for kind, array in found.items()}
+    places = _inverse(order.get(ShapeKind.TRIANGLE))
+    found[ShapeKind.TRIANGLE] = shelf.room((count,), Triangle.dtype)
+    triangles.write(places, found[ShapeKind.TRIANGLE])
+    normals = shelf.room((smooth,), TriangleNormals.dtype)
+    if smooth:
+        triangles.write_normals(places, normals)
+    uvs, uvs_1, colors = (_at_corners(triangles, name, places) for name in ("uvs", "uvs_1", "colors"))
     _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
-    warnings = odd + [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in degenerate.items()]
+    warnings = odd + [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in triangles.degenerate.items()]
     warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
     warnings += lost(low, high, owners, exact, origin)
     for array in (*found.values(), nodes, normals, uvs, uvs_1, colors):
@@ -102,9 +107,23 @@ def geometry(
     )  # fmt: skip
 
 
-def _shelved(corners: np.ndarray, rows: np.ndarray | None) -> np.ndarray:
-    """What triangles have at their corners, in final order."""
-    return Shelf(corners.nbytes).put(corners, rows if len(corners) else None)
+def _inverse(order: np.ndarray | None) -> np.ndarray | None:
+    """Where each goes, of which goes where."""
+    if order is None:
+        return None
+    places = np.empty(len(order), np.uint32)
+    places[order] = np.arange(len(order), dtype=np.uint32)
+    return places
+
+
+def _at_corners(triangles: Triangles, name: str, places: np.ndarray | None) -> np.ndarray:
+    """What triangles have at their corners, in final order: none where no mesh has it."""
+    width, dtype = (4, np.dtype(np.float16)) if name == "colors" else (2, np.dtype(np.float32))
+    shape = len(triangles) if triangles.have(name) else 0, 3, width
+    out = Shelf(int(np.prod(shape)) * dtype.itemsize).room(shape, dtype)
+    if len(out):
+        triangles.write_corners(name, places, out)
+    return out
 
 
 def _hide(records: dict[ShapeKind, np.ndarray], shapes: Sequence[Shape]) -> None:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from gpu import layout
+from service.pack.chunks import chunks, in_threads
 from service.pack.normals import corner_normals, encode
 
 # Sine of an angle below which a triangle's area is rounding noise in float32, whatever its size.
 FLAT = 4 * float(np.finfo(np.float32).eps)
 SMALLEST = float(np.finfo(np.float32).tiny)
+
+Rows = slice | np.ndarray
 
 
 @dataclass(frozen=True)
@@ -54,76 +59,141 @@ def place(
     return PlacedMesh(vertices, faces, normals, normal_faces, single_sided, *used, uvs, uvs_1, colors)
 
 
-def triangles(
-    meshes: list[PlacedMesh], origin: np.ndarray
-) -> tuple[np.ndarray, np.ndarray, dict[int, int], list[np.ndarray]]:
-    """(`layout.Triangle` records, their `layout.TriangleNormals` or none if all are flat, degenerate ones by shape,
-    by mesh which faces are left).
+def survey(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[Triangles, np.ndarray]:
+    """The triangles that have an area, and the boxes (n, 6) float32 around them, in the order of the meshes."""
+    points = [(mesh.vertices - origin).astype(np.float32) for mesh in meshes]
+    kept, boxes, degenerate = list[np.ndarray | None](), [np.zeros((0, 6), np.float32)], dict[int, int]()
+    for mesh, own in zip(meshes, points, strict=True):
+        found, flat = np.empty((len(mesh.faces), 6), np.float32), np.empty(len(mesh.faces), bool)
+        in_threads(partial(_survey, own, mesh.faces, found, flat), chunks(len(found)))
+        lost = int(np.count_nonzero(flat))
+        kept.append(np.flatnonzero(~flat) if lost else None)
+        boxes.append(found[~flat] if lost else found)
+        if lost:
+            degenerate[mesh.shape] = lost
+    return Triangles(meshes, points, kept, degenerate), boxes[1] if len(meshes) == 1 else np.concatenate(boxes)
 
-    Degenerate triangles are left out: those whose normal would not survive float32.
+
+def _survey(points: np.ndarray, faces: np.ndarray, boxes: np.ndarray, flat: np.ndarray, which: slice) -> None:
+    """Fills the boxes of these faces, and which of them are degenerate: their normal would not survive float32."""
+    a, b, c = (points.take(faces[which, k], axis=0) for k in range(3))
+    boxes[which, :3] = np.minimum(np.minimum(a, b), c)
+    boxes[which, 3:] = np.maximum(np.maximum(a, b), c)
+    e1, e2 = b - a, c - a
+    size = _squares(np.cross(e1, e2))
+    limit = np.maximum(FLAT**2 * _squares(e1) * _squares(e2), SMALLEST)
+    flat[which] = ~((size > limit) & np.isfinite(size))
+
+
+@dataclass(frozen=True)
+class Triangles:
+    """Not yet laid out: a million's records are written once, into their last place.
+
+    Where `places` (n,) are asked for, they are where each goes; None: in the order of the meshes.
     """
-    records, normals, degenerate, kept = [], [], {}, []
-    any_smooth = any(mesh.normals is not None for mesh in meshes)
-    for mesh in meshes:
-        vertices = (mesh.vertices - origin).astype(np.float32)
-        corners = vertices[mesh.faces]
-        e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
-        cross = np.cross(e1, e2)
-        size = _squares(cross)
-        limit = np.maximum(FLAT**2 * _squares(e1) * _squares(e2), SMALLEST)
-        keep = np.flatnonzero((size > limit) & np.isfinite(size))
-        if len(keep) < len(corners):
-            degenerate[mesh.shape] = len(corners) - len(keep)
-        kept.append(keep)
-        record = np.zeros(len(keep), layout.Triangle.dtype)
-        record["v0"], record["v1"], record["v2"] = corners[keep, 0], corners[keep, 1], corners[keep, 2]
-        record["material"], record["light"] = mesh.material, layout.NONE
-        record["shape"] = mesh.shape | (layout.SINGLE_SIDED if mesh.single_sided else 0)
-        records.append(record)
-        if any_smooth:
-            normals.append(_normals(mesh, keep, cross[keep]))
-    empty = [np.zeros(0, layout.Triangle.dtype)], [np.zeros(0, layout.TriangleNormals.dtype)]
-    return np.concatenate(records or empty[0]), np.concatenate(normals or empty[1]), degenerate, kept
+
+    meshes: list[PlacedMesh]
+    points: list[np.ndarray]  # their vertices (k, 3) float32, relative to the origin
+    kept: list[np.ndarray | None]  # which of their faces; None: all
+    degenerate: dict[int, int]  # how many are not, by shape
+
+    def __len__(self) -> int:
+        return sum(self._counts())
+
+    @property
+    def any_smooth(self) -> bool:
+        return any(mesh.normals is not None for mesh in self.meshes)
+
+    def have(self, name: str) -> bool:
+        """Whether a mesh has `uvs`, `uvs_1` or `colors`."""
+        return any(getattr(mesh, name) is not None for mesh in self.meshes)
+
+    def write(self, places: np.ndarray | None, out: np.ndarray) -> None:
+        """Fills `layout.Triangle` records."""
+
+        def some(number: int, which: Rows, where: Rows) -> None:
+            mesh, record = self.meshes[number], np.empty(_count(which), layout.Triangle.dtype)
+            record["v0"], record["v1"], record["v2"] = self._corners(number, which)
+            record["material"], record["light"] = mesh.material, layout.NONE
+            record["shape"] = mesh.shape | (layout.SINGLE_SIDED if mesh.single_sided else 0)
+            _words(out)[where] = _words(record)
+
+        self._spread(places, some)
+
+    def write_normals(self, places: np.ndarray | None, out: np.ndarray) -> None:
+        """Fills `layout.TriangleNormals` records."""
+        codes = [None if mesh.normals is None else encode(mesh.normals) for mesh in self.meshes]
+
+        def some(number: int, which: Rows, where: Rows) -> None:
+            mesh, own = self.meshes[number], codes[number]
+            record = np.zeros(_count(which), layout.TriangleNormals.dtype)
+            if mesh.normals is not None and own is not None:
+                a, b, c = self._corners(number, which)
+                _normals(mesh.normals, own, mesh.normal_faces[which], np.cross(b - a, c - a), record)
+            _words(out)[where] = _words(record)
+
+        self._spread(places, some)
+
+    def write_corners(self, name: str, places: np.ndarray | None, out: np.ndarray) -> None:
+        """Fills `uvs`, `uvs_1` (n, 3, 2) or `colors` (n, 3, 4); zeros or white of a mesh without them."""
+
+        def some(number: int, which: Rows, where: Rows) -> None:
+            values = getattr(self.meshes[number], name)
+            corners = np.full((_count(which), *out.shape[1:]), name == "colors", out.dtype)
+            if values is not None:
+                faces = self.meshes[number].faces[which]
+                corners[:, :, : values.shape[1]] = values.take(faces, axis=0)
+            out[where] = corners
+
+        self._spread(places, some)
+
+    def _counts(self) -> list[int]:
+        return [
+            len(mesh.faces) if kept is None else len(kept) for mesh, kept in zip(self.meshes, self.kept, strict=True)
+        ]
+
+    def _corners(self, number: int, which: Rows) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        a, b, c = (self.points[number].take(self.meshes[number].faces[which, k], axis=0) for k in range(3))
+        return a, b, c
+
+    def _spread(self, places: np.ndarray | None, some: Callable[[int, Rows, Rows], None]) -> None:
+        """Calls `some` with the number of a mesh, which of its faces, and where these go, until all are done."""
+        jobs, start = list[tuple[int, Rows, Rows]](), 0
+        for number, (kept, count) in enumerate(zip(self.kept, self._counts(), strict=True)):
+            for part in chunks(count):
+                which = part if kept is None else kept[part]
+                where = slice(start + part.start, start + part.stop)
+                jobs.append((number, which, where if places is None else places[where]))
+            start += count
+        in_threads(lambda job: some(*job), jobs)
 
 
-def at_corners(meshes: list[PlacedMesh], kept: list[np.ndarray], name: str) -> np.ndarray:
-    """`uvs`, `uvs_1` (triangles, 3, 2) float32 or `colors` (triangles, 3, 4) float16 of the kept faces; none where no
-    mesh has them, else zeros or white for those without.
-    """
-    width, dtype, missing = (4, np.float16, 1) if name == "colors" else (2, np.float32, 0)
-    if all(getattr(mesh, name) is None for mesh in meshes):
-        return np.zeros((0, 3, width), dtype)
-    out = np.full((sum(map(len, kept)), 3, width), missing, dtype)
-    end = 0
-    for mesh, keep in zip(meshes, kept, strict=True):
-        values = getattr(mesh, name)
-        start, end = end, end + len(keep)
-        if values is not None:
-            out[start:end, :, : values.shape[1]] = values.astype(dtype)[mesh.faces[keep]]
-    return out
+def _count(which: Rows) -> int:
+    return which.stop - which.start if isinstance(which, slice) else len(which)
+
+
+def _words(records: np.ndarray) -> np.ndarray:
+    """As rows of words, which numpy moves faster than records."""
+    return records.view(np.uint32).reshape(len(records), -1)
 
 
 def _squares(v: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("ij,ij->i", v, v, dtype=np.float64))
 
 
-def _normals(mesh: PlacedMesh, keep: np.ndarray, cross: np.ndarray) -> np.ndarray:
-    """`layout.TriangleNormals` of the faces `keep`, whose geometric normals are along `cross`."""
-    records = np.zeros(len(keep), layout.TriangleNormals.dtype)
-    if mesh.normals is None:
-        return records
-    records["smoothed"] = 1
-    codes = encode(mesh.normals)
-    missing = ~np.asarray(np.any(mesh.normals, axis=1))
-    corners = mesh.normal_faces[keep]
-    behind = np.ones(len(keep), bool)
-    for k in range(3):
-        behind &= np.einsum("ij,ij->i", mesh.normals[corners[:, k]], cross) < 0
-    turned = encode(-mesh.normals) if behind.any() else codes
-    flat = encode(cross) if missing.any() else np.zeros(len(keep), np.uint32)
-    for k, name in enumerate(("n0", "n1", "n2")):
-        index = corners[:, k]
-        # Outward is counter-clockwise: normals of a file that all point inwards are turned round.
-        code = np.where(behind, turned[index], codes[index])
-        records[name] = np.where(missing[index], flat, code)
-    return records
+def _normals(
+    normals: np.ndarray, codes: np.ndarray, corners: np.ndarray, cross: np.ndarray, record: np.ndarray
+) -> None:
+    """Fills records of faces that meet `normals`, encoded as `codes`, through `corners`, and face along `cross`."""
+    record["smoothed"] = 1
+    found = [normals.take(corners[:, k], axis=0) for k in range(3)]
+    # Outward is counter-clockwise: normals of a file that all point inwards are turned round.
+    behind = np.logical_and.reduce([np.einsum("ij,ij->i", normal, cross) < 0 for normal in found])
+    for name, normal, index in zip(("n0", "n1", "n2"), found, corners.T, strict=True):
+        code = codes.take(index)
+        if behind.any():
+            code[behind] = encode(-normal[behind])
+        missing = ~normal.any(axis=1)
+        if missing.any():
+            code[missing] = encode(cross[missing])
+        record[name] = code

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from service.pack.chunks import chunks, in_threads
+
 
 def encode(normals: np.ndarray) -> np.ndarray:
     """(n,) uint32 of (n, 3) directions of any length: octahedral, as GLSL's packSnorm2x16 [Cigolle et al. 2014].
@@ -11,7 +13,16 @@ def encode(normals: np.ndarray) -> np.ndarray:
     Decoded: e = unpackSnorm2x16(code); n = (e.x, e.y, 1 - |e.x| - |e.y|); where n.z < 0, n.x and n.y move towards
     zero by -n.z; normalise. Off by at most 0.004 degrees. A zero normal becomes +z.
     """
-    n = np.asarray(normals, np.float64)
+    codes = np.empty(len(normals), np.uint32)
+
+    def some(which: slice) -> None:
+        codes[which] = _encoded(np.asarray(normals[which], np.float64))
+
+    in_threads(some, chunks(len(normals)))
+    return codes
+
+
+def _encoded(n: np.ndarray) -> np.ndarray:
     size = np.abs(n).sum(axis=1)
     n = n / np.where(size > 0, size, 1.0)[:, None]
     sign = np.where(n[:, :2] >= 0, 1.0, -1.0)

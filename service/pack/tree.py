@@ -6,6 +6,7 @@ import numpy as np
 
 from gpu import SceneTooLarge
 from gpu.layout import ShapeKind
+from service.pack.chunks import chunks, in_threads
 from service.pack.records import Bounds
 from service.problems import FieldError, InvalidDocument
 from service.scene.numbers import Vec3
@@ -18,12 +19,6 @@ LINEAR = {
     ShapeKind.ELLIPSOID: 6,
     ShapeKind.TRIANGLE: 12,
 }
-
-
-def triangle_bounds(triangles: np.ndarray) -> Bounds:
-    a, b, c = triangles["v0"], triangles["v1"], triangles["v2"]
-    return np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-
 
 # Of a kind in the tree at most so many stand in the loop, too: the largest, whose boxes most rays would meet.
 LARGE = {
@@ -40,25 +35,47 @@ LARGE_RATIO = 16.0  # times the median of its kind, at least: a ball of few tria
 def stand_out(bounds: dict[ShapeKind, Bounds]) -> dict[ShapeKind, np.ndarray]:
     """Of each kind in the tree the indices of those few that stand in the loop instead, the largest first."""
     area = {kind: _areas(*box) for kind, box in bounds.items()}
-    ranked = {kind: np.argsort(-a, kind="stable")[: LARGE[kind]] for kind, a in area.items()}
+    ranked = {kind: _largest(a, LARGE[kind]) for kind, a in area.items()}
     ranked = {kind: r[area[kind][r] > LARGE_RATIO * float(np.median(area[kind]))] for kind, r in ranked.items()}
     out = dict.fromkeys(bounds, 0)
     # What stands out no longer counts for the box around the others: a room on a globe has walls.
-    while True:
-        rest = [np.delete(np.stack(box), ranked[kind][: out[kind]], axis=1) for kind, box in bounds.items()]
+    while any(map(len, ranked.values())):
+        rest = [_without(box, ranked[kind][: out[kind]]) for kind, box in bounds.items()]
         low = np.min([low.min(axis=0) for low, _ in rest], axis=0)
         high = np.max([high.max(axis=0) for _, high in rest], axis=0)
-        least = LARGE_SHARE * float(_areas(low, high))
+        least = LARGE_SHARE * float(_areas(low[None], high[None])[0])
         found = {kind: int((area[kind][places] > least).sum()) for kind, places in ranked.items()}
         if found == out:
-            return {kind: ranked[kind][:count] for kind, count in out.items()}
+            break
         out = {kind: max(count, out[kind]) for kind, count in found.items()}
+    return {kind: ranked[kind][:count] for kind, count in out.items()}
+
+
+def _largest(values: np.ndarray, count: int) -> np.ndarray:
+    """Their indices, the largest first, of equal ones the first first."""
+    if len(values) > count:
+        least = np.partition(values, len(values) - count)[len(values) - count]
+        some = np.flatnonzero(values >= least)
+    else:
+        some = np.arange(len(values))
+    return np.asarray(some[np.argsort(-values[some], kind="stable")[:count]])
+
+
+def _without(box: Bounds, places: np.ndarray) -> Bounds:
+    low, high = box
+    return (np.delete(low, places, axis=0), np.delete(high, places, axis=0)) if len(places) else box
 
 
 def _areas(low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Half the surface area of each box."""
-    x, y, z = np.moveaxis(np.subtract(high, low, dtype=np.float64), -1, 0)
-    return np.asarray(x * y + y * z + z * x)
+    """(n,) half the surface area of each box."""
+    areas = np.empty(len(low))
+
+    def some(which: slice) -> None:
+        x, y, z = np.subtract(high[which], low[which], dtype=np.float64).T
+        areas[which] = x * y + y * z + z * x
+
+    in_threads(some, chunks(len(low)))
+    return areas
 
 
 def plant(
@@ -70,20 +87,23 @@ def plant(
     """
     from gpu import bvh  # loads numba: only a scene that needs a tree waits for it
 
-    small = {kind: np.setdiff1d(np.arange(len(low)), large[kind]) for kind, (low, _) in bounds.items()}
+    small = {kind: np.delete(np.arange(len(low), dtype=np.uint32), large[kind]) for kind, (low, _) in bounds.items()}
     counts = [len(places) for places in small.values()]
     kinds = np.repeat(np.array(list(bounds), np.uint8), counts)
-    low = np.concatenate([bounds[k][0][places] for k, places in small.items()]).astype(np.float32)
-    high = np.concatenate([bounds[k][1][places] for k, places in small.items()]).astype(np.float32)
+    rest = [_without(box, large[kind]) for kind, box in bounds.items()]
+    low, high = (
+        np.concatenate([box[k] for box in rest], dtype=np.float32) if len(rest) > 1 else rest[0][k].astype(np.float32)
+        for k in range(2)
+    )
+    del rest
     try:
         tree = bvh.build(low, high, kinds, firsts={int(k): len(places) for k, places in large.items() if len(places)})
     except SceneTooLarge as error:
         raise InvalidDocument([FieldError("/shapes", str(error))]) from None
     nodes, count = bvh.thread(tree)
     starts = np.cumsum([0, *counts])
-    leaf_kinds = kinds[tree.order]
-    order = {
-        kind: np.concatenate([large[kind], places[(tree.order[leaf_kinds == kind] - start).astype(np.int64)]])
-        for (kind, places), start in zip(small.items(), starts, strict=False)
-    }
+    order = {}
+    for (kind, places), start in zip(small.items(), starts, strict=False):
+        leaves = tree.order if len(small) == 1 else tree.order[kinds[tree.order] == kind] - np.uint32(start)
+        order[kind] = np.concatenate([large[kind].astype(np.uint32), places[leaves]])
     return nodes, count, order, tree.origin, tree.scale

@@ -1,0 +1,26 @@
+"""Long arrays piece by piece: what is needed on the way stays in the cache, and all cores have work."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+T = TypeVar("T")
+
+CHUNK = 1 << 14  # rows; a few float64 of each take a megabyte
+
+
+def chunks(count: int) -> list[slice]:
+    return [slice(at, min(at + CHUNK, count)) for at in range(0, count, CHUNK)]
+
+
+def in_threads(call: Callable[[T], None], jobs: Sequence[T]) -> None:
+    """Calls with every job, in any order: numpy lets go of the interpreter's lock."""
+    if len(jobs) < 3:
+        for job in jobs:
+            call(job)
+        return
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        list(pool.map(call, jobs))
