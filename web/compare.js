@@ -37,9 +37,9 @@ export class Comparison {
 
   // `places`: {root, stage, divider, canvas, difference}; `first` the viewport of A; `acts` the editor;
   // `changed()` when the picture's size may be another one; `models` those that B can be turned into;
-  // `beside()` the session of A.
-  constructor(places, { first, acts, models, changed, names, lost, beside }) {
-    Object.assign(this, places, { first, acts, changed, names, lost, beside });
+  // `beside()` the session of A, `samplesOfA()` those of its picture.
+  constructor(places, { first, acts, models, changed, names, lost, beside, samplesOfA }) {
+    Object.assign(this, places, { first, acts, changed, names, lost, beside, samplesOfA });
     this.#build(models);
     this.divider.addEventListener("input", () => this.#split());
   }
@@ -151,10 +151,14 @@ export class Comparison {
       this.difference.getContext("2d").putImageData(out, 0, 0);
     }
     const percent = (x) => `${(100 * x).toFixed(2)} %`;
+    const [ofA, ofB] = [this.samplesOfA(), this.#header.samples];
     this.metric.replaceChildren(
-      "RMSE ", element("b", {}, percent(rmse)), Number.isFinite(psnr) ? ` · PSNR ${psnr.toFixed(1)} dB` : "",
-      ` · most ${percent(most)}${isShown ? ` · shown ×${GAIN}` : ""}`,
+      "RMSE ", element("b", {}, percent(rmse)), isShown ? ` · shown ×${GAIN}` : "",
+      element("span", { class: "beside" }, [
+        "", ...(Number.isFinite(psnr) ? [`PSNR ${psnr.toFixed(1)} dB`] : []), `largest ${percent(most)}`,
+        ...(ofA === ofB ? [] : [`at ${ofA} and ${ofB} samples`]),
+      ].join(" · ")),
     );
-    this.metric.title = "Of the displayed colours, white being 100 %";
+    this.metric.title = "Of the displayed colours, white being 100 %; noise counts until both are done";
   }
 }

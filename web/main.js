@@ -145,7 +145,7 @@ const panel = new Panel(find("panel"), {
 });
 const comparison = new Comparison(
   { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },
-  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {}, beside: () => stream.session },
+  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {}, beside: () => stream.session, samplesOfA: () => header?.samples ?? 0 },
 );
 
 const keep = new Keep(find("page-keep"), {

@@ -1,6 +1,7 @@
 // What can be laid over the picture: a histogram, clipped pixels, the legend of a layer, guides.
 
 import { element } from "./dom.js";
+import { percent } from "./words.js";
 
 const RED = [255, 60, 60];
 const BLUE = [60, 110, 255];
@@ -46,6 +47,16 @@ export function drawClipping(canvas, image) {
   Object.assign(canvas, { width, height });
   canvas.getContext("2d").putImageData(over, 0, 0);
   return { high: high / (width * height), low: low / (width * height) };
+}
+
+// What the two colours over the picture stand for, with the shares of it that they cover.
+export function showClipped(root, { high, low }) {
+  const key = ([color, text]) => {
+    const dot = element("i", {});
+    dot.style.setProperty("background", `rgb(${color.join(" ")})`);
+    return element("span", { class: "key" }, dot, text);
+  };
+  root.replaceChildren(...[[RED, `Clipped ${percent(high)}`], [BLUE, `Black ${percent(low)}`]].map(key));
 }
 
 export function showLegend(root, legend) {

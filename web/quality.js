@@ -1,10 +1,13 @@
-// The quality presets with what they cost: as the server measured it, and as this scene goes here and now.
+// The quality presets with what they cost this scene, here and now; before that is known, what the price list says.
 
 import { element } from "./dom.js";
 import { watchChoice } from "./tabs.js";
 import { count, duration, inWords, percent } from "./words.js";
 
 const TRUSTED = 4; // samples before a forecast is worth something
+const UNSEEN = 0.0005; // a share of the light that nobody misses
+
+const isKnown = (live) => live?.samples >= TRUSTED && live.scale === 1;
 
 // The time and noise that a number of samples comes to, from what the picture has taken so far.
 export function forecast(target, { samples, elapsed_s, noise }) {
@@ -14,40 +17,46 @@ export function forecast(target, { samples, elapsed_s, noise }) {
   };
 }
 
-function price(preset, live) {
-  const known = live?.samples >= TRUSTED && live.scale === 1;
-  const { seconds, noise } = known ? forecast(preset.max_samples, live) : preset.cost ?? {};
+// What a preset costs. `live`: the header of the newest frame.
+export function price(preset, live) {
+  const { seconds, noise } = isKnown(live) ? forecast(preset.max_samples, live) : preset.cost ?? {};
   if (typeof seconds !== "number") return "";
-  const missing = known ? live.missing_light?.[preset.max_bounces] : undefined; // of this scene's light, once measured
-  return [
-    `≈ ${duration(seconds)}`,
-    typeof noise === "number" ? `${percent(noise)} noise` : "",
-    typeof missing === "number" ? (missing < 0.0005 ? "no light missing" : `${percent(missing)} of the light missing`) : "",
-  ].filter(Boolean).join(", ");
+  const reached = typeof noise === "number" ? ` to ${percent(noise)} noise` : "";
+  return isKnown(live) ? `≈ ${duration(seconds)}${reached} here` : `listed: ${duration(seconds)}${reached}`;
 }
 
-const basics = ({ max_samples, max_bounces }) => `${count(max_samples)} samples, ${max_bounces} bounces`;
+const share = (light) => (light < UNSEEN ? `under ${percent(UNSEEN)}` : percent(light));
+
+// What a preset takes, and what light lies beyond its bounces: of this scene once that is measured.
+export function taken({ max_samples, max_bounces, cost }, live) {
+  const text = `${count(max_samples)} samples, ${max_bounces} bounces`;
+  const here = isKnown(live) ? live.missing_light?.[max_bounces] : undefined;
+  if (typeof here === "number") return `${text}; beyond them ${share(here)} of this scene's light is missing`;
+  if (!cost) return text;
+  const { missing_light: usual, worst_missing_light: worst } = cost;
+  const listed = worst.share < UNSEEN ? share(worst.share) : `${share(usual)}, in ${worst.scene} ${percent(worst.share)},`;
+  return `${text}; beyond them ${listed} of the listed scenes' light is missing`;
+}
 
 export function qualityChoice(root, pick) {
   const mark = watchChoice(root, ".quality", (button) => pick(button.dataset.name));
-  const prices = new Map();
+  const places = new Map();
   let made = null;
   return (presets, chosen, live) => {
     if (presets !== made) {
       made = presets;
-      prices.clear();
-      root.replaceChildren(...Object.entries(presets).map(([name, preset]) => {
-        prices.set(name, element("span", { class: "price" }));
+      places.clear();
+      root.replaceChildren(...Object.keys(presets).map((name) => {
+        places.set(name, { price: element("span", { class: "price" }), taken: element("span", { class: "what" }) });
         return element(
           "button", { type: "button", role: "radio", class: "quality", "data-name": name },
-          element("span", {}, inWords(name)), prices.get(name),
-          element("span", { class: "what" }, [basics(preset), preset.gives_up].filter(Boolean).join(". ")),
+          element("span", {}, inWords(name)), ...Object.values(places.get(name)),
         );
       }));
     }
-    for (const [name, place] of prices) {
-      const text = price(presets[name], live);
-      if (place.textContent !== text) place.textContent = text;
+    for (const [name, place] of places) {
+      const texts = { price: price(presets[name], live), taken: taken(presets[name], live) };
+      for (const [part, text] of Object.entries(texts)) if (place[part].textContent !== text) place[part].textContent = text;
     }
     mark((button) => button.dataset.name === chosen);
   };

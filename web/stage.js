@@ -5,7 +5,7 @@ import { ball, together } from "./bounds.js";
 import { axes, frame, ray } from "./camera.js";
 import { watchGestures } from "./gestures.js";
 import { Inspector } from "./inspector.js";
-import { drawClipping, drawHistogram, fitGuides, showLegend } from "./overlays.js";
+import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
 import { Picker, drawOutline } from "./picking.js";
 import { watchChoice } from "./tabs.js";
 import { at, pointer } from "./patch.js";
@@ -65,6 +65,7 @@ export class Stage {
     this.inspector.toggle(tool === "inspect");
     this.find("guides").hidden = !guides;
     this.find("clipping").hidden = !clipping;
+    this.find("clipped").hidden = !clipping;
     this.find("histogram").hidden = !histogram;
     this.overlay();
   }
@@ -85,7 +86,7 @@ export class Stage {
       this.#overlaid = performance.now();
       const image = this.viewport.pixels();
       if (histogram) drawHistogram(this.find("histogram"), image);
-      if (clipping) drawClipping(this.find("clipping"), image);
+      if (clipping) showClipped(this.find("clipped"), drawClipping(this.find("clipping"), image));
     }, Math.max(0, this.#overlaid + OVERLAY_MS - performance.now()));
   }
 

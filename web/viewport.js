@@ -2,11 +2,18 @@
 
 import { LEGENDS, isPainted, paintLayer } from "./aov.js";
 
+const NEARBY = 16; // pixels less across that a picture may have
+
 // Sides in pixels of a picture that fills the box at the device's ratio, within an area.
 export function pictureSize({ width, height }, ratio, area) {
   const wanted = Math.max(1, width * ratio * height * ratio);
   const shrink = ratio * Math.min(1, Math.sqrt(area / wanted));
-  return { width: Math.max(16, Math.round(width * shrink)), height: Math.max(16, Math.round(height * shrink)) };
+  const size = (across) => ({ width: Math.max(16, across), height: Math.max(16, Math.round((across * height) / width)) });
+  const across = Math.round(width * shrink);
+  if (shrink === ratio) return size(across);
+  // Of the sizes nearby the one whose sides are to each other as the box's: else a line of the stage shows beside it.
+  const gap = ({ width: w, height: h }) => Math.abs((w * height) / (h * width) - 1);
+  return Array.from({ length: NEARBY }, (_, i) => size(across - i)).reduce((best, each) => (gap(each) < gap(best) ? each : best));
 }
 
 export class Viewport {

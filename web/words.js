@@ -24,7 +24,7 @@ export function duration(seconds) {
   return minutes < 100 ? `${minutes} min` : `${Math.round(minutes / 60)} h`;
 }
 
-export const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))} %`;
+export const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))}\u00a0%`;
 
 // 16777216 -> "16 777 216", with spaces that do not break.
 export const count = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");

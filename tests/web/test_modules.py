@@ -123,7 +123,34 @@ def test_the_picture_fills_its_box_within_an_area(page: Page) -> None:
     size = call(page, "viewport.js", "pictureSize", {"width": 1200, "height": 800}, 2, 512 * 512)
     assert size["width"] * size["height"] == pytest.approx(512 * 512, rel=0.01)
     assert size["width"] / size["height"] == pytest.approx(1.5, rel=0.01)
+    box = {"width": 1091, "height": 825}
+    size = call(page, "viewport.js", "pictureSize", box, 1, 512 * 512)
+    left_over = box["width"] - box["height"] * size["width"] / size["height"]
+    assert abs(left_over) < 0.25, "no line of a pixel beside the picture"
     assert call(page, "viewport.js", "pictureSize", {"width": 300, "height": 200}, 1, 512 * 512) == {
         "width": 300,
         "height": 200,
     }
+
+
+def test_a_preset_says_what_it_costs_this_scene_and_before_that_the_list(page: Page) -> None:
+    cost = {
+        "seconds": 23.4, "noise": 0.039, "missing_light": 0.0004,
+        "worst_missing_light": {"share": 0.0296, "scene": "glass"},
+    }  # fmt: skip
+    preset = {"max_samples": 256, "max_bounces": 8, "cost": cost}
+
+    def said(live: Any) -> list[str]:
+        return [call(page, "quality.js", name, preset, live).replace("\u00a0", " ") for name in ("price", "taken")]
+
+    assert said(None) == [
+        "listed: 23 s to 3.9 % noise",
+        "256 samples, 8 bounces; beyond them under 0.05 %, in glass 3 %, of the listed scenes' light is missing",
+    ]
+    live = {"samples": 64, "scale": 1, "elapsed_s": 10, "noise": 0.08}
+    assert said(live | {"scale": 0.25}) == said(None), "a preview tells nothing of the picture's price"
+    assert said(live)[0] == "≈ 40 s to 4 % noise here"
+    assert said(live | {"missing_light": {"5": 0.2, "8": 0.012}}) == [
+        "≈ 40 s to 4 % noise here",
+        "256 samples, 8 bounces; beyond them 1.2 % of this scene's light is missing",
+    ]

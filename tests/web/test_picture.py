@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from typing import Any
 
 import numpy as np
@@ -136,6 +137,8 @@ def test_histogram_and_clipping_follow_the_exposure(editor: Editor) -> None:
         return float((overlay(editor, "clipping")[..., :3] == color).all(axis=2).mean())
 
     editor.wait("white pixels", lambda: share([255, 60, 60]) > 0.5)
+    clipped = re.search(r"Clipped ([\d.]+)\s%", editor.text("#clipped"))
+    assert clipped and float(clipped[1]) == pytest.approx(100 * share([255, 60, 60]), abs=3), "told beside it"
     entry.fill("-20")
     entry.press("Enter")
     editor.wait("black pixels", lambda: share([60, 110, 255]) > 0.9)
@@ -146,10 +149,10 @@ def test_quality_has_a_price(editor: Editor) -> None:
     editor.tab("render")
 
     def seconds(name: str) -> float:
-        words = editor.text(f".quality[data-name={name}] .price").replace(",", "").split()
+        words = editor.text(f".quality[data-name={name}] .price").split()
         return float(words[1]) * {"s": 1, "min": 60, "h": 3600}[words[2]] if words else 0.0
 
-    editor.wait("a forecast", lambda: seconds("reference") > 0)
+    editor.wait("a forecast", lambda: editor.text(".quality[data-name=reference] .price").endswith(" noise here"))
     assert seconds("reference") > 100 * seconds("draft") > 0
     editor.page.click(".quality[data-name=draft]")
     editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == 16)
