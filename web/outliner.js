@@ -111,7 +111,8 @@ export class Outliner {
       this.#find("thing-material").replaceChildren(...names.map((name) => element("option", { value: name }, inWords(name))));
       this.#find("thing-material").value = document.material;
     }
-    const kind = `${this.thing} ${document?.type}${document?.transform?.matrix ? " matrix" : ""}`;
+    const marks = [document?.transform?.matrix && "matrix", this.acts.removable(this.thing) && "removable"].filter(Boolean);
+    const kind = [this.thing, document?.type, ...marks].join(" ");
     if (kind !== this.#made) this.#make(kind, document, isShape);
     for (const { place, form } of this.#forms) form.show(at(scene, place) ?? {});
   }

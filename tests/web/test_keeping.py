@@ -189,3 +189,16 @@ def test_things_are_added_moved_and_removed(editor: Editor) -> None:
     editor.wait_for_change(before)
     editor.page.keyboard.press("Control+z")
     editor.wait("the ball's place", lambda: not editor.differs(before, 8))
+
+
+def test_the_last_thing_cannot_be_deleted(editor: Editor) -> None:
+    """A scene keeps a shape: also the one that moved up into the place of another of its kind."""
+    acts, things = editor.page.locator("#thing-acts"), editor.page.locator("#outline-list [role=option]")
+    editor.tab("scene")
+    editor.page.click("#outline-list [data-thing='/shapes/1']")
+    acts.get_by_text("Delete").click()
+    assert editor.text("#thing-title") == "Sphere" and acts.inner_text().split() == ["Frame", "Duplicate"]
+    acts.get_by_text("Duplicate").click()
+    editor.page.click("#outline-list [data-thing='/shapes/0']")
+    acts.get_by_text("Delete").click()
+    assert things.count() == 3 and acts.inner_text().split() == ["Frame", "Duplicate"]
