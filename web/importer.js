@@ -7,6 +7,7 @@ import { axes } from "./camera.js";
 import { at, equal, isObject, pointer, put } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
+import { sentence } from "./words.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
@@ -37,7 +38,7 @@ export class Importer {
       try {
         await this.#take(file, at);
       } catch (problem) {
-        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problem.message });
+        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: sentence(problem.message) });
       }
       this.messages.hide("upload");
     }
@@ -112,7 +113,7 @@ export class Importer {
     try {
       await this.#paint(place, await this.upload(file), file);
     } catch (problem) {
-      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problem.message });
+      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: sentence(problem.message) });
     }
     this.messages.hide("upload");
   }

@@ -21,7 +21,7 @@ export class Status {
     places.rate.textContent = Number.isFinite(rate) ? Number(rate.toPrecision(2)) : NOTHING;
     places.noise.textContent = noise === null ? NOTHING : percent(noise);
     places.elapsed.textContent = duration(elapsed_s);
-    places.left.textContent = eta_s === null ? NOTHING : duration(eta_s);
+    places.left.textContent = eta_s ? duration(eta_s) : NOTHING;
     places.progress.value = eta_s === null ? (limit ? samples / limit : 0) : elapsed_s / (elapsed_s + eta_s || 1);
     places.preview.hidden = scale >= 1;
     places.preview.textContent = `Preview, 1/${Math.round(1 / scale)} size`;

@@ -26,5 +26,8 @@ export function duration(seconds) {
 
 export const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))}\u00a0%`;
 
+// What the server says of a thing, as a sentence of its own.
+export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
+
 // 16777216 -> "16 777 216", with spaces that do not break.
 export const count = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");
