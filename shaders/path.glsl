@@ -3,6 +3,7 @@
 #include "bsdf.glsl"
 #include "lights.glsl"
 #include "passing.glsl"
+#include "medium.glsl"
 
 struct Radiance {
     vec3 color;
@@ -149,7 +150,11 @@ Scatter path_folded(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool ma
 }
 #endif
 
+#if HAS_ATTENUATION
+Radiance path_trace(vec3 o, vec3 d, Sampler rng, Medium medium) {
+#else
 Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
+#endif
     Radiance result = Radiance(vec3(0.0), 0.0);
     Point at;
     Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
@@ -170,23 +175,16 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
     alive = alive && frame.max_bounces > 0u;
     vec3 throughput = vec3(1.0);
+#if HAS_ATTENUATION
+    throughput = medium_share(medium, n.t);
+    result.color *= throughput;
+#endif
     vec3 before = result.color; // light of all bounces but the last
     uint bounce = 0u;
 #if HAS_TRANSMISSION
     // Radiance over the square of the index is what passes a boundary unchanged: `dense` is that square here over
     // that at the camera, kept apart so that roulette does not see it.
     float dense = 1.0;
-    vec3 fog = vec3(0.0); // rate of attenuation along the ray
-    if (alive && dot(at.ng, d) > 0.0) {
-#if HAS_TEXTURES
-        vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
-        texture_look(at, texels);
-        Material m = texture_material(at, texels);
-#else
-        Material m = material_pick(at.material);
-#endif
-        if (surface_transmits(m)) throughput = exp(-surface_attenuation(m) * n.t);
-    }
 #endif
     if (alive) {
         do {
@@ -227,9 +225,17 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #if HAS_PRINCIPLED
             principled_face(wo, dot(at.ng, wo_w) < 0.0, s);
 #endif
-#if HAS_TRANSMISSION
-            bool clear = surface_transmits(m);
-            vec3 inner = surface_attenuation(m);
+#if HAS_ATTENUATION
+            vec3 rate = surface_attenuation(m);
+            bool clear = surface_transmits(m), inside = dot(at.ng, wo_w) < 0.0;
+            if (clear && inside && medium.depth < 0.5) {
+                // The back of an open sheet: as if there had been a body all along.
+                medium = medium_entered(medium, rate);
+                if (bounce == 0u) throughput = medium_share(medium, n.t);
+            }
+            Medium beyond = medium;
+            if (clear && inside) beyond = medium_left(medium, rate);
+            if (clear && !inside) beyond = medium_entered(medium, rate);
 #endif
             uint pair = PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE;
             vec2 choice = sobol_pair(rng, pair + PAIR_CHOICE);
@@ -270,7 +276,10 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #else
                 c *= path_dense(dense, wi.z, s, light.t);
 #endif
-                c *= exp(-(clear ? (dot(at.ng, light.wi) < 0.0 ? inner : vec3(0.0)) : fog) * light.t);
+#endif
+#if HAS_ATTENUATION
+                bool crosses = (dot(at.ng, light.wi) < 0.0) != inside;
+                c *= exp(-(crosses ? beyond.rate : medium.rate) * light.t);
 #endif
                 uvec2 skip = uvec2(flat_id, light.id);
 #if HAS_OPACITY
@@ -364,7 +373,9 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #else
             dense = path_dense(dense, wi_next.z, s, 0.0);
 #endif
-            if (clear) fog = dot(at.ng, d) < 0.0 ? inner : vec3(0.0);
+#endif
+#if HAS_ATTENUATION
+            if ((dot(at.ng, d) < 0.0) != inside) medium = beyond;
 #endif
 #if HAS_OPACITY
             if (alive) n = passing_nearest(o, d, flat_id, bounce, rng, at);
@@ -373,8 +384,8 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             at = shapes_point(n, o, d);
 #endif
             bool met = n.id != NONE;
-#if HAS_TRANSMISSION
-            throughput *= exp(-fog * n.t);
+#if HAS_ATTENUATION
+            throughput *= medium_share(medium, n.t);
 #endif
 #if ESTIMATOR != ESTIMATOR_LIGHT || HAS_PRINCIPLED
             float found_pdf = next.pdf;

@@ -25,12 +25,19 @@ void main() {
     precise vec4 sum = sums[slot], lost = compensations[slot];
     vec4 moment = moments[slot];
     if (frame.replicate != 0u) pixel = uvec2(moment.xy); // the meter's buffers say where (gpu/meter.py)
+#if HAS_ATTENUATION
+    Medium medium = medium_at_camera();
+#endif
     uint i = 0u;
     do {
         Sampler rng = sobol_begin(pixel, frame.sample_first + i);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
+#if HAS_ATTENUATION
+        Radiance r = path_trace(o, d, rng, medium);
+#else
         Radiance r = path_trace(o, d, rng);
+#endif
         vec3 before = moment.w > 0.0 ? sum.rgb / moment.w : vec3(0.0);
         precise vec4 x = vec4(r.color, r.alpha) - lost;
         precise vec4 total = sum + x;

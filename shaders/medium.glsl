@@ -1,0 +1,79 @@
+// Bodies that absorb. Their rates add up, so that it does not matter in which order nested or overlapping bodies are
+// entered and left, and what is in two bodies loses light to both.
+#if HAS_ATTENUATION
+struct Medium {
+    vec3 rate;   // of attenuation along the ray, 1/m: the sum of those of the bodies around
+    float depth; // how many transmitting bodies that are
+};
+
+const float MEDIUM_WALL = 1e20; // a rate above lets nothing through, and would round away the others in a sum
+const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below goes through at most
+// Off the camera's axes, where meshes like to have their edges.
+const vec3 MEDIUM_SEARCH = vec3(0.1371, 0.0713, -1.0);
+
+Medium medium_entered(Medium m, vec3 rate) { return Medium(m.rate + rate, m.depth + 1.0); }
+
+// With the last body goes all rate: a texture may have given it another one where it was entered.
+Medium medium_left(Medium m, vec3 rate) {
+    if (m.depth > 1.5) return Medium(max(m.rate - rate, vec3(0.0)), m.depth - 1.0);
+    return Medium(vec3(0.0), 0.0);
+}
+
+// What is left of light after t metres.
+vec3 medium_share(Medium m, float t) { return exp(-m.rate * t); }
+
+// What the camera is in: whose surface a straight line leaves more often than it enters it. Opaque things do not
+// matter. The line goes backwards, where there is least; if that says inside, so must a second one, forwards: an open
+// sheet is no body.
+Medium medium_at_camera() {
+    vec3 d = normalize(MEDIUM_SEARCH.x * frame.camera_right + MEDIUM_SEARCH.y * frame.camera_up
+                     + MEDIUM_SEARCH.z * frame.camera_forward);
+    vec3 o = frame.camera_position;
+    Medium sum = Medium(vec3(0.0), 0.0), first = sum;
+    vec3 walls = vec3(0.0);
+    uint skip = NONE, layer = 0u, side = 0u;
+    bool more;
+    do {
+        Nearest n = shapes_nearest(o, d, skip);
+        Point at = shapes_point(n, o, d);
+        more = n.id != NONE && layer < MEDIUM_LAYERS;
+#if HAS_TEXTURES
+        vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
+        texture_look(at, texels);
+        Material m = texture_material(at, texels);
+#else
+        Material m = material_pick(at.material);
+#endif
+        bool counts = more && surface_transmits(m);
+#if HAS_HIDDEN_SHAPES
+        counts = counts && (at.shape & HIDDEN) == 0u;
+#endif
+        if (counts) {
+            float crossing = dot(at.ng, d) > 0.0 ? 1.0 : -1.0;
+            vec3 rate = surface_attenuation(m), wall = step(MEDIUM_WALL, rate);
+            sum.rate += crossing * (1.0 - wall) * rate;
+            walls += crossing * wall;
+            sum.depth += crossing;
+        }
+        if (more) {
+            o = shapes_leave(at, d);
+            skip = at.flat_id;
+        } else {
+            sum.rate = sum.depth > 0.5 ? max(sum.rate, vec3(0.0)) + MEDIUM_WALL * max(walls, vec3(0.0)) : vec3(0.0);
+            sum.depth = max(sum.depth, 0.0);
+            more = side == 0u && sum.depth > 0.5;
+            if (side == 0u) first = sum;
+            side++;
+            o = frame.camera_position;
+            d = -d;
+            skip = NONE;
+            if (more) {
+                sum = Medium(vec3(0.0), 0.0);
+                walls = vec3(0.0);
+            }
+        }
+        layer++;
+    } while (more);
+    return Medium(min(first.rate, sum.rate), min(first.depth, sum.depth));
+}
+#endif
