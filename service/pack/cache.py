@@ -41,6 +41,11 @@ class PackCache:
                 self._kept.popitem(last=False)
         return value
 
+    def find(self, fits: Callable[[Any], bool]) -> Any:
+        """The newest that fits; or None."""
+        with self._lock:
+            return next((value for value, _ in reversed(self._kept.values()) if fits(value)), None)
+
 
 def _freeze(value: object) -> int:
     """Makes the arrays in a dataclass read-only, as they are shared from now on; returns their bytes."""

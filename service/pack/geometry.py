@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -27,6 +27,17 @@ MANY = 100_000  # triangles, after which what was needed on the way is worth giv
 
 
 @dataclass(frozen=True)
+class Meshes:
+    """What a geometry says of its meshes: `key` is equal where they are, with all that goes into their triangles."""
+
+    key: Hashable
+    low: np.ndarray  # boxes around those with vertices (n, 3), and which shapes of the document they are
+    high: np.ndarray
+    owners: np.ndarray
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
 class Geometry:
     """Records by kind, in final order: of a kind in `bvh_kinds` that of the leaves. Large ones are shared memory."""
 
@@ -45,20 +56,28 @@ class Geometry:
     large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
     origin: Vec3
     radius: float  # of a ball around everything; 1 where there is nothing
+    meshes: Meshes
     warnings: tuple[str, ...]
 
 
 def geometry(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    uv_sets: Mapping[str, frozenset[int]],
+    uv_sets: Mapping[str, frozenset[int]], key: Hashable = None, earlier: Geometry | None = None,
 ) -> Geometry:  # fmt: skip
-    """`names`: the materials in order; `emissive`: those that shine; `uv_sets`: which texture coordinates they read.
+    """`names`: the materials in order; `emissive`: those that shine; `uv_sets`: which texture coordinates they read;
+    `key`: of the meshes, none of which shines, for `earlier`: a geometry of the same meshes, whose triangles and tree
+    serve again where nothing else is in that tree.
 
     Raises InvalidDocument.
     """
+    if earlier is not None:
+        again = _among_other_shapes(earlier, shapes, names, emissive, assets, max_triangles, uv_sets)
+        if again is not None:
+            return again
     placed, placed_meshes, odd = place(shapes, names, emissive, assets, max_triangles, uv_sets)
     analytic = _analytic(placed, np.zeros(3))
-    low, high, owners, exact = _extents(analytic, placed_meshes)
+    own = _mesh_extents(placed_meshes, key, odd)
+    low, high, owners, exact = _extents(analytic, own)
     origin, radius = choose(low, high)
     if origin.any():
         analytic = _analytic(placed, origin)
@@ -93,9 +112,9 @@ def geometry(
     _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
-    warnings = odd + [f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in triangles.degenerate.items()]
-    warnings += [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
-    warnings += lost(low, high, owners, exact, origin)
+    flat = tuple(f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in triangles.degenerate.items())
+    own = replace(own, warnings=own.warnings + flat)
+    warnings = [*own.warnings, *_vanished(placed), *lost(low, high, owners, exact, origin)]
     for array in (*found.values(), nodes, normals, uvs, uvs_1, colors):
         array.flags.writeable = array.nbytes < LEAST  # others may have it mapped
     if len(found[ShapeKind.TRIANGLE]) > MANY:
@@ -103,8 +122,39 @@ def geometry(
     return Geometry(
         found, normals, uvs, uvs_1, colors, shining, areas, nodes, node_count,
         node_origin, node_scale, kinds, {kind: len(places) for kind, places in standing.items()},
-        vec3(origin), radius, tuple(warnings),
+        vec3(origin), radius, own, tuple(warnings),
     )  # fmt: skip
+
+
+def _among_other_shapes(
+    earlier: Geometry, shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets,
+    max_triangles: int, uv_sets: Mapping[str, frozenset[int]],
+) -> Geometry | None:  # fmt: skip
+    """The meshes of `earlier` with what else there is now; None where that touches them."""
+    if earlier.bvh_kinds - {ShapeKind.TRIANGLE}:
+        return None
+    placed, _, _ = place(shapes, names, emissive, assets, max_triangles, uv_sets, known_meshes=True)
+    analytic = _analytic(placed, np.zeros(3))
+    low, high, owners, exact = _extents(analytic, earlier.meshes)
+    origin, radius = choose(low, high)
+    if vec3(origin) != earlier.origin or any(len(array) > LINEAR[kind] for kind, (array, _) in analytic.items()):
+        return None
+    if origin.any():
+        analytic = _analytic(placed, origin)
+    records.only_vast(analytic[ShapeKind.SPHERE][0], low, high)
+    found = {kind: array for kind, (array, _) in analytic.items()}
+    _hide(found, shapes)
+    found[ShapeKind.TRIANGLE] = earlier.shapes[ShapeKind.TRIANGLE]
+    shining = lights.mark(found, np.array([name in emissive for name in names]))
+    warnings = [*earlier.meshes.warnings, *_vanished(placed), *lost(low, high, owners, exact, origin)]
+    return replace(
+        earlier, shapes=found, lights=shining, areas=lights.areas(found, shining), radius=radius,
+        warnings=tuple(warnings),
+    )  # fmt: skip
+
+
+def _vanished(placed: Placed) -> list[str]:
+    return [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
 
 
 def _inverse(order: np.ndarray | None) -> np.ndarray | None:
@@ -144,14 +194,18 @@ def _analytic(placed: Placed, origin: np.ndarray) -> dict[ShapeKind, tuple[np.nd
     }
 
 
+def _mesh_extents(placed_meshes: list[PlacedMesh], key: Hashable, odd: list[str]) -> Meshes:
+    some = [mesh for mesh in placed_meshes if len(mesh.vertices)]
+    low, high = (np.array([end(mesh.vertices, axis=0) for mesh in some]).reshape(-1, 3) for end in (np.min, np.max))
+    return Meshes(key, low, high, np.array([mesh.shape for mesh in some], np.uint32), tuple(odd))
+
+
 def _extents(
-    analytic: dict[ShapeKind, tuple[np.ndarray, Bounds]], placed_meshes: list[PlacedMesh]
+    analytic: dict[ShapeKind, tuple[np.ndarray, Bounds]], own: Meshes
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     """Boxes around all shapes, low and high (n, 3), which of the document they are (n,), and which are balls."""
-    some = [mesh for mesh in placed_meshes if len(mesh.vertices)]
-    low = [bounds[0] for _, bounds in analytic.values()] + [mesh.vertices.min(axis=0)[None] for mesh in some]
-    high = [bounds[1] for _, bounds in analytic.values()] + [mesh.vertices.max(axis=0)[None] for mesh in some]
-    owners = [records["shape"] for records, _ in analytic.values()]
-    owners += [np.array([mesh.shape], np.uint32) for mesh in some]
+    low = [*(bounds[0] for _, bounds in analytic.values()), own.low]
+    high = [*(bounds[1] for _, bounds in analytic.values()), own.high]
+    owners = [*(records["shape"] for records, _ in analytic.values()), own.owners]
     shapes = np.concatenate(owners)
     return np.concatenate(low), np.concatenate(high), shapes, np.arange(len(shapes)) < len(owners[0])

@@ -42,7 +42,8 @@ def mark(shapes: dict[ShapeKind, np.ndarray], emissive: np.ndarray) -> np.ndarra
         shining = np.flatnonzero(emissive[records["material"]])
         light = np.zeros(len(shining), layout.Light.dtype)
         light["kind"], light["index"], light["material"] = light_kind, shining, records["material"][shining]
-        records["light"][shining] = count + np.arange(len(shining))
+        if len(shining):  # others may be shared, and not to be written to
+            records["light"][shining] = count + np.arange(len(shining))
         lights.append(light)
         count += len(shining)
     return np.concatenate(lights)

@@ -19,10 +19,10 @@ MOST_ODD = 20  # warnings: a model of a thousand parts may have them all
 
 def place(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    uv_sets: Mapping[str, frozenset[int]],
+    uv_sets: Mapping[str, frozenset[int]], known_meshes: bool = False,
 ) -> tuple[Placed, list[PlacedMesh], list[str]]:  # fmt: skip
     """(analytic shapes, meshes, what is odd about them) in the world; `names` and `emissive` are materials, `uv_sets`
-    what they read.
+    what they read. With `known_meshes` these are left out.
 
     Raises InvalidDocument.
     """
@@ -41,7 +41,7 @@ def place(
                 placed.quad(shape.origin, shape.u, shape.v, matrix, used)
             case BoxShape():
                 placed.box(shape.min, shape.max, matrix, used, shape.material in emissive)
-            case MeshShape():
+            case MeshShape() if not known_meshes:
                 data = _data(shape, i, assets)
                 odd += [f"/shapes/{i}: {warning}" for warning in data.warnings]
                 mesh = _mesh(shape, data, matrix, used, max_triangles - count, sets)

@@ -22,6 +22,7 @@ from service.pack.values import pack_camera, pack_materials, pack_turn
 from service.scene import Scene
 from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
+from service.scene.shape import MeshShape
 
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1
 
@@ -114,13 +115,21 @@ def _geometry(
 
     sets = uv_sets(scene)
 
-    def make() -> Geometry:
-        return geometry(scene.shapes, names, shining, assets, room, sets)
-
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
-        return make()
-    key = ("geometry", tuple(map(content, scene.shapes)), tuple(names), shining, room, tuple(sets.items()))
-    return cache.get(key, make)
+        return geometry(scene.shapes, names, shining, assets, room, sets)
+    contents, shared = tuple(map(content, scene.shapes)), (tuple(names), room, tuple(sets.items()))
+    meshes = [(i, shape) for i, shape in enumerate(scene.shapes) if isinstance(shape, MeshShape)]
+    mesh_key = None
+    if meshes and not any(shape.material in shining for _, shape in meshes):
+        mesh_key = (tuple((i, contents[i]) for i, _ in meshes), *shared)
+
+    def make() -> Geometry:
+        earlier = None
+        if mesh_key is not None:
+            earlier = cache.find(lambda kept: isinstance(kept, Geometry) and kept.meshes.key == mesh_key)
+        return geometry(scene.shapes, names, shining, assets, room, sets, mesh_key, earlier)
+
+    return cache.get(("geometry", contents, shining, *shared), make)
 
 
 def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> Sky:
