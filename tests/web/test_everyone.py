@@ -60,6 +60,8 @@ def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, i
                 return box.left < -1 || box.right > innerWidth + 1 || box.width < 8;
             }).map((each) => each.outerHTML.slice(0, 100))"""
         assert editor.page.evaluate(script) == [], tab
+        editor.page.evaluate("document.querySelector('.page:not([hidden]) > :last-child').scrollIntoView()")
+        assert editor.page.evaluate("document.scrollingElement.scrollTop") == 0, "only the panel scrolls"
     box = editor.page.locator("#stage").bounding_box()
     assert box is not None and box["width"] * box["height"] > 0.2 * size[0] * size[1], "the picture has room"
     assert editor.page.evaluate("document.documentElement.scrollWidth") <= size[0]
