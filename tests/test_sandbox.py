@@ -201,7 +201,7 @@ def test_closing_ends_the_children() -> None:
 
 
 def test_unsealed_or_lying_memory_is_not_adopted() -> None:
-    fd, table = publish({"a": np.arange(6.0).reshape(2, 3)})
+    fd, table = publish({"a": [np.arange(6.0).reshape(2, 3)]})
     assert np.array_equal(adopt(fd, table)["a"], [[0, 1, 2], [3, 4, 5]])
     with pytest.raises(ValueError, match="buffer"):
         adopt(fd, [table[0] | {"shape": [200, 300]}])

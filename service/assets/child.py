@@ -23,9 +23,11 @@ import numpy as np
 from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile
 from service.assets.errors import ParseError
 from service.assets.gltf.scene import read_scene
-from service.assets.wire import Array, publish, receive, send
+from service.assets.wire import Pieces, publish, receive, send
+from service.shared import trim
 
 CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
+LARGE = 1 << 20  # bytes of a file after which memory is given back to the system
 LIBRARIES = ("numpy", "PIL.Image", "OpenImageIO", "DracoPy", "trimesh.exchange.stl")
 
 
@@ -41,8 +43,11 @@ def main() -> None:
             for name in LIBRARIES:
                 importlib.import_module(name)
             continue
+        large = os.fstat(source).st_size > LARGE
         reply, result = _answer(request, source, link)
         os.close(source)
+        if large:
+            trim()
         try:
             send(link, reply, result)
         except OSError:
@@ -78,6 +83,7 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
         parsed = _parse(request["format"], source, limits, request["whole"])
         arrays, facts = _arrays(parsed)
+        del parsed
         fd, table = publish(arrays)
         return {"arrays": table, **facts}, fd
     except ParseError as error:
@@ -119,15 +125,17 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshDa
     return read_scene(data, limits) if whole else parse_mesh(format, data, limits)
 
 
-def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Array], dict[str, Any]]:
+def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Pieces], dict[str, Any]]:
     if isinstance(parsed, SceneFile):
         parts = [(len(p.data), p.pointer, p.vertices, p.triangles) for p in parsed.parts]
         told = json.dumps(vars(parsed) | {"parts": parts}).encode()
-        files = np.concatenate([np.frombuffer(part.data, np.uint8) for part in parsed.parts])
-        return {"scene": np.frombuffer(told, np.uint8), "files": files}, {}
+        files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
+        return {"scene": [np.frombuffer(told, np.uint8)], "files": files}, {}
     if isinstance(parsed, ImageData):
-        return {"pixels": parsed.pixels}, {}
-    arrays = {name: array for name, array in vars(parsed).items() if isinstance(array, np.ndarray)}
+        return {"pixels": [parsed.pixels]}, {}
+    arrays: dict[str, Pieces] = {
+        name: [array] for name, array in vars(parsed).items() if isinstance(array, np.ndarray)
+    }
     return arrays, {"warnings": list(parsed.warnings)}
 
 

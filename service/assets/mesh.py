@@ -17,18 +17,17 @@ def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     """Raises ParseError, or whatever a library raises on nonsense."""
     parts = READERS[format](data, limits)
     check(parts, limits.max_triangles)
+    # One after the other, so that a million triangles are not there twice.
     vertices = np.ascontiguousarray(parts.vertices, np.float64)
     faces: Indices = np.ascontiguousarray(parts.faces, np.int32)
+    parts.vertices, parts.faces = vertices, faces
+    normals = None if parts.normals is None else unit_normals(vertices, faces, parts.normals)
+    parts.normals = None
+    uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
+    parts.uvs = parts.uvs_1 = None
     parts.warnings += oddities(vertices, faces)
-    return MeshData(
-        vertices,
-        faces,
-        None if parts.normals is None else unit_normals(vertices, faces, parts.normals),
-        _floats(parts.uvs),
-        _floats(parts.uvs_1),
-        None if parts.colors is None else unit_colors(parts.colors, parts.warnings),
-        tuple(parts.warnings),
-    )
+    colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
+    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings))
 
 
 def _floats(rows: Numbers | None) -> Floats | None:

@@ -25,6 +25,7 @@ NAMES = {
     "vn": ("normal", "normals"),
 }
 MOST_ROWS = 2**31 - 1
+SHARES = 8
 
 
 @dataclass
@@ -94,35 +95,52 @@ def _joined(found: Found) -> Parts:
         index[keyword] = np.concatenate(found.corners.pop(keyword))
         _check(index[keyword], len(tables[keyword]), keyword, found, counts)
     vertices = tables["v"]
-    corner = index["v"] - 1
     warnings = []
-    used = {}
-    for keyword in ("vt", "vn"):
-        missing = int(np.count_nonzero(index[keyword] == 0))
-        if missing < len(corner):
-            used[keyword] = index[keyword] - 1  # -1: the row of zeros at the end; a normal is computed
-            if missing:
-                tables[keyword] = np.concatenate([tables[keyword], np.zeros((1, WIDTHS[keyword]))])
-                if keyword == "vt":
-                    warnings.append(f"{missing} corners have no texture coordinate; they take 0 0")
+    missing = {keyword: int(np.count_nonzero(place == 0)) for keyword, place in index.items()}
+    for place in index.values():
+        place -= 1  # -1: the row of zeros at the end; a normal is computed
+    corner = index.pop("v")
+    used = {keyword: place for keyword, place in index.items() if missing[keyword] < len(corner)}
+    del index
+    for keyword in used:
+        if missing[keyword]:
+            tables[keyword] = np.concatenate([tables[keyword], np.zeros((1, WIDTHS[keyword]))])
+            if keyword == "vt":
+                warnings.append(f"{missing[keyword]} corners have no texture coordinate; they take 0 0")
     triangles = None if (counts == 3).all() else triangulate(vertices, corner, counts)
     alike = all(len(tables[k]) == len(vertices) and np.array_equal(corner, place) for k, place in used.items())
     rows = {"v": vertices, **{k: tables[k] for k in used}}
     if len(colors) == len(vertices):
         rows["colors"] = colors
     if not alike:
-        mixed = corner.astype(np.int64)
-        for keyword, place in used.items():
-            mixed = mixed * (len(tables[keyword]) + 1) + (place + 1)
-            if keyword == "vt" and "vn" in used:  # three indices of 31 bits don't fit into 64: two at a time
-                mixed = np.unique(mixed, return_inverse=True)[1]
-        _, first, joined = np.unique(mixed, return_index=True, return_inverse=True)
-        del mixed
+        first, joined = _distinct(corner, len(vertices), [(place, len(tables[k])) for k, place in used.items()])
         places = {"v": corner, "colors": corner, **used}
         rows = {k: table[places[k][first]] for k, table in rows.items()}
-        corner = joined.astype(np.int32)
+        corner = joined
     faces = corner.reshape(-1, 3) if triangles is None else corner[triangles]
     return Parts(rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings)
+
+
+def _distinct(corner: Ints, have: int, others: list[tuple[Ints, int]]) -> tuple[Longs, Ints]:
+    """(the first corner of each distinct set of indices, in their order; the number of each corner's set).
+
+    `others`: indices from -1 on, and how many rows they count in. A share of the vertices at a time: sorting all
+    corners of a million triangles at once takes a quarter of a gigabyte.
+    """
+    firsts, joined, count = [], np.empty(len(corner), np.int32), 0
+    step = max(have // SHARES, 1)
+    for low in range(0, have, step):
+        these = np.flatnonzero((corner >= low) & (corner < low + step))
+        mixed = corner[these].astype(np.int64)
+        for number, (place, rows) in enumerate(others):
+            mixed = mixed * (rows + 1) + (place[these] + 1)
+            if number < len(others) - 1:  # three indices of 31 bits don't fit into 64: two at a time
+                mixed = np.unique(mixed, return_inverse=True)[1]
+        _, first, inverse = np.unique(mixed, return_index=True, return_inverse=True)
+        firsts.append(these[first])
+        joined[these] = inverse + count
+        count += len(first)
+    return np.concatenate(firsts), joined
 
 
 def _check(index: Ints, have: int, keyword: str, found: Found, counts: Longs) -> None:

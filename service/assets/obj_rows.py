@@ -5,6 +5,7 @@ Lines, materials and free-form statements are skipped.
 
 from __future__ import annotations
 
+import mmap
 import re
 import warnings
 from collections.abc import Iterator
@@ -20,7 +21,7 @@ from service.assets.polygons import Longs
 Letters = npt.NDArray[np.uint8]
 
 KEYWORDS = {"v": (b"v", 1), "vt": (b"vt", 2), "vn": (b"vn", 2), "f": (b"f", 1)}
-BLOCK = 1 << 21  # bytes; what is made of a block is some forty times as large
+BLOCK = 1 << 19  # bytes; what is made of a block is some forty times as large
 NEWLINE, BLANK = 10, 32  # the latter and all below separate words
 NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
 CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
@@ -73,6 +74,8 @@ def blocks(data: bytes | memoryview) -> Iterator[Block]:
         end = _end(view, at)
         text = _plain(bytes(view[at:end]))
         at = end
+        if isinstance(view.obj, mmap.mmap):  # what was read of the file need not count as this process' memory
+            view.obj.madvise(mmap.MADV_DONTNEED, 0, at)
         starts, found = _classified(text)
         numbers = line + np.arange(len(starts))
         line += len(starts)

@@ -6,10 +6,10 @@ import numpy as np
 import numpy.typing as npt
 
 from service.assets.data import Doubles, Indices
-from service.assets.polygons import Longs
 
 FLAT = 4 * float(np.finfo(np.float32).eps)
-CHUNK = 1 << 16  # triangles at once: a million's float64 copies take a quarter of a gigabyte
+CHUNK = 1 << 14  # triangles at once: a million's float64 copies take a quarter of a gigabyte
+SHARES = 8  # in which the edges of more are looked at: by the remainder of an end's number
 
 
 def oddities(vertices: Doubles, faces: Indices) -> list[str]:
@@ -58,30 +58,45 @@ def _places(vertices: Doubles) -> Indices:
 
 def _repeated(faces: Indices, count: int) -> int:
     """How many triangles have the corners of an earlier one, whichever way they face."""
-    corners = np.sort(faces, axis=1).astype(np.uint64)
-    keys = (corners[:, 0] * np.uint64(count) + corners[:, 1]) * np.uint64(0x9E3779B97F4A7C15) ^ corners[:, 2]
+    keys = np.empty(len(faces), np.uint64)
+    for at in range(0, len(faces), CHUNK):
+        a, b, c = faces[at : at + CHUNK].astype(np.uint64).T
+        least, most = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        middle = a + b + c - least - most
+        keys[at : at + CHUNK] = (least * np.uint64(count) + middle) * np.uint64(0x9E3779B97F4A7C15) ^ most
     keys.sort()
     return int(np.count_nonzero(keys[1:] == keys[:-1]))
 
 
 def _edges(faces: Indices, count: int) -> tuple[int, int, int]:
     """How many edges have one triangle, more than two, and two that run along it the same way."""
-    keys = np.empty((3, len(faces)), np.int64)
-    for k in range(3):
-        start, end = faces[:, k].astype(np.int64), faces[:, (k + 1) % 3]
-        keys[k] = (np.minimum(start, end) * count + np.maximum(start, end)) * 2 + (start > end)
-    flat: Longs = keys.reshape(-1)
-    flat.sort()
-    edge = flat >> 1
-    begins = np.flatnonzero(np.concatenate([[True], edge[1:] != edge[:-1]]))
-    sizes = np.diff(begins, append=len(edge))
-    pairs = begins[sizes == 2]
-    turned = int(np.count_nonzero((flat[pairs] ^ flat[np.minimum(pairs + 1, len(flat) - 1)]) & 1 == 0))
-    return int(np.count_nonzero(sizes == 1)), int(np.count_nonzero(sizes > 2)), turned
+    boundary, crowded, turned = 0, 0, 0
+    shares = 1 if len(faces) < CHUNK else SHARES
+    for share in range(shares):
+        pieces = []
+        for k in range(3):
+            start, end = faces[:, k], faces[:, (k + 1) % 3]
+            these = np.flatnonzero(np.minimum(start, end) % shares == share)
+            a, b = start[these].astype(np.int64), end[these].astype(np.int64)
+            pieces.append((np.minimum(a, b) * count + np.maximum(a, b)) * 2 + (a > b))
+        keys = np.concatenate(pieces)
+        if not len(keys):
+            continue
+        keys.sort()
+        edge = keys >> 1
+        begins = np.flatnonzero(np.concatenate([[True], edge[1:] != edge[:-1]]))
+        sizes = np.diff(begins, append=len(edge))
+        pairs = begins[sizes == 2]
+        boundary += int(np.count_nonzero(sizes == 1))
+        crowded += int(np.count_nonzero(sizes > 2))
+        turned += int(np.count_nonzero((keys[pairs] ^ keys[np.minimum(pairs + 1, len(keys) - 1)]) & 1 == 0))
+    return boundary, crowded, turned
 
 
 def _volume(vertices: Doubles, faces: Indices) -> float:
     """Six times what a closed mesh encloses; negative where it faces inwards."""
-    middle = vertices.mean(axis=0)
-    a, b, c = (vertices[faces[:, k]] - middle for k in range(3))
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)))
+    middle, volume = vertices.mean(axis=0), 0.0
+    for at in range(0, len(faces), CHUNK):
+        a, b, c = (vertices[faces[at : at + CHUNK, k]] - middle for k in range(3))
+        volume += float(np.einsum("ij,ij->", a, np.cross(b, c)))
+    return volume

@@ -32,6 +32,7 @@ COLORS = (("red", "green", "blue"), ("r", "g", "b"))
 
 
 Columns = dict[str, npt.NDArray[Any]]
+Corners = npt.NDArray[np.signedinteger]
 
 
 @dataclass
@@ -71,7 +72,8 @@ def read_ply(data: memoryview) -> Parts:
     body = Body(data, start) if encoding != "ascii" else _text_as_binary(data, start, elements)
     vertex: Columns = {}
     declared: dict[str, str] = {}
-    counts = corners = np.empty(0, np.int64)
+    counts = np.empty(0, np.int64)
+    corners: Corners = np.empty(0, np.int64)
     for element in elements:
         if element.name == "face" and element.lists():
             wanted = next((p for p in element.lists() if p.name in FACE_LISTS), None)
@@ -180,7 +182,7 @@ class Body:
         self.at += rows.nbytes
         return rows
 
-    def lists(self, element: Element, wanted: Property) -> tuple[Longs, Longs]:
+    def lists(self, element: Element, wanted: Property) -> tuple[Longs, Corners]:
         """The lengths of the wanted list, and all its values, one row after the other."""
         if not element.length:
             return np.empty(0, np.int64), np.empty(0, np.int64)
@@ -196,7 +198,7 @@ class Body:
         counts, lengths, values = self._walk(element, wanted, element.length)
         return np.array(counts), values
 
-    def _walk(self, element: Element, wanted: Property, rows: int) -> tuple[list[int], dict[str, int], Longs]:
+    def _walk(self, element: Element, wanted: Property, rows: int) -> tuple[list[int], dict[str, int], Corners]:
         """Row by row, for lists that differ: the wanted list's lengths, all lengths of the last row, the values."""
         counts, pieces, lengths = [], [], {}
         counters = [p.count and Struct(p.count[0] + CODES[p.count[1:]]) for p in element.properties]
@@ -229,10 +231,10 @@ class Body:
             )
 
 
-def _whole(values: npt.NDArray[Any]) -> Longs:
+def _whole(values: npt.NDArray[Any]) -> Corners:
     if values.dtype.kind == "f" and not ((np.abs(values) < 2**53) & (values == np.floor(values))).all():
         raise ParseError("its faces have an index that is no whole number")
-    return values.astype(np.int64)
+    return values.astype(np.int32 if np.can_cast(values.dtype, np.int32) else np.int64)
 
 
 def _text_as_binary(data: memoryview, start: int, elements: list[Element]) -> Body:

@@ -20,6 +20,7 @@ SEALS = fcntl.F_SEAL_SEAL | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SE
 DTYPES = ("|u1", "<f4", "<f8", "<i4")
 
 Array = npt.NDArray[Any]
+Pieces = list[Array]  # of one array, along its first axis
 
 
 def send(link: socket.socket, message: dict[str, Any], fd: int) -> None:
@@ -49,15 +50,20 @@ def write(fd: int, view: memoryview, offset: int) -> None:
         view, offset = view[done:], offset + done
 
 
-def publish(arrays: dict[str, Array]) -> tuple[int, list[dict[str, Any]]]:
-    """A sealed memfd with the arrays one after the other, and where each lies."""
+def publish(arrays: dict[str, Pieces]) -> tuple[int, list[dict[str, Any]]]:
+    """A sealed memfd with the arrays one after the other, and where each lies. Takes them out of the dictionary: what
+    is written need not be there twice.
+    """
     fd, table, end = memory(b"", "sunbox-asset"), [], 0
-    for name, array in arrays.items():
-        data = np.ascontiguousarray(array)
-        offset = -(-end // ALIGNMENT) * ALIGNMENT
-        end = offset + data.nbytes
-        table.append({"name": name, "dtype": data.dtype.str, "shape": data.shape, "offset": offset})
-        write(fd, data.reshape(-1).view(np.uint8).data, offset)
+    for name in list(arrays):
+        pieces = arrays.pop(name)
+        offset = end = -(-end // ALIGNMENT) * ALIGNMENT
+        shape = (sum(map(len, pieces)), *pieces[0].shape[1:])
+        table.append({"name": name, "dtype": pieces[0].dtype.str, "shape": shape, "offset": offset})
+        while pieces:
+            data = np.ascontiguousarray(pieces.pop(0))
+            write(fd, data.reshape(-1).view(np.uint8).data, end)
+            end += data.nbytes
     fcntl.fcntl(fd, fcntl.F_ADD_SEALS, SEALS)
     return fd, table
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.assets.data import Doubles, Floats
+from service.assets.data import Doubles, Floats, Indices
 from service.assets.gltf import accessors, draco
 from service.assets.gltf.file import Array, GltfFile
 from service.assets.gltf.notes import Notes
@@ -24,7 +24,7 @@ class Primitive:
     """Rows of its vertices (n, ...) and its triangles (m, 3). v of `uvs` points down, as in the file."""
 
     vertices: Array  # (n, 3) floating
-    faces: Longs
+    faces: Indices
     normals: Array | None = None
     uvs: tuple[Floats | None, ...] = (None,) * UV_SETS
     colors: Floats | None = None  # (n, 3 or 4)
@@ -52,7 +52,7 @@ class Primitive:
         used[self.faces.reshape(-1)] = True
         if used.all():
             return self
-        number = np.cumsum(used) - 1
+        number = np.cumsum(used, dtype=np.int32) - np.int32(1)
 
         def kept(rows: Array | None) -> Array | None:
             return None if rows is None else rows[used]
@@ -100,14 +100,14 @@ def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | No
         indices = accessors.indices(file, place).astype(np.int64)
     else:
         indices = np.arange(len(vertices))
-    faces = _triangles(mode, indices, len(vertices), place, notes)
-    if not len(faces):
+    triangles = _triangles(mode, indices, len(vertices), place, notes).astype(np.int32)
+    if not len(triangles):
         notes.add(place.pointer, "has no triangles: left out")
         return None
     sets = sum(f"JOINTS_{k}" in rows and f"WEIGHTS_{k}" in rows for k in range(len(rows)))
     return Primitive(
         vertices,
-        faces,
+        triangles,
         _floating(rows["NORMAL"]) if "NORMAL" in rows else None,
         tuple(_texcoord(rows.get(f"TEXCOORD_{k}")) for k in range(UV_SETS)),
         _unit(rows["COLOR_0"]) if "COLOR_0" in rows else None,

@@ -49,7 +49,7 @@ def _joined(parts: list[Primitive], warnings: list[str]) -> Parts:
             rows[:, 1] = 1 - rows[:, 1]  # glTF's v points down
     return Parts(
         np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.faces + at for p, at in zip(parts, first, strict=False)]),
+        np.concatenate([p.faces + np.int64(at) for p, at in zip(parts, first, strict=False)]),
         _rows([p.normals for p in parts], parts, 3),
         uvs[0],
         uvs[1],

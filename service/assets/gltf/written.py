@@ -27,4 +27,4 @@ def ply(primitive: Primitive) -> bytes:
         + "".join(f"property float {name}\n" for name in columns)
         + f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
     )
-    return header.encode() + vertices.tobytes() + faces.tobytes()
+    return b"".join([header.encode(), vertices.data, faces.data])
