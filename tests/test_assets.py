@@ -251,3 +251,15 @@ def test_a_changed_file_is_read_again(folder: Path) -> None:
         assert assets.mesh("m.obj") is first
         (folder / "m.obj").write_bytes(OBJ + FACE)
         assert len(assets.mesh("m.obj").faces) == 2
+
+
+def test_a_file_is_taken_as_its_bytes_are(store: AssetStore) -> None:
+    for data in (OBJ, EXR):
+        with store.incoming() as file:
+            store.receive(file, data[:7])
+            store.receive(file, data[7:])
+            info = store.add(file)
+        assert (info.bytes, store.read(info.id)) == (len(data), data)
+        assert store.add(data) == info
+    with store.incoming() as file, pytest.raises(AssetError, match="empty"):
+        store.add(file)

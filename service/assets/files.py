@@ -10,7 +10,7 @@ from types import TracebackType
 from service.assets.data import AssetLimits, ImageData, MeshData
 from service.assets.errors import ParseError
 from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
-from service.assets.sniff import sniff
+from service.assets.source import format_of
 from service.assets.store import AssetStore
 from service.problems import AssetError
 
@@ -83,13 +83,12 @@ class FileAssets:
         if size > limits.max_file:
             raise AssetError(f"{ref!r} has {size} bytes; {limits.max_file} are allowed")
         with open(fd, "rb", closefd=False) as file:
-            data = file.read()
-        format = sniff(data, filename=ref)
+            format = format_of(file, filename=ref) if size else None
         if format is None:
-            what = "is empty" if not data else "is no mesh or image of a known format"
+            what = "is empty" if not size else "is no mesh or image of a known format"
             raise AssetError(f"{ref!r} {what}")
         try:
-            return self._loader.sandbox.parse(format, data)
+            return self._loader.sandbox.parse(format, fd)
         except ParseError as error:
             raise refused(repr(ref), error) from None
 

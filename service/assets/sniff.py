@@ -1,6 +1,7 @@
 """Which format some bytes are in: by the bytes themselves, else by what the sender called them."""
 
 import re
+from mmap import mmap
 
 from service.assets.data import Kind
 
@@ -55,19 +56,19 @@ STL_TEXT = re.compile(rb"\s*+solid\b[^\n]*+\s++(?:facet|endsolid)\b", re.IGNOREC
 GLTF_TEXT = re.compile(rb"\s*\{")
 
 
-def sniff(data: bytes, content_type: str | None = None, filename: str | None = None) -> str | None:
+def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:
     """A key of KINDS, or None where nothing tells."""
-    for magic, name in MAGIC:
-        if data.startswith(magic):
-            return name
-    if data[:4] == b"RIFF" and data[8:12] == b"WEBP":
-        return "webp"
     head = data[:65536]
-    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(data[80:84], "little"):
+    for magic, name in MAGIC:
+        if head.startswith(magic):
+            return name
+    if head[:4] == b"RIFF" and head[8:12] == b"WEBP":
+        return "webp"
+    if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(head[80:84], "little"):
         return "stl"
     if STL_TEXT.match(head):
         return "stl"
-    if GLTF_TEXT.match(head) and b'"asset"' in data:
+    if GLTF_TEXT.match(head) and data.find(b'"asset"') >= 0:
         return "gltf"
     if OBJ_START.match(head):
         return "obj"

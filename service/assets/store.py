@@ -7,10 +7,10 @@ import os
 import re
 import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import asdict, replace
 from pathlib import Path
-from typing import Protocol
+from typing import BinaryIO, Protocol
 
 import numpy as np
 
@@ -19,6 +19,7 @@ from service.assets.errors import ParseError
 from service.assets.importing import Imported, take_apart
 from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
 from service.assets.sniff import KINDS, sniff
+from service.assets.source import Source, digest, format_of, handed, length, write
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 
 log = logging.getLogger(__name__)
@@ -63,21 +64,32 @@ class AssetStore:
         self._folder = root / "assets"
         self._builtin = builtin
 
-    def add(self, data: bytes, content_type: str | None = None, filename: str | None = None) -> AssetInfo:
+    def incoming(self) -> BinaryIO:
+        """A file without a name, for an upload; gone when it is closed. Raises Unavailable."""
+        with self._storing("new"):
+            return tempfile.TemporaryFile(dir=self._folder)
+
+    def receive(self, file: BinaryIO, more: bytes) -> None:
+        """Raises Unavailable where the disk takes no more."""
+        with self._storing("new"):
+            file.write(more)
+            file.flush()
+
+    def add(self, data: Source, content_type: str | None = None, filename: str | None = None) -> AssetInfo:
         """Keeps the bytes, once they have been parsed. Raises UnsupportedMedia, AssetError, Unavailable."""
-        id = "sha256:" + hashlib.sha256(data).hexdigest()
+        id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
         if known is not None:
             return known
-        if not data:
+        if not size:
             raise AssetError("the asset is empty")
-        format = sniff(data, content_type, filename)
+        format = format_of(data, content_type, filename)
         if format is None:
             raise UnsupportedMedia(f"this is none of the formats known: {FORMATS}")
         if KINDS[format] == "scene":
             info = self._import(id, format, data)
         else:
-            info = _describe(id, format, len(data), self._parse(id, format, lambda: data))
+            info = _describe(id, format, size, self._parse(id, format, lambda: nullcontext(data)))
         self._store(info, data)
         return info
 
@@ -92,19 +104,25 @@ class AssetStore:
                 return imported
         except (OSError, ValueError, TypeError):
             pass  # nothing of it is lost: the file itself is still here
-        self._import(id, info.format, self.read(id))
+        with self._opened(id) as source:
+            self._import(id, info.format, source)
         return Imported(**json.loads(self._path(id, SCENE).read_bytes()))
 
     def read(self, id: str) -> bytes:
+        """Raises NotFound."""
+        with self._opened(id) as source:
+            return source if isinstance(source, bytes) else source.read()
+
+    def _opened(self, id: str) -> AbstractContextManager[bytes | BinaryIO]:
         """Raises NotFound."""
         if self._known(id):
             try:
                 with suppress(OSError):
                     os.utime(self._path(id))  # who makes room goes by this
-                return self._path(id).read_bytes()
+                return self._path(id).open("rb")
             except FileNotFoundError:  # to make room, just now
                 pass
-        return self._builtin_bytes(id)
+        return nullcontext(self._builtin_bytes(id))
 
     def holds(self, id: str) -> bool:
         return self._known(id) is not None or (self._builtin is not None and id in self._builtin())
@@ -116,7 +134,7 @@ class AssetStore:
             return known
         data = self._builtin_bytes(id)
         format = _format(data)
-        return _describe(id, format, len(data), self._parse(id, format, lambda: data))
+        return _describe(id, format, len(data), self._parse(id, format, lambda: nullcontext(data)))
 
     def mesh(self, ref: str) -> MeshData:
         """Raises AssetError."""
@@ -133,30 +151,29 @@ class AssetStore:
     def close(self) -> None:
         self.loader.close()
 
-    def _import(self, id: str, format: str, data: bytes) -> AssetInfo:
+    def _import(self, id: str, format: str, data: Source) -> AssetInfo:
         """Stores the parts of a scene and its document, not the file itself."""
         try:
-            file = self.loader.sandbox.parse_scene(format, data)
+            file = self.loader.sandbox.parse_scene(format, handed(data))
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
         imported = take_apart(file, self._keep)
         with self._storing(id):
             self._write(self._path(id, SCENE), json.dumps(asdict(imported)).encode())
         warnings = imported.warnings or None
-        return AssetInfo(id, "scene", format, len(data), triangles=file.triangles, warnings=warnings)
+        return AssetInfo(id, "scene", format, length(data), triangles=file.triangles, warnings=warnings)
 
     def _keep(self, part: ScenePart) -> str:
         """The id of a part of a scene, stored as an asset of its own."""
         id = "sha256:" + hashlib.sha256(part.data).hexdigest()
         if self._known(id) is None:
-            data = bytes(part.data)
             if part.triangles is None:
-                return self.add(data).id
-            info = AssetInfo(id, "mesh", "ply", len(data), vertices=part.vertices, triangles=part.triangles)
-            self._store(info, data, lasting=False)
+                return self.add(bytes(part.data)).id
+            info = AssetInfo(id, "mesh", "ply", len(part.data), vertices=part.vertices, triangles=part.triangles)
+            self._store(info, part.data, lasting=False)
         return id
 
-    def _store(self, info: AssetInfo, data: bytes, lasting: bool = True) -> None:
+    def _store(self, info: AssetInfo, data: Source, lasting: bool = True) -> None:
         """Not `lasting`: what can be made again needs no wait for the disk, 15 ms a part; a scene has thousands."""
         with self._storing(info.id):
             self._write(self._path(info.id), data, lasting)
@@ -180,11 +197,15 @@ class AssetStore:
             format = known.format if known else _format(self._builtin_bytes(ref))
         except NotFound as error:
             raise AssetError(error.detail) from None
-        return self._parse(ref, format, lambda: self.read(ref))
+        return self._parse(ref, format, lambda: self._opened(ref))
 
-    def _parse(self, id: str, format: str, read: Callable[[], bytes]) -> Parsed:
+    def _parse(self, id: str, format: str, opened: Callable[[], AbstractContextManager[Source]]) -> Parsed:
+        def parse() -> Parsed:
+            with opened() as source:
+                return self.loader.sandbox.parse(format, handed(source))
+
         try:
-            return self.loader.load(id, lambda: self.loader.sandbox.parse(format, read()))
+            return self.loader.load(id, parse)
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
 
@@ -209,12 +230,12 @@ class AssetStore:
     def _path(self, id: str, suffix: str = "") -> Path:
         return self._folder / (id.removeprefix("sha256:") + suffix)
 
-    def _write(self, path: Path, data: bytes, lasting: bool = True) -> None:
+    def _write(self, path: Path, data: Source, lasting: bool = True) -> None:
         """Whole or not at all; where it is to last also when the power fails."""
         fd, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=self._folder)
         try:
             with open(fd, "wb") as file:
-                file.write(data)
+                write(data, file)
                 file.flush()
                 if lasting:
                     os.fsync(fd)

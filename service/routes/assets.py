@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 from dataclasses import asdict
 from typing import Annotated, Any
@@ -30,13 +31,17 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
     responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 503),
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
-    data = await request.body()
     kind = request.headers.get("content-type")
     own = house(request)
+    file, size = await asyncio.to_thread(own.assets.incoming), 0
+    async for chunk in request.stream():
+        size += len(chunk)
+        await asyncio.to_thread(own.assets.receive, file, chunk)
 
     def add() -> AssetInfo:
-        own.quota.make_room(len(data))
-        return own.assets.add(data, kind, filename)
+        with file:  # here: a request that is cancelled does not wait for this thread
+            own.quota.make_room(size)
+            return own.assets.add(file, kind, filename)
 
     info = await packing(add)
     return {name: value for name, value in asdict(info).items() if value is not None}
