@@ -2,7 +2,7 @@
 
 values      camera, materials, the environment's turn: an edit of one of them needs nothing else from here
 placing     document -> `placed` (analytic shapes) and `meshes` with their `normals`, in the world, float64
-records     placed shapes -> records, relative to an origin; `tree` orders those that are many
+records     placed shapes -> records, relative to an origin; `tree` orders those that are many, in `chunks`
 geometry    all of that together, with the shapes that shine
 sky         environment -> texels and the tables that draw from them
 textures    images -> texels, and which number of which material reads which of them
@@ -14,6 +14,7 @@ scene       the whole; `cache` keeps geometries and skies between edits
 from service.pack.cache import PackCache
 from service.pack.scene import Packed, pack
 from service.pack.textures import repacked
+from service.pack.tree import warm as warm_builder
 from service.pack.values import pack_camera, pack_materials, pack_turn
 
 __all__ = [
@@ -24,4 +25,5 @@ __all__ = [
     "pack_materials",
     "pack_turn",
     "repacked",
+    "warm_builder",
 ]

@@ -107,3 +107,9 @@ def plant(
         leaves = tree.order if len(small) == 1 else tree.order[kinds[tree.order] == kind] - np.uint32(start)
         order[kind] = np.concatenate([large[kind].astype(np.uint32), places[leaves]])
     return nodes, count, order, tree.origin, tree.scale
+
+
+def warm() -> None:
+    """Loads numba and the builder's compiled code, or compiles it: half a second, or several, of the first mesh."""
+    low = np.arange(3.0 * (LINEAR[ShapeKind.TRIANGLE] + 1), dtype=np.float32).reshape(-1, 3)
+    plant({ShapeKind.TRIANGLE: (low, low + 1)}, {ShapeKind.TRIANGLE: np.zeros(0, np.intp)})

@@ -8,6 +8,7 @@ import time
 from functools import partial
 from typing import Any
 
+from service.pack import warm_builder
 from service.problems import ServiceError
 from service.rendering.engine import Engine
 from service.rendering.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
@@ -46,6 +47,8 @@ class Warming:
             log.info("warmed up seconds=%.2f", time.monotonic() - began)
         finally:
             self._engine.drop(task)
+        await packing(warm_builder)
+        log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
 
     def heard(self, message: FromRenderer) -> None:
         if isinstance(message, Frame | Failed):
