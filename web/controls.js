@@ -125,7 +125,7 @@ function color(field, id, { input, commit, refuse, restore }) {
   });
   const text = element("input", {
     type: "text", class: "entry", spellcheck: "false", autocomplete: "off",
-    "aria-label": `${field.title}, #rrggbb or three linear numbers`,
+    "aria-label": `${field.title}, #rrggbb or three linear numbers`, placeholder: UNSET,
     oninput: () => { text.dataset.dirty = "yes"; },
     onblur: () => { delete text.dataset.dirty; },
     onkeydown: (event) => {
@@ -135,6 +135,7 @@ function color(field, id, { input, commit, refuse, restore }) {
     },
     onchange: () => {
       delete text.dataset.dirty;
+      if (text.value === "" && !isSet) return restore();
       const match = HEX.exec(text.value.trim());
       if (match) input(linear(match[0]).map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
       else if (NUMBERS.test(text.value)) input(text.value.trim().split(/[\s,]+/).map(Number));
@@ -150,8 +151,9 @@ function color(field, id, { input, commit, refuse, restore }) {
       write();
     },
   });
+  let isSet = true;
   const write = () => {
-    const shown = isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
+    const shown = !isSet ? "" : isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
     if (!isBeingEdited(text)) text.value = shown;
     mode.textContent = isLinear ? "lin" : "hex";
   };
@@ -166,6 +168,8 @@ function color(field, id, { input, commit, refuse, restore }) {
   return {
     element: power ? element("div", {}, row, power.element) : row,
     show(value) {
+      isSet = (value ?? null) !== null;
+      swatch.classList.toggle("unset", !isSet);
       const now = linear(value ?? 0);
       const most = Math.max(...now);
       if (bright) {

@@ -254,7 +254,6 @@ class PrincipledMaterial(DisneyMaterial):
             "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
             unit="",
             widget="slider",
-            default=1.5,
         ),
     ] = None
     attenuation_color: Annotated[
@@ -323,7 +322,6 @@ class PrincipledMaterial(DisneyMaterial):
             "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
             unit="",
             widget="slider",
-            default=0.03,
         ),
     ] = None
     clearcoat_normal_map: Annotated[

@@ -84,6 +84,20 @@ def test_colours_pass_through_srgb(editor: Editor) -> None:
     assert text.input_value() == "#ff0080"
 
 
+def test_what_follows_from_others_shows_no_value_of_its_own(editor: Editor) -> None:
+    """Without an index of refraction `specular` sets it: 1.5 would be a lie, and could not be taken back."""
+    page, before = editor.page, editor.settled()
+    index, reset = page.locator(editor.field("ior", "number")), page.locator("[data-field=ior] .reset")
+    assert index.input_value() == "" and reset.is_hidden()
+    assert page.locator(editor.field("sheen_color", "text")).input_value() == ""
+    index.fill("2.5")
+    index.press("Enter")
+    editor.wait_for_change(before)
+    reset.click()
+    editor.wait("the first picture", lambda: not editor.differs(before, 6))
+    assert index.input_value() == ""
+
+
 @pytest.mark.parametrize(("picker", "choice"), [("scene", "cornell"), ("environment", None), ("material", None)])
 def test_presets_change_the_picture(editor: Editor, picker: str, choice: str | None) -> None:
     before = editor.settled()
