@@ -69,7 +69,7 @@ class Loop:
                 self._work(task, task.turn)
                 self._pulse.lasted(time.monotonic() - began)
             for task in list(self._tasks.values()):
-                if task.want is not None:
+                if task.wanted:
                     self._work(task, task.answer)
             busy = any(task.ready for task in self._tasks.values())
             self._account(at_once=not busy)
@@ -126,7 +126,7 @@ class Loop:
             if isinstance(message, Read):  # evicted, and the server had not heard of it when it sent this
                 self._send(Evicted(message.task))
         elif isinstance(message, Want):
-            task.want = message
+            task.look(message)
         elif isinstance(message, Read):
             self._work(task, lambda: task.read(message), message)
         elif isinstance(message, Restore):

@@ -18,7 +18,8 @@ log = logging.getLogger(__name__)
 
 
 class Holder(Protocol):
-    rested_since: float
+    @property
+    def rested_since(self) -> float: ...
 
     @property
     def bytes(self) -> int: ...

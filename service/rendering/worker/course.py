@@ -1,0 +1,60 @@
+"""How far one task's picture is, when that is enough, and what there is to tell of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from service.rendering.messages import Progress, Reason, StopRule
+from service.rendering.worker.beyond import Beyond
+from service.rendering.worker.held import Held
+from service.rendering.worker.meter import Meter
+from service.rendering.worker.stopping import MAX_SAMPLES, Clock, eta_s, late, reached
+
+if TYPE_CHECKING:
+    from gpu import Renderer
+
+
+class Course:
+    def __init__(self, renderer: Renderer) -> None:
+        self.generation = 0  # of what is there
+        self.interactive = False  # a person looks on, and may edit at any moment
+        self.stop = StopRule()
+        self.reason: Reason | None = None  # why it ended
+        self.pixel_s: float | None = None  # what a sample of a pixel took lately
+        self.beyond = Beyond(renderer)
+        self.restart()
+
+    def restart(self) -> None:
+        """At zero samples; what was learnt of their price stays."""
+        self.beyond.restart()
+        self.clock, self.meter = Clock(), Meter()
+        self.even = True  # as many samples in every pixel, as far as is known
+
+    def progress(self, held: Held, scale: float = 1.0) -> Progress:
+        if held.holding is None:
+            return Progress()
+        samples, elapsed_s = held.ladder.picture(scale).samples, self.clock.elapsed_s
+        noise = self.meter.read(held.full) if scale == 1.0 else None
+        stopped = self.reason == "stopped"
+        done = self.reason is not None and not stopped
+        eta = 0.0 if done else eta_s(self.stop, held.full.samples, noise, elapsed_s)
+        return Progress(samples, noise, elapsed_s, None if stopped else eta, self.beyond.shares)
+
+    def cap(self, held: Held) -> int:
+        """How many samples to trace for: all, or what fits into the time, so that every pixel ends with as many."""
+        limit = self.stop.max_samples or MAX_SAMPLES
+        if self.stop.time_limit is None:
+            return limit
+        left_s, sample_s = self.stop.time_limit - self.clock.now_s, self._sample_s(held)
+        return min(limit, held.full.samples + max(1, int(left_s / sample_s) if sample_s else 1))
+
+    def enough(self, held: Held) -> Reason | None:
+        """Why it ends now, if it does."""
+        noise = self.meter.read(held.full) if self.stop.target_noise is not None else None
+        reason = reached(self.stop, held.full.samples, noise)
+        if reason is None and late(self.stop, self.clock.now_s, self._sample_s(held), self.even):
+            reason = "time_limit"
+        return reason
+
+    def _sample_s(self, held: Held) -> float:
+        return (self.pixel_s or 0.0) * held.full.settings.width * held.full.settings.height

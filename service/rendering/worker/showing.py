@@ -1,0 +1,206 @@
+"""One task's picture as it is looked at: frames that are wanted, readings, and the denoised form of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from gpu import picture_bytes
+from gpu.denoise import GUIDE_SAMPLES
+from service.rendering.messages import Frame, FromRenderer, Image, Read, View, Want
+from service.rendering.worker.course import Course
+from service.rendering.worker.held import Held
+from service.rendering.worker.smoothing import Smooth, Smoothing
+
+if TYPE_CHECKING:
+    from gpu import Picture
+
+GUIDES = ("albedo", "normal", "depth", "shape_id", "material_id")
+SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
+
+
+class Showing:
+    """What cannot be shown at once is prepared in steps, while `due`."""
+
+    def __init__(
+        self,
+        number: int,
+        send: Callable[[FromRenderer], None],
+        held: Held,
+        course: Course,
+        smoothing: Smoothing,
+        finish: Callable[[], None],
+    ) -> None:
+        """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
+        self.want: Want | None = None
+        self.scale: float | None = None  # of what there is to see
+        self.owes_done = False
+        self.smoothing = smoothing
+        self._number, self._send, self._finish = number, send, finish
+        self._held, self._course = held, course
+        self._served: tuple[object, ...] = ()
+        self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
+        self._guided: Picture | None = None  # whose they are, while some are missing
+        self._smooth_reads: list[Read] = []  # waiting for the denoised picture
+        self._smoothed = False  # the denoiser has spoken, and who waits for that is to be told
+
+    def restart(self) -> None:
+        """Another picture: nothing of it was seen yet."""
+        self.part()
+        self.smoothing.restart()
+        self._smoothed = False
+        self.scale = None
+
+    def part(self) -> None:
+        """The pictures are leaving the device."""
+        self._guided = None
+
+    def forget(self) -> None:
+        """Nothing is there any more, which is what who waits for a reading is given."""
+        reads = self._reads + self._smooth_reads
+        self._reads, self._smooth_reads = [], []
+        self.restart()
+        self.owes_done = False
+        for read in reads:
+            self.read(read)
+
+    @property
+    def due(self) -> bool:
+        """There is a step to be done."""
+        return self._guided is not None or self._smoothed or self._smooth_due
+
+    def step(self) -> bool:
+        """Does it; whether there was one."""
+        return self._smooth() or self._trace_guides()
+
+    def answer(self) -> bool:
+        """Sends the frame that is wanted if there is something new to see in it."""
+        want, shown, course = self.want, self.scale, self._course
+        if want is None or shown is None:
+            return False
+        if self._held.aside is not None:  # at rest: there is nothing new in it
+            if self._served and self._served[3] == course.reason and not want.anyway:
+                return False
+            self._held.wake()
+        if self._held.holding is None:
+            return False
+        picture = self._held.ladder.picture(shown)
+        if self._needs_guides(picture, want.view):
+            return False
+        smooth = None
+        if shown == 1.0 and self.smoothing.covers(want.view.aov, course.meter.noise):
+            smooth = self._smooth_frame()
+            if smooth is None and self._holds_frame(want):
+                return False
+        progress = smooth.progress if smooth else course.progress(self._held, shown)
+        whole = smooth is None or smooth is self.smoothing.has(picture.samples)
+        content = (course.generation, shown, progress.samples, course.reason, smooth is not None and smooth.fine)
+        if content == self._served and not want.anyway:
+            return False
+        pixels = _pixels_of(picture, want.view, smooth)
+        last = course.reason is not None and whole
+        self._served, self.want = content, None
+        denoised = smooth is not None
+        self._send(Frame(self._number, want.serial, course.generation, pixels, progress, shown, last, denoised))
+        return True
+
+    def _smooth_frame(self) -> Smooth | None:
+        """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
+        latest = self.smoothing.latest
+        if latest is None or self._served[:2] != (self._course.generation, 1.0):
+            return latest
+        samples, seen = latest.progress.samples, int(str(self._served[2]))
+        stale = samples == seen < self._held.full.samples and not self.smoothing.under_way
+        return None if samples < seen or stale else latest
+
+    def _holds_frame(self, want: Want) -> bool:
+        """Whether the client has something to look at until the denoised picture comes, which can't be long."""
+        seen = self._served[:1] == (self._course.generation,)
+        return self.smoothing.under_way and seen and not want.anyway
+
+    def read(self, read: Read) -> None:
+        self._held.wake()
+        full = self._held.full if self._held.holding and self._held.full.samples else None
+        if full is not None and self._needs_guides(full, read.view):
+            self._reads.append(read)
+            return
+        smooth = None
+        if full is not None and self.smoothing.covers(read.view.aov, self._course.meter.read(full, fresh=True)):
+            smooth = self.smoothing.has(full.samples)
+            if smooth is None:
+                self._smooth_reads.append(read)
+                return
+        self._give(read, full, smooth)
+
+    def _give(self, read: Read, full: Picture | None, smooth: Smooth | None) -> None:
+        pixels = _pixels_of(full, read.view, smooth) if full else None
+        progress = smooth.progress if smooth else self._course.progress(self._held)
+        self._held.rests()
+        self._send(Image(self._number, read.serial, pixels, progress, smooth is not None))
+
+    @property
+    def _smooth_due(self) -> bool:
+        """Whether somebody waits for the picture to be denoised, and it can be."""
+        if self._held.holding is None or self.scale != 1.0 or not self.smoothing.wanted:
+            return False
+        want = self.want if self._course.interactive else None
+        watched = want is not None and self.smoothing.covers(want.view.aov, self._course.meter.noise)
+        if not (watched or self.owes_done or self._smooth_reads):
+            return False
+        return self.smoothing.due(self._held.full.samples, fine=self._smooth_finely)
+
+    @property
+    def _smooth_finely(self) -> bool:
+        return self._course.reason is not None or bool(self._smooth_reads)
+
+    def _smooth(self) -> bool:
+        """A slice of what denoising needs on this side, where any is due."""
+        if self._smoothed:
+            self._smoothed = False
+            reads, self._smooth_reads = self._smooth_reads, []
+            for read in reads:
+                self._give(read, self._held.full, None if self.smoothing.warning else self.smoothing.latest)
+            if self.owes_done:
+                self._finish()
+            return True
+        if not self._smooth_due:
+            return False
+        full, course = self._held.full, self._course
+        if full.trace_guides(SLICE_S, GUIDE_SAMPLES):
+            course.meter.read(full, fresh=True)
+            self.smoothing.begin(full, course.progress(self._held), self._smooth_finely, self._hear_smoothed)
+        return True
+
+    def _hear_smoothed(self) -> None:
+        self._smoothed = True
+
+    def _needs_guides(self, picture: Picture, view: View) -> bool:
+        if view.aov not in GUIDES:
+            return False
+        if not picture.guided:
+            more = picture_bytes(picture.settings, guided=True) - picture_bytes(picture.settings)
+            self._held.make_room(more)
+        if picture.trace_guides(0.0):
+            return False
+        self._guided = picture
+        return True
+
+    def _trace_guides(self) -> bool:
+        """A slice of them, where somebody waits for them; then the readings that they held up."""
+        if self._guided is None:
+            return False
+        if self._guided.trace_guides(SLICE_S):
+            self._guided = None
+            reads, self._reads = self._reads, []
+            for read in reads:
+                self.read(read)
+        return True
+
+
+def _pixels_of(picture: Picture, view: View, smooth: Smooth | None) -> np.ndarray:
+    color = smooth.pixels if smooth else None
+    if view.encoding == "linear":
+        return picture.read(view.aov) if color is None else color
+    return picture.display(view.aov, view.exposure, view.tone_map, view.encoding, color)
