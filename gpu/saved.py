@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
+from collections.abc import Callable, Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -30,11 +30,17 @@ class Saved:
     buffers: list[np.ndarray]
 
 
-def save(picture: Picture) -> Generator[None, None, Saved]:
-    """Reads the picture's state piece by piece, a step each; the picture must not be traced meanwhile."""
+def _room(size: int) -> np.ndarray:
+    return np.empty(size, np.uint8)
+
+
+def save(picture: Picture, room: Callable[[int], np.ndarray] = _room) -> Generator[None, None, Saved]:
+    """Reads the picture's state piece by piece, a step each; the picture must not be traced meanwhile.
+
+    `room` gives the memory for so many bytes."""
     out: list[np.ndarray] = []
     for buffer in picture.state:
-        data = np.empty(buffer.size, np.uint8)
+        data = room(buffer.size)
         for start in range(0, buffer.size, PIECE_BYTES):
             contexts.use(picture.context)
             piece = data[start : start + PIECE_BYTES]

@@ -62,7 +62,7 @@ def create_app(config: Config) -> FastAPI:
         config,
         store,
         Reader(config, store),
-        Engine(Options(config.device, config.hang_s, config.gpu_memory)),
+        Engine(Options(config.device, config.hang_s, config.gpu_memory, config.checkpoint_s)),
         saved,
         quota,
         Renders(_bounds(config)),

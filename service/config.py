@@ -63,6 +63,9 @@ class Config(BaseSettings):
     hang_s: float = Field(
         10.0, gt=0, description="Without progress for so long (s), and ten slices, the renderer is replaced."
     )
+    checkpoint_s: float = Field(
+        10.0, gt=0, description="A render is saved so often (s), or with 1 % of its time, to go on from there."
+    )
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(
         16_000_000, ge=1, le=2**24, description="Most triangles of a scene; at most 2^24 (float32 counts no further)."

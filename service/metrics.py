@@ -98,6 +98,7 @@ def _collector(house: House, traffic: Traffic) -> Collector:
             yield histogram("setup_seconds", "Uploading a scene and compiling for it.", seen.setup_s)
             restarts = {(reason,): float(count) for reason, count in seen.restarts.items()}
             yield counters("renderer_restarts", "Renderers lost, by how.", ("reason",), restarts)
+            yield counter("checkpoints", "Renders under way that were saved against such a loss.", seen.checkpoints)
             yield histogram("recovery_seconds", "From a renderer's loss to the next one.", seen.recovery_s)
             errors = {(kind,): float(count) for kind, count in seen.errors.items()}
             yield counters("errors", "Told on streams and of failed renders, by problem.", ("type",), errors)

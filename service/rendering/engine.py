@@ -12,6 +12,7 @@ from typing import Any, Protocol
 from service.problems import Unavailable
 from service.rendering import link
 from service.rendering.messages import (
+    Checkpoint,
     Done,
     Drop,
     Evicted,
@@ -175,32 +176,29 @@ class Engine:
 
     def _begin(self) -> None:
         self._process = process = Process(self._options, self._received, lambda: self._lose(process))
-        for held in self._tasks.values():
-            held.resident = held.record.saved is None
+        for task, held in self._tasks.items():
+            held.resident = held.record.kept is None
             if held.resident:
                 self._tell_all(held.record)
                 held.listener.again()
-            elif held.record.reads:
-                self._do(self._bring_back(next(iter(held.record.reads.values())).task, held))
+            elif held.record.saved is None or held.record.reads:
+                self._do(self._bring_back(task, held))
 
-    def _tell_all(self, record: Record) -> None:
-        for message in record.again():
+    def _tell_all(self, record: Record, kept: link.Encoded | None = None) -> None:
+        for message in record.again(kept):
             if isinstance(message, tuple):
                 self._send_encoded(message)
             else:
                 self._send(message)
 
     async def _bring_back(self, task: int, held: _Held) -> None:
-        """Gives the renderer a finished picture that it has no more, and then what is to be read of it."""
+        """Gives the renderer a picture that it has no more, to go on with or to be read."""
         process = self._process
-        encoded = await asyncio.to_thread(link.encode, held.record.saved)
+        encoded = await asyncio.to_thread(link.encode, held.record.kept)
         if held.resident or process is None or process is not self._process or task not in self._tasks:
             return link.discard(encoded)
         held.resident = True
-        self._tell_all(held.record)
-        self._send_encoded(encoded)
-        for read in held.record.reads.values():
-            self._send(read)
+        self._tell_all(held.record, encoded)
 
     def _received(self, message: FromRenderer) -> None:
         if isinstance(message, Ready):
@@ -226,6 +224,8 @@ class Engine:
             return  # it was brought back, and had a turn before it heard that it is finished
         if isinstance(message, Loaded):
             self._count(message)
+        elif isinstance(message, Checkpoint):
+            self.statistics.checkpoints += 1
         elif isinstance(message, Frame | Progressed | Done) and time.monotonic() - held.struck_at > FORGIVEN_S:
             held.strikes = 0
         held.listener.heard(held.record.heard(message))

@@ -131,12 +131,12 @@ class Drop:
 
 @dataclass(frozen=True)
 class Restore:
-    """The picture of a task whose scene was just sent again: finished, as it was when Done brought it."""
+    """The picture of a task whose scene was just sent again, as it was when Done or Checkpoint brought it."""
 
     task: int
     generation: int
     saved: Any
-    reason: Reason
+    reason: Reason | None  # why it had ended; None: it goes on
     progress: Progress
 
 
@@ -214,6 +214,16 @@ class Done:
 
 
 @dataclass(frozen=True)
+class Checkpoint:
+    """A render under way, should this renderer be lost."""
+
+    task: int
+    generation: int
+    progress: Progress
+    saved: Any  # a gpu.Saved
+
+
+@dataclass(frozen=True)
 class Evicted:
     """The renderer has this finished task no more; Restore brings it back."""
 
@@ -249,4 +259,4 @@ class Failed:
 
 
 ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Restore
-FromRenderer = Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Done | Evicted | Failed
+FromRenderer = Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Checkpoint | Done | Evicted | Failed

@@ -32,6 +32,7 @@ class Options:
     device: int | None = None
     patience_s: float = 10.0  # without progress
     memory: int | None = None  # bytes that may be held on the device; None: the worker decides
+    checkpoint_s: float = 10.0  # between two of a render
 
 
 class Process:
@@ -108,6 +109,7 @@ class _Watched(pulse.Pulse):
 def _spawn(end: socket.socket, pulse_descriptor: int, options: Options) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(pulse_descriptor)]
     command += ["--server", str(os.getpid()), "--log-level", str(logging.getLogger().getEffectiveLevel())]
+    command += ["--checkpoint", str(options.checkpoint_s)]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]
     # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from service.rendering import link
 from service.rendering.link import Encoded
 from service.rendering.messages import (
+    Checkpoint,
     Done,
     Failed,
     Frame,
@@ -44,12 +45,18 @@ class Record:
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
         self.saved: Restore | None = None  # a finished picture
+        self._checkpoint: Restore | None = None  # one under way
         self._task = task
         self._states: list[_State] = []  # the last one that was seen to work, and those after it
         self._want: Want | None = None
         self._stopped = False
         self._paused: Pause | Resume | None = None
         self._stopped_at: Done | None = None
+
+    @property
+    def kept(self) -> Restore | None:
+        """What there is of its picture outside the renderer."""
+        return self.saved or self._checkpoint
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
         self._push(_State(update.generation, link.another(encoded), whole=True))
@@ -75,21 +82,25 @@ class Record:
                 self._fall_back(message)
         elif isinstance(message, Image):
             self.reads.pop(message.serial, None)
-        elif isinstance(message, Loaded | Frame | Progressed | Done):
+        elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
             self._works(message.generation)
+        if isinstance(message, Checkpoint):
+            self._checkpoint = Restore(message.task, message.generation, message.saved, None, message.progress)
         if isinstance(message, Frame) and self._want is not None and self._want.serial == message.serial:
             self._want = None
         return self._done(message) if isinstance(message, Done) else message
 
-    def again(self) -> list[Encoded | ToRenderer]:
-        """What to tell a new renderer, in order; the encoded ones are whoever's sends them."""
+    def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
+        """What to tell a new renderer, in order; the encoded ones are whoever's sends them. `kept`: encoded."""
         out: list[Encoded | ToRenderer] = []
         for state in self._states:
             out.append(link.another(state.scene))
             if state.since is not None:
                 out.append(state.since)
+        if kept is not None:
+            out.append(kept)
         if not out or self.saved is not None:
-            return out
+            return [*out, *self.reads.values()]
         stopped = self._stopped_at
         if stopped is not None and stopped.progress.samples:  # as far as it was seen, not further and not less
             stop = StopRule(max_samples=stopped.progress.samples)
@@ -110,7 +121,7 @@ class Record:
         self._states.append(state)
         if len(self._states) > STATES:
             link.discard(self._states.pop(1).scene)
-        self._stopped, self._stopped_at = False, None
+        self._stopped, self._stopped_at, self._checkpoint = False, None, None
 
     def _edited(self, update: Update) -> None:
         if not self._states:
@@ -121,7 +132,7 @@ class Record:
             self._push(_State(update.generation, link.another(last.scene), whole=False, since=since))
         else:
             last.since = since
-            self._stopped, self._stopped_at = False, None
+            self._stopped, self._stopped_at, self._checkpoint = False, None, None
 
     def _works(self, generation: int) -> None:
         while len(self._states) > 1 and self._states[1].began <= generation:
@@ -139,6 +150,7 @@ class Record:
         self._states = kept
 
     def _done(self, done: Done) -> Done:
+        self._checkpoint = None
         if self._stopped_at is not None and self._stopped_at.generation == done.generation:
             done = replace(done, reason="stopped")
         if done.reason == "stopped":

@@ -27,6 +27,7 @@ def main() -> int:
     parser.add_argument("descriptor", type=int)
     parser.add_argument("pulse", type=int)
     parser.add_argument("--memory", type=int, help="bytes that may be held on the device")
+    parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
     parser.add_argument("--device", type=int)
     parser.add_argument("--log-level", type=int, default=logging.WARNING)
     parser.add_argument("--server", type=int, required=True, help="its process id")
@@ -39,25 +40,25 @@ def main() -> int:
     logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
-            return _serve(end, Pulse(arguments.pulse), arguments.device, arguments.memory)
+            return _serve(end, arguments)
         except link.Closed:
             return 0
 
 
-def _serve(end: socket.socket, pulse: Pulse, device: int | None, memory: int | None) -> int:
+def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     from gpu import GpuError, Renderer, denoise
     from service.rendering.worker.loop import Loop
     from service.rendering.worker.memory import default_limit
 
     try:
-        renderer = Renderer(device)
+        renderer = Renderer(arguments.device)
     except GpuError as error:
         link.send(end, Unable(str(error)))
         return 1
     link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
-    limit = memory or default_limit(bool(renderer.info["software"]))
-    Loop(end, renderer, pulse, limit, device).run()
+    limit = arguments.memory or default_limit(bool(renderer.info["software"]))
+    Loop(end, renderer, Pulse(arguments.pulse), limit, arguments.device, arguments.checkpoint).run()
     return 0
 
 

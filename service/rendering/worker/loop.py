@@ -41,11 +41,18 @@ log = logging.getLogger(__name__)
 
 class Loop:
     def __init__(
-        self, end: socket.socket, renderer: Renderer, pulse: Pulse, memory_limit: int, device: int | None
+        self,
+        end: socket.socket,
+        renderer: Renderer,
+        pulse: Pulse,
+        memory_limit: int,
+        device: int | None,
+        checkpoint_s: float,
     ) -> None:
         self._end = end
         self._renderer = renderer
         self._pulse = pulse
+        self._checkpoint_s = checkpoint_s
         self._tasks: dict[int, Task] = {}
         self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
@@ -141,7 +148,7 @@ class Loop:
             self._remove(task)
 
     def _new(self, first: Update) -> Task:
-        shared = self._denoiser, first.client, self._memory, self._forget, self._compiler
+        shared = self._denoiser, first.client, self._memory, self._forget, self._compiler, self._checkpoint_s
         return Task(self._renderer, first.task, self._send, *shared)
 
     def _forget(self, task: Task) -> None:

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Generator
+from collections.abc import Callable
+from math import inf
 from typing import TYPE_CHECKING
 
-from gpu import GpuError, OutOfMemory, RenderSettings, save
+from gpu import GpuError, OutOfMemory, RenderSettings
 from service.rendering.messages import (
+    Checkpoint,
     Done,
     Failed,
     FromRenderer,
@@ -25,6 +27,7 @@ from service.rendering.worker.course import Course
 from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.held import Held
 from service.rendering.worker.holding import kernel_of
+from service.rendering.worker.keeping import Keeping
 from service.rendering.worker.ladder import FULL_S
 from service.rendering.worker.memory import UNLIMITED, Memory
 from service.rendering.worker.showing import SLICE_S, Showing
@@ -49,10 +52,12 @@ class Task:
         memory: Memory | None = None,
         forget: Callable[[Task], None] | None = None,
         compiler: Compiler | None = None,
+        checkpoint_s: float = inf,
     ) -> None:
         """With `compiler`, others need not wait for its kernels.
 
-        With `forget`, Done brings the picture of a render to the server; what is forgotten it can bring back."""
+        With `forget`, Done brings the picture of a render to the server; what is forgotten it can bring back;
+        while it is under way, a Checkpoint does so every `checkpoint_s` seconds."""
         self.number, self.client = number, client
         self.attempted = 0  # the generation of the last update
         self.used_s = 0.0
@@ -70,7 +75,7 @@ class Task:
         self._compiled_ms = 0.0  # what that took elsewhere
         self._settings: RenderSettings | None = None
         self._paused = self._away = False
-        self._saving: Generator[None, None, Saved] | None = None  # a finished picture, for the server to keep
+        self._keeping = Keeping(checkpoint_s)
         self._reported = 0.0
 
     @property
@@ -90,7 +95,7 @@ class Task:
             return not self._compiling
         if not self._held.there:
             return False
-        if self._saving is not None or self._showing.due:
+        if self._keeping.under_way or self._showing.due:
             return True
         return self._course.reason is None and (
             self.unseen or not (self._paused or self._showing.smoothing.holds)
@@ -145,7 +150,7 @@ class Task:
             self.stop()
         held = self._held
         held.wake()
-        if held.holding is None or self._showing.step() or self._save():
+        if held.holding is None or self._showing.step() or self._keep():
             return
         if self._course.reason is not None:
             return
@@ -215,7 +220,8 @@ class Task:
             self._showing.smoothing.wanted = update.denoise
         if update.scene is not None:
             course.interactive = update.interactive
-        course.reason, self._saving, self._showing.owes_done = None, None, False
+        course.reason, self._showing.owes_done = None, False
+        self._keeping.restart()
         if update.restarts:
             self._restart()
         if update.scene is not None or update.settings is not None:
@@ -226,7 +232,7 @@ class Task:
 
     def evict(self) -> None:
         """Leaves the device: to the machine's memory, or where the server has it already, altogether."""
-        if not self._course.interactive and self._forget is not None:
+        if self._forget is not None and self._kept:
             self._part()
             self._forget(self)
         else:
@@ -237,10 +243,13 @@ class Task:
             self._apply(self._pending)
         if self._held.holding is None:
             return
+        course = self._course
         self._held.full.restore(restore.saved)
-        self._course.reason, self._saving, self._showing.scale = restore.reason, None, 1.0
-        self._course.clock.set(restore.progress.elapsed_s)
-        self._course.meter.set(restore.progress.samples, restore.progress.noise)
+        course.reason, self._showing.scale = restore.reason, 1.0
+        course.clock.set(restore.progress.elapsed_s)
+        course.meter.set(restore.progress.samples, restore.progress.noise)
+        course.even = not restore.saved.under_way[0]
+        self._keeping.restart()
 
     def look(self, want: Want) -> None:
         self._showing.want = want
@@ -252,15 +261,23 @@ class Task:
     def read(self, read: Read) -> None:
         self._showing.read(read)
 
-    def _save(self) -> bool:
-        """A step of saving the finished picture; the render is done when it is safe."""
-        if self._saving is None:
-            return False
-        try:
-            next(self._saving)
-        except StopIteration as end:
-            self._saving = None
-            self._say_done(end.value)
+    @property
+    def _kept(self) -> bool:
+        """The server keeps its picture."""
+        return self._forget is not None and not self._course.interactive
+
+    def _keep(self) -> bool:
+        """A step of saving the picture, where that is due; a finished render is done when it is safe."""
+        full, keeping = self._held.full, self._keeping
+        if not keeping.under_way:
+            if not self._kept or self._course.reason is not None or not keeping.due(full):
+                return False
+            keeping.begin(full)
+        saved = keeping.step()
+        if saved is not None and self._course.reason is not None:
+            self._say_done(saved)
+        elif saved is not None:
+            self._send(Checkpoint(self.number, self.generation, self.progress(), saved))
         return True
 
     def pause(self, away: bool = False) -> None:
@@ -279,12 +296,13 @@ class Task:
             self._stopping = True
         else:
             self._stopping = False
-            if self._saving is None:
+            if self._course.reason is None or not self._keeping.under_way:
+                self._keeping.restart()
                 self._end("stopped")
 
     def release(self) -> None:
         """Gives the GPU's memory back; the task can be loaded again."""
-        self._saving = None
+        self._keeping.restart()
         if self._compiler is not None:
             self._compiler.forget(self._hear_compiled)
         self._held.release()
@@ -331,9 +349,8 @@ class Task:
     def _finish(self) -> None:
         """Says that it has ended; where the server keeps such pictures, not before it has this one."""
         self._showing.owes_done = False
-        keep = self._forget is not None and not self._course.interactive
-        if keep and self._held.holding is not None and self._held.full.samples:
-            self._saving = save(self._held.full)
+        if self._kept and self._held.holding is not None and self._held.full.samples:
+            self._keeping.begin(self._held.full)
         else:
             self._say_done(None)
 

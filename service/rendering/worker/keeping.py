@@ -1,0 +1,58 @@
+"""A task's picture on its way to the server, which keeps it: the finished one, and long renders now and then."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator
+from typing import TYPE_CHECKING
+
+from gpu import picture_bytes, save
+from service import shared
+
+if TYPE_CHECKING:
+    from gpu import Picture, Saved
+
+REST = 100  # times what the last one took until the next, which so cost 1 % at most
+MOST_BYTES = 256 << 20  # of a picture under way, as the server has one of each render
+
+
+class Keeping:
+    """Steps, between which others have their turns."""
+
+    def __init__(self, every_s: float) -> None:
+        """`every_s`: between two of a picture under way, at least."""
+        self._every_s = every_s
+        self._steps: Generator[None, None, Saved] | None = None
+        self._took_s = 0.0
+        self._due_at = 0.0
+        self.restart()
+
+    def restart(self) -> None:
+        """Another picture, or this one is not wanted any more."""
+        self._steps, self._took_s = None, 0.0
+        self._due_at = time.monotonic() + self._every_s
+
+    @property
+    def under_way(self) -> bool:
+        return self._steps is not None
+
+    def due(self, picture: Picture) -> bool:
+        """Whether the picture under way is to be kept as it is now."""
+        late = time.monotonic() >= self._due_at
+        return late and picture.samples > 0 and picture_bytes(picture.settings) <= MOST_BYTES
+
+    def begin(self, picture: Picture) -> None:
+        self._steps, self._took_s = save(picture, shared.room), 0.0
+
+    def step(self) -> Saved | None:
+        """The picture, with the last step."""
+        assert self._steps is not None
+        began, saved = time.monotonic(), None
+        try:
+            next(self._steps)
+        except StopIteration as end:
+            self._steps, saved = None, end.value
+        now = time.monotonic()
+        self._took_s += now - began
+        self._due_at = now + max(self._every_s, REST * self._took_s)
+        return saved

@@ -1,0 +1,147 @@
+"""A long render that loses its renderer goes on from where it was saved last, to the same bits."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import Awaitable, Callable, Generator
+from types import SimpleNamespace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings
+from service.rendering.engine import Engine
+from service.rendering.messages import Checkpoint, Done, Image, Progressed, Read, Stop, StopRule, Update
+from service.rendering.process import Options
+from service.rendering.worker import keeping
+from tests.test_compiling import LINEAR, arrays_of
+from tests.test_worker import Ears, settings
+
+ENDLESS = 1 << 24
+
+
+def with_engine(test: Callable[[Engine], Awaitable[None]], **options: Any) -> None:
+    async def run() -> None:
+        engine = Engine(Options(**options))
+        engine.start()
+        try:
+            await engine.ready(30)
+            await test(engine)
+        finally:
+            await engine.close()
+
+    asyncio.run(run())
+
+
+async def begun(engine: Engine, samples: int) -> tuple[int, Ears]:
+    ears = Ears()
+    task = engine.open(ears, "render")
+    await engine.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4), StopRule(samples)))
+    return task, ears
+
+
+async def lost(engine: Engine, ears: Ears) -> int:
+    """The samples of the last checkpoint; its renderer is no more, and what it said was heard."""
+    saved = (await ears.next(Checkpoint)).progress.samples
+    pid = engine.process_id
+    assert pid is not None
+    os.kill(pid, signal.SIGKILL)
+    while engine.process_id == pid:
+        await asyncio.sleep(0.001)
+    while not ears.messages.empty():
+        message = ears.messages.get_nowait()
+        assert not isinstance(message, Done | str)
+        saved = message.progress.samples if isinstance(message, Checkpoint) else saved
+    return int(saved)
+
+
+async def picture(engine: Engine, task: int, ears: Ears) -> np.ndarray:
+    engine.send(Read(task, 1, LINEAR))
+    return np.array((await ears.next(Image)).pixels)
+
+
+def test_it_goes_on_to_the_same_bits(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        task, ears = await begun(engine, ENDLESS)
+        elapsed_s = 0.0
+        for _ in range(3):
+            saved = await lost(engine, ears)
+            engine.send(Read(task, 1, LINEAR))  # waits until there is something to read
+            assert (await ears.next(Image)).progress.samples == saved > 0
+            again = (await ears.next(Progressed)).progress
+            assert again.samples >= saved and again.elapsed_s > elapsed_s
+            elapsed_s = again.elapsed_s
+        engine.send(Update(task, 2, stop=StopRule(again.samples + 8), base=1))
+        done = await ears.next(Done)
+        assert done.reason == "max_samples" and done.progress.samples >= again.samples
+        assert engine.statistics.checkpoints >= 3 and engine.statistics.restarts["killed"] == 3
+        pixels = await picture(engine, task, ears)
+        engine.drop(task)
+        task, ears = await begun(engine, done.progress.samples)
+        await ears.next(Done)
+        assert np.array_equal(pixels, await picture(engine, task, ears))
+
+    with_engine(test, checkpoint_s=0.05)
+
+
+def test_what_is_cancelled_meanwhile_stays_as_it_was(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        task, ears = await begun(engine, ENDLESS)
+        saved = await lost(engine, ears)
+        engine.send(Stop(task))
+        done = await ears.next(Done)
+        assert done.reason == "stopped" and done.progress.samples == saved
+        assert (await picture(engine, task, ears)).shape == (96, 96, 4)
+
+    with_engine(test, checkpoint_s=0.05)
+
+
+def test_a_short_render_has_none(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        _, ears = await begun(engine, 20)
+        await ears.next(Done)
+        assert engine.statistics.checkpoints == 0
+
+    with_engine(test, checkpoint_s=1e3)
+
+
+def test_a_stream_has_none(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays_of("plain"), settings(64), StopRule(200), interactive=True))
+        await ears.next(Done)
+        assert engine.statistics.checkpoints == 0
+
+    with_engine(test, checkpoint_s=0.001)
+
+
+def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = 0.0
+
+    def slow(picture: Any, room: Any) -> Generator[None, None, str]:
+        nonlocal now
+        for _ in range(4):
+            now += 0.5
+            yield
+        return "saved"
+
+    monkeypatch.setattr(keeping.time, "monotonic", lambda: now)
+    monkeypatch.setattr(keeping, "save", slow)
+    kept, shown = keeping.Keeping(10.0), SimpleNamespace(samples=1, settings=RenderSettings(512, 512))
+    small: Any = shown
+    assert not kept.due(small)
+    now = 10.0
+    assert kept.due(small)
+    large: Any = SimpleNamespace(samples=1, settings=RenderSettings(4096, 4096))
+    assert not kept.due(large)
+    kept.begin(small)
+    steps = [kept.step() for _ in range(5)]
+    assert steps == [None] * 4 + ["saved"] and not kept.under_way
+    now += 199.0
+    assert not kept.due(small)
+    now += 1.0
+    assert kept.due(small)
