@@ -17,7 +17,7 @@ from gpu.program import Source
 from gpu.settings import RenderSettings
 from gpu.texels import BYTES
 
-ENTRY = "pathtrace.comp"
+ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others take some 30 ms, once
 _BUFFER = 1 << 16  # bytes; zeros for whatever is bound, and no pixel looks at it
 _QUICK_S = 0.04  # of processor time: no compiler was at work
 _LOOKS = 8  # for a kernel in the disk cache, which drivers write behind our back
@@ -33,19 +33,20 @@ class Recipe:
 
     defines: tuple[tuple[str, object], ...]
     textures: tuple[tuple[int, int, str, int, int], ...]
+    entry: str = ENTRY
 
     @property
     def text(self) -> str:
-        return Source(ENTRY, dict(self.defines)).text
+        return Source(self.entry, dict(self.defines)).text
 
     def digest(self, driver: str) -> str:
         return sha256(repr((driver, self.text, self.textures)).encode()).hexdigest()[:32]
 
 
-def recipe(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]) -> Recipe:
-    """What a picture of `arrays` needs compiled where these flags are raised."""
+def recipe(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str], entry: str = ENTRY) -> Recipe:
+    """What a picture of `arrays` needs compiled where these flags are raised: its kernel, or that of its GUIDES."""
     defines = features.defines(raised, settings, features.counts(arrays))
-    return Recipe(tuple(defines.items()), _textures(arrays))
+    return Recipe(tuple(defines.items()), _textures(arrays), entry)
 
 
 def _textures(a: SceneArrays) -> tuple[tuple[int, int, str, int, int], ...]:

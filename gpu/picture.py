@@ -121,6 +121,11 @@ class Picture:
         """Holds AOVs of the first hit."""
         return bool(self._guides)
 
+    @property
+    def guided_yet(self) -> bool:
+        """Some of those were traced: their kernel is there."""
+        return (self._guide_samples, self._guide_row) > (0, 0)
+
     def restore(self, saved: Saved) -> None:
         """Go on where a picture of the same scene and settings was saved."""
         contexts.use(self.context)
@@ -296,7 +301,7 @@ class Picture:
             for buffer in self._guides.values():
                 buffer.clear()
             self._guide_samples, self._guide_row = 0, 0
-        if self._guide_samples < want:
+        if self._guide_samples < want and budget_s > 0:
             kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
             self._bind()
         rows = max(1 if width > _GUIDE_PIXELS else 8, _GUIDE_PIXELS // width // 8 * 8)

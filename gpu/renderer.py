@@ -32,9 +32,15 @@ class Renderer:
             raise WrongThread("a Renderer belongs to the thread that made it")
         contexts.use(self._context)
 
-    def load(self, arrays: SceneArrays, editing: bool = False, everything: bool = False) -> Scene:
-        """Upload a scene. `editing` keeps compiled what its materials' sliders could raise; `everything` raises every
-        flag, whatever the scene needs.
+    def load(
+        self,
+        arrays: SceneArrays,
+        editing: bool = False,
+        everything: bool = False,
+        raised: frozenset[str] = frozenset(),
+    ) -> Scene:
+        """Upload a scene. `editing` keeps compiled what its materials' sliders could raise, and what was `raised`
+        before; `everything` raises every flag, whatever the scene needs.
 
         Raises SceneTooLarge, OutOfMemory.
         """
@@ -43,7 +49,7 @@ class Renderer:
             count = len(getattr(arrays, name))
             if count > layout.LEAF_FIRST_MASK:
                 raise SceneTooLarge(f"{count} {name}: at most {layout.LEAF_FIRST_MASK} of a kind")
-        return Scene(self._context, arrays, editing, self._texels, everything)
+        return Scene(self._context, arrays, editing, self._texels, everything, raised)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.

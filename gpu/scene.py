@@ -62,13 +62,19 @@ class Scene:
     """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
 
     def __init__(
-        self, context: Any, arrays: SceneArrays, editing: bool, texels: Texels, everything: bool = False
+        self,
+        context: Any,
+        arrays: SceneArrays,
+        editing: bool,
+        texels: Texels,
+        everything: bool = False,
+        raised: frozenset[str] = frozenset(),
     ) -> None:
         self._context = context
         self._shared = texels
         self._editing = editing
         self._everything = everything
-        self._raised: frozenset[str] = frozenset()
+        self._raised = raised
         self.arrays = arrays
         self._raise_flags()
         self._buffers: dict[Slot, Any] = {}

@@ -14,10 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings
+from gpu import Renderer, RenderSettings, features
 from service.pack import pack
 from service.rendering.engine import Engine
 from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
+from service.rendering.worker.holding import Holding, kernel_of
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -29,17 +30,20 @@ LINEAR = View(encoding="linear")
 AHEAD = """
 import sys
 from gpu import features
-from gpu.ahead import Ahead, recipe
+from gpu.ahead import ENTRY, GUIDES, Ahead, recipe
 from tests.test_compiling import SETTINGS, arrays_of
 a = arrays_of(sys.argv[1])
-print(Ahead().compile(recipe(a, SETTINGS, features.flags(a)))[1])
+ahead = Ahead()
+print(all([ahead.compile(recipe(a, SETTINGS, features.flags(a), entry))[1] for entry in (ENTRY, GUIDES)]))
 """
 RENDERER = """
 import sys
 from gpu import Renderer
 from tests.test_compiling import SETTINGS, arrays_of
 with Renderer() as renderer:
-    renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS).trace(9.0, 2)
+    picture = renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS)
+    picture.trace(9.0, 2)
+    picture.read("normal")
 """
 SETTINGS = RenderSettings(32, 32, max_bounces=2)
 SCENES: dict[str, Any] = {
@@ -172,6 +176,55 @@ def test_others_are_traced_meanwhile(gpu: Renderer, arrays: Any, cold: Path) -> 
         assert helpers(engine.process_id) == []  # what is in the disk cache needs none
 
     with_engine(again)
+
+
+def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, arrays: Any, cold: Path) -> None:
+    async def test(engine: Engine) -> None:
+        ears, other = Ears(), Ears()
+        busy, late = engine.open(other), engine.open(ears)
+        for task, hears, stop in ((busy, other, StopRule()), (late, ears, StopRule(2))):
+            await engine.send_scene(Update(task, 1, arrays, SIZE, stop))
+            await hears.next(task, Loaded)
+        await ears.next(late, Done)
+        before = helpers(engine.process_id)
+        engine.send(Read(late, 1, View("normal", encoding="linear")))
+        normal = asyncio.create_task(ears.next(late, Image))
+        seen: list[int] = []
+        while not normal.done():
+            engine.send(Read(busy, len(seen), LINEAR))
+            seen.append((await other.next(busy, Image)).progress.samples)
+            await asyncio.sleep(0)
+        assert len(set(seen)) >= 5 and len(before) <= len(helpers(engine.process_id)) == 1
+        pixels = (await normal).pixels
+        scene = gpu.load(arrays)
+        picture = gpu.picture(scene, RenderSettings(**SIZE))
+        picture.trace(60.0, 2)
+        assert np.array_equal(pixels, picture.read("normal"))
+        picture.release()
+        scene.release()
+
+    with_engine(test)
+
+
+def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
+    """What a slider raised while it was moved stays raised: no other kernel, and no other bits."""
+    holding = Holding(gpu, arrays, RenderSettings(32, 32), True, {})
+    rough = np.array(arrays.materials)
+    glowing = rough.copy()
+    glowing["emission"] = 1.0
+    for materials in (glowing, rough):
+        holding.scene.edit(materials=materials)
+    holding.ladder.reset()
+    holding.ladder.full.trace(60.0, 3)
+    flags, compiled = holding.scene.flags, gpu.kernels
+    assert flags > features.flags(arrays, editing=True)
+    aside = holding.aside()
+    edit = Update(1, 2, materials=rough, base=1)
+    recipe = kernel_of(edit, aside.settings, None, aside)
+    back = Holding.back(gpu, aside)
+    assert back.scene.flags == flags and gpu.kernels == compiled and back.ladder.full.samples == 3
+    assert recipe is not None and dict(recipe.defines) == back.scene.defines(aside.settings)
+    back.release()
 
 
 def test_a_helper_that_dies_is_done_without(gpu: Renderer, arrays: Any, cold: Path) -> None:

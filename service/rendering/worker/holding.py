@@ -21,6 +21,7 @@ class Aside:
     arrays: SceneArrays
     settings: RenderSettings
     editing: bool
+    flags: frozenset[str]  # of its kernel: edits that came and went may have raised more than the arrays ask for
     pictures: dict[float, Saved]  # by scale, of those that had begun
 
 
@@ -28,11 +29,17 @@ class Holding:
     """Raises what the renderer raises, and then holds nothing."""
 
     def __init__(
-        self, renderer: Renderer, arrays: SceneArrays, settings: RenderSettings, editing: bool, edits: dict[str, Any]
+        self,
+        renderer: Renderer,
+        arrays: SceneArrays,
+        settings: RenderSettings,
+        editing: bool,
+        edits: dict[str, Any],
+        flags: frozenset[str] = frozenset(),
     ) -> None:
         self._renderer = renderer
         self._editing = editing
-        self.scene: Scene = renderer.load(arrays, editing)
+        self.scene: Scene = renderer.load(arrays, editing, raised=flags)
         try:
             if edits:
                 self.scene.edit(**edits)
@@ -58,13 +65,13 @@ class Holding:
     def aside(self) -> Aside:
         """Off the device; this holding is released."""
         pictures = {scale: finished(save(made)) for scale, made in self.ladder.begun.items()}
-        out = Aside(self.scene.arrays, self.ladder.full.settings, self._editing, pictures)
+        out = Aside(self.scene.arrays, self.ladder.full.settings, self._editing, self.scene.flags, pictures)
         self.release()
         return out
 
     @classmethod
     def back(cls, renderer: Renderer, aside: Aside) -> Holding:
-        out = cls(renderer, aside.arrays, aside.settings, aside.editing, {})
+        out = cls(renderer, aside.arrays, aside.settings, aside.editing, {}, aside.flags)
         try:
             for scale, saved in aside.pictures.items():
                 out.ladder.picture(scale).restore(saved)
@@ -110,7 +117,7 @@ def kernel_of(
         if update.settings is None and aperture and not edits.keys() & {"materials", "texture_words"}:
             return None
     elif aside is not None:
-        arrays, editing = aside.arrays, aside.editing
+        arrays, editing, raised = aside.arrays, aside.editing, aside.flags
     else:
         return None
     if edits or update.scene is None:

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import picture_bytes
+from gpu import ahead, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from service.rendering.messages import Frame, FromRenderer, Image, Read, View, Want
+from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.course import Course
 from service.rendering.worker.held import Held
 from service.rendering.worker.smoothing import Smooth, Smoothing
@@ -32,6 +33,7 @@ class Showing:
         course: Course,
         smoothing: Smoothing,
         finish: Callable[[], None],
+        compiler: Compiler | None,
     ) -> None:
         """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
         self.want: Want | None = None
@@ -40,6 +42,8 @@ class Showing:
         self.smoothing = smoothing
         self._number, self._send, self._finish = number, send, finish
         self._held, self._course = held, course
+        self._compiler = compiler
+        self._compiling = False  # the kernel of the AOVs of the first hit
         self._served: tuple[object, ...] = ()
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
@@ -55,7 +59,9 @@ class Showing:
 
     def part(self) -> None:
         """The pictures are leaving the device."""
-        self._guided = None
+        self._guided, self._compiling = None, False
+        if self._compiler is not None:
+            self._compiler.forget(self._hear_compiled)
 
     def forget(self) -> None:
         """Nothing is there any more, which is what who waits for a reading is given."""
@@ -67,9 +73,14 @@ class Showing:
             self.read(read)
 
     @property
+    def awaited(self) -> bool:
+        """Somebody waits for something that takes steps."""
+        return self._guided is not None or bool(self._reads) or self._smoothed or self._smooth_due
+
+    @property
     def due(self) -> bool:
         """There is a step to be done."""
-        return self._guided is not None or self._smoothed or self._smooth_due
+        return self.awaited and not self._compiling
 
     def step(self) -> bool:
         """Does it; whether there was one."""
@@ -168,6 +179,8 @@ class Showing:
         if not self._smooth_due:
             return False
         full, course = self._held.full, self._course
+        if self._waits(full):
+            return True
         if full.trace_guides(SLICE_S, GUIDE_SAMPLES):
             course.meter.read(full, fresh=True)
             self.smoothing.begin(full, course.progress(self._held), self._smooth_finely, self._hear_smoothed)
@@ -175,6 +188,20 @@ class Showing:
 
     def _hear_smoothed(self) -> None:
         self._smoothed = True
+
+    def _waits(self, picture: Picture) -> bool:
+        """Whether the kernel for the AOVs of the first hit is being compiled, where others would wait for it."""
+        if self._compiler is None or picture.guided_yet:
+            return False
+        scene = picture.scene
+        wanted = ahead.recipe(scene.arrays, picture.settings, scene.flags, ahead.GUIDES)
+        self._compiling = self._compiler.waits(wanted, self._hear_compiled)
+        if not self._compiling:
+            self._compiler.met(wanted)  # in a moment
+        return self._compiling
+
+    def _hear_compiled(self, milliseconds: float) -> None:
+        self._compiling = False
 
     def _needs_guides(self, picture: Picture, view: View) -> bool:
         if view.aov not in GUIDES:
@@ -189,9 +216,14 @@ class Showing:
 
     def _trace_guides(self) -> bool:
         """A slice of them, where somebody waits for them; then the readings that they held up."""
-        if self._guided is None:
+        picture = self._guided
+        if picture is None and self._reads and self._held.holding is not None:  # it was aside meanwhile
+            picture = self._held.full
+        if picture is None:
             return False
-        if self._guided.trace_guides(SLICE_S):
+        if self._waits(picture):
+            return True
+        if picture.trace_guides(SLICE_S):
             self._guided = None
             reads, self._reads = self._reads, []
             for read in reads:

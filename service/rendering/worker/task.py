@@ -66,7 +66,7 @@ class Task:
         self._held = Held(renderer, memory or Memory(UNLIMITED, list), self, self._part)
         self._course = Course(renderer)
         smoothing = Smoothing(denoiser, yields=bool(renderer.info["software"]))
-        self._showing = Showing(number, send, self._held, self._course, smoothing, self._finish)
+        self._showing = Showing(number, send, self._held, self._course, smoothing, self._finish, compiler)
         self._scale = 1.0  # of what is traced
         self._pending: Update | None = None  # not applied yet
         self._stopping = False  # when that was applied
@@ -97,9 +97,7 @@ class Task:
             return False
         if self._keeping.under_way or self._showing.due:
             return True
-        return self._course.reason is None and (
-            self.unseen or not (self._paused or self._showing.smoothing.holds)
-        )
+        return self._course.reason is None and (self.unseen or not (self._paused or self._showing.smoothing.holds))
 
     @property
     def unseen(self) -> bool:
@@ -122,7 +120,8 @@ class Task:
 
     @property
     def idle(self) -> bool:
-        return self._held.holding is not None and not self.ready and not self._showing.smoothing.pending
+        waited_for = self.ready or self._showing.awaited or self._showing.smoothing.pending
+        return self._held.holding is not None and not waited_for
 
     @property
     def bytes(self) -> int:
