@@ -50,11 +50,6 @@ def whereabouts(part: memoryview) -> tuple[Block, int] | None:
     return None
 
 
-def room(size: int) -> np.ndarray:
-    """So many bytes, in a block of their own where they are many."""
-    return np.zeros(size, np.uint8) if size < LEAST else np.frombuffer(block(size), np.uint8)
-
-
 class Shelf:
     """Room for arrays side by side, in one block where they are large."""
 

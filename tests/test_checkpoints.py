@@ -13,8 +13,9 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
+from service.rendering import link
 from service.rendering.engine import Engine
-from service.rendering.messages import Checkpoint, Done, Image, Progressed, Read, Stop, StopRule, Update
+from service.rendering.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
 from service.rendering.process import Options
 from service.rendering.worker import keeping
 from tests.test_compiling import LINEAR, arrays_of
@@ -119,6 +120,24 @@ def test_a_stream_has_none(gpu: Renderer) -> None:
     with_engine(test, checkpoint_s=0.001)
 
 
+def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
+    """The server keeps 64 of them and more."""
+    scene = gpu.load(arrays_of("plain"))
+    picture = gpu.picture(scene, RenderSettings(192, 192))
+    picture.trace(60.0, 2)
+    kept, saved = keeping.Keeping(10.0), None
+    kept.begin(picture)
+    while saved is None:
+        saved = kept.step()
+    encoded = link.encode(Checkpoint(1, 1, Progress(), saved))
+    assert len(encoded[1]) == 1
+    received = link.decode(*encoded).saved
+    for mine, theirs, buffer in zip(saved.buffers, received.buffers, picture.state, strict=True):
+        assert mine.tobytes() == theirs.tobytes() == buffer.read()
+    picture.release()
+    scene.release()
+
+
 def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
 
@@ -131,7 +150,7 @@ def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> No
 
     monkeypatch.setattr(keeping.time, "monotonic", lambda: now)
     monkeypatch.setattr(keeping, "save", slow)
-    kept, shown = keeping.Keeping(10.0), SimpleNamespace(samples=1, settings=RenderSettings(512, 512))
+    kept, shown = keeping.Keeping(10.0), SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[])
     small: Any = shown
     assert not kept.due(small)
     now = 10.0

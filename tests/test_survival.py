@@ -55,7 +55,7 @@ def descriptors(server: Server) -> int:
 
 
 def until(condition: Any) -> None:
-    by = time.monotonic() + 25
+    by = time.monotonic() + 60  # busy machines start a renderer in ten seconds; this server loses patience in two
     while not condition():
         assert time.monotonic() < by
         time.sleep(0.02)

@@ -6,6 +6,8 @@ import time
 from collections.abc import Generator
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from gpu import picture_bytes, save
 from service import shared
 
@@ -42,7 +44,8 @@ class Keeping:
         return late and picture.samples > 0 and picture_bytes(picture.settings) <= MOST_BYTES
 
     def begin(self, picture: Picture) -> None:
-        self._steps, self._took_s = save(picture, shared.room), 0.0
+        shelf = shared.Shelf(*(buffer.size for buffer in picture.state))  # one descriptor goes with the picture
+        self._steps, self._took_s = save(picture, lambda size: shelf.room((size,), np.dtype(np.uint8))), 0.0
 
     def step(self) -> Saved | None:
         """The picture, with the last step."""
