@@ -8,6 +8,7 @@ from __future__ import annotations
 import asyncio
 import ipaddress
 from collections.abc import Awaitable, Callable
+from contextlib import suppress
 from urllib.parse import urlsplit
 
 from starlette._utils import get_route_path
@@ -32,6 +33,7 @@ CLOSE_CODES: dict[type[ServiceError], int] = {Unauthorized: 4401, Forbidden: 440
 REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
 RETRY_S = 5  # when to come again with a body that there is no room for
+LINGER_S, SILENT_S = 30.0, 2.0  # for a refused body: in all, and without a byte
 # Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are made.
 CONTENT_POLICY = (
     "default-src 'self'; img-src 'self' blob: data:; object-src 'none'; "
@@ -80,7 +82,8 @@ class Guard:
         except ServiceError as error:
             if scope["type"] == "websocket":
                 return await _close(scope, receive, send, CLOSE_CODES[type(error)], str(error))
-            return await self._refuse(error)(scope, receive, _secured(send, granted, close=True))
+            patient = _lingering(send, receive)
+            return await self._refuse(error)(scope, receive, _secured(patient, granted, close=True))
         if scope["type"] == "websocket":
             return await self._app(scope, receive, send)
         body = _Body(self, receive)
@@ -184,6 +187,25 @@ def _secured(send: Send, granted: str | None, close: bool = False) -> Callable[[
             if close:  # the body was not read, so the connection can't be used again
                 headers["connection"] = "close"
         await send(message)
+
+    return sending
+
+
+def _lingering(send: Send, receive: Receive) -> Callable[[Message], Awaitable[None]]:
+    """Answers at once, and takes what still comes before the connection is closed: closed with bytes unread, TCP
+    resets it, and who is still sending loses the answer."""
+
+    async def sending(message: Message) -> None:
+        if message["type"] != "http.response.body" or message.get("more_body", False):
+            return await send(message)
+        await send({**message, "more_body": True})
+        with suppress(TimeoutError):
+            async with asyncio.timeout(LINGER_S):
+                while True:
+                    heard = await asyncio.wait_for(receive(), SILENT_S)
+                    if heard["type"] == "http.disconnect" or not heard.get("more_body", False):
+                        break
+        await send({"type": "http.response.body"})
 
     return sending
 

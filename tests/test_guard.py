@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import socket
 from collections.abc import Iterator
@@ -10,11 +11,13 @@ from urllib.parse import urlsplit
 
 import httpx
 import pytest
+from starlette.responses import PlainTextResponse
 from websockets.exceptions import ConnectionClosed
 from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from service.config import Config, ConfigError, load_config
+from service.guard import Guard
 from service.keys import Keys
 from service.problems import Unauthorized
 from tests.serving import ENDLESS, SCENE, SMALL, Server
@@ -209,3 +212,32 @@ def test_useless_keys_are_refused(value: str, monkeypatch: pytest.MonkeyPatch) -
 
 def test_no_key_is_in_the_configurations_text() -> None:
     assert "secret" not in repr(Config(api_key=["secret"]))
+
+
+def test_who_sends_a_refused_body_hears_why() -> None:
+    """Answered at once; what still comes is taken before the connection is closed, which would lose the answer."""
+    body: list[Any] = [{"type": "http.request", "body": b"x" * 9, "more_body": True}] * 3
+    coming = [*body, {"type": "http.request", "body": b"", "more_body": False}]
+    happened: list[str] = []
+
+    async def receive() -> Any:
+        happened.append("read")
+        return coming.pop(0)
+
+    async def send(message: Any) -> None:
+        if message["type"] == "http.response.body":
+            happened.append("answered" if message.get("body") else "ended")
+            assert message.get("more_body", False) is bool(message.get("body"))
+
+    headers = [(b"host", b"127.0.0.1"), (b"content-length", b"99")]
+    scope: Any = {
+        "type": "http",
+        "method": "POST",
+        "path": "/v1/assets",
+        "headers": headers,
+        "server": ("127.0.0.1", 80),
+    }
+    taken, config = PlainTextResponse("taken"), Config(max_body=10)
+    guard = Guard(taken, config=config, refuse=lambda error: PlainTextResponse(str(error), 413))
+    asyncio.run(guard(scope, receive, send))
+    assert happened == ["answered", "read", "read", "read", "read", "ended"]
