@@ -5,8 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from service.pack.chunks import CHUNK
 from service.pack.normals import corner_normals, encode
-from tests.documents import CUBE, MIRRORED, matrix_of, mesh, packed, sphere
+from tests.documents import CUBE, GREY, MIRRORED, matrix_of, mesh, packed, sphere
 
 
 def decode(codes):
@@ -88,3 +89,35 @@ def test_degenerate_triangles_are_skipped_and_counted():
     result = packed(sphere(), mesh(vertices=vertices, faces=faces))
     assert len(result.arrays.triangles) == len(result.arrays.triangle_normals) == 1
     assert result.warnings == ["/shapes/1: 3 degenerate triangles skipped"]
+
+
+def grid(size):
+    """A bumpy one of 2 size^2 triangles, some of them degenerate: (vertices, faces, uvs)."""
+    u, v = np.meshgrid(np.linspace(0, 1, size + 1), np.linspace(0, 1, size + 1), indexing="ij")
+    vertices = np.stack([u, 0.1 * np.sin(9 * u) * np.cos(7 * v), v], axis=-1).reshape(-1, 3)
+    place = np.arange(len(vertices)).reshape(size + 1, size + 1)
+    a, b, c, d = (p.reshape(-1) for p in (place[:-1, :-1], place[:-1, 1:], place[1:, 1:], place[1:, :-1]))
+    faces = np.concatenate([np.stack([a, b, c], axis=1), np.stack([a, c, d], axis=1)])
+    faces[:: CHUNK // 3, 2] = faces[:: CHUNK // 3, 1]
+    return vertices, faces, np.stack([u, v], axis=-1).reshape(-1, 2)
+
+
+def test_triangles_of_a_large_mesh_are_all_there_with_what_is_theirs():
+    vertices, faces, uvs = grid(120)
+    assert len(faces) > CHUNK
+    large = mesh(vertices=vertices.tolist(), faces=faces.tolist(), uvs=uvs.tolist(), material="checked")
+    checked = {"type": "diffuse", "albedo": {"texture": "checks"}}
+    textures = {"checks": {"type": "checker", "a": 0.2, "b": 0.8}}
+    arrays = packed(large, mesh(), materials={"checked": checked, "grey": GREY}, textures=textures).arrays
+    standing = np.flatnonzero(faces[:, 2] != faces[:, 1])
+    of_large = arrays.triangles["shape"] == 0
+    found = np.stack([arrays.triangles[name][of_large] for name in ("v0", "v1", "v2")], axis=1)
+    assert len(arrays.triangles) == len(standing) + 12 and len(found) == len(standing)
+    # uv 0..1 over x and z: by them each triangle is known
+    np.testing.assert_allclose(arrays.triangle_uvs[of_large], found[:, :, [0, 2]], atol=1e-6)
+    expected = vertices[faces[standing]].astype(np.float32).reshape(-1, 9)
+    found = found.reshape(-1, 9)
+    assert np.array_equal(found[np.lexsort(found.T)], expected[np.lexsort(expected.T)])
+    cross = np.cross(found[:, 3:6] - found[:, :3], found[:, 6:] - found[:, :3])
+    for name in ("n0", "n1", "n2"):
+        assert (np.einsum("ij,ij->i", decode(arrays.triangle_normals[name][of_large]), cross) > 0).all()
