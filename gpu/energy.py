@@ -16,11 +16,11 @@ FILE = Path(__file__).with_name("energy.npz")
 MU_COUNT = 40  # cosines, as squares of equal steps
 ETA_COUNT = 25  # indices 1..4; (eta - 1) / (eta + 1) as squares of equal steps
 ALBEDO_SHAPE = (ETA_COUNT, 40, MU_COUNT)  # eta, roughness, cosine
-STRETCHED_SHAPE = (13, 8, 13, 14, 18)  # eta (every other of the above), aspect, roughness, azimuth, cosine
-MEAN_SHAPE = (2 * ETA_COUNT - 1, STRETCHED_SHAPE[1], 2 * ALBEDO_SHAPE[1] - 1)  # eta, aspect, roughness
+STRETCHED_SHAPE = (16, 9, 19, 14, 18)  # eta, aspect, roughness, azimuth, cosine
+MEAN_SHAPE = (2 * ETA_COUNT - 1, 1 + STRETCHED_SHAPE[1], 2 * ALBEDO_SHAPE[1] - 1)  # eta, round and aspect, roughness
 AZIMUTH_POWER = 0.8  # azimuths from the short axis, as this power of equal steps: denser there
 SHEEN_SHAPE = (16, MU_COUNT)  # sheen roughness, cosine
-LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1
+LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1; aspects in the tables are equal ratios apart
 LARGEST_ETA = 4.0
 LEAST_SHEEN_ROUGHNESS = 0.27  # below, the sheen's masking lets it send back more than it receives
 _X_END = (LARGEST_ETA - 1) / (LARGEST_ETA + 1)
@@ -31,10 +31,10 @@ class Tables:
     """Shares of the light from a direction, float32.
 
     `albedo` (eta, roughness, mu, 4): reflected with Fresnel 1; with eta's, never too low; lost where glass is
-    entered; lost where it is left. `stretched` (eta, aspect, roughness, azimuth, mu, 4): the same
-    of stretched lobes.
-    `mean` (eta, aspect, roughness, 4): their cosine-weighted means; of what is lost divided by how much more is lost
-    in truth, as `energy_tables` says. `sheen` (roughness, mu): the sheen's, the same.
+    entered; lost where it is left. `stretched` (eta, aspect, roughness, azimuth, mu, 4): the same of stretched lobes,
+    though seldom a little too low.
+    `mean` (eta, round lobes and each aspect of stretched, roughness, 4): their cosine-weighted means; of what is
+    lost divided by how much more is lost in truth, as `energy_tables` says. `sheen` (roughness, mu): the same.
     """
 
     albedo: np.ndarray
@@ -66,11 +66,28 @@ def sheen_nodes(count: int = SHEEN_SHAPE[0]) -> np.ndarray:
     return np.linspace(LEAST_SHEEN_ROUGHNESS, 1, count)
 
 
+# Of uint16, modulo 65536: of smooth tables they are small and pack well. Along azimuth and cosine.
+_SMOOTH = (3, 4)
+
+
+def differences(table: np.ndarray) -> np.ndarray:
+    for axis in _SMOOTH:
+        table = np.diff(table, axis=axis, prepend=table.dtype.type(0))
+    return table
+
+
+def _summed(table: np.ndarray) -> np.ndarray:
+    for axis in _SMOOTH:
+        table = np.cumsum(table, axis=axis, dtype=table.dtype)
+    return table
+
+
 @lru_cache(maxsize=1)
 def tables() -> Tables:
     """The tables that travel with the package."""
     with np.load(FILE) as kept:
-        found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in kept.items()}
+        found = {n: _summed(v) if n == "stretched" else v for n, v in kept.items()}
+    found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in found.items()}
     # What is reflected with Fresnel 1 is the same for every index: kept once.
     one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)
     found["stretched"] = np.concatenate([one[..., None], found["stretched"]], -1)

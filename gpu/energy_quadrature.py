@@ -42,12 +42,15 @@ def albedos(
     one = reflected = kept_a = kept_b = 0.0
     # Many rows, each turned against the last: seen head-on a whole row is lost or kept.
     rows, columns = 3 * n, n // 3
+    step_x, step_y = math.cos(2.0 * math.pi / columns), math.sin(2.0 * math.pi / columns)
     for i in range(rows):
         cap = (1.0 - (i + 0.5) / rows) * (1.0 + vz) - vz
         r = math.sqrt(max(0.0, 1.0 - cap * cap))
-        for j in range(columns):
-            phi = 2.0 * math.pi * ((j + 0.5) / columns + 0.61803398875 * i)
-            mx, my, mz = ax * (r * math.cos(phi) + vx), ay * (r * math.sin(phi) + vy), max(cap + vz, 0.0)
+        phi = 2.0 * math.pi * (0.5 / columns + 0.61803398875 * i)
+        px, py = r * math.cos(phi), r * math.sin(phi)
+        for _ in range(columns):
+            mx, my, mz = ax * (px + vx), ay * (py + vy), max(cap + vz, 0.0)
+            px, py = px * step_x - py * step_y, px * step_y + py * step_x
             scale = 1.0 / math.sqrt(mx * mx + my * my + mz * mz + 1e-300)
             mx, my, mz = mx * scale, my * scale, mz * scale
             c = x * mx + y * my + z * mz

@@ -40,10 +40,16 @@ RADIANCE_MAX = 1e20  # what a texel times the environment's scale may reach
 
 
 def upload_tables(context: Any) -> dict[int, Any]:
-    """Textures of `gpu.energy` by texture unit, linear and clamped: their first axes are folded into the third."""
+    """Textures of `gpu.energy` by texture unit, linear and clamped: their first axes are folded into the third.
+
+    The index of stretched lobes goes with the second: 2 048 layers are all that a driver need have.
+    """
     out = {}
     for name, unit in layout.ENERGY_TEXTURES.items():
         table = getattr(energy.tables(), name)
+        if name == "stretched":
+            etas, aspects, steps, azimuths, cosines, _ = table.shape
+            table = np.moveaxis(table, 0, 2).reshape(aspects * steps, etas * azimuths, cosines, -1)
         channels = 1 if name == "sheen" else table.shape[-1]
         height, width = table.shape[-3:-1] if channels > 1 else table.shape[-2:]
         size = (width, height, table.size // (width * height * channels))

@@ -1,7 +1,7 @@
 // Tables of what lobes send back, made by gpu/energy_tables.py: interpolated in all their axes by the sampler.
 #if HAS_PRINCIPLED
 layout(binding = ENERGY_ALBEDO_TEXTURE) uniform sampler3D energy_albedo_table; // cosine, roughness, eta
-layout(binding = ENERGY_MEAN_TEXTURE) uniform sampler3D energy_mean_table;     // roughness, aspect, eta
+layout(binding = ENERGY_MEAN_TEXTURE) uniform sampler3D energy_mean_table;     // roughness, round or aspect, eta
 layout(binding = ENERGY_SHEEN_TEXTURE) uniform sampler3D energy_sheen_table;   // cosine, sheen roughness
 
 // Texture coordinate of a place 0..1 between the middles of the first and last of n texels.
@@ -14,10 +14,10 @@ float energy_eta(float eta) {
 
 float energy_roughness(float roughness) { return pow(roughness, 2.0 / 3.0); }
 
-float energy_aspect(float aspect) { return clamp((1.0 - aspect) / (1.0 - ENERGY_LEAST_ASPECT), 0.0, 1.0); }
+float energy_aspect(float aspect) { return clamp(log(aspect) / log(ENERGY_LEAST_ASPECT), 0.0, 1.0); }
 
 #if HAS_ANISOTROPIC
-// cosine, azimuth, and in turn roughness, aspect and eta
+// cosine, azimuth and in turn eta, roughness and in turn aspect
 layout(binding = ENERGY_STRETCHED_TEXTURE) uniform sampler3D energy_stretched_table;
 
 // energy_albedo of a stretched lobe: w in the lobe's own frame.
@@ -25,16 +25,16 @@ vec4 energy_stretched(vec3 w, float roughness, float aspect, float eta) {
     vec2 a = abs(w.xy);
     float azimuth = a.x + a.y > 0.0 ? atan(a.x, a.y) * (2.0 * INV_PI) : 1.0; // from the short axis
     azimuth = pow(azimuth, ENERGY_AZIMUTH_POWER);
-    vec2 xy = vec2(energy_place(sqrt(abs(w.z)), ENERGY_COSINES), energy_place(azimuth, ENERGY_AZIMUTHS));
+    float x = energy_place(sqrt(abs(w.z)), ENERGY_COSINES), y = azimuth * float(ENERGY_AZIMUTHS - 1) + 0.5;
     float z = clamp(energy_roughness(roughness), 0.0, 1.0) * float(ENERGY_STEPS - 1) + 0.5;
     float s = energy_aspect(aspect) * float(ENERGY_ASPECTS - 1), e = energy_eta(eta) * float(ENERGY_ETAS - 1);
     int k = min(int(s), ENERGY_ASPECTS - 2), m = min(int(e), ENERGY_ETAS - 2);
-    float slab = 1.0 / float(ENERGY_ETAS * ENERGY_ASPECTS), inv = slab / float(ENERGY_STEPS);
+    vec2 inv = 1.0 / vec2(ENERGY_ETAS * ENERGY_AZIMUTHS, ENERGY_ASPECTS * ENERGY_STEPS);
     vec4 sum = vec4(0.0);
     for (int i = 0; i < 2; i++) {
-        float at = float((m + i) * ENERGY_ASPECTS + k) * slab + z * inv;
-        vec4 low = texture(energy_stretched_table, vec3(xy, at));
-        vec4 high = texture(energy_stretched_table, vec3(xy, at + slab));
+        vec2 yz = inv * vec2(float((m + i) * ENERGY_AZIMUTHS) + y, float(k * ENERGY_STEPS) + z);
+        vec4 low = texture(energy_stretched_table, vec3(x, yz));
+        vec4 high = texture(energy_stretched_table, vec3(x, yz.x, yz.y + inv.y * float(ENERGY_STEPS)));
         float share = abs(e - float(m + 1 - i));
         sum += share * mix(low, high, s - float(k));
     }
@@ -56,9 +56,12 @@ vec4 energy_albedo(vec3 w, float roughness, float aspect, float eta) {
 // Their cosine-weighted means.
 vec4 energy_mean(float roughness, float aspect, float eta) {
     ivec3 n = textureSize(energy_mean_table, 0);
-    float y = energy_place(energy_aspect(aspect), n.y);
+    float y = 0.5; // round lobes have a row of their own
+#if HAS_ANISOTROPIC
+    if (aspect < 1.0) y = 1.5 + energy_aspect(aspect) * float(ENERGY_ASPECTS - 1);
+#endif
     float x = energy_place(energy_roughness(roughness), n.x);
-    return texture(energy_mean_table, vec3(x, y, energy_place(energy_eta(eta), n.z)));
+    return texture(energy_mean_table, vec3(x, y / float(n.y), energy_place(energy_eta(eta), n.z)));
 }
 
 float energy_sheen(float c, float roughness) {
