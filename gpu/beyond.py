@@ -35,7 +35,7 @@ def missing_light(
     Goes in slices: exhaust the generator. Raises what making a picture raises."""
     side = (_PIXELS / (settings.width * settings.height)) ** 0.5
     width, height = (max(1, round(side * pixels)) for pixels in (settings.width, settings.height))
-    small = replace(settings, width=width, height=height)
+    small = replace(settings, width=width, height=height, adaptive=False)  # or limits would see other paths
     light: dict[int, float] = {}
     for bounces in sorted({*limits, DEEPEST}):
         picture = renderer.picture(scene, replace(small, max_bounces=bounces))

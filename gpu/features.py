@@ -220,6 +220,7 @@ def defines(
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
     out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)
+    out["ADAPTIVE"] = int(settings is not None and settings.adaptive)
     out["ESTIMATOR"] = ESTIMATORS.index(settings.estimator) if settings else 0
     out["SAMPLER"] = SAMPLERS.index(settings.sampler) if settings else 0
     return out

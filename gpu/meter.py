@@ -50,6 +50,8 @@ class Meter:
         drawn = draw(weights, self._size, side, self._count, seed)
         places[: len(drawn), :3] = drawn
         self.buffers[Slot.MOMENTS].write(places.tobytes())
+        for slot in (Slot.SUM, Slot.COMPENSATION):
+            self.buffers[slot].clear()
 
     def _weigh(self, moments: Any, side: int) -> np.ndarray:
         """(rows, columns) of blocks of `side` x `side` pixels: the variance a pixel has there, relative."""

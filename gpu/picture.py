@@ -12,21 +12,21 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
-from gpu import display, features, filters, layout, meter
+from gpu import display, features, filters, guides, layout, meter
+from gpu.adaptive import Adaptive
 from gpu.errors import NothingRendered
+from gpu.guides import Guides
 from gpu.kernels import Kernels
 from gpu.layout import Slot
 from gpu.meter import Meter
+from gpu.plan import DECISIONS
+from gpu.resolve import resolve
 from gpu.saved import Saved
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
 from gpu.tiles import MAX_SAMPLES_A_PASS, Tile, Tiles, samples_at_once
 
-_GUIDE_SAMPLES = 256  # AOVs of the first hit average at most so many
-_GUIDE_PIXELS = 1 << 16  # traced at once for them: 25 ms on llvmpipe in a large mesh
-_LINE = 1024  # pixels that resolve.comp takes for a row
 _ALIGNED = 32  # pixels: a multiple of it is, at 8 bytes or 16, where a binding may begin on any driver
-IDS = ("shape_id", "material_id")
 
 
 class Picture:
@@ -38,13 +38,13 @@ class Picture:
         self.compile_ms = 0.0
         pixels = settings.width * settings.height
         self._main: dict[Slot, Any] = {}
-        self._guides: dict[Slot, Any] = {}
+        self._guides = Guides(context, (settings.width, settings.height))
+        self._adaptive: Adaptive | None = None
         self._ended = context.buffer(reserve=16)
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
         self._kernel: Any = None
         self._most_pixels = contexts.storage_block_bytes(context) // 16 // _ALIGNED * _ALIGNED - _ALIGNED
         self._meter = Meter(context, kernels, (settings.width, settings.height), self._most_pixels)
-        self._cut()
         try:
             for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
                 self._main[slot] = contexts.allocate(self.context, 16 * pixels)
@@ -76,21 +76,25 @@ class Picture:
             self._cut()
         if self._kernels.last_compile_ms:
             self._compile_fully()
-        for buffer in (*self.state, *self._guides.values()):
+        for buffer in self.state:
             buffer.clear()
+        self._guides.clear()
+        if self._adaptive is not None:
+            self._adaptive.forget()
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
         table[:, 0] = filters.inverse(self.settings.filter, features.FILTER_TABLE_SIZE)
         self._filter.write(table)
         self.samples = 0
-        self._guide_samples, self._guide_row = 0, 0
         self._pass_samples = 0  # samples of the pass under way; 0: none is
-        self._row, self._column = 0, 0  # where its next tile begins; rows beyond the picture are the meter's
+        self._row, self._column = 0, 0  # where its next tile begins; rows beyond the tiles' are the meter's
 
     def _compile_fully(self) -> None:
         """Drivers write machine code when a kernel first runs: here, over no pixel, and not in a timed slice."""
         start = time.perf_counter()
         self._bind()
         self._bind_part(self._main, (0, 0, 1, 1), 1)
+        if self._adaptive is not None:
+            self._adaptive.bind(None)
         self._frame_buffer.write(self._frame((0, 0), (0, 0), 0, 1).tobytes())
         self._kernel.run(1, 1)
         self.context.finish()
@@ -103,13 +107,20 @@ class Picture:
             counts = features.counts(self.scene.arrays)
             standing = sum(int(str(counts[name])) for name in features.COUNTS)
             samples = samples_at_once(s.max_bounces, standing, len(self.scene.arrays.nodes) // 8)
-        self._tiles = Tiles(s.width, s.height, self._most_pixels, s.max_bounces, samples)
+        self._most_samples = samples  # of an invocation
+        if self._adaptive is not None:
+            self._adaptive.release()
+        self._adaptive, size = None, (s.width, s.height)
+        if s.adaptive:
+            self._adaptive = Adaptive(self.context, self._kernels, size, self._most_pixels, s.max_bounces)
+        self._tiles = self._adaptive or Tiles(*size, self._most_pixels, s.max_bounces, samples)
         self._meter_tiles = Tiles(meter.LINE, self._meter.lines, self._most_pixels, s.max_bounces, samples)
 
     @property
     def state(self) -> list[Any]:
         """The buffers that samples are added to."""
-        return [*self._main.values(), *self._meter.buffers.values(), self._ended]
+        plan = [] if self._adaptive is None else [self._adaptive.buffer]
+        return [*self._main.values(), *self._meter.buffers.values(), self._ended, *plan]
 
     @property
     def under_way(self) -> tuple[int, int, int]:
@@ -119,12 +130,12 @@ class Picture:
     @property
     def guided(self) -> bool:
         """Holds AOVs of the first hit."""
-        return bool(self._guides)
+        return bool(self._guides.buffers)
 
     @property
     def guided_yet(self) -> bool:
         """Some of those were traced: their kernel is there."""
-        return (self._guide_samples, self._guide_row) > (0, 0)
+        return self._guides.begun
 
     def restore(self, saved: Saved) -> None:
         """Go on where a picture of the same scene and settings was saved."""
@@ -133,6 +144,11 @@ class Picture:
             buffer.write(data)
         self.samples = saved.samples
         self._pass_samples, self._row, self._column = saved.under_way
+        if self._adaptive is not None:  # it begins its pass again: pixels that have theirs get no more
+            self._adaptive.forget()
+            self._row, self._column = 0, 0
+            if self._pass_samples:
+                self._list_pass()
 
     @property
     def any_samples(self) -> bool:
@@ -159,23 +175,39 @@ class Picture:
         self._bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
-                end = min(max_samples, meter.FROM) if self.samples < meter.FROM else max_samples
-                self._pass_samples = min(self._tiles.pass_samples(self.samples), end - self.samples)
+                self._begin_pass(max_samples)
             self._slice()
             if time.perf_counter() - start >= budget_s:
                 break
         return time.perf_counter() - start
 
+    def _begin_pass(self, max_samples: int) -> None:
+        stops = [meter.FROM] if self._adaptive is None else [meter.FROM, *DECISIONS]
+        if self._adaptive is not None and self.samples in DECISIONS:
+            self._adaptive.decide(self._main)
+        end = min([max_samples, *(stop for stop in stops if stop > self.samples)])
+        self._pass_samples = min(self._tiles.pass_samples(self.samples), end - self.samples)
+        if self._adaptive is not None:
+            self._list_pass()
+
+    def _list_pass(self) -> None:
+        assert self._adaptive is not None
+        self._adaptive.begin(self.samples, self.samples + self._pass_samples, self._most_samples)
+
     def _slice(self) -> None:
         """The next tile of the pass: of the picture, then of the meter."""
-        height = self.settings.height
+        height, lines = self._tiles.size[1], self._meter.lines
         metering = self._row >= height
-        tiles = self._meter_tiles if metering else self._tiles
-        tile = tiles.tile(self._row - height if metering else self._row, self._column, self._pass_samples)
+        tiles: Tiles | Adaptive = self._meter_tiles if metering else self._tiles
+        rounds, samples = 1, self._pass_samples
+        if self._adaptive is not None:
+            rounds, samples = self._adaptive.rounds, self._adaptive.chunk
+        row = (self._row - height) % lines if metering else self._row
+        tile = tiles.tile(row, self._column, samples)
         start = time.perf_counter()
         self._dispatch(tile, metering)
         self.context.finish()
-        tiles.took(tile, self._pass_samples, time.perf_counter() - start)
+        tiles.took(tile, samples, time.perf_counter() - start)
         self._column = tile[0] + tile[2]
         if self._column >= tiles.size[0]:
             self._column, self._row = 0, self._row + tile[3]
@@ -183,7 +215,7 @@ class Picture:
         if self._row == height and self._column == 0 and self.samples < meter.FROM <= after:
             self._meter.place(self._main, self.settings.seed)
             self._bind()
-        if self._row >= height + self._meter.lines or (self._row >= height and after < meter.FROM):
+        if self._row >= height + lines * rounds or (self._row >= height and after < meter.FROM):
             self._row = 0
             self.samples += self._pass_samples
             self._pass_samples = 0
@@ -218,16 +250,34 @@ class Picture:
         return first
 
     def _dispatch(self, tile: Tile, metering: bool) -> None:
-        if metering:
+        if self._adaptive is not None:
+            frame = self._adaptive_frame(self._adaptive, tile, metering)
+        elif metering:
             first = self.samples if self.samples >= meter.FROM else 0
             frame = self._frame(tile[:2], tile[2:], first, self.samples + self._pass_samples - first)
-            frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, meter.LINE
-            frame["slot_first"] = self._bind_part(self._meter.buffers, tile, meter.LINE)
+            self._bind_meter(frame, tile)
         else:
             frame = self._frame(tile[:2], tile[2:], self.samples, self._pass_samples)
             frame["slot_first"] = self._bind_part(self._main, tile, self.settings.width)
         self._frame_buffer.write(frame.tobytes())
-        self._kernel.run(-(-tile[2] // 8), -(-tile[3] // 8))
+        if self._adaptive is not None and not metering:
+            self._kernel.run(tile[3], 1)
+        else:
+            self._kernel.run(-(-tile[2] // 8), -(-tile[3] // 8))
+
+    def _adaptive_frame(self, adaptive: Adaptive, tile: Tile, metering: bool) -> np.ndarray:
+        """Each pixel goes on from the samples that it has."""
+        place = adaptive.bind(None if metering else tile)
+        frame = self._frame(tile[:2], tile[2:] if metering else (tile[3], 1), 0, adaptive.chunk)
+        if metering:
+            self._bind_meter(frame, tile)
+        else:
+            frame["slot_first"] = self._bind_part(self._main, place, self.settings.width)
+        return frame
+
+    def _bind_meter(self, frame: np.ndarray, tile: Tile) -> None:
+        frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, meter.LINE
+        frame["slot_first"] = self._bind_part(self._meter.buffers, tile, meter.LINE)
 
     def _need_samples(self) -> None:
         contexts.use(self.context)
@@ -247,10 +297,9 @@ class Picture:
         Waits for the GPU. Raises NothingRendered before a sample is complete.
         """
         self._need_samples()
-        if aov in IDS:
-            return self._read_id(aov)
-        if aov in ("albedo", "normal", "depth"):
-            return self._read_guide(aov)
+        if aov in (*guides.IDS, "albedo", "normal", "depth"):
+            self.trace_guides()
+            return self._guides.read(aov)
         moments = self._vectors(self._main[Slot.MOMENTS])
         n = np.maximum(moments[..., 3:], 1)
         if aov == "variance":
@@ -260,28 +309,10 @@ class Picture:
         mean: np.ndarray = self._vectors(self._main[Slot.SUM]) / n
         return mean
 
-    def _read_guide(self, aov: str) -> np.ndarray:
-        self.trace_guides()
-        if aov != "depth":
-            return self._mean_guide(Slot.ALBEDO if aov == "albedo" else Slot.NORMAL)
-        albedo, normal = (self._vectors(self._guides[s]) for s in (Slot.ALBEDO, Slot.NORMAL))
-        hits = albedo[..., 3:]
-        return np.where(hits > 0, normal[..., 3:] / np.maximum(hits, 1), 0).astype(np.float32)
-
-    def _mean_guide(self, slot: Slot) -> np.ndarray:
-        mean: np.ndarray = self._vectors(self._guides[slot])[..., :3] / np.float32(self._guide_samples)
-        return mean
-
     def guides(self, most: int) -> tuple[np.ndarray, np.ndarray]:
         """Albedo and normal of the first hit over exactly min(samples, most) samples, whatever was read before."""
         self.trace_guides(most=most)
-        return self._mean_guide(Slot.ALBEDO), self._mean_guide(Slot.NORMAL)
-
-    def _read_id(self, aov: str) -> np.ndarray:
-        self.trace_guides()
-        met = np.frombuffer(self._guides[Slot.OUTPUT].read(), np.uint32)
-        ids: np.ndarray = met.reshape(self.settings.height, self.settings.width, 2)[..., IDS.index(aov), None]
-        return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
+        return self._guides.read("albedo"), self._guides.read("normal")
 
     def trace_guides(self, budget_s: float = math.inf, most: int | None = None) -> bool:
         """Trace the AOVs of the first hit for about `budget_s` seconds; whether they are all there.
@@ -290,32 +321,24 @@ class Picture:
         the first `most` and no others. `read` traces what is still missing.
         """
         self._need_samples()
-        start = time.perf_counter()
-        want = min(self.samples, most or _GUIDE_SAMPLES)
-        width, height = self.settings.width, self.settings.height
-        if not self._guides:
-            for slot, pixel_bytes in ((Slot.ALBEDO, 16), (Slot.NORMAL, 16), (Slot.OUTPUT, 8)):
-                self._guides[slot] = contexts.allocate(self.context, pixel_bytes * width * height)
-                self._guides[slot].clear()
-        if most is not None and (self._guide_samples, self._guide_row) > (want, 0):
-            for buffer in self._guides.values():
-                buffer.clear()
-            self._guide_samples, self._guide_row = 0, 0
-        if self._guide_samples < want and budget_s > 0:
+        until = time.perf_counter() + budget_s
+        want = min(self.samples, most or guides.SAMPLES)
+        if not self._guides.buffers:
+            self._guides.allocate()
+        if most is not None:
+            self._guides.limit(want)
+        if self._guides.samples < want and budget_s > 0:
             kernel = self._kernels.get("guides.comp", self.scene.defines(self.settings))
             self._bind()
-        rows = max(1 if width > _GUIDE_PIXELS else 8, _GUIDE_PIXELS // width // 8 * 8)
-        while self._guide_samples < want and time.perf_counter() - start < budget_s:
-            size = (width, min(rows, height - self._guide_row))
-            frame = self._frame((0, self._guide_row), size, self._guide_samples, 1)
-            frame["slot_first"] = self._bind_part(self._guides, (0, self._guide_row, *size), width)
-            self._frame_buffer.write(frame.tobytes())
-            kernel.run(-(-size[0] // 8), -(-size[1] // 8))
-            self.context.finish()
-            self._guide_row += size[1]
-            if self._guide_row >= height:
-                self._guide_samples, self._guide_row = self._guide_samples + 1, 0
-        return self._guide_samples >= want
+            self._guides.trace(lambda tile, sample: self._trace_guide(kernel, tile, sample), want, until)
+        return self._guides.samples >= want
+
+    def _trace_guide(self, kernel: Any, tile: Tile, sample: int) -> None:
+        frame = self._frame(tile[:2], tile[2:], sample, 1)
+        frame["slot_first"] = self._bind_part(self._guides.buffers, tile, self.settings.width)
+        self._frame_buffer.write(frame.tobytes())
+        kernel.run(-(-tile[2] // 8), -(-tile[3] // 8))
+        self.context.finish()
 
     def noise(self) -> float | None:
         """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""
@@ -341,34 +364,22 @@ class Picture:
         self._need_samples()
         if aov != "color":
             return display.encode(aov, self.read(aov), dtype)
-        width, height = self.settings.width, self.settings.height
-        floats = dtype == "f4"
-        defines = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve"}
-        defines |= {"OUTPUT_FLOAT": int(floats), "LINE": _LINE}
-        kernel = self._kernels.get("resolve.comp", defines)
-        kernel["exposure"].value = 2.0**exposure
-        own = [] if color is None else [self.context.buffer(a.tobytes()) for a in (color, np.ones_like(color))]
-        sums, counts = own or (self._main[Slot.SUM], self._main[Slot.MOMENTS])
-        parts = []
-        for first in range(0, width * height, self._most_pixels):  # no more than a driver binds at once
-            count = min(self._most_pixels, width * height - first)
-            output = contexts.allocate(self.context, (16 if floats else 4) * count)
-            for slot, source in ((Slot.SUM, sums), (Slot.MOMENTS, counts)):
-                source.bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
-            output.bind_to_storage_buffer(int(Slot.OUTPUT))
-            kernel["count"].value = count
-            kernel.run(_LINE // 8, -(-count // (8 * _LINE)))
-            parts.append(output.read())
-            output.release()
-        for buffer in own:
+        own: dict[Slot, Any] = {}
+        if color is not None:
+            given = {Slot.SUM: color, Slot.MOMENTS: np.ones_like(color)}
+            own = {slot: self.context.buffer(values.tobytes()) for slot, values in given.items()}
+        most = self._most_pixels
+        pixels = resolve(self.context, self._kernels, own or self._main, most, exposure, tone_map, dtype)
+        for buffer in own.values():
             buffer.release()
-        pixels = np.frombuffer(b"".join(parts), np.float32 if floats else np.uint8)
-        return pixels.reshape(height, width, 4)
+        return pixels.reshape(self.settings.height, self.settings.width, 4)
 
     def release(self) -> None:
         contexts.use(self.context)
-        for buffer in (*self.state, *self._guides.values()):
+        for buffer in (*self.state, *self._guides.buffers.values()):
             buffer.release()
+        if self._adaptive is not None:
+            self._adaptive.release()
         self._filter.release()
         if self._kernel is not None:
             self._kernels.let_go(self._kernel)

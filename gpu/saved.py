@@ -59,4 +59,5 @@ def scene_bytes(scene: object) -> int:
 
 def picture_bytes(settings: RenderSettings, guided: bool = False) -> int:
     """About what a picture takes on the device, with the AOVs of the first hit or without."""
-    return settings.width * settings.height * (GUIDED_PIXEL_BYTES if guided else PIXEL_BYTES) + PICTURE_BYTES
+    pixel_bytes = (GUIDED_PIXEL_BYTES if guided else PIXEL_BYTES) + (1 if settings.adaptive else 0)  # the plan
+    return settings.width * settings.height * pixel_bytes + PICTURE_BYTES

@@ -13,7 +13,8 @@ AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """Size in pixels; `clamp` bounds the radiance of indirect light (None: unbiased)."""
+    """Size in pixels; `clamp` bounds the radiance of indirect light (None: unbiased); `adaptive`: a pixel's samples
+    follow its noise (gpu/plan.py), and a picture's are their mean."""
 
     width: int
     height: int
@@ -24,3 +25,4 @@ class RenderSettings:
     roulette_depth: int = 3
     seed: int = 0
     clamp: float | None = None
+    adaptive: bool = False

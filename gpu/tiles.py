@@ -14,8 +14,8 @@ LOOP_TURNS = 65_535  # llvmpipe ends all loops of an invocation after so many tu
 BAND = 16  # rows
 _LEAST = 8  # columns of a tile: a work group's
 _LONG_BAND, _LONG_LEAST = 4, 16  # where paths may be so long that 128 pixels take a tenth of a second
-_GUESS_S = 2e-7  # of a sample of a pixel, before any was measured
-_USUAL_BOUNCES = 16  # of more, a path that nobody has seen yet may cost as much more than those seen
+GUESS_S = 2e-7  # of a sample of a pixel, before any was measured
+USUAL_BOUNCES = 16  # of more, a path that nobody has seen yet may cost as much more than those seen
 
 Tile = tuple[int, int, int, int]  # x, y, width, height
 
@@ -28,7 +28,7 @@ class Tiles:
     ) -> None:
         self.size, self.max_bounces = (width, height), max_bounces
         self._most_samples = most_samples
-        self._caution = max(1.0, max_bounces / _USUAL_BOUNCES)
+        self._caution = max(1.0, max_bounces / USUAL_BOUNCES)
         band, self._least = (BAND, _LEAST) if self._caution < 4 else (_LONG_BAND, _LONG_LEAST)
         self._band = band if band * width <= most else max(1, most // width)
         self._most_rows = max(self._band, most // width // self._band * self._band)
@@ -40,7 +40,7 @@ class Tiles:
         """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
         width, height = self.size
         first = row // self._band
-        guess = (self.cost_s or _GUESS_S * self._caution) * self._caution
+        guess = (self.cost_s or GUESS_S * self._caution) * self._caution
         pixels = SLICE_S / samples / (self._rates[first] or guess)
         rows = min(self._band, height - row)
         if column == 0 and pixels >= self._band * width:

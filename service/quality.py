@@ -56,7 +56,7 @@ class ResolvedSettings:
 
     def for_gpu(self) -> dict[str, Any]:
         """The keyword arguments of gpu.RenderSettings."""
-        same = ("max_bounces", "estimator", "sampler", "filter", "roulette_depth", "seed", "clamp")
+        same = ("max_bounces", "estimator", "sampler", "filter", "roulette_depth", "seed", "clamp", "adaptive")
         sized = {"width": self.render_width, "height": self.render_height}
         return sized | {name: getattr(self, name) for name in same}
 
@@ -66,8 +66,7 @@ class ResolvedSettings:
 
     def again(self, samples: int) -> dict[str, Any]:
         """Settings, as JSON, with which a picture that has `samples` samples comes out the same another time."""
-        most = self.max_samples if self.adaptive else samples
-        stop = {"max_samples": most, "time_limit": None, "target_noise": None}
+        stop = {"max_samples": samples, "time_limit": None, "target_noise": None}
         return {name: value for name, value in (self.document() | stop).items() if value is not None}
 
 

@@ -2,13 +2,11 @@
 // pixels errs, as far as its samples and its neighbours' say. 0: sums over all pixels, and the metered pixels' values.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
+#include "spread.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 
-// Of the luminance, times (n - 1) of the sum's n samples: as if channels went together, which they nearly do.
-float meter_spread(uint slot) {
-    float s = dot(sqrt(max(moments[slot].rgb, vec3(0.0))), vec3(0.2126, 0.7152, 0.0722));
-    return s * s;
-}
+// Of the luminance, times (n - 1) of the sum's n samples.
+float meter_spread(uint slot) { return spread_luminance(moments[slot].rgb); }
 
 #if METER_WEIGH
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };

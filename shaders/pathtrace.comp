@@ -1,4 +1,5 @@
 // Entry: samples [sample_first, sample_first + sample_count) of each pixel of a tile, added one by one, in order.
+// ADAPTIVE: of each area listed, those that its pixels are short of.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 layout(std430, binding = SLOT_SUM) buffer sum_buffer { vec4 sums[]; };
@@ -15,22 +16,33 @@ layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
 #include "texture.glsl"
 #include "path.glsl"
 #include "camera.glsl"
+#include "plan.glsl"
 
 void main() {
     uvec2 pixel;
     uint slot;
+#if ADAPTIVE
+    if (frame.replicate == 0u ? !plan_pixel(pixel, slot) : !camera_pixel(pixel, slot)) return;
+#else
     if (!camera_pixel(pixel, slot)) return;
+#endif
     // Kahan's compensated sum for the picture; Welford's second moment about its mean. Relative error after a
     // million samples 4e-8, where a plain sum has 9e-5 and a running average 4e-4.
     precise vec4 sum = sums[slot], lost = compensations[slot];
     vec4 moment = moments[slot];
     if (frame.replicate != 0u) pixel = uvec2(moment.xy); // the meter's buffers say where (gpu/meter.py)
+#if ADAPTIVE
+    uint first = uint(moment.w), count = plan_due(pixel, first);
+    if (count == 0u) return;
+#else
+    uint first = frame.sample_first, count = frame.sample_count;
+#endif
 #if HAS_ATTENUATION
     Medium medium = medium_at_camera();
 #endif
     uint i = 0u;
     do {
-        Sampler rng = sobol_begin(pixel, frame.sample_first + i);
+        Sampler rng = sobol_begin(pixel, first + i);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
 #if HAS_ATTENUATION
@@ -48,8 +60,8 @@ void main() {
         vec3 after = (r.color - sum.rgb / moment.w) * frame.moment_scale;
         moment.rgb += max(delta * after, vec3(0.0));
         if (path_was_cut) break; // as this loop is by now
-    } while (++i < frame.sample_count);
-    if (i < frame.sample_count) atomicAdd(path_cut, frame.sample_count - i);
+    } while (++i < count);
+    if (i < count) atomicAdd(path_cut, count - i);
     sums[slot] = sum;
     compensations[slot] = lost;
     moments[slot] = moment;

@@ -94,7 +94,7 @@ def test_the_renderer_knows_every_keyword() -> None:
         *[("estimator", v) for v in ("bdpt", "MIS", ["mis"])],
         ("sampler", "halton"),
         ("filter", "sinc"),
-        *[("adaptive", v) for v in (True, 0, "false", None)],
+        *[("adaptive", v) for v in (0, 1, "false", None)],
         *[("denoise", v) for v in (0, 1, "false", None)],
         ("samples", 9),
     ],
@@ -108,7 +108,8 @@ def test_refused_with_the_field_s_pointer(name: str, value: Any) -> None:
 @pytest.mark.parametrize(
     ("name", "value"),
     [("max_samples", 2**24), ("max_bounces", 0), ("max_bounces", 1024), ("seed", 2**32 - 1), ("clamp", 1e20),
-     ("resolution_scale", 1e-3), ("time_limit", 1), ("adaptive", False), ("denoise", False), ("denoise", True)],
+     ("resolution_scale", 1e-3), ("time_limit", 1), ("adaptive", False), ("adaptive", True), ("denoise", False),
+     ("denoise", True)],
 )  # fmt: skip
 def test_ends_of_ranges_are_taken(name: str, value: Any) -> None:
     assert getattr(parse_settings({name: value}), name) == value

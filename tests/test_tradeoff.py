@@ -54,8 +54,8 @@ def test_one_command_measures_it_all(tmp_path: Path, gpu: Any, capsys: pytest.Ca
     document = json.loads((tmp_path / "t.json").read_text())
     knobs = {row["knob"] for row in document["knobs"]}
     assert knobs == {
-        "samples", "max_bounces", "estimator", "sampler", "clamp", "resolution_scale", "denoise", "roulette_depth",
-        "filter", "noise meter",
+        "samples", "max_bounces", "estimator", "sampler", "clamp", "resolution_scale", "denoise", "adaptive",
+        "roulette_depth", "filter", "noise meter",
     }  # fmt: skip
     assert set(document["presets"]) == set(quality.PRESETS) and document["machine"]["commit"]
     numbers = [v for row in document["scenes"][0]["variations"] for p in row["curve"] for v in p.values()]

@@ -12,7 +12,7 @@ import { TextureForm } from "./texturing.js";
 import { inWords } from "./words.js";
 
 // The settings that stand open; the others are a click away. The picture's size is the window's business.
-const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "denoise"];
+const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "adaptive", "denoise"];
 const NOT_SETTINGS = ["width", "height", "quality"];
 
 // What of a view is a matter of taste; the rest is how the stream carries it.

@@ -64,6 +64,7 @@ def variations() -> list[Variation]:
     out += [Variation("clamp", str(c), {"clamp": float(c)}) for c in (1, 10)]
     out += [Variation("resolution_scale", "0.5", scale=0.5, samples=(64, 256))]
     out += [Variation("denoise", "true", denoise=True, samples=(4, 16, 64, 256))]
+    out += [Variation("adaptive", "true", {"adaptive": True}, samples=(16, 64, 256))]
     out += [Variation("roulette_depth", str(n), {"roulette_depth": n}) for n in (1, 8)]
     out += [Variation("filter", name, {"filter": name}) for name in ("box", "tent", "gaussian")]
     out += [Variation("noise meter", "off", metered=False)]

@@ -61,7 +61,7 @@ class Render(BaseModel):
     id: str
     state: Literal["queued", "running", "done", "cancelled", "failed"]
     reason: Literal["max_samples", "time_limit", "target_noise", "stopped"] | None
-    samples: int = Field(description="Complete ones per pixel.")
+    samples: int = Field(description="Complete ones per pixel; with `adaptive` their mean over the pixels.")
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
     elapsed_s: float = Field(description="From the first dispatch to the end of the last sample.")
     setup_s: float = Field(description="Loading, building and compiling before that.")

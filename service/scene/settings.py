@@ -4,13 +4,13 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal, Protocol
 
-from pydantic import BeforeValidator, Field, TypeAdapter
+from pydantic import Field, TypeAdapter
 
 from service.config import MAX_PIXELS
 from service.problems import FieldError, InvalidDocument
-from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.base import OMITTABLE, Model, hint
 from service.scene.mistakes import validated
-from service.scene.numbers import BRIGHTEST, LARGEST, described
+from service.scene.numbers import BRIGHTEST, LARGEST
 
 # The knobs of quality "balanced", which are the defaults; service.quality has the other presets.
 BALANCED: dict[str, Any] = {"max_samples": 256, "max_bounces": 8, "roulette_depth": 3, "resolution_scale": 1.0}
@@ -24,17 +24,6 @@ class Limits(Protocol):
 
     @property
     def max_pixels(self) -> int: ...
-
-
-def _only_false(value: Any) -> Any:
-    if value is True:
-        raise refusal("is not built yet: leave it out, or say false")
-    if value is not False:
-        raise refusal(f"must be false, not {described(value)}")
-    return value
-
-
-NotYet = Annotated[Literal[False], BeforeValidator(_only_false)]
 
 
 class Settings(Model):
@@ -136,7 +125,10 @@ class Settings(Model):
             default=BALANCED["resolution_scale"],
         ),
     ] = None
-    adaptive: Annotated[NotYet, hint("Adaptive", "More samples where there is more noise: not built yet.")] = False
+    adaptive: Annotated[
+        bool,
+        hint("Adaptive", "More samples where there is more noise, fewer elsewhere; the samples count their mean."),
+    ] = False
     clamp: Annotated[
         Annotated[float, Field(gt=0, le=BRIGHTEST)] | None,
         OMITTABLE,

@@ -1,0 +1,26 @@
+// Entry: of each area of 8 x 8 pixels, by the class of its rows (gpu/plan.py), the variance of a sample's luminance,
+// summed over the pixels, and how many samples they have. Rows of the moments are bound, from the first of an area on.
+layout(local_size_x = 8, local_size_y = 8) in;
+#include "layout.glsl"
+#include "spread.glsl"
+layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 seen[]; };
+uniform uvec2 size; // of the bound rows
+
+void main() {
+    uvec2 a = gl_GlobalInvocationID.xy, areas = (size + 7u) / 8u;
+    if (a.x >= areas.x || a.y >= areas.y) return;
+    vec4 sum = vec4(0.0), counts = vec4(0.0);
+    uint y = 8u * a.y, right = min(8u * a.x + 8u, size.x), low = min(y + 8u, size.y);
+    do {
+        uint x = 8u * a.x;
+        vec4 own = vec4(equal(uvec4(y & 3u), uvec4(0u, 1u, 2u, 3u)));
+        do {
+            vec4 moment = moments[y * size.x + x];
+            if (moment.w > 1.0) sum += own * spread_luminance(moment.rgb) / (moment.w - 1.0);
+            counts = max(counts, own * moment.w);
+        } while (++x < right);
+    } while (++y < low);
+    seen[2u * (a.y * areas.x + a.x)] = sum;
+    seen[2u * (a.y * areas.x + a.x) + 1u] = counts;
+}
