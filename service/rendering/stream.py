@@ -133,7 +133,8 @@ class Stream:
             else:
                 closing = attendance.over.result()
                 if closing is self.ended:  # what is still to be said is: why
-                    await asyncio.wait({asyncio.ensure_future(self._said()), sending}, timeout=CLOSING_S)
+                    said = asyncio.ensure_future(self._said())
+                    await asyncio.wait({said, sending}, timeout=CLOSING_S, return_when=asyncio.FIRST_COMPLETED)
                 await _stopped(sending)
                 await asyncio.wait_for(attendance.socket.close(closing.code, closing.reason), CLOSING_S)
         except TimeoutError:

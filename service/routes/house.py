@@ -26,7 +26,7 @@ from service.rendering.sessions import Sessions
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
 GPU_S = 60.0  # ... when without one nothing is to be served at all
-FAREWELL_S = 2.0  # for a client that reads slowly to be told
+FAREWELL_S = 4.0  # for a client that reads slowly to be told
 
 
 @dataclass
