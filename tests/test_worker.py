@@ -393,7 +393,7 @@ def test_it_ends_with_its_link(gpu: Renderer, arrays: Any) -> None:
         await ears.next(Loaded)
         pid, began = engine.process_id, time.monotonic()
         await engine.close()
-        assert time.monotonic() - began < 3 and not Path(f"/proc/{pid}").exists()
+        assert time.monotonic() - began < 10 and not Path(f"/proc/{pid}").exists()
         assert await ears.next(str)
 
     asyncio.run(test())
