@@ -52,8 +52,14 @@ def rude(client: Client, ended: threading.Event) -> None:
     while not ended.wait(0.3):
         with suppress(OSError, ConnectionClosed):
             client.start(settings={**ENDLESS, "width": 1024, "height": 1024})
-            client.socket.socket.shutdown(socket.SHUT_RDWR)
+        vanish(client)
         client = Client(client.url)
+    vanish(client)
+
+
+def vanish(client: Client) -> None:
+    with suppress(OSError):
+        client.socket.socket.shutdown(socket.SHUT_RDWR)
 
 
 @pytest.mark.parametrize("behaviours", [(silent, flooding, babbling, rude)])
@@ -64,8 +70,10 @@ def test_nobody_is_disturbed(
     ended = threading.Event()
 
     def misbehave(behave: Callable[[Client, threading.Event], None]) -> None:
+        client = Client(server.url)
         with suppress(ConnectionClosed, OSError, TimeoutError):
-            behave(Client(server.url), ended)
+            behave(client, ended)
+        vanish(client)  # or its endless render would go on beside all later tests
 
     threads = [threading.Thread(target=misbehave, args=(behave,), daemon=True) for behave in behaviours]
     for thread in threads:
