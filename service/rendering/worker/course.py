@@ -43,8 +43,8 @@ class Course:
     def cap(self, held: Held) -> int:
         """How many samples to trace for: all, or what fits into the time, so that every pixel ends with as many."""
         limit, samples = self.stop.max_samples or MAX_SAMPLES, held.full.samples
-        if self.stop.target_noise is not None and reached(self.stop, samples, self.meter.noise) == "target_noise":
-            return samples + held.full.under_way[0]
+        if held.full.under_way[0] and reached(self.stop, samples, self.meter.noise) is not None:
+            return samples + held.full.under_way[0]  # see `enough`
         if self.stop.time_limit is None:
             return limit
         left_s, sample_s = self.stop.time_limit - self.clock.now_s, self._sample_s(held)
@@ -55,8 +55,8 @@ class Course:
         """Why it ends now, if it does."""
         noise = self.meter.read(held.full) if self.stop.target_noise is not None else None
         reason = reached(self.stop, held.full.samples, noise)
-        if reason == "target_noise" and held.full.under_way[0]:
-            reason = None  # the pass is finished first: a picture of so many samples is to come out the same again
+        if held.full.under_way[0]:  # is finished first: a picture of so many samples is to come out the same again
+            reason = None
         if reason is None and late(self.stop, self.clock.now_s, self._sample_s(held), self.even):
             reason = "time_limit"
         return reason
