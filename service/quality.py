@@ -102,14 +102,15 @@ def text(name: str, prices: dict[str, Any]) -> str:
     """One line about a preset, for a menu."""
     cost, size = prices["presets"][name], prices["told_size"]
     worst = cost["worst_missing_light"]
-    line = f"{_short(cost['seconds'])} s to {100 * cost['noise']:.1f} % noise at {size} x {size}; "
+    line = f"{short(cost['seconds'])} s to {100 * cost['noise']:.1f} % noise at {size} x {size}; "
     line += f"light beyond {PRESETS[name]['max_bounces']} bounces is missing"
     if worst["share"] < 0.0005:
         return line + ", less than 0.05 % of it in any scene measured"
     return line + f", {100 * cost['missing_light']:.1f} % of it, {100 * worst['share']:.1f} % in {worst['scene']}"
 
 
-def _short(seconds: float) -> str:
+def short(seconds: float) -> str:
+    """So many seconds as a menu says them."""
     return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}"
 
 

@@ -6,7 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
-from service.quality import PRESETS, PRICES_FILE, text
+from service.quality import PRESETS, PRICES_FILE, short, text
 
 ROOT = Path(__file__).parents[2]
 DOCS = ROOT / "docs"
@@ -58,7 +58,7 @@ def markdown(document: Row) -> str:
     for name, p in document["presets"].items():
         worst = p["worst_missing_light"]
         lines.append(
-            f"| {name} | {p['seconds']:.2g} | {p['noise']:.1%} | {p['relmse']:.2g} | {p['flip']:.3f} |"
+            f"| {name} | {short(p['seconds'])} | {p['noise']:.1%} | {p['relmse']:.2g} | {p['flip']:.3f} |"
             f" {p['missing_light']:.2%} | {worst['share']:.1%} ({worst['scene']}) |"
             f" {'; '.join(p['beaten_by']) or 'nothing'} |"
         )
@@ -86,7 +86,7 @@ def markdown(document: Row) -> str:
     for scene in document["scenes"]:
         for name, p in scene["presets"].items():
             lines.append(
-                f"| {scene['name']} | {name} | {p['seconds']:.2g} | {p['noise']:.1%} | {p['relmse']:.2g} |"
+                f"| {scene['name']} | {name} | {short(p['seconds'])} | {p['noise']:.1%} | {p['relmse']:.2g} |"
                 f" {p['flip']:.3f} | {p['light']:.1%} |"
             )
     return "\n".join([*lines, "", "![relMSE over seconds](tradeoff.png)", ""])
