@@ -29,8 +29,9 @@ def missing_light(
     renderer: Renderer, scene: Scene, settings: RenderSettings, limits: Iterable[int]
 ) -> Generator[None, None, dict[int, float]]:
     """For each number of bounces, the share (0 to 1) of the picture's light (its mean luminance) that paths of at
-    most so many leave out, beside `DEEPEST`. Of a small picture with the kernel and the seed of the large one: two
-    limits see the same paths, one of them cut short, so that their difference has little noise of its own.
+    most so many leave out, beside `DEEPEST` or the most of them. Of a small picture with the kernel and the seed of
+    the large one: two limits see the same paths, one of them cut short, so that their difference has little noise of
+    its own.
 
     Goes in slices: exhaust the generator. Raises what making a picture raises."""
     side = (_PIXELS / (settings.width * settings.height)) ** 0.5
@@ -46,5 +47,5 @@ def missing_light(
             light[bounces] = float((picture.read()[..., :3].astype(np.float64) @ LUMINANCE).mean())
         finally:
             picture.release()
-    whole = light[DEEPEST]
+    whole = light[max(light)]
     return {limit: max(0.0, 1 - light[limit] / whole) if whole > 0 else 0.0 for limit in limits}

@@ -40,6 +40,14 @@ def test_inside_a_glowing_sphere(gpu: Renderer, albedo: float) -> None:
     assert found == pytest.approx({n: albedo ** (n + 1) for n in LIMITS}, abs=2e-6 + albedo**65)
 
 
+def test_more_bounces_than_the_deepest_are_the_measure(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("gpu.beyond.DEEPEST", 5)
+    material = {"type": "diffuse", "albedo": 0.5, "emission": 2, "emission_sides": "both"}
+    sphere = {"type": "sphere", "center": [0, 0, 0], "radius": 9, "material": "m"}
+    found = shares(gpu, document([sphere], {"m": material}), estimator="bsdf", roulette_depth=100)
+    assert found[5] == pytest.approx(0.5**6, abs=2e-6) and found[64] == 0
+
+
 def test_what_has_no_light_misses_none(gpu: Renderer) -> None:
     ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
     assert shares(gpu, document([ball])) == dict.fromkeys(LIMITS, 0.0)
