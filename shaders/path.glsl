@@ -1,9 +1,12 @@
-// The estimator: light carried back along one camera path. The only place, with frame.glsl, that changes space.
+// The estimator: light carried back along one camera path. With facing.glsl and frame.glsl the only
+// place that changes space.
 #include "surface.glsl"
 #include "bsdf.glsl"
 #include "lights.glsl"
 #include "passing.glsl"
 #include "medium.glsl"
+#include "arriving.glsl"
+#include "facing.glsl"
 
 struct Radiance {
     vec3 color;
@@ -15,12 +18,6 @@ const float PATH_CERTAIN = 1e30;
 
 bool path_was_cut; // of the last path: by the driver
 
-// Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
-float path_weight(float a, float b) {
-    float r = b / a;
-    return 1.0 / (1.0 + r * r);
-}
-
 vec3 path_clamp(vec3 c, bool indirect) {
 #if HAS_CLAMP
     float m = max_component(c);
@@ -28,127 +25,6 @@ vec3 path_clamp(vec3 c, bool indirect) {
 #endif
     return c;
 }
-
-#if HAS_SUN_DISKS
-// What the disks of directional lights send along d, each weighed against finding it by direct sampling. `pdf` is the
-// density of d.
-vec3 path_disks(vec3 d, float pdf) {
-    vec3 sum = vec3(0.0);
-    uint i = 0u;
-    do {
-        Light l = light_load(frame.sun_first + i);
-        vec3 c = directional_light_radiance(l, d);
-#if ESTIMATOR == ESTIMATOR_MIS
-        c *= path_weight(pdf, directional_light_pdf(l) * l.probability);
-#endif
-        if (i < frame.sun_count) sum += c; // a kernel with every flag raised may have no disk
-    } while (++i < frame.sun_count);
-    return sum;
-}
-#endif
-
-#if HAS_ENVIRONMENT || HAS_SUN_DISKS
-// What arrives from infinity along d, weighed against finding it by direct sampling; `pdf` is the density of d. Disks
-// are not for the camera to see.
-vec3 path_outside(vec3 d, float pdf, bool scattered) {
-    vec3 arriving = vec3(0.0);
-#if HAS_ENVIRONMENT
-    vec4 l = environment_radiance(d);
-    arriving = l.rgb;
-#if ESTIMATOR == ESTIMATOR_MIS
-    arriving *= path_weight(pdf, l.a * frame.environment_probability);
-#endif
-#endif
-#if HAS_SUN_DISKS
-    if (scattered) arriving += path_disks(d, pdf);
-#endif
-    return arriving;
-}
-#endif
-
-// Emission towards the side the ray came from: the outward one, unless the material has both shine.
-vec3 path_emission(Point at, vec3 d) {
-#if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
-    bool both = material_pick(at.material).emission_sides == 2u;
-    if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at);
-#elif HAS_TEXTURED_LIGHTS
-    if (at.light != NONE && dot(d, at.ng) < 0.0) return texture_emission(at);
-#elif HAS_EMISSION_BOTH
-    Material m = material_pick(at.material);
-    if (at.light != NONE && (dot(d, at.ng) < 0.0 || m.emission_sides == 2u)) return m.emission;
-#elif HAS_EMISSION
-    if (at.light != NONE && dot(d, at.ng) < 0.0) return material_pick(at.material).emission;
-#endif
-    return vec3(0.0);
-}
-
-// blinn_phong's radiance without a cause: from both sides, and no light to anything that picks lights.
-vec3 path_ambient(Point at) {
-#if HAS_AMBIENT && HAS_TEXTURES
-    return texture_ambient(at);
-#elif HAS_AMBIENT
-    return material_pick(at.material).ambient;
-#else
-    return vec3(0.0);
-#endif
-}
-
-// A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation, or a map, can turn it away
-// at a silhouette; it is then bent back until it is just in view, which loses no light to black rims.
-vec3 path_normal(Point at, vec3 wo_w) {
-    vec3 n = dot(at.ng, wo_w) < 0.0 ? -at.ns : at.ns;
-#if HAS_SMOOTH_NORMALS || HAS_NORMAL_MAPS
-    float c = dot(n, wo_w);
-    if (c < 0.01) n = normalize(n + (0.01 - c) * wo_w);
-#endif
-    return n;
-}
-
-#if HAS_TRANSMISSION
-// The square of the index on wi's side, over the camera's. What comes from infinity comes from outside, even where an
-// open sheet of glass leads there.
-float path_dense(float dense, float wi_z, Surface s, float t) {
-    if (wi_z < 0.0) dense /= s.eta * s.eta;
-    return t == INFINITY_T ? max(dense, 1.0) : dense;
-}
-#endif
-
-// Whether a direction is on the same side of the shading normal and of the surface itself.
-bool path_agrees(float shading, float geometric) {
-#if HAS_TRANSMISSION
-    return shading * geometric > 0.0;
-#else
-    return geometric > 0.0;
-#endif
-}
-
-#if HAS_NORMAL_MAPS
-// A lobe about a normal that a map has bent reaches below the surface. What it sends there comes back up, as if the
-// surface were a mirror to it: nothing is lost, and nothing gained. It is the idea of [Schuessler, Heitz, Hanika,
-// Dachsbacher 2017, "Microfacet-based normal mapping"] with the tangent facet laid flat, of one further scattering.
-// So v has the sum of two directions of the lobe: itself and its image below. Light that is refracted folds likewise.
-Scatter path_folded(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool mapped) {
-    Scatter sum = Scatter(vec3(0.0), 0.0);
-    float side = dot(v, front);
-    vec3 w = v;
-    bool more;
-    uint k = 0u;
-    do {
-        vec3 wi = frame_to_local(basis, w);
-        Scatter f = bsdf_eval(s, wo, wi);
-        if (!mapped || wi.z * side > 0.0) sum = Scatter(sum.f + f.f, sum.pdf + f.pdf);
-        w = v - 2.0 * side * front;
-        more = k == 0u && mapped && dot(w, basis.z) * side > 0.0;
-#if HAS_COAT_NORMALS
-        Scatter c = principled_coat(s, wo, wi);
-        if (side > 0.0) sum = Scatter(sum.f + c.f, sum.pdf + c.pdf);
-        more = more || (k == 0u && mapped && side > 0.0 && dot(frame_to_local(basis, w), s.coat.z) > 0.0);
-#endif
-        k++;
-    } while (more);
-    return sum;
-}
-#endif
 
 #if HAS_ATTENUATION
 Radiance path_trace(vec3 o, vec3 d, Sampler rng, Medium medium) {
@@ -160,7 +36,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
     bool alive = n.id != NONE;
     if (alive) {
-        result = Radiance(path_emission(at, d) + path_ambient(at), 1.0);
+        result = Radiance(arriving_emission(at, d) + arriving_ambient(at), 1.0);
     }
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
     // A path leaves the scene once at most: what arrives from there is asked for once, when all its neighbours ended.
@@ -205,7 +81,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #if HAS_COAT_NORMALS
             mapped = mapped || coat_mapped;
 #endif
-            Basis basis = frame_basis(path_normal(at, wo_w));
+            Basis basis = frame_basis(facing_normal(at, wo_w));
             vec2 tangent = vec2(1.0, 0.0);
 #if HAS_ANISOTROPIC
             vec2 along = vec2(dot(at.tangent, basis.x), dot(at.tangent, basis.y));
@@ -220,7 +96,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             Surface s = surface_make(m, tangent);
             vec3 wo = frame_to_local(basis, wo_w);
 #if HAS_COAT_NORMALS
-            s.coat = frame_basis(frame_to_local(basis, path_normal(coat_at, wo_w)));
+            s.coat = frame_basis(frame_to_local(basis, facing_normal(coat_at, wo_w)));
 #endif
 #if HAS_PRINCIPLED
             principled_face(wo, dot(at.ng, wo_w) < 0.0, s);
@@ -254,27 +130,27 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             vec3 wi = frame_to_local(basis, light.wi);
 #if HAS_NORMAL_MAPS
             float side = mapped ? dot(light.wi, front) : wi.z;
-            Scatter f = path_folded(s, basis, wo, light.wi, front, mapped);
-            wanted = wanted && (mapped || path_agrees(wi.z, dot(light.wi, front)));
+            Scatter f = facing_folded(s, basis, wo, light.wi, front, mapped);
+            wanted = wanted && (mapped || facing_agrees(wi.z, dot(light.wi, front)));
             wanted = wanted && max_component(f.f * light.radiance) > 0.0;
 #else
             Scatter f = bsdf_eval(s, wo, wi);
-            wanted = wanted && path_agrees(wi.z, dot(light.wi, front)) && max_component(f.f * light.radiance) > 0.0;
+            wanted = wanted && facing_agrees(wi.z, dot(light.wi, front)) && max_component(f.f * light.radiance) > 0.0;
 #endif
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
             wanted = wanted && light.id != n.id; // rounding may put a point on a ball's inside outside of it
 #endif
             float weight = 1.0;
 #if ESTIMATOR == ESTIMATOR_MIS
-            if (light.extended) weight = path_weight(light.pdf, f.pdf);
+            if (light.extended) weight = arriving_weight(light.pdf, f.pdf);
 #endif
             if (wanted) {
                 vec3 c = throughput * (f.f * light.radiance * (weight / light.pdf));
 #if HAS_TRANSMISSION
 #if HAS_NORMAL_MAPS
-                c *= path_dense(dense, side, s, light.t);
+                c *= facing_dense(dense, side, s, light.t);
 #else
-                c *= path_dense(dense, wi.z, s, light.t);
+                c *= facing_dense(dense, wi.z, s, light.t);
 #endif
 #endif
 #if HAS_ATTENUATION
@@ -341,16 +217,16 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
             float across = dot(d, front);
             if (mapped && across * lobe < 0.0) d -= 2.0 * across * front;
-            Scatter folded = path_folded(s, basis, wo, d, front, mapped);
+            Scatter folded = facing_folded(s, basis, wo, d, front, mapped);
 #if ESTIMATOR == ESTIMATOR_UNIFORM
             if (!certain) next.f = folded.f;
 #else
             if (!certain) next = folded;
 #endif
             float side_next = mapped ? dot(d, front) : wi_next.z;
-            alive = next.pdf > 0.0 && (mapped ? goes : path_agrees(wi_next.z, dot(d, front)));
+            alive = next.pdf > 0.0 && (mapped ? goes : facing_agrees(wi_next.z, dot(d, front)));
 #else
-            alive = next.pdf > 0.0 && path_agrees(wi_next.z, dot(d, front));
+            alive = next.pdf > 0.0 && facing_agrees(wi_next.z, dot(d, front));
 #endif
             throughput *= next.f / (alive ? next.pdf : 1.0);
             float reach = max_component(throughput);
@@ -369,9 +245,9 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             n.id = NONE;
 #if HAS_TRANSMISSION
 #if HAS_NORMAL_MAPS
-            dense = path_dense(dense, side_next, s, 0.0);
+            dense = facing_dense(dense, side_next, s, 0.0);
 #else
-            dense = path_dense(dense, wi_next.z, s, 0.0);
+            dense = facing_dense(dense, wi_next.z, s, 0.0);
 #endif
 #endif
 #if HAS_ATTENUATION
@@ -402,9 +278,9 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             left_pdf = found_pdf;
 #endif
 #if HAS_EMISSION
-            vec3 arriving = path_emission(at, d);
+            vec3 arriving = arriving_emission(at, d);
 #if ESTIMATOR == ESTIMATOR_MIS
-            if (at.light != NONE) arriving *= path_weight(found_pdf, lights_pdf(at.light, n, at, from, d));
+            if (at.light != NONE) arriving *= arriving_weight(found_pdf, lights_pdf(at.light, n, at, from, d));
 #endif
 #if HAS_TRANSMISSION
             arriving *= dense;
@@ -413,7 +289,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #endif
 #endif
 #if HAS_AMBIENT
-            vec3 ambient = path_ambient(at);
+            vec3 ambient = arriving_ambient(at);
 #if HAS_TRANSMISSION
             ambient *= dense;
 #endif
@@ -423,7 +299,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
         } while (alive && bounce < frame.max_bounces);
     }
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
-    vec3 arriving = path_outside(d, left_pdf, bounce > 0u);
+    vec3 arriving = arriving_outside(d, left_pdf, bounce > 0u);
 #if HAS_TRANSMISSION
     arriving *= max(dense, 1.0);
 #endif

@@ -1,0 +1,71 @@
+// What a path meets that sends light by itself: emission, ambient, what lies at infinity; and what it counts for.
+
+// Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
+float arriving_weight(float a, float b) {
+    float r = b / a;
+    return 1.0 / (1.0 + r * r);
+}
+
+#if HAS_SUN_DISKS
+// What the disks of directional lights send along d, each weighed against finding it by direct sampling. `pdf` is the
+// density of d.
+vec3 arriving_disks(vec3 d, float pdf) {
+    vec3 sum = vec3(0.0);
+    uint i = 0u;
+    do {
+        Light l = light_load(frame.sun_first + i);
+        vec3 c = directional_light_radiance(l, d);
+#if ESTIMATOR == ESTIMATOR_MIS
+        c *= arriving_weight(pdf, directional_light_pdf(l) * l.probability);
+#endif
+        if (i < frame.sun_count) sum += c; // a kernel with every flag raised may have no disk
+    } while (++i < frame.sun_count);
+    return sum;
+}
+#endif
+
+#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+// What arrives from infinity along d, weighed against finding it by direct sampling; `pdf` is the density of d. Disks
+// are not for the camera to see.
+vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
+    vec3 arriving = vec3(0.0);
+#if HAS_ENVIRONMENT
+    vec4 l = environment_radiance(d);
+    arriving = l.rgb;
+#if ESTIMATOR == ESTIMATOR_MIS
+    arriving *= arriving_weight(pdf, l.a * frame.environment_probability);
+#endif
+#endif
+#if HAS_SUN_DISKS
+    if (scattered) arriving += arriving_disks(d, pdf);
+#endif
+    return arriving;
+}
+#endif
+
+// Emission towards the side the ray came from: the outward one, unless the material has both shine.
+vec3 arriving_emission(Point at, vec3 d) {
+#if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
+    bool both = material_pick(at.material).emission_sides == 2u;
+    if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at);
+#elif HAS_TEXTURED_LIGHTS
+    if (at.light != NONE && dot(d, at.ng) < 0.0) return texture_emission(at);
+#elif HAS_EMISSION_BOTH
+    Material m = material_pick(at.material);
+    if (at.light != NONE && (dot(d, at.ng) < 0.0 || m.emission_sides == 2u)) return m.emission;
+#elif HAS_EMISSION
+    if (at.light != NONE && dot(d, at.ng) < 0.0) return material_pick(at.material).emission;
+#endif
+    return vec3(0.0);
+}
+
+// blinn_phong's radiance without a cause: from both sides, and no light to anything that picks lights.
+vec3 arriving_ambient(Point at) {
+#if HAS_AMBIENT && HAS_TEXTURES
+    return texture_ambient(at);
+#elif HAS_AMBIENT
+    return material_pick(at.material).ambient;
+#else
+    return vec3(0.0);
+#endif
+}
