@@ -85,6 +85,7 @@ class SceneArrays:
     ellipsoids: np.ndarray = field(default_factory=lambda: _empty(layout.Solid))
     triangles: np.ndarray = field(default_factory=lambda: _empty(layout.Triangle))
     triangle_normals: np.ndarray = field(default_factory=lambda: _empty(layout.TriangleNormals))  # none: all flat
+    tangents: bool = False  # whether these have tangents, of meshes whose materials run along them
     triangle_uvs: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # none, or all
     triangle_uvs_1: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # of set 1
     triangle_colors: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 4), np.float16))

@@ -110,6 +110,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_BVH_TRIANGLES": _tree(ShapeKind.TRIANGLE),
     "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
     "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
+    "HAS_TANGENTS": lambda s: s.tangents,
     "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in COUNTS.values()),
     "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s),
     "HAS_TEXTURES": lambda s: s.textures is not None or len(s.triangle_colors) > 0,

@@ -19,6 +19,12 @@ ABSENT = -1.0  # a material's number that was not given
 TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises what it may need
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
+# In TriangleNormals.bits: the corners' normals are interpolated; v grows to the right of u, seen from outside; and
+# from TANGENT_SHIFT on three codes of TANGENT_BITS each, 0 of none: 1 + the tangent's angle in the plane of its
+# corner's normal, in steps. A step is .35 degrees, less than a normal map of 8 bits tells apart; right angles are
+# whole numbers of them.
+NORMALS_SMOOTH, NORMALS_LEFT = 1, 2
+TANGENT_SHIFT, TANGENT_BITS, TANGENT_STEPS = 2, 10, 1020
 
 
 class LayoutError(TypeError):
@@ -261,7 +267,7 @@ class TriangleNormals(Record):
     n0: u32  # octahedral, 2 x 16 bits snorm (packSnorm2x16)
     n1: u32
     n2: u32
-    smoothed: u32  # 1: interpolate these; 0: the triangle is flat
+    bits: u32  # NORMALS_*, TANGENT_*
 
 
 class Node(Record):

@@ -93,6 +93,10 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #else
             Material m = material_pick(at.material);
 #endif
+#if HAS_ANISOTROPIC
+            // From u towards v, from whichever side it is seen: else a body's inside would not be its outside's mirror.
+            m.anisotropic_rotation *= dot(at.ng, wo_w) < 0.0 ? -at.handed : at.handed;
+#endif
             Surface s = surface_make(m, tangent);
             vec3 wo = frame_to_local(basis, wo_w);
 #if HAS_COAT_NORMALS

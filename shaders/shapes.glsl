@@ -11,11 +11,13 @@ struct Point {
     uint light;   // or NONE
     uint flat_id; // the shape, where a ray that leaves it cannot meet it again, else NONE
     uint shape;   // in the scene document, with its bits
+#if HAS_TEXTURES || HAS_ANISOTROPIC
+    float handed; // -1 where v grows against cross(ns, tangent)
+#endif
 #if HAS_TEXTURES
     vec2 uv;      // texture coordinates, v up
     vec2 uv_1;    // of a mesh's second set
     vec4 color;   // of a mesh's vertices
-    float handed; // -1 where v grows against cross(ns, tangent)
 #endif
 };
 
@@ -86,7 +88,9 @@ Point shapes_point(Nearest n, vec3 o, vec3 d) {
     uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK;
     vec3 p = o + n.t * d;
 #if HAS_TEXTURES
-    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, vec2(0.0), vec2(0.0), vec4(1.0), 1.0);
+    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0), vec4(1.0));
+#elif HAS_ANISOTROPIC
+    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
 #else
     Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
 #endif

@@ -84,6 +84,7 @@ SCENES: dict[str, Doc] = {
     "APERTURE": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "aperture_radius": 0.1}),
     "DISNEY": made_of({"type": "disney"}), "SUBSURFACE": made_of({"type": "disney", "subsurface": 1}),
     "SHEEN": made_of({"type": "disney", "sheen": 1}), "ANISOTROPIC": made_of({"type": "disney", "anisotropic": 1}),
+    "TANGENTS": made_of({"type": "disney", "anisotropic": 1}, icosphere("m", 1)),
     "CLEARCOAT": made_of({"type": "disney", "clearcoat": 1}), "METAL_ROUGH": made_of(GLTF),
     "BLINN_PHONG": made_of(PHONG), "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
     "PRINCIPLED": made_of({"type": "principled"}), "TRANSMISSION": made_of(GLASS),

@@ -72,7 +72,7 @@ def test_flat_and_missing_normals():
     cancelled = mesh(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2], [0, 2, 1]])
     arrays = packed(cancelled, mesh(smooth=False)).arrays
     normals = arrays.triangle_normals[np.argsort(arrays.triangles["shape"], kind="stable")]
-    assert normals["smoothed"].tolist() == [1, 1] + 12 * [0]
+    assert normals["bits"].tolist() == [1, 1] + 12 * [0]
     np.testing.assert_allclose(np.abs(decode(normals["n0"][:2])), [[0, 0, 1], [0, 0, 1]], atol=1e-4)
 
 

@@ -23,6 +23,7 @@ class MeshData:
     uvs_1: Floats | None = None  # the same of set 1
     colors: Floats | None = None  # (n, 3), linear, 0..1
     warnings: tuple[str, ...] = ()  # what is odd about it, for whoever made it
+    tangents: Floats | None = None  # (n, 4), as glTF's TANGENT: a direction of any length, zero of none; handedness
 
 
 @dataclass(frozen=True)

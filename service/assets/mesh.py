@@ -24,10 +24,11 @@ def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     normals = None if parts.normals is None else unit_normals(vertices, faces, parts.normals)
     parts.normals = None
     uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
-    parts.uvs = parts.uvs_1 = None
+    tangents = _floats(parts.tangents)
+    parts.uvs = parts.uvs_1 = parts.tangents = None
     parts.warnings += oddities(vertices, faces)
     colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
-    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings))
+    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents)
 
 
 def _floats(rows: Numbers | None) -> Floats | None:

@@ -23,6 +23,7 @@ class Parts:
     uvs_1: Numbers | None = None
     colors: Numbers | None = None  # (n, 3 or more), linear
     warnings: list[str] = field(default_factory=list)
+    tangents: Numbers | None = None  # (n, 4), as glTF's TANGENT; zero: none
 
 
 def check(parts: Parts, max_triangles: int) -> None:
@@ -32,7 +33,7 @@ def check(parts: Parts, max_triangles: int) -> None:
         raise ParseError("it has no faces")
     if len(faces) > max_triangles:
         raise ParseError(f"{len(faces)} triangles are more than the {max_triangles} allowed")
-    for name in ("vertices", "normals", "uvs", "uvs_1", "colors"):
+    for name in ("vertices", "normals", "uvs", "uvs_1", "colors", "tangents"):
         rows = getattr(parts, name)
         if rows is not None and not np.isfinite(rows).all():
             bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
@@ -54,6 +55,7 @@ OF_VERTEX = {
     "uvs": "the texture coordinate of vertex {}",
     "uvs_1": "the second texture coordinate of vertex {}",
     "colors": "the colour of vertex {}",
+    "tangents": "the tangent of vertex {}",
 }
 
 

@@ -25,9 +25,10 @@ TYPES = {
 HEADER_BYTES = 1 << 20
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 FACE_LISTS = ("vertex_indices", "vertex_index")
-# As Blender, pbrt, MeshLab and others write them; the second set is our own.
+# As Blender, pbrt, MeshLab and others write them; the second set and tangents are our own.
 UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UVS_1 = (("s1", "t1"),)
+TANGENTS = (("tx", "ty", "tz", "tw"),)
 COLORS = (("red", "green", "blue"), ("r", "g", "b"))
 
 
@@ -105,6 +106,7 @@ def read_ply(data: memoryview) -> Parts:
         _named(vertex, UVS),
         _named(vertex, UVS_1),
         _colors(vertex, declared),
+        tangents=_named(vertex, TANGENTS),
     )
 
 

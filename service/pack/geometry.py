@@ -17,6 +17,7 @@ from service.pack.origin import warnings as lost
 from service.pack.placed import Placed
 from service.pack.placing import place
 from service.pack.records import Bounds
+from service.pack.textures import Reads
 from service.pack.tree import LINEAR, plant, stand_out
 from service.pack.values import vec3
 from service.scene.numbers import Vec3
@@ -43,6 +44,7 @@ class Geometry:
 
     shapes: dict[ShapeKind, np.ndarray]
     triangle_normals: np.ndarray
+    tangents: bool  # whether these have them
     triangle_uvs: np.ndarray
     triangle_uvs_1: np.ndarray
     triangle_colors: np.ndarray
@@ -62,19 +64,19 @@ class Geometry:
 
 def geometry(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    uv_sets: Mapping[str, frozenset[int]], key: Hashable = None, earlier: Geometry | None = None,
+    reads: Mapping[str, Reads], key: Hashable = None, earlier: Geometry | None = None,
 ) -> Geometry:  # fmt: skip
-    """`names`: the materials in order; `emissive`: those that shine; `uv_sets`: which texture coordinates they read;
-    `key`: of the meshes, none of which shines, for `earlier`: a geometry of the same meshes, whose triangles and tree
-    serve again where nothing else is in that tree.
+    """`names`: the materials in order; `emissive`: those that shine; `reads`: what they read of their
+    shapes; `key`: of the meshes, none of which shines, for `earlier`: a geometry of the same meshes, whose triangles
+    and tree serve again where nothing else is in that tree.
 
     Raises InvalidDocument.
     """
     if earlier is not None:
-        again = _among_other_shapes(earlier, shapes, names, emissive, assets, max_triangles, uv_sets)
+        again = _among_other_shapes(earlier, shapes, names, emissive, assets, max_triangles, reads)
         if again is not None:
             return again
-    placed, placed_meshes, odd = place(shapes, names, emissive, assets, max_triangles, uv_sets)
+    placed, placed_meshes, odd = place(shapes, names, emissive, assets, max_triangles, reads)
     analytic = _analytic(placed, np.zeros(3))
     own = _mesh_extents(placed_meshes, key, odd)
     low, high, owners, exact = _extents(analytic, own)
@@ -97,7 +99,7 @@ def geometry(
     del boxes, bounds
     if len(triangles) > MANY:
         trim()
-    count, smooth = len(triangles), len(triangles) if triangles.any_smooth else 0
+    count, smooth = len(triangles), len(triangles) if triangles.any_smooth or triangles.any_tangents else 0
     sizes = count * Triangle.dtype.itemsize, smooth * TriangleNormals.dtype.itemsize
     shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes)), *sizes)
     nodes = shelf.put(nodes)
@@ -120,7 +122,7 @@ def geometry(
     if len(found[ShapeKind.TRIANGLE]) > MANY:
         trim()
     return Geometry(
-        found, normals, uvs, uvs_1, colors, shining, areas, nodes, node_count,
+        found, normals, triangles.any_tangents, uvs, uvs_1, colors, shining, areas, nodes, node_count,
         node_origin, node_scale, kinds, {kind: len(places) for kind, places in standing.items()},
         vec3(origin), radius, own, tuple(warnings),
     )  # fmt: skip
@@ -128,12 +130,12 @@ def geometry(
 
 def _among_other_shapes(
     earlier: Geometry, shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets,
-    max_triangles: int, uv_sets: Mapping[str, frozenset[int]],
+    max_triangles: int, reads: Mapping[str, Reads],
 ) -> Geometry | None:  # fmt: skip
     """The meshes of `earlier` with what else there is now; None where that touches them."""
     if earlier.bvh_kinds - {ShapeKind.TRIANGLE}:
         return None
-    placed, _, _ = place(shapes, names, emissive, assets, max_triangles, uv_sets, known_meshes=True)
+    placed, _, _ = place(shapes, names, emissive, assets, max_triangles, reads, known_meshes=True)
     analytic = _analytic(placed, np.zeros(3))
     low, high, owners, exact = _extents(analytic, earlier.meshes)
     origin, radius = choose(low, high)

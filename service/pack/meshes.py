@@ -11,6 +11,7 @@ import numpy as np
 from gpu import layout
 from service.pack.chunks import chunks, in_threads
 from service.pack.normals import corner_normals, encode
+from service.pack.tangents import Tangents, codes, tangents
 
 # Sine of an angle below which a triangle's area is rounding noise in float32, whatever its size.
 FLAT = 4 * float(np.finfo(np.float32).eps)
@@ -36,27 +37,40 @@ class PlacedMesh:
     uvs: np.ndarray | None = None  # (n, 2), as the vertices
     uvs_1: np.ndarray | None = None
     colors: np.ndarray | None = None  # (n, 3 or 4)
+    tangents: Tangents | None = None  # where the material runs along them
+
+
+@dataclass(frozen=True)
+class Chart:
+    """What a mesh's tangents come from: `given` (n, 4) as in a glTF file, or else the texture coordinates (n, 2)."""
+
+    uvs: np.ndarray | None
+    given: np.ndarray | None
 
 
 def place(
     vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, smooth: bool,
     matrix: np.ndarray | None, single_sided: bool, used: tuple[int, int],
     uvs: np.ndarray | None = None, uvs_1: np.ndarray | None = None, colors: np.ndarray | None = None,
+    chart: Chart | None = None,
 ) -> PlacedMesh:  # fmt: skip
-    """The mesh under its transform; a smooth one without normals gets them here, in its own space."""
+    """The mesh under its transform; a smooth one without normals gets them here, in its own space, and one with a
+    `chart` its tangents."""
     normal_faces = faces
     if not smooth:
         normals = None
     elif normals is None:
         normals, normal_faces = corner_normals(vertices, faces)
+    along = None if chart is None else tangents(vertices, faces, normals, normal_faces, chart.uvs, chart.given)
     if matrix is not None:
         axes = matrix[:3, :3]
         vertices = vertices @ axes.T + matrix[:3, 3]
         if normals is not None:  # by the inverse transpose; rows, so from the right; its size does not matter
             normals = normals @ (np.linalg.inv(axes) * np.abs(axes).max())
+        along = None if along is None else along.moved(axes)
         if np.linalg.det(axes) < 0:
             faces, normal_faces = faces[:, [0, 2, 1]], normal_faces[:, [0, 2, 1]]
-    return PlacedMesh(vertices, faces, normals, normal_faces, single_sided, *used, uvs, uvs_1, colors)
+    return PlacedMesh(vertices, faces, normals, normal_faces, single_sided, *used, uvs, uvs_1, colors, along)
 
 
 def survey(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[Triangles, np.ndarray]:
@@ -104,6 +118,10 @@ class Triangles:
     def any_smooth(self) -> bool:
         return any(mesh.normals is not None for mesh in self.meshes)
 
+    @property
+    def any_tangents(self) -> bool:
+        return any(mesh.tangents is not None for mesh in self.meshes)
+
     def have(self, name: str) -> bool:
         """Whether a mesh has `uvs`, `uvs_1` or `colors`."""
         return any(getattr(mesh, name) is not None for mesh in self.meshes)
@@ -122,14 +140,20 @@ class Triangles:
 
     def write_normals(self, places: np.ndarray | None, out: np.ndarray) -> None:
         """Fills `layout.TriangleNormals` records."""
-        codes = [None if mesh.normals is None else encode(mesh.normals) for mesh in self.meshes]
+        own_codes = [None if mesh.normals is None else encode(mesh.normals) for mesh in self.meshes]
 
         def some(number: int, which: Rows, where: Rows) -> None:
-            mesh, own = self.meshes[number], codes[number]
+            mesh, own = self.meshes[number], own_codes[number]
             record = np.zeros(_count(which), layout.TriangleNormals.dtype)
-            if mesh.normals is not None and own is not None:
+            if own is not None or mesh.tangents is not None:
                 a, b, c = self._corners(number, which)
-                _normals(mesh.normals, own, mesh.normal_faces[which], np.cross(b - a, c - a), record)
+                across = np.cross(b - a, c - a)
+                if mesh.normals is not None and own is not None:
+                    _normals(mesh.normals, own, mesh.normal_faces[which], across, record)
+                else:
+                    record["n0"] = record["n1"] = record["n2"] = encode(across)
+                if mesh.tangents is not None:
+                    _tangents(mesh.tangents, which, record)
             _words(out)[where] = _words(record)
 
         self._spread(places, some)
@@ -185,7 +209,7 @@ def _normals(
     normals: np.ndarray, codes: np.ndarray, corners: np.ndarray, cross: np.ndarray, record: np.ndarray
 ) -> None:
     """Fills records of faces that meet `normals`, encoded as `codes`, through `corners`, and face along `cross`."""
-    record["smoothed"] = 1
+    record["bits"] = layout.NORMALS_SMOOTH
     found = [normals.take(corners[:, k], axis=0) for k in range(3)]
     # Outward is counter-clockwise: normals of a file that all point inwards are turned round.
     behind = np.logical_and.reduce([np.einsum("ij,ij->i", normal, cross) < 0 for normal in found])
@@ -197,3 +221,11 @@ def _normals(
         if missing.any():
             code[missing] = encode(cross[missing])
         record[name] = code
+
+
+def _tangents(tangents: Tangents, which: Rows, record: np.ndarray) -> None:
+    """Adds the tangents to records that hold the normals."""
+    record["bits"] |= np.where(tangents.left[which], layout.NORMALS_LEFT, 0).astype(np.uint32)
+    for k, name in enumerate(("n0", "n1", "n2")):
+        code = codes(record[name], tangents.rows.take(tangents.corners[which, k], axis=0))
+        record["bits"] |= code << np.uint32(layout.TANGENT_SHIFT + k * layout.TANGENT_BITS)

@@ -32,6 +32,17 @@ def _encoded(n: np.ndarray) -> np.ndarray:
     return np.asarray(bits[:, 0] | bits[:, 1] << np.uint32(16))
 
 
+def decode(codes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(n, 3) float64 unit directions of (n,) codes, and which of them point below the plane z = 0, or along it."""
+    halves = np.ascontiguousarray(codes, np.uint32).view(np.int16).reshape(-1, 2)
+    e = halves.astype(np.float64) / 32767
+    z = 1 - np.abs(e).sum(axis=1)
+    fold = np.maximum(-z, 0.0)[:, None] * np.where(e >= 0, 1.0, -1.0)
+    n = np.column_stack([e - fold, z])
+    below = np.abs(halves.astype(np.int32)).sum(axis=1) >= 32767
+    return n / np.linalg.norm(n, axis=1, keepdims=True), below
+
+
 def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """(normals (k, 3) of the distinct positions, faces (m, 3) counting in them).
 
@@ -39,7 +50,7 @@ def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
     that it depends on neither the tessellation nor on vertices that a file repeats along its seams. Zero where the
     faces cancel.
     """
-    place = _positions(vertices)
+    place = same(vertices)
     faces = place[faces]
     count = int(place.max(initial=-1)) + 1
     points = np.zeros((count, 3))
@@ -60,12 +71,13 @@ def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
     return np.where(cancelled[:, None], 0.0, normals / np.where(cancelled, 1.0, length)[:, None]), faces
 
 
-def _positions(vertices: np.ndarray) -> np.ndarray:
-    """(n,) the number of each vertex's position, equal for equal positions."""
-    bits = np.ascontiguousarray(vertices + 0.0, np.float64).view(np.uint64)  # + 0.0: -0 becomes 0
+def same(*columns: np.ndarray) -> np.ndarray:
+    """(n,) a number for each row of all the arrays (n, ...) together, the same for the same: a position's, say."""
+    joined = columns[0] if len(columns) == 1 else np.concatenate(columns, axis=1, dtype=np.float64)
+    bits = np.ascontiguousarray(joined + 0.0, np.float64).view(np.uint64)  # + 0.0: -0 becomes 0
     # Sorting one mixed number per row is ten times as fast as sorting rows.
     mixed = np.zeros(len(bits), np.uint64)
-    for axis in range(3):
+    for axis in range(bits.shape[1]):
         mixed = (mixed ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
     _, first, place = np.unique(mixed, return_index=True, return_inverse=True)

@@ -9,8 +9,9 @@ import numpy as np
 from service.assets import Assets, MeshData
 from service.assets.oddities import oddities
 from service.pack import meshes
-from service.pack.meshes import PlacedMesh
+from service.pack.meshes import Chart, PlacedMesh
 from service.pack.placed import Placed, check_reach
+from service.pack.textures import Reads
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
 
@@ -19,10 +20,10 @@ MOST_ODD = 20  # warnings: a model of a thousand parts may have them all
 
 def place(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    uv_sets: Mapping[str, frozenset[int]], known_meshes: bool = False,
+    reads: Mapping[str, Reads], known_meshes: bool = False,
 ) -> tuple[Placed, list[PlacedMesh], list[str]]:  # fmt: skip
-    """(analytic shapes, meshes, what is odd about them) in the world; `names` and `emissive` are materials, `uv_sets`
-    what they read. With `known_meshes` these are left out.
+    """(analytic shapes, meshes, what is odd about them) in the world; `names` and `emissive` are materials, `reads`
+    what these read of them. With `known_meshes` these are left out.
 
     Raises InvalidDocument.
     """
@@ -31,8 +32,8 @@ def place(
     for i, shape in enumerate(shapes):
         matrix = None if shape.transform is None else shape.transform.matrix4()
         used = materials[shape.material], i
-        sets = uv_sets.get(shape.material, frozenset())
-        if 1 in sets and not isinstance(shape, MeshShape):
+        read = reads.get(shape.material, Reads())
+        if 1 in read.uv_sets and not isinstance(shape, MeshShape):
             raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
         match shape:
             case SphereShape():
@@ -44,7 +45,7 @@ def place(
             case MeshShape() if not known_meshes:
                 data = _data(shape, i, assets)
                 odd += [f"/shapes/{i}: {warning}" for warning in data.warnings]
-                mesh = _mesh(shape, data, matrix, used, max_triangles - count, sets)
+                mesh = _mesh(shape, data, matrix, used, max_triangles - count, read)
                 count += len(mesh.faces)
                 placed_meshes.append(mesh)
     if len(odd) > MOST_ODD:
@@ -54,19 +55,20 @@ def place(
 
 def _mesh(
     shape: MeshShape, data: MeshData, matrix: np.ndarray | None, used: tuple[int, int], room: int,
-    sets: frozenset[int],
+    read: Reads,
 ) -> PlacedMesh:  # fmt: skip
     if len(data.faces) > room:
         detail = f"has {len(data.faces)} triangles; this server has room for {room} more in a scene"
         raise InvalidDocument([FieldError(f"/shapes/{used[1]}", detail)])
     for number, uvs in ((0, data.uvs), (1, data.uvs_1)):
-        if number in sets and uvs is None:
+        if number in read.uv_sets and uvs is None:
             field = "uvs" if shape.asset is None and number == 0 else "material" if shape.asset is None else "asset"
             raise _uncharted(used[1], field, shape.material, f"uv set {number}, which this mesh does not have")
     mesh = meshes.place(
         data.vertices, data.faces, data.normals, shape.smooth, matrix, not shape.double_sided, used,
-        data.uvs if sets else None, data.uvs_1 if 1 in sets else None,
+        data.uvs if read.uv_sets else None, data.uvs_1 if 1 in read.uv_sets else None,
         None if data.colors is None or (data.colors == 1).all() else data.colors,
+        None if read.tangents is None else Chart(data.uvs_1 if read.tangents else data.uvs, data.tangents),
     )  # fmt: skip
     if matrix is not None:
         check_reach(used[1], float(np.abs(mesh.vertices).max(initial=0.0)))

@@ -17,7 +17,7 @@ from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
 from service.pack.glow import glow
 from service.pack.sky import Sky, make_sky, sky_key
-from service.pack.textures import pack_textures, uv_sets
+from service.pack.textures import pack_textures, reads
 from service.pack.values import pack_camera, pack_materials, pack_turn
 from service.scene import Scene
 from service.scene.environment import Environment
@@ -85,6 +85,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         ellipsoids=built.shapes[ShapeKind.ELLIPSOID],
         triangles=built.shapes[ShapeKind.TRIANGLE],
         triangle_normals=built.triangle_normals,
+        tangents=built.tangents,
         triangle_uvs=built.triangle_uvs,
         triangle_uvs_1=built.triangle_uvs_1,
         triangle_colors=built.triangle_colors,
@@ -112,12 +113,10 @@ def _geometry(
     used = {shape.material for shape in scene.shapes}
     shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
     room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
-
-    sets = uv_sets(scene)
-
+    read = reads(scene)
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
-        return geometry(scene.shapes, names, shining, assets, room, sets)
-    contents, shared = tuple(map(content, scene.shapes)), (tuple(names), room, tuple(sets.items()))
+        return geometry(scene.shapes, names, shining, assets, room, read)
+    contents, shared = tuple(map(content, scene.shapes)), (tuple(names), room, tuple(read.items()))
     meshes = [(i, shape) for i, shape in enumerate(scene.shapes) if isinstance(shape, MeshShape)]
     mesh_key = None
     if meshes and not any(shape.material in shining for _, shape in meshes):
@@ -127,7 +126,7 @@ def _geometry(
         earlier = None
         if mesh_key is not None:
             earlier = cache.find(lambda kept: isinstance(kept, Geometry) and kept.meshes.key == mesh_key)
-        return geometry(scene.shapes, names, shining, assets, room, sets, mesh_key, earlier)
+        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, earlier)
 
     return cache.get(("geometry", contents, shining, *shared), make)
 

@@ -16,6 +16,7 @@ from service.pack.values import member_of
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
+from service.scene.material import Material, stretches
 from service.scene.mistakes import escaped
 from service.scene.texture import (
     CheckerTexture,
@@ -62,14 +63,36 @@ class Texels:
     places: dict[str, tuple[int, ImageData]] = field(default_factory=dict)
 
 
-def uv_sets(scene: Scene) -> dict[str, frozenset[int]]:
-    """The sets of texture coordinates that each textured material reads."""
+@dataclass(frozen=True)
+class Reads:
+    """What a material reads of its shapes: sets of texture coordinates, and the one that its tangents run along."""
+
+    uv_sets: frozenset[int] = frozenset()
+    tangents: int | None = None  # None: it needs none
+
+
+def reads(scene: Scene) -> dict[str, Reads]:
+    """Of the materials that read anything."""
     out = {}
     for name, material in scene.materials.items():
-        textures = [scene.textures[reference.texture] for reference in references(material).values()]
-        if textures:
-            out[name] = frozenset(t.uv if isinstance(t, ImageTexture) else 0 for t in textures)
+        sets = {key: _uv_set(scene, reference) for key, reference in references(material).items()}
+        found = Reads(frozenset(sets.values()), _tangent_set(material, sets))
+        if found != Reads():
+            out[name] = found
     return out
+
+
+def _uv_set(scene: Scene, reference: Reference) -> int:
+    texture = scene.textures[reference.texture]
+    return texture.uv if isinstance(texture, ImageTexture) else 0
+
+
+def _tangent_set(material: Material, sets: Mapping[str, int]) -> int | None:
+    """That of its normal map, or else of its coat's; the first where it only stretches highlights."""
+    for name in ("normal_map", "clearcoat_normal_map"):
+        if name in sets:
+            return sets[name]
+    return 0 if stretches(material) else None
 
 
 def pack_textures(
@@ -277,8 +300,13 @@ def values_of(use: Use, pixels: np.ndarray) -> np.ndarray:
 
 
 def _warnings(uses: list[Use], images: Mapping[str, ImageData]) -> Iterator[str]:
+    charts = {use.material: getattr(use.texture, "uv", 0) for use in uses if use.member == "normal"}
     for use in uses:
         if isinstance(use.reference, NormalTexture):
+            own = getattr(use.texture, "uv", 0)
+            along = charts.get(use.material, own)
+            if own != along:
+                yield f"{use.pointer}: reads uv set {own}, but runs along set {along}, that of the normal map"
             continue
         low, high = layout.TEXTURABLE[use.member]
         pixels: np.ndarray

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from service.scene import CubemapEnvironment, NormalTexture, Scene, SkyEnvironment
-from service.scene.material import Material
+from service.scene.material import Material, stretches
+from service.scene.shape import MeshShape
 from service.scene.texture import Reference, references
 
 BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for which packing has an answer
@@ -48,9 +49,13 @@ def _skeleton(scene: Scene) -> tuple[object, ...]:
     """What arrays, light tables and kernels are made from: equal skeletons differ in values that are edited in place.
 
     Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked. So is
-    which parameter reads which texture; factors are not.
+    which parameter reads which texture; factors are not. A mesh whose highlight is stretched has tangents.
     """
-    materials = [(name, m.type, m.emission, m.emission_sides, _looks(m)) for name, m in scene.materials.items()]
+    on_meshes = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape)}
+    materials = [
+        (name, m.type, m.emission, m.emission_sides, _looks(m), name in on_meshes and stretches(m))
+        for name, m in scene.materials.items()
+    ]
     return materials, scene.textures, scene.shapes, scene.lights, _environment(scene)
 
 

@@ -17,6 +17,7 @@ from service.scene.texture import (
     AnyRadiometric,
     AnyReflectance,
     NormalTexture,
+    ScalarTexture,
 )
 
 
@@ -335,3 +336,9 @@ Material = Annotated[
     DiffuseMaterial | DisneyMaterial | PrincipledMaterial | MetalRoughMaterial | BlinnPhongMaterial,
     Field(discriminator="type"),
 ]
+
+
+def stretches(material: Material) -> bool:
+    """Whether its highlight has a direction, which a mesh must then have at its vertices."""
+    found = getattr(material, "anisotropic", 0.0)
+    return bool((found.factor if isinstance(found, ScalarTexture) else found) > 0)

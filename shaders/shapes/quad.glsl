@@ -27,11 +27,13 @@ Point quad_point(Quad q, vec3 p, uint id) {
     r.light = q.light;
     r.shape = q.shape;
     r.flat_id = id;
+#if HAS_TEXTURES || HAS_ANISOTROPIC
+    r.handed = dot(cross(q.normal, q.u), q.v) < 0.0 ? -1.0 : 1.0;
+#endif
 #if HAS_TEXTURES
     r.uv = clamp(at / size, 0.0, 1.0);
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
-    r.handed = dot(cross(q.normal, q.u), q.v) < 0.0 ? -1.0 : 1.0;
 #endif
     return r;
 }

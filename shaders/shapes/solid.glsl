@@ -25,11 +25,13 @@ Point solid_point(Solid s, vec3 q, vec3 n) {
     r.shape = s.shape;
     r.flat_id = NONE;
     r.tangent = axes[0];
+#if HAS_TEXTURES || HAS_ANISOTROPIC
+    r.handed = dot(s.row_x, cross(s.row_y, s.row_z)) < 0.0 ? -1.0 : 1.0;
+#endif
 #if HAS_TEXTURES
     r.uv = vec2(0.0);
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
-    r.handed = dot(s.row_x, cross(s.row_y, s.row_z)) < 0.0 ? -1.0 : 1.0;
 #endif
     return r;
 }

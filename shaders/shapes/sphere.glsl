@@ -55,6 +55,7 @@ Point sphere_point(Sphere s, vec3 p) {
     vec3 n = frame_rotate(vec4(-s.rotation.xyz, s.rotation.w), r.ng);
     vec3 t = dot(n.xz, n.xz) > 0.0 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0);
     r.tangent = frame_rotate(s.rotation, t);
+    r.handed = 1.0;
 #else
     r.tangent = vec3(1.0, 0.0, 0.0);
 #endif
@@ -62,7 +63,6 @@ Point sphere_point(Sphere s, vec3 p) {
     r.uv = sphere_uv(n);
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
-    r.handed = 1.0;
 #endif
     return r;
 }

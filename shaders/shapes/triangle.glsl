@@ -72,23 +72,15 @@ ivec2 triangle_corner(uint index, uint k) {
     return ivec2(at & (TEXTURE_ROW - 1u), at / TEXTURE_ROW);
 }
 
-// Texture coordinates and vertex colours at the weights b, and the tangent along growing u.
-void triangle_detail(uint index, vec3 b, vec3 e1, vec3 e2, inout Point r) {
+// Texture coordinates and vertex colours at the weights b.
+void triangle_detail(uint index, vec3 b, inout Point r) {
     r.uv = vec2(0.0);
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
-    r.handed = 1.0;
 #if HAS_UVS
-    vec2 a0 = texelFetch(triangle_uvs, triangle_corner(index, 0u), 0).xy;
-    vec2 a1 = texelFetch(triangle_uvs, triangle_corner(index, 1u), 0).xy;
-    vec2 a2 = texelFetch(triangle_uvs, triangle_corner(index, 2u), 0).xy;
-    r.uv = b.x * a0 + b.y * a1 + b.z * a2;
-    vec2 d1 = a1 - a0, d2 = a2 - a0;
-    float turned = d1.x * d2.y - d1.y * d2.x;
-    if (turned != 0.0) {
-        r.handed = turned < 0.0 ? -1.0 : 1.0;
-        r.tangent = r.handed * (d2.y * e1 - d1.y * e2);
-    }
+    r.uv = b.x * texelFetch(triangle_uvs, triangle_corner(index, 0u), 0).xy
+         + b.y * texelFetch(triangle_uvs, triangle_corner(index, 1u), 0).xy
+         + b.z * texelFetch(triangle_uvs, triangle_corner(index, 2u), 0).xy;
 #endif
 #if HAS_UVS_1
     r.uv_1 = b.x * texelFetch(triangle_uvs_1, triangle_corner(index, 0u), 0).xy
@@ -100,6 +92,21 @@ void triangle_detail(uint index, vec3 b, vec3 e1, vec3 e2, inout Point r) {
             + b.y * texelFetch(triangle_colors, triangle_corner(index, 1u), 0)
             + b.z * texelFetch(triangle_colors, triangle_corner(index, 2u), 0);
 #endif
+}
+#endif
+
+#if HAS_TANGENTS
+// The tangent of the k-th corner, whose normal has these bits: an angle in that normal's plane, from the x of the frame
+// of [Duff et al. 2017]. The frame's side is told by the bits, which round to the same on every device.
+vec3 triangle_tangent(uint normal, uint bits, uint k) {
+    vec3 n = triangle_decode(normal);
+    vec2 e = abs(unpackSnorm2x16(normal));
+    float s = e.x + e.y < 1.0 - 0.5 / 32767.0 ? 1.0 : -1.0;
+    float a = -1.0 / (s + n.z);
+    vec3 x = vec3(1.0 + s * n.x * n.x * a, s * n.x * n.y * a, -s * n.x);
+    uint code = (bits >> (TANGENT_SHIFT + k * TANGENT_BITS)) & ((1u << TANGENT_BITS) - 1u);
+    float angle = float(int(code) - 1) * (TWO_PI / float(TANGENT_STEPS));
+    return cos(angle) * x + sin(angle) * cross(n, x);
 }
 #endif
 
@@ -118,13 +125,24 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     r.p = b0 * tri.v0 + uv.x * tri.v1 + uv.y * tri.v2;
     r.ns = r.ng;
     r.tangent = e1;
+#if HAS_TEXTURES || HAS_ANISOTROPIC
+    r.handed = 1.0;
+#endif
 #if HAS_TEXTURES
-    triangle_detail(index, vec3(b0, uv), e1, e2, r);
+    triangle_detail(index, vec3(b0, uv), r);
 #endif
 #if HAS_SMOOTH_NORMALS
     TriangleNormals n = triangle_normals_load(index);
     vec3 ns = b0 * triangle_decode(n.n0) + uv.x * triangle_decode(n.n1) + uv.y * triangle_decode(n.n2);
-    if (n.smoothed != 0u && dot(ns, ns) > 0.0) r.ns = normalize(ns);
+    if ((n.bits & NORMALS_SMOOTH) != 0u && dot(ns, ns) > 0.0) r.ns = normalize(ns);
+#if HAS_TANGENTS
+    vec3 along = b0 * triangle_tangent(n.n0, n.bits, 0u) + uv.x * triangle_tangent(n.n1, n.bits, 1u)
+               + uv.y * triangle_tangent(n.n2, n.bits, 2u);
+    if ((n.bits >> TANGENT_SHIFT) != 0u && dot(along, along) > 0.0) r.tangent = along;
+#if HAS_TEXTURES || HAS_ANISOTROPIC
+    if ((n.bits & NORMALS_LEFT) != 0u) r.handed = -1.0;
+#endif
+#endif
 #endif
     r.material = tri.material;
     r.light = tri.light;

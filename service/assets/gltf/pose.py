@@ -27,6 +27,8 @@ def morphed(file: GltfFile, primitive: Primitive, place: Place, weights: tuple[f
     moved: dict[str, Array] = {"POSITION": vertices}
     if primitive.normals is not None:
         moved["NORMAL"] = primitive.normals
+    if primitive.tangents is not None:
+        moved["TANGENT"] = primitive.tangents[:, :3]
     for target, weight in zip(place.objects("targets"), weights, strict=False):
         for name, rows in moved.items():
             if not weight or name not in target:
@@ -39,7 +41,10 @@ def morphed(file: GltfFile, primitive: Primitive, place: Place, weights: tuple[f
             if len(offsets) != len(rows):
                 raise target.error(name, f"has {len(offsets)} items for {len(rows)} vertices")
             moved[name] = rows + weight * offsets.astype(np.float64)
-    return replace(primitive, vertices=moved["POSITION"], normals=moved.get("NORMAL"))
+    tangents = primitive.tangents
+    if tangents is not None:
+        tangents = np.concatenate([moved["TANGENT"], tangents[:, 3:]], axis=1)
+    return replace(primitive, vertices=moved["POSITION"], normals=moved.get("NORMAL"), tangents=tangents)
 
 
 class Skin:
@@ -65,7 +70,7 @@ class Skin:
         total = sum(w.sum(axis=1, dtype=np.float64) for w in primitive.weights)
         vertices, normals = primitive.vertices.astype(np.float64), primitive.normals
         turned = cofactors(self.matrices[:, :3, :3])
-        posed, faced = np.zeros_like(vertices), np.zeros_like(vertices)
+        posed, faced, along = np.zeros_like(vertices), np.zeros_like(vertices), np.zeros_like(vertices)
         for joints, shares in zip(primitive.joints, primitive.weights, strict=True):
             for k in range(4):
                 joint, share = joints[:, k].astype(np.int64), shares[:, k].astype(np.float64)
@@ -76,10 +81,15 @@ class Skin:
                 posed += share * (np.einsum("nij,nj->ni", matrix[:, :3, :3], vertices) + matrix[:, :3, 3])
                 if normals is not None:
                     faced += share * np.einsum("nij,nj->ni", turned[joint], normals)
-        mirrored = np.linalg.det(self.matrices[:, :3, :3]) < 0
-        if mirrored.all():
+                if primitive.tangents is not None:
+                    along += share * np.einsum("nij,nj->ni", matrix[:, :3, :3], primitive.tangents[:, :3])
+        mirrored = bool((np.linalg.det(self.matrices[:, :3, :3]) < 0).all())
+        if mirrored:
             faced, faces = -faced, primitive.faces[:, ::-1]
         else:
             faces = primitive.faces
+        tangents = primitive.tangents
+        if tangents is not None:
+            tangents = np.concatenate([along, tangents[:, 3:] * (-1 if mirrored else 1)], axis=1)
         return replace(primitive, vertices=posed, faces=faces, normals=None if normals is None else faced,
-                       joints=(), weights=())  # fmt: skip
+                       tangents=tangents, joints=(), weights=())  # fmt: skip

@@ -30,6 +30,7 @@ class Primitive:
     colors: Floats | None = None  # (n, 3 or 4)
     joints: tuple[Array, ...] = ()  # (n, 4) each
     weights: tuple[Floats, ...] = ()
+    tangents: Array | None = None  # (n, 4)
     kept: Longs | None = None  # which of the file's vertices these are; None: all
 
     def moved(self, world: Doubles) -> Primitive:
@@ -39,11 +40,13 @@ class Primitive:
         normals = self.normals
         if normals is not None:
             normals = normals @ (-cofactors(linear) if mirrored else cofactors(linear)).T
+        tangents = None if self.tangents is None else turned(self.tangents, linear, mirrored)
         return replace(
             self,
             vertices=self.vertices @ linear.T + world[:3, 3],
             faces=self.faces[:, ::-1] if mirrored else self.faces,
             normals=normals,
+            tangents=tangents,
         )
 
     def compact(self) -> Primitive:
@@ -64,6 +67,7 @@ class Primitive:
             normals=kept(self.normals),
             uvs=tuple(map(kept, self.uvs)),
             colors=kept(self.colors),
+            tangents=kept(self.tangents),
             joints=tuple(rows[used] for rows in self.joints),
             weights=tuple(rows[used] for rows in self.weights),
             kept=np.flatnonzero(used),
@@ -74,6 +78,13 @@ def cofactors(linear: Doubles) -> Doubles:
     """(..., 3, 3): takes normals along, up to a factor whose sign is the determinant's."""
     columns = [np.cross(linear[..., k - 2], linear[..., k - 1]) for k in range(3)]
     return np.stack(columns, axis=-1)
+
+
+def turned(tangents: Array, linear: Doubles, mirrored: bool | np.bool_) -> Array:
+    """(n, 4): directions along the surface go as its points do. The bitangent, w cross(n, t), does, too: as outward
+    stays outward, w changes its sign under a mirroring matrix."""
+    along = tangents[:, :3].astype(np.float64) @ linear.T
+    return np.concatenate([along, tangents[:, 3:] * (-1.0 if mirrored else 1.0)], axis=1)
 
 
 def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | None:
@@ -113,11 +124,12 @@ def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | No
         _unit(rows["COLOR_0"]) if "COLOR_0" in rows else None,
         tuple(rows[f"JOINTS_{k}"] for k in range(sets)),
         tuple(_unit(rows[f"WEIGHTS_{k}"]) for k in range(sets)),
+        _unit(rows["TANGENT"]) if "TANGENT" in rows and "NORMAL" in rows else None,  # else ignored, says the standard
     ).compact()
 
 
-TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TEXCOORD": ("VEC2",), "COLOR": ("VEC3", "VEC4"),
-         "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",)}  # fmt: skip
+TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXCOORD": ("VEC2",),
+         "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",)}  # fmt: skip
 
 
 def _rows(file: GltfFile, attributes: Place, packed: dict[str, Array], notes: Notes) -> dict[str, Array]:
@@ -126,7 +138,7 @@ def _rows(file: GltfFile, attributes: Place, packed: dict[str, Array], notes: No
     for name in attributes.value:
         kind, _, number = name.partition("_")
         if kind not in TYPES or (number and not (number.isascii() and number.isdigit())):
-            continue  # TANGENT, and a program's own
+            continue  # a program's own
         if number and int(number[:4]) >= {"TEXCOORD": UV_SETS, "COLOR": 1}.get(kind, MOST_SETS):
             notes.add(attributes.at(name), "is not read: there are two sets of uv and one of colours")
             continue

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -138,8 +138,18 @@ class _Importer:
             if primitive is not None:
                 primitive = morphed(self.file, primitive, place, morph) if morph else primitive
                 primitive = skin.posed(primitive, place) if skin else primitive
+                primitive = primitive if self._directed(place) else replace(primitive, tangents=None)
             self._parts[key] = self._write(primitive, place) if primitive else None
         return self._parts[key]
+
+    def _directed(self, place: Place) -> bool:
+        """Whether a primitive's material asks for tangents."""
+        if "material" not in place:
+            return False
+        material = self.file.follow(place, "material", "materials")
+        coat = material.extension("KHR_materials_clearcoat")
+        stretched = material.extension("KHR_materials_anisotropy") is not None
+        return stretched or "normalTexture" in material or (coat is not None and "clearcoatNormalTexture" in coat)
 
     def _write(self, primitive: Primitive, place: Place) -> Part:
         vertices = primitive.vertices
@@ -159,10 +169,6 @@ class _Importer:
         attributes = place.need("attributes")
         if part.colored and material.extension("KHR_materials_unlit") is not None:
             self.notes.add(attributes.at("COLOR_0"), "colours don't tint an unlit material")
-        if "TANGENT" in attributes and {"normalTexture", "KHR_materials_anisotropy"} & {
-            *material.value, *(material.object("extensions") or Place({}, "")).value
-        }:  # fmt: skip
-            self.notes.add(attributes.at("TANGENT"), "is not read: tangents follow the texture coordinates")
         primitive = self._read[place.pointer]
         colors = primitive.colors if primitive else None
         fading = colors is not None and colors.shape[1] == 4 and (colors[:, 3] != 1).any()

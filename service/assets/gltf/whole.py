@@ -55,11 +55,12 @@ def _joined(parts: list[Primitive], warnings: list[str]) -> Parts:
         uvs[1],
         _rows([None if p.colors is None else p.colors[:, :3] for p in parts], parts, 3, 1.0),
         warnings,
+        _rows([p.tangents for p in parts], parts, 4),
     )
 
 
 def _rows(columns: list[Array | None], parts: list[Primitive], width: int, missing: float = 0.0) -> Array | None:
-    """None where no part has them; a part without gets `missing`: normals of zero are computed from the triangles."""
+    """None where no part has them; a part without gets `missing`: normals and tangents of zero are computed."""
     if all(column is None for column in columns):
         return None
     return np.concatenate([

@@ -12,6 +12,8 @@ def ply(primitive: Primitive) -> bytes:
     columns = {"x": primitive.vertices[:, 0], "y": primitive.vertices[:, 1], "z": primitive.vertices[:, 2]}
     if primitive.normals is not None:
         columns |= {f"n{axis}": primitive.normals[:, k] for k, axis in enumerate("xyz")}
+    if primitive.tangents is not None:
+        columns |= {f"t{axis}": primitive.tangents[:, k] for k, axis in enumerate("xyzw")}
     for names, uvs in zip((("s", "t"), ("s1", "t1")), primitive.uvs, strict=True):
         if uvs is not None:
             columns |= {names[0]: uvs[:, 0], names[1]: 1 - uvs[:, 1]}
