@@ -132,9 +132,12 @@ vec3 texture_ambient(Point at) {
 }
 
 #if HAS_NORMAL_MAPS
-// The shading normal n bent as a normal map has it: red along growing u, green along growing v, blue outwards.
-vec3 texture_bent(Point at, vec3 n, vec4 texel, float strength) {
+// The shading normal n bent as a normal map has it: red along growing u, green along growing v, blue outwards. They are
+// the image's own: where it is turned or mirrored on the surface, so are its bumps. Scaling leaves their slopes.
+vec3 texture_bent(Point at, vec3 n, vec4 texel, TextureSlot s, float strength) {
     vec3 t = 2.0 * texel.xyz - 1.0;
+    vec2 u = s.turn.xz, v = s.turn.yw;
+    t.xy = vec2(dot(t.xy, u) * inversesqrt(max(dot(u, u), 1e-30)), dot(t.xy, v) * inversesqrt(max(dot(v, v), 1e-30)));
     t.xy *= strength;
     vec3 x = at.tangent - dot(at.tangent, n) * n;
     float x2 = dot(x, x);
@@ -150,7 +153,8 @@ bool texture_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout 
 #if TEXTURE_NORMAL >= 0
     TextureUse use = texture_use_pick(at.material, TEXTURE_NORMAL_USE);
     mapped = use.channel != TEXTURE_CHANNEL_NONE;
-    if (mapped) n = texture_bent(at, n, texels[TEXTURE_NORMAL], use.factor.x);
+    TextureSlot s = texture_slot_pick(at.material, uint(TEXTURE_NORMAL));
+    if (mapped) n = texture_bent(at, n, texels[TEXTURE_NORMAL], s, use.factor.x);
 #endif
     return mapped;
 }
@@ -161,7 +165,8 @@ bool texture_coat_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], i
 #if TEXTURE_COAT_NORMAL >= 0
     TextureUse use = texture_use_pick(at.material, TEXTURE_COAT_NORMAL_USE);
     mapped = use.channel != TEXTURE_CHANNEL_NONE;
-    if (mapped) n = texture_bent(at, n, texels[TEXTURE_COAT_NORMAL], use.factor.x);
+    TextureSlot s = texture_slot_pick(at.material, uint(TEXTURE_COAT_NORMAL));
+    if (mapped) n = texture_bent(at, n, texels[TEXTURE_COAT_NORMAL], s, use.factor.x);
 #endif
     return mapped;
 }

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Any
 
 import numpy as np
@@ -63,6 +64,24 @@ def test_red_is_along_u_and_green_along_v(
         got = render(gpu, scene, 1, "normal", assets=MAPS, width=8, height=8).mean((0, 1))
         side = np.sign(np.dot(away, n))
         np.testing.assert_allclose(got, side * (0.8 * np.array(n) + 0.6 * np.array(along)), atol=2e-3)
+
+
+@pytest.mark.parametrize(
+    ("placing", "right", "up"),
+    [
+        ({"rotation": 90}, [0, -1], [1, 0]),  # uv' turns counter-clockwise, so the image clockwise
+        ({"rotation": 30, "scale": [5, 5]}, [math.cos(math.pi / 6), -0.5], [0.5, math.cos(math.pi / 6)]),
+        ({"scale": [-2, 3]}, [-1, 0], [0, 1]),
+        ({"scale": [1, -1], "rotation": 90}, [0, 1], [1, 0]),  # u and v change places
+    ],
+)
+def test_bumps_turn_with_their_image(gpu: Renderer, placing: Any, right: Any, up: Any) -> None:
+    for name, along in (("right", right), ("up", up)):
+        material = {"type": "diffuse", "albedo": 1, "normal_map": {"texture": name}}
+        textures = {name: {"asset": name, **placing}}
+        scene = document([QUAD], {"m": material}, textures=textures, camera=at([0.3, 0.2, 0], [0, 0, 3]))
+        got = render(gpu, scene, 1, "normal", assets=MAPS, width=8, height=8).mean((0, 1))
+        np.testing.assert_allclose(got, [*(0.6 * np.array(along)), 0.8], atol=2e-3)
 
 
 def test_strength_flattens(gpu: Renderer) -> None:
