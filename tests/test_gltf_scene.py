@@ -45,6 +45,18 @@ def noted(found: Imported) -> dict[str, str]:
     return {warning["pointer"]: warning["detail"] for warning in found.warnings}
 
 
+@pytest.mark.parametrize("name", ["NORMAL", "TEXCOORD_0", "TANGENT", "COLOR_0"])
+def test_what_is_not_finite_is_refused_by_its_place(store: AssetStore, name: str) -> None:
+    rows = {"POSITION": QUAD, "NORMAL": np.ones((4, 3), "<f4"), "TEXCOORD_0": QUAD_UVS.copy(),
+            "TANGENT": np.ones((4, 4), "<f4"), "COLOR_0": np.ones((4, 3), "<f4")}  # fmt: skip
+    rows[name][2, 0] = np.inf
+    file = Gltf()
+    material = file.add("materials", {"extensions": {"KHR_materials_anisotropy": {"anisotropyStrength": 0.5}}})
+    file.node(mesh=file.mesh(file.primitive(rows, material=material)))
+    with pytest.raises(AssetError, match=f"attributes/{name}: has an item that is not finite: .inf"):
+        store.add(file.glb())
+
+
 def test_nodes_share_their_mesh_and_mirror(store: AssetStore) -> None:
     file = Gltf()
     mesh = file.mesh()

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -32,6 +33,12 @@ class Primitive:
     weights: tuple[Floats, ...] = ()
     tangents: Array | None = None  # (n, 4)
     kept: Longs | None = None  # which of the file's vertices these are; None: all
+
+    def detail(self) -> Iterator[tuple[str, Array]]:
+        """What its vertices have besides a position, by the name of the attribute."""
+        sets = {f"TEXCOORD_{k}": rows for k, rows in enumerate(self.uvs)}
+        named = {"NORMAL": self.normals, "TANGENT": self.tangents, "COLOR_0": self.colors, **sets}
+        yield from ((name, rows) for name, rows in named.items() if rows is not None)
 
     def moved(self, world: Doubles) -> Primitive:
         """Under a 4x4 matrix. Outward stays outward: a mirroring one turns the triangles round."""

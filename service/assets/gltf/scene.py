@@ -155,6 +155,10 @@ class _Importer:
         vertices = primitive.vertices
         if not np.isfinite(vertices).all() or np.abs(vertices).max() > MAX_COORDINATE:
             raise place.error("attributes", "have a POSITION that is not finite or lies beyond 1e9 m")
+        for name, rows in primitive.detail():
+            if not np.isfinite(rows).all():
+                bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
+                raise place.need("attributes").error(name, f"has an item that is not finite: {rows[bad].tolist()}")
         return Part(
             self.files.keep(ply(primitive), place.pointer, len(vertices), len(primitive.faces)),
             (vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)),
