@@ -190,8 +190,8 @@ def test_a_denoiser_that_dies_is_replaced_and_then_given_up() -> None:
         denoiser.ask(order(color, (guide, guide), fine=False), told.append)
         assert denoiser.busy
         if kill:
-            assert denoiser._process is not None
-            denoiser._process.kill()
+            assert denoiser.process_id is not None
+            os.kill(denoiser.process_id, signal.SIGKILL)
         while denoiser.busy:
             denoiser.sleep(timeout_s=20)
             denoiser.hear()
@@ -211,7 +211,7 @@ def test_the_helper_ends_with_its_parent() -> None:
         "import sys, numpy as np; from service.rendering.worker.denoiser import Denoiser, order\n"
         "d = Denoiser(); a = np.ones((64, 64, 4), np.float32)\n"
         "d.ask(order(a, (a[..., :3], a[..., :3]), True), print)\n"
-        "sys.stdout.write(str(d._process.pid)); sys.stdout.flush()\n"
+        "sys.stdout.write(str(d.process_id)); sys.stdout.flush()\n"
         "import os; os._exit(0)"
     )
     pid = int(subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30).stdout)

@@ -5,8 +5,6 @@ from __future__ import annotations
 import logging
 import os
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from contextlib import suppress
@@ -15,11 +13,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.rendering import link
+from service.rendering.worker.helper import Helper
 
 if TYPE_CHECKING:
     from gpu import Recipe
 
-ROOT = Path(__file__).parents[3]
 TRIES = 3  # misfortunes in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
 REMEMBERED = 256  # kernels; of thousands that were asked for the records tell
@@ -52,21 +50,21 @@ class Compiler:
     def __init__(self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool]) -> None:
         """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop."""
         self._driver = f"{info['renderer']} {info['version']}"
-        self._device, self._crowded = device, crowded
+        self._crowded = crowded
+        given = () if device is None else ("--device", str(device))
+        self._helper = Helper("service.rendering.worker.compiling", *given)
         self._able = _has_cache()
         self._records = _records()
         self._known: set[Recipe] = set()  # what needs no helper any more, or was not helped
         self._met: set[Recipe] = set()
         self._orders: list[_Order] = []  # the first is under way
-        self._process: subprocess.Popen[bytes] | None = None
-        self._end: socket.socket | None = None
         self._until = 0.0
         self._failures = 0
 
     @property
     def ends(self) -> list[socket.socket]:
         """Where it may be heard from."""
-        return [] if self._end is None else [self._end]
+        return self._helper.ends
 
     @property
     def left_s(self) -> float | None:
@@ -118,10 +116,8 @@ class Compiler:
 
     def hear(self) -> None:
         """Tells who waits, if there is anything to tell, and begins the next."""
-        if self._end is None:
-            return
         try:
-            answer: Compiled = link.receive(self._end)
+            answer: Compiled = self._helper.hear()
         except BlockingIOError:
             if not self._orders or time.monotonic() < self._until:
                 return
@@ -138,12 +134,7 @@ class Compiler:
             self._begin()
 
     def close(self) -> None:
-        if self._end is not None:
-            self._end.close()
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-        self._end = self._process = None
+        self._helper.close()
 
     def _ended(self, detail: str) -> None:
         self.close()
@@ -160,38 +151,18 @@ class Compiler:
 
     def _begin(self) -> None:
         """Sends the first order; where that can't be, all are told to do without."""
-        for _ in range(2):
-            try:
-                if self._failures < TRIES:
-                    self._start()
-                    assert self._end is not None
-                    link.send(self._end, self._orders[0].recipe)
-                    self._until = time.monotonic() + LIMIT_S
-                    return
-            except (link.Closed, OSError) as error:  # it had just ended, being idle; or it can't be started
-                log.info("no compiler: %s", error or "it had ended")
-                self.close()
+        try:
+            if self._failures < TRIES:
+                self._helper.ask(self._orders[0].recipe)
+                self._until = time.monotonic() + LIMIT_S
+                return
+        except (link.Closed, OSError) as error:  # it can't be started
+            log.info("no compiler: %s", error or "it had ended")
+            self.close()
         self._able = False
         log.warning("compiling in the loop from now on")
         while self._orders:
             self._tell(0.0)
-
-    def _start(self) -> None:
-        if self._end is not None:
-            return
-        self._end, theirs = link.pair()
-        with theirs:
-            command = [sys.executable, "-m", "service.rendering.worker.compiling", str(theirs.fileno())]
-            command += ["--parent", str(os.getpid())]
-            command += [] if self._device is None else ["--device", str(self._device)]
-            self._process = subprocess.Popen(
-                command,
-                pass_fds=[theirs.fileno()],
-                cwd=ROOT,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                process_group=0,  # Ctrl-C in a terminal is for the server
-            )
 
 
 def _has_cache() -> bool:

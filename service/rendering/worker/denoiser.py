@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 import logging
-import os
 import select
 import socket
-import subprocess
-import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from pathlib import Path
 
 import numpy as np
 
 from gpu import denoise
 from service.rendering import link
+from service.rendering.worker.helper import Helper
 
-ROOT = Path(__file__).parents[3]
 # How long a stream waits for its denoised frame, and in times of what the last one took; then it goes on without.
 PATIENCE_S, PATIENCE = 3.0, 3.0
 TRIES = 3  # deaths in a row; then nothing is denoised any more, and the reason is told
@@ -52,8 +48,7 @@ class Denoiser:
 
     def __init__(self) -> None:
         self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why it does nothing
-        self._process: subprocess.Popen[bytes] | None = None
-        self._end: socket.socket | None = None
+        self._helper = Helper("service.rendering.worker.denoising")
         self._told: Callable[[Delivery], None] | None = None
         self._deaths = 0
         self._asked_at = self._took_s = 0.0
@@ -76,23 +71,21 @@ class Denoiser:
     @property
     def ends(self) -> list[socket.socket]:
         """Where it may be heard from."""
-        return [] if self._end is None else [self._end]
+        return self._helper.ends
+
+    @property
+    def process_id(self) -> int | None:
+        return self._helper.process_id
 
     def ask(self, order: Order, told: Callable[[Delivery], None]) -> None:
         """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
         self._told, self._asked_at = told, time.monotonic()
-        try:
-            link.send(self._begin(), order)
-        except link.Closed:  # it had just ended, being idle
-            self.close()
-            link.send(self._begin(), order)
+        self._helper.ask(order)
 
     def hear(self) -> None:
         """Hands on what was denoised, if anything was."""
-        if self._end is None:
-            return
         try:
-            delivery: Delivery = link.receive(self._end)
+            delivery: Delivery = self._helper.hear()
         except BlockingIOError:
             return
         except link.Closed:
@@ -114,31 +107,10 @@ class Denoiser:
 
     def sleep(self, other: socket.socket | None = None, timeout_s: float | None = None) -> None:
         """Until there is something to hear here, or from `other`."""
-        select.select([end for end in (self._end, other) if end is not None], [], [], timeout_s)
+        select.select([*self.ends, *([] if other is None else [other])], [], [], timeout_s)
 
     def close(self) -> None:
-        if self._end is not None:
-            self._end.close()
-        if self._process is not None:
-            self._process.kill()
-            self._process.wait()
-        self._end = self._process = None
-
-    def _begin(self) -> socket.socket:
-        if self._end is None:
-            self._end, theirs = link.pair()
-            module = "service.rendering.worker.denoising"
-            command = [sys.executable, "-m", module, str(theirs.fileno()), "--parent", str(os.getpid())]
-            self._process = subprocess.Popen(
-                command,
-                pass_fds=[theirs.fileno()],
-                cwd=ROOT,
-                stdin=subprocess.DEVNULL,
-                stdout=subprocess.DEVNULL,
-                process_group=0,  # Ctrl-C in a terminal is for the parent
-            )
-            theirs.close()
-        return self._end
+        self._helper.close()
 
 
 def order(color: np.ndarray, guides: tuple[np.ndarray, np.ndarray], fine: bool) -> Order:

@@ -1,0 +1,74 @@
+"""A process beside the renderer that does one kind of work for it: begun when first asked, ended when not needed."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from service.rendering import link
+
+ROOT = Path(__file__).parents[3]
+
+
+class Helper:
+    """Runs `python -m MODULE DESCRIPTOR --parent PID ARGUMENTS`, which may end by itself when idle."""
+
+    def __init__(self, module: str, *arguments: str) -> None:
+        self._module, self._arguments = module, arguments
+        self._process: subprocess.Popen[bytes] | None = None
+        self._end: socket.socket | None = None
+
+    @property
+    def ends(self) -> list[socket.socket]:
+        """Where it may be heard from."""
+        return [] if self._end is None else [self._end]
+
+    @property
+    def process_id(self) -> int | None:
+        return None if self._process is None else self._process.pid
+
+    def ask(self, message: object) -> None:
+        """Raises link.Closed where it ends as soon as it begins, OSError where it can't be started."""
+        try:
+            link.send(self._begin(), message)
+        except link.Closed:  # it had just ended, being idle
+            self.close()
+            link.send(self._begin(), message)
+
+    def hear(self) -> Any:
+        """What it said. Raises BlockingIOError when that is nothing, link.Closed when it has ended."""
+        if self._end is None:
+            raise BlockingIOError
+        return link.receive(self._end)
+
+    def close(self) -> None:
+        if self._end is not None:
+            self._end.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._end = self._process = None
+
+    def _begin(self) -> socket.socket:
+        if self._end is not None:
+            return self._end
+        self._end, theirs = link.pair()
+        with theirs:
+            command = [sys.executable, "-m", self._module, str(theirs.fileno()), "--parent", str(os.getpid())]
+            try:
+                self._process = subprocess.Popen(
+                    [*command, *self._arguments],
+                    pass_fds=[theirs.fileno()],
+                    cwd=ROOT,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    process_group=0,  # Ctrl-C in a terminal is for the parent
+                )
+            except OSError:
+                self.close()
+                raise
+        return self._end
