@@ -33,6 +33,9 @@ FIN = np.array([[0, 1, 4]], np.int32)
         ),
         (POINTS, np.concatenate([CUBE, CUBE[3:5, [1, 2, 0]]]), ["2 triangles stand where", "5 edges belong to more"]),
         (POINTS, np.concatenate([CUBE, FIN]), ["2 edges belong to more"]),
+        (POINTS, np.concatenate([CUBE[:1], CUBE[:1]]), ["^1 triangle stands where", "3 edges lie"]),
+        (POINTS, np.array([[0, 1, 2], [0, 1, 4]], np.int32), ["^1 edge lies between"]),
+        (POINTS, np.array([[0, 1, 2], [1, 0, 4], [0, 1, 7]], np.int32), ["^1 edge belongs to more"]),
         (POINTS, np.array([[0, 0, 1], [1, 1, 1]], np.int32), []),
     ],
 )

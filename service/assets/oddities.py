@@ -22,14 +22,17 @@ def oddities(vertices: Doubles, faces: Indices) -> list[str]:
     count = len(vertices)
     twice = _repeated(welded, count)
     if twice:
-        found.append(f"{twice} triangles stand where another one does: chance says which of them is met")
+        stand = "1 triangle stands" if twice == 1 else f"{twice} triangles stand"
+        found.append(f"{stand} where another one does: chance says which of them is met")
     if not len(welded):
         return found
     boundary, crowded, turned = _edges(welded, count)
     if crowded:
-        found.append(f"{crowded} edges belong to more than two triangles: inside and outside are not clear there")
+        belong = "1 edge belongs" if crowded == 1 else f"{crowded} edges belong"
+        found.append(f"{belong} to more than two triangles: inside and outside are not clear there")
     if turned:
-        found.append(f"{turned} edges lie between triangles that face opposite ways")
+        lie = "1 edge lies" if turned == 1 else f"{turned} edges lie"
+        found.append(f"{lie} between triangles that face opposite ways")
     if not boundary and not crowded and not turned and _volume(vertices, faces) < 0:
         found.append("it is closed and all of it faces inwards: light and glass take the inside for the outside")
     return found

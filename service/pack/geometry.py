@@ -114,7 +114,8 @@ def geometry(
     _hide(found, shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
-    flat = tuple(f"/shapes/{i}: {n} degenerate triangles skipped" for i, n in triangles.degenerate.items())
+    counts = triangles.degenerate.items()
+    flat = tuple(f"/shapes/{i}: {n} degenerate triangle{'s' if n > 1 else ''} skipped" for i, n in counts)
     own = replace(own, warnings=own.warnings + flat)
     warnings = [*own.warnings, *_vanished(placed), *lost(low, high, owners, exact, origin)]
     for array in (*found.values(), nodes, normals, uvs, uvs_1, colors):
