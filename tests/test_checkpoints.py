@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 import os
 import signal
-from collections.abc import Awaitable, Callable, Generator
+from collections.abc import Generator
 from types import SimpleNamespace
 from typing import Any
 
@@ -16,25 +16,12 @@ from gpu import Renderer, RenderSettings
 from service.rendering import link
 from service.rendering.engine import Engine
 from service.rendering.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
-from service.rendering.process import Options
 from service.rendering.worker import keeping
+from tests.engines import with_engine
 from tests.test_compiling import LINEAR, arrays_of
 from tests.test_worker import Ears, settings
 
 ENDLESS = 1 << 24
-
-
-def with_engine(test: Callable[[Engine], Awaitable[None]], **options: Any) -> None:
-    async def run() -> None:
-        engine = Engine(Options(**options))
-        engine.start()
-        try:
-            await engine.ready(30)
-            await test(engine)
-        finally:
-            await engine.close()
-
-    asyncio.run(run())
 
 
 async def begun(engine: Engine, samples: int) -> tuple[int, Ears]:

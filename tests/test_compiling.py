@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +20,7 @@ from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Upda
 from service.rendering.worker.holding import Holding, kernel_of
 from service.scene import parse_scene
 from tests.documents import Shelf
+from tests.engines import with_engine
 from tests.serving import SCENE
 
 SIZE = {"width": 32, "height": 32}
@@ -102,19 +102,6 @@ def helpers(parent: int | None) -> list[int]:
         except OSError:
             continue
     return found
-
-
-def with_engine(test: Callable[[Engine], Awaitable[None]]) -> None:
-    async def run() -> None:
-        engine = Engine()
-        engine.start()
-        try:
-            await engine.ready(30)
-            await test(engine)
-        finally:
-            await engine.close()
-
-    asyncio.run(run())
 
 
 @pytest.fixture
