@@ -15,7 +15,7 @@ from gpu.arrays import SceneArrays
 from gpu.errors import CompileError
 from gpu.program import Source
 from gpu.settings import RenderSettings
-from gpu.texels import BYTES
+from gpu.texels import BYTES, KINDS
 
 ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others take some 30 ms, once
 _BUFFER = 1 << 16  # bytes; zeros for whatever is bound, and no pixel looks at it
@@ -47,6 +47,14 @@ def recipe(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]
     """What a picture of `arrays` needs compiled where these flags are raised: its kernel, or that of its GUIDES."""
     defines = features.defines(raised, settings, features.counts(arrays))
     return Recipe(tuple(defines.items()), _textures(arrays), entry)
+
+
+def full_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe:
+    """The same with every flag raised, for a `scene.Everything`, which has something bound to every texture unit."""
+    own = recipe(arrays, settings, features.everything())
+    bound = {unit for unit, *_ in own.textures}
+    bare = ((unit, channels, dtype, 1, 1) for unit, (channels, dtype) in KINDS.items() if unit not in bound)
+    return replace(own, textures=(*own.textures, *bare))
 
 
 def _textures(a: SceneArrays) -> tuple[tuple[int, int, str, int, int], ...]:

@@ -169,6 +169,11 @@ EDITED = {
 }
 
 
+def everything() -> frozenset[str]:
+    """Every flag there is."""
+    return frozenset(FLAGS)
+
+
 def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
     """The flags that `scene` raises; with `editing`, also those that an edit of its materials could."""
     raised = {name for name, asks in FLAGS.items() if asks(scene)}

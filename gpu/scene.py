@@ -16,7 +16,7 @@ from gpu.errors import OutOfMemory
 from gpu.layout import LightKind, Slot
 from gpu.pinned import pin
 from gpu.settings import RenderSettings
-from gpu.texels import Texels, rows
+from gpu.texels import KINDS, Texels, bare, rows
 
 log = logging.getLogger(__name__)
 
@@ -138,7 +138,7 @@ class Scene:
         return {u: rows(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)}
 
     def _raise_flags(self) -> None:
-        raised = frozenset(features.FLAGS) if self._everything else features.flags(self.arrays, self._editing)
+        raised = features.everything() if self._everything else features.flags(self.arrays, self._editing)
         self._raised = self._raised | raised if self._editing else raised
 
     def _upload(self, array: np.ndarray) -> Any:
@@ -264,3 +264,22 @@ class Scene:
             texture.release()
         if self._key:
             self._shared.give_back(self._key)
+
+
+class Everything(Scene):
+    """A scene that is on the device, with every flag raised: to compare kernels with. Released before that one."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.__dict__.update(scene.__dict__)
+        self._everything = True
+        self._raise_flags()
+        self._own = {unit: bare(self._context, unit) for unit in KINDS if unit not in self._details | self._images}
+        self._details = self._details | self._own
+        if not self._tables:
+            self._tables = upload_tables(self._context)
+            self._own |= self._tables
+
+    def release(self) -> None:
+        contexts.use(self._context)
+        for texture in self._own.values():
+            texture.release()

@@ -12,6 +12,13 @@ from gpu import layout
 from gpu.errors import OutOfMemory
 
 BYTES = {"f1": 1, "f2": 2, "f4": 4}
+KINDS = {  # channels and dtype, by texture unit
+    layout.UVS_TEXTURES[0]: (2, "f4"),
+    layout.UVS_TEXTURES[1]: (2, "f4"),
+    layout.COLORS_TEXTURE: (4, "f2"),
+    layout.BYTES_TEXTURE: (4, "f1"),
+    layout.FLOATS_TEXTURE: (4, "f4"),
+}
 
 
 def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
@@ -34,6 +41,14 @@ def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
         last = np.zeros(pitch, np.uint8)
         last[:rest] = flat[height * pitch :]
         texture.write(last, viewport=(0, height, layout.TEXELS_A_ROW, 1))
+    texture.filter = (context.NEAREST, context.NEAREST)
+    return texture
+
+
+def bare(context: Any, unit: int) -> Any:
+    """A texture of one texel, as something has to be bound there."""
+    channels, dtype = KINDS[unit]
+    texture = context.texture((1, 1), channels, bytes(channels * BYTES[dtype]), alignment=1, dtype=dtype)
     texture.filter = (context.NEAREST, context.NEAREST)
     return texture
 

@@ -33,7 +33,7 @@ def run(arguments: argparse.Namespace) -> int:
     try:
         with Renderer(config.device) as renderer:
             if packed is not None:
-                rows += kernel(renderer, packed)
+                rows += kernel(renderer, packed, config.device)
             rows += [(name, str(renderer.info[name])) for name in ("renderer", "version", "vendor")]
     except GpuError as error:
         raise Failed(str(error)) from None
@@ -54,11 +54,15 @@ def contents(scene: Scene, packed: Packed) -> list[tuple[str, str]]:
     return rows + [("warning", warning) for warning in packed.warnings]
 
 
-def kernel(renderer: Renderer, packed: Packed) -> list[tuple[str, str]]:
+def kernel(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple[str, str]]:
     """What the scene's kernel is compiled for, what not, and what that saves; measured here and now."""
-    from gpu.price import kernel_price
+    from gpu.price import SIZE, full_kernel, kernel_price
+    from gpu.settings import RenderSettings
+    from service.rendering.worker.compiler import Compiler
 
-    price = kernel_price(renderer, packed.arrays)
+    settings = RenderSettings(SIZE, SIZE)
+    price = kernel_price(renderer, packed.arrays, settings)
+    Compiler(renderer.info, device, crowded=lambda: False).met(full_kernel(packed.arrays, settings))
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
         ("features", " ".join(price.raised) or "none"),

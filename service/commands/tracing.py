@@ -16,6 +16,7 @@ from service.commands.progress import ProgressLine
 from service.quality import forecast
 from service.rendering import messages
 from service.rendering.messages import (
+    Appraised,
     Done,
     FromRenderer,
     Image,
@@ -27,6 +28,7 @@ from service.rendering.messages import (
     Update,
     View,
 )
+from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.task import Task
 
@@ -36,6 +38,7 @@ if TYPE_CHECKING:
     from service.quality import ResolvedSettings
 
 NUMBER = 1  # of the only task
+UNMEASURED = Appraised(NUMBER, "Not measured.")
 SIGNAL_S = 0.1  # how long a signal may go unnoticed while the denoiser works
 
 
@@ -68,11 +71,13 @@ class Tracing:
         self._line = ProgressLine()
         self._reason: str | None = None
         self._kernel: dict[str, Any] | None = None
+        self._appraised = UNMEASURED
         self._pixels: np.ndarray | None = None
         self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
         self._denoiser = Denoiser()
-        self._task = Task(renderer, NUMBER, self._hear, self._denoiser)
+        at_hand = Compiler(renderer.info, None, crowded=lambda: False)  # compiles nothing, knows what was
+        self._task = Task(renderer, NUMBER, self._hear, self._denoiser, spare=at_hand)
         update = Update(NUMBER, 1, packed.arrays, settings.for_gpu(), stop, denoise=settings.denoise)
         self._task.update(update)
 
@@ -96,6 +101,12 @@ class Tracing:
             raise Failed("stopped before the first sample: there is no picture yet")
         return self._pixels
 
+    def appraise(self) -> None:
+        """Measures what its kernel saves, where that takes no compiling."""
+        self._task.appraising.ask()
+        while self._task.appraising.due:
+            self._task.appraise()
+
     def close(self) -> None:
         self._denoiser.close()
 
@@ -116,7 +127,7 @@ class Tracing:
             "noise": now.noise,
             "elapsed_s": now.elapsed_s,
             "setup_s": setup_s,
-            "kernel": self._kernel,
+            "kernel": None if self._kernel is None else self._kernel | self._appraised.kernel,
             "eta_s": now.eta_s,
             "forecast": forecast(now.samples, now.noise, now.elapsed_s, now.missing),
             "warnings": self.warnings,
@@ -126,6 +137,8 @@ class Tracing:
     def _hear(self, message: FromRenderer) -> None:
         if isinstance(message, Image):
             self._pixels, self._answered = message.pixels, True
+        elif isinstance(message, Appraised):
+            self._appraised = message
         elif isinstance(message, Progressed):
             if self._line.due():
                 self._line.show(message.progress)

@@ -12,6 +12,8 @@ from typing import Any, Protocol
 from service.problems import Unavailable
 from service.rendering import link
 from service.rendering.messages import (
+    Appraise,
+    Appraised,
     Checkpoint,
     Done,
     Drop,
@@ -149,7 +151,7 @@ class Engine:
         held.record.told(message)
         if held.resident:
             self._send(message)
-        elif isinstance(message, Read):
+        elif isinstance(message, Read | Appraise):
             self._do(self._bring_back(message.task, held))
 
     async def send_scene(self, update: Update) -> None:
@@ -177,6 +179,7 @@ class Engine:
     def _begin(self) -> None:
         self._process = process = Process(self._options, self._received, lambda: self._lose(process))
         for task, held in self._tasks.items():
+            self._not_appraised(held, "The renderer was lost meanwhile: ask again.")
             held.resident = held.record.kept is None
             if held.resident:
                 self._tell_all(held.record)
@@ -213,6 +216,7 @@ class Engine:
 
     def _hear(self, message: FromRenderer, held: _Held) -> None:
         if isinstance(message, Evicted):
+            self._not_appraised(held, "It made room for others meanwhile: ask again.")
             held.resident = held.record.saved is None
             if held.resident:  # it ended before it had a sample
                 for read in list(held.record.reads.values()):
@@ -229,6 +233,11 @@ class Engine:
         elif isinstance(message, Frame | Progressed | Done) and time.monotonic() - held.struck_at > FORGIVEN_S:
             held.strikes = 0
         held.listener.heard(held.record.heard(message))
+
+    def _not_appraised(self, held: _Held, why: str) -> None:
+        """Nobody is tempted to try again and again what may have been too much."""
+        if (asked := held.record.appraise) is not None:
+            held.listener.heard(held.record.heard(Appraised(asked.task, why)))
 
     def _is_ready(self, message: Ready) -> None:
         assert self._process is not None

@@ -16,6 +16,8 @@ from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocume
 from service.quality import ResolvedSettings, forecast
 from service.rendering.engine import Engine
 from service.rendering.messages import (
+    Appraise,
+    Appraised,
     Done,
     Failed,
     FromRenderer,
@@ -32,6 +34,8 @@ from service.rendering.reading import stop_rule, weight
 
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 
+UNASKED = Appraised(0, "Nobody asked: GET this render with ?saving=true, and wait=60 to wait for it.")
+ASKED = Appraised(0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60.")
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 ID_BYTES = 16  # 128 bits: nobody guesses one
 PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
@@ -65,6 +69,8 @@ class Job:
         self._progress = Progress()
         self._reason: str | None = None
         self._kernel: dict[str, Any] | None = None  # before it is compiled
+        self._appraised = UNASKED
+        self._answered = asyncio.Event()  # by the renderer, as to that
         self._error: ServiceError | None = None
         self._task: int | None = None
         self._reads: dict[int, asyncio.Future[Image]] = {}
@@ -103,6 +109,20 @@ class Job:
             self._engine.drop(self._task)
             self._task = None
 
+    def appraise(self) -> None:
+        """Has measured what its kernel saves, when the renderer has nothing else to do."""
+        if self._appraised.sample_s is None and self._error is None:
+            self._appraised = ASKED
+            self._answered.clear()
+            if self._kernel is not None and self._task is not None:
+                self._engine.send(Appraise(self._task))
+
+    async def settled(self, appraised: bool) -> None:
+        """Returns when it is finished, and with `appraised` when that is answered."""
+        await self.finished.wait()
+        if appraised and self._kernel is not None and self._task is not None:
+            await self._answered.wait()
+
     @property
     def settings(self) -> ResolvedSettings:
         return self._settings
@@ -117,7 +137,7 @@ class Job:
             "noise": progress.noise,
             "elapsed_s": progress.elapsed_s,
             "setup_s": self._setup_s,
-            "kernel": self._kernel,
+            "kernel": None if self._kernel is None else self._kernel | self._appraised.kernel,
             "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
             "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
             "warnings": self._warnings,
@@ -149,6 +169,8 @@ class Job:
         elif isinstance(message, Loaded):
             self._setup_s += message.setup_s
             self._kernel = message.kernel
+            if self._appraised is ASKED:
+                self.appraise()
             self._warnings += message.warnings
             if self.state == "queued":
                 self.state = "running"
@@ -156,6 +178,9 @@ class Job:
             self._progress = message.progress
             if message.progress.samples:
                 self._sampled.set()
+        elif isinstance(message, Appraised):
+            self._appraised = message
+            self._answered.set()
         elif isinstance(message, Done):
             self._end(message)
         elif isinstance(message, Failed):
@@ -200,6 +225,7 @@ class Job:
     def _forget(self, error: ServiceError) -> None:
         self._error, self._packed = error, None
         self._sampled.set()
+        self._answered.set()
         for serial in list(self._reads):
             self._answer(serial, error)
 

@@ -130,6 +130,13 @@ class Drop:
 
 
 @dataclass(frozen=True)
+class Appraise:
+    """Asks what the kernel of a render saves, to be measured when there is nothing else to do."""
+
+    task: int
+
+
+@dataclass(frozen=True)
 class Restore:
     """The picture of a task whose scene was just sent again, as it was when Done or Checkpoint brought it."""
 
@@ -224,6 +231,29 @@ class Checkpoint:
 
 
 @dataclass(frozen=True)
+class Appraised:
+    """What a render's own kernel takes beside the one with everything on, or in `detail` why that is not known."""
+
+    task: int
+    detail: str = ""
+    full_compile_ms: float | None = None
+    sample_s: float | None = None  # and pixel
+    full_sample_s: float | None = None
+
+    @property
+    def kernel(self) -> dict[str, Any]:
+        """What a render's status says of it."""
+        known = self.sample_s is not None and self.full_sample_s is not None and self.full_sample_s > 0
+        return {
+            "saving": 1 - (self.sample_s or 0.0) / (self.full_sample_s or 1.0) if known else None,
+            "saving_unknown": self.detail or None,
+            "sample_s": self.sample_s,
+            "full_sample_s": self.full_sample_s,
+            "full_compile_ms": self.full_compile_ms,
+        }
+
+
+@dataclass(frozen=True)
 class Evicted:
     """The renderer has this finished task no more; Restore brings it back."""
 
@@ -258,5 +288,7 @@ class Failed:
     fallback: int | None = None
 
 
-ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Restore
-FromRenderer = Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Checkpoint | Done | Evicted | Failed
+ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Restore | Appraise
+FromRenderer = (
+    Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Checkpoint | Done | Appraised | Evicted | Failed
+)

@@ -7,6 +7,8 @@ from dataclasses import dataclass, replace
 from service.rendering import link
 from service.rendering.link import Encoded
 from service.rendering.messages import (
+    Appraise,
+    Appraised,
     Checkpoint,
     Done,
     Failed,
@@ -44,6 +46,7 @@ class Record:
 
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
+        self.appraise: Appraise | None = None  # not answered yet
         self.saved: Restore | None = None  # a finished picture
         self._checkpoint: Restore | None = None  # one under way
         self._task = task
@@ -68,6 +71,8 @@ class Record:
             self._want = message
         elif isinstance(message, Read):
             self.reads[message.serial] = message
+        elif isinstance(message, Appraise):
+            self.appraise = message
         elif isinstance(message, Pause | Resume):
             self._paused = message
         elif isinstance(message, Stop):
@@ -82,6 +87,8 @@ class Record:
                 self._fall_back(message)
         elif isinstance(message, Image):
             self.reads.pop(message.serial, None)
+        elif isinstance(message, Appraised):
+            self.appraise = None
         elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
             self._works(message.generation)
         if isinstance(message, Checkpoint):
@@ -99,8 +106,11 @@ class Record:
                 out.append(state.since)
         if kept is not None:
             out.append(kept)
+        asked: list[ToRenderer] = [*self.reads.values()]
+        if self.appraise is not None:
+            asked.append(self.appraise)
         if not out or self.saved is not None:
-            return [*out, *self.reads.values()]
+            return [*out, *asked]
         stopped = self._stopped_at
         if stopped is not None and stopped.progress.samples:  # as far as it was seen, not further and not less
             stop = StopRule(max_samples=stopped.progress.samples)
@@ -111,7 +121,7 @@ class Record:
             out.append(self._paused)
         if self._want is not None:
             out.append(self._want)
-        return [*out, *self.reads.values()]
+        return [*out, *asked]
 
     def close(self) -> None:
         while self._states:

@@ -46,6 +46,11 @@ class Kernel(BaseModel):
     raised: list[str] = Field(description="Features of the scene that the kernel was compiled with.")
     not_raised: list[str] = Field(description="Features that it was spared.")
     compile_ms: float
+    saving: float | None = Field(description="Share of the time of a kernel with everything on; measured.")
+    saving_unknown: str | None = Field(description="Why `saving` is null; null where it is not.")
+    sample_s: float | None = Field(description="Of this kernel, seconds a sample and pixel; null until measured.")
+    full_sample_s: float | None = Field(description="The same of the kernel with everything on.")
+    full_compile_ms: float | None = Field(description="What that one took to compile, or to load where it was kept.")
 
 
 class Forecast(BaseModel):

@@ -28,6 +28,14 @@ router = APIRouter(prefix="/v1", tags=["renders"])
 
 LONGEST_WAIT_S = 600.0  # many proxies cut idle connections long before
 Wait = Annotated[float, Query(ge=0, le=LONGEST_WAIT_S, allow_inf_nan=False, description="s")]
+Saving = Annotated[
+    bool,
+    Query(
+        description="Have measured what this render's kernel saves beside the one with everything on. That happens "
+        "once, while nothing is being rendered; the other kernel may have to be compiled for it, in spare time (17 s "
+        "of a core by llvmpipe). Answers bring it from then on."
+    ),
+]
 DISPLAYED = ("png", "jpeg", "webp")
 
 
@@ -108,15 +116,18 @@ async def renders(request: Request) -> list[dict[str, Any]]:
 @router.get(
     "/renders/{id}",
     summary="How far it is",
-    description="With `wait`, answers at the render's end, or after so many seconds.",
+    description="With `wait`, answers at the render's end, or after so many seconds; with `saving` too, when that is "
+    "measured.",
     response_model=None,
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422),
 )
-async def status(request: Request, id: answers.RenderId, wait: Wait = 0) -> dict[str, Any]:
+async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving: Saving = False) -> dict[str, Any]:
     job = house(request).renders.get(id, owner(request))
+    if saving:
+        job.appraise()
     if wait:
         with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(job.finished.wait(), wait)
+            await asyncio.wait_for(job.settled(saving), wait)
     return job.status()
 
 

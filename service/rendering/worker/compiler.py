@@ -20,6 +20,7 @@ if TYPE_CHECKING:
 
 TRIES = 3  # misfortunes in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
+SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others leave
 REMEMBERED = 256  # kernels; of thousands that were asked for the records tell
 RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
 DISABLED = {"1", "true", "yes", "y", "t"}
@@ -47,12 +48,16 @@ class _Order:
 class Compiler:
     """Its process starts with the first order and ends when idle for a while."""
 
-    def __init__(self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool]) -> None:
-        """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop."""
+    def __init__(
+        self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool], spare: bool = False
+    ) -> None:
+        """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop; `spare`: in time
+        that nobody else wants, however long that takes."""
         self._driver = f"{info['renderer']} {info['version']}"
         self._crowded = crowded
-        given = () if device is None else ("--device", str(device))
-        self._helper = Helper("service.rendering.worker.compiling", *given)
+        given = [] if device is None else ["--device", str(device)]
+        self._helper = Helper("service.rendering.worker.compiling", *given, *(["--spare"] if spare else []))
+        self._limit_s = SPARE_LIMIT_S if spare else LIMIT_S
         self._able = _has_cache()
         self._records = _records()
         self._known: set[Recipe] = set()  # what needs no helper any more, or was not helped
@@ -80,7 +85,7 @@ class Compiler:
             return False
         order = next((order for order in self._orders if order.recipe == recipe), None)
         if order is None:
-            if not self._able or not self._crowded() or (self._records / recipe.digest(self._driver)).exists():
+            if not self._able or not self._crowded() or self._is_recorded(recipe):
                 return False
             order = _Order(recipe)
             self._orders.append(order)
@@ -101,6 +106,17 @@ class Compiler:
             _prune(self._records)
         self._known.add(recipe)
         self._met.add(recipe)
+        self._record(recipe)
+
+    def has(self, recipe: Recipe) -> bool:
+        """Whether it loads at once."""
+        return recipe in self._met or self._is_recorded(recipe)
+
+    def _is_recorded(self, recipe: Recipe) -> bool:
+        return self._able and (self._records / recipe.digest(self._driver)).exists()
+
+    def _record(self, recipe: Recipe) -> None:
+        """It is in the driver's disk cache."""
         if self._able:
             try:
                 self._records.mkdir(parents=True, exist_ok=True)
@@ -121,7 +137,7 @@ class Compiler:
         except BlockingIOError:
             if not self._orders or time.monotonic() < self._until:
                 return
-            self._ended(f"it took more than {LIMIT_S:.0f} s")
+            self._ended(f"it took more than {self._limit_s:.0f} s")
         except link.Closed:
             self._ended("the compiler's process ended unexpectedly")
         else:
@@ -129,6 +145,8 @@ class Compiler:
             if not answer.cached:
                 log.warning("compiled ahead in vain: the driver has no disk cache to write to")
             log.info("compiled ahead ms=%.0f %s", answer.milliseconds, answer.detail)
+            if answer.cached and not answer.detail:
+                self._record(self._orders[0].recipe)
             self._tell(answer.milliseconds)
         if self._orders:
             self._begin()
@@ -154,7 +172,7 @@ class Compiler:
         try:
             if self._failures < TRIES:
                 self._helper.ask(self._orders[0].recipe)
-                self._until = time.monotonic() + LIMIT_S
+                self._until = time.monotonic() + self._limit_s
                 return
         except (link.Closed, OSError) as error:  # it can't be started
             log.info("no compiler: %s", error or "it had ended")

@@ -6,6 +6,7 @@ A process of its own with its own context: what it compiles the renderer loads f
 from __future__ import annotations
 
 import argparse
+import os
 import select
 import signal
 import socket
@@ -22,7 +23,10 @@ def main() -> int:
     parser.add_argument("descriptor", type=int)
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--device", type=int)
+    parser.add_argument("--spare", action="store_true", help="only while nobody else wants the processor")
     arguments = parser.parse_args()
+    if arguments.spare:
+        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not end_with(arguments.parent):
         return 0

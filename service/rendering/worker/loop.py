@@ -12,6 +12,7 @@ from collections.abc import Callable, Iterator
 from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
 from service.rendering import link
 from service.rendering.messages import (
+    Appraise,
     Drop,
     Evicted,
     Failed,
@@ -58,6 +59,7 @@ class Loop:
         self._scheduler = Scheduler()
         self._denoiser = Denoiser()
         self._compiler = Compiler(renderer.info, device, self._crowded)
+        self._spare = Compiler(renderer.info, device, lambda: True, spare=True)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
@@ -70,6 +72,7 @@ class Loop:
                 self._take(message)
             self._denoiser.hear()
             self._compiler.hear()
+            self._spare.hear()
             task = self._scheduler.choose(self._tasks.values())
             if task is not None:
                 began = time.monotonic()
@@ -80,13 +83,14 @@ class Loop:
                     self._work(task, task.answer)
             busy = any(task.ready for task in self._tasks.values())
             self._account(at_once=not busy)
+            busy = busy or self._appraise()
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """What has come in by now; with `wait`, as soon as there is anything, or a helper has spoken."""
         if wait:
-            ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
-            waits = [self._compiler.left_s, None if self._denoiser.late else self._denoiser.left_s]
-            waits.append(self._renderer.tidy())
+            ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._spare.ends]
+            waits = [self._compiler.left_s, self._spare.left_s, self._renderer.tidy()]
+            waits.append(None if self._denoiser.late else self._denoiser.left_s)
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
         try:
             while True:
@@ -96,14 +100,25 @@ class Loop:
         except BlockingIOError:
             return
 
-    def _work(self, task: Task, work: Callable[[], object], read: Read | None = None) -> None:
-        """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's."""
+    def _work(
+        self, task: Task, work: Callable[[], object], read: Read | None = None, spare: bool = False
+    ) -> None:
+        """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
+        in time that nobody wanted, which is not held against it."""
         began = time.perf_counter()
-        with self._pulse.working(task.number, COMPILING_S if task.loads else 0.0):
+        with self._pulse.working(task.number, COMPILING_S if task.loads or spare else 0.0):
             self._guard(task, work, read)
         seconds = time.perf_counter() - began
-        self._scheduler.charge(task, seconds)
+        if not spare:
+            self._scheduler.charge(task, seconds)
         self._used_s[task.number] += seconds
+
+    def _appraise(self) -> bool:
+        """A step of what is only done when there is nothing else; whether there was one."""
+        task = next((task for task in self._tasks.values() if task.appraising.due), None)
+        if task is not None:
+            self._work(task, task.appraise, spare=True)
+        return task is not None
 
     def _crowded(self) -> bool:
         return sum(task.awaited for task in self._tasks.values()) > 1
@@ -130,7 +145,7 @@ class Loop:
                 self._tasks[message.task] = task
             task.update(message)
         elif task is None:
-            if isinstance(message, Read):  # evicted, and the server had not heard of it when it sent this
+            if isinstance(message, Read | Appraise):  # evicted, and the server had not heard of it when it sent this
                 self._send(Evicted(message.task))
         elif isinstance(message, Want):
             task.look(message)
@@ -138,6 +153,8 @@ class Loop:
             self._work(task, lambda: task.read(message), message)
         elif isinstance(message, Restore):
             self._work(task, lambda: task.restore(message))
+        elif isinstance(message, Appraise):
+            task.appraising.ask()
         elif isinstance(message, Pause):
             task.pause(message.away)
         elif isinstance(message, Resume):
@@ -148,8 +165,9 @@ class Loop:
             self._remove(task)
 
     def _new(self, first: Update) -> Task:
-        shared = self._denoiser, first.client, self._memory, self._forget, self._compiler, self._checkpoint_s
-        return Task(self._renderer, first.task, self._send, *shared)
+        shared = self._denoiser, first.client, self._memory, self._forget
+        more = self._compiler, self._checkpoint_s, self._spare
+        return Task(self._renderer, first.task, self._send, *shared, *more)
 
     def _forget(self, task: Task) -> None:
         """The server has this finished picture, and brings it back when somebody asks for it."""

@@ -22,6 +22,7 @@ from service.rendering.messages import (
     Update,
     Want,
 )
+from service.rendering.worker.appraising import Appraising
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.course import Course
 from service.rendering.worker.denoiser import Denoiser
@@ -53,8 +54,9 @@ class Task:
         forget: Callable[[Task], None] | None = None,
         compiler: Compiler | None = None,
         checkpoint_s: float = inf,
+        spare: Compiler | None = None,
     ) -> None:
-        """With `compiler`, others need not wait for its kernels.
+        """With `compiler`, others need not wait for its kernels; `spare` is the one of `appraising`.
 
         With `forget`, Done brings the picture of a render to the server; what is forgotten it can bring back;
         while it is under way, a Checkpoint does so every `checkpoint_s` seconds."""
@@ -67,6 +69,7 @@ class Task:
         self._course = Course(renderer)
         smoothing = Smoothing(denoiser, yields=bool(renderer.info["software"]))
         self._showing = Showing(number, send, self._held, self._course, smoothing, self._finish, compiler)
+        self.appraising = Appraising(number, send, renderer, spare)
         self._scale = 1.0  # of what is traced
         self._pending: Update | None = None  # not applied yet
         self._stopping = False  # when that was applied
@@ -279,6 +282,11 @@ class Task:
             self._send(Checkpoint(self.number, self.generation, self.progress(), saved))
         return True
 
+    def appraise(self) -> None:
+        """A step of `appraising`."""
+        self._held.wake()
+        self.appraising.step(self._held.full if self._held.holding is not None else None)
+
     def pause(self, away: bool = False) -> None:
         self._paused, self._away = True, away
         self._course.clock.pause()
@@ -319,6 +327,7 @@ class Task:
         """What is on the device leaves it, and who works on that must let it go."""
         self._showing.part()
         self._course.beyond.restart()
+        self.appraising.part()
 
     def _restart(self) -> None:
         self._showing.restart()
