@@ -10,14 +10,14 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
-from gpu import features, layout
+from gpu import features, layout, meter, resolve
 from gpu.arrays import SceneArrays
 from gpu.errors import CompileError
 from gpu.program import Source
-from gpu.settings import RenderSettings
+from gpu.settings import TONE_MAPS, RenderSettings
 from gpu.texels import BYTES, KINDS
 
-ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others take some 30 ms, once
+ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others: `common`
 _BUFFER = 1 << 16  # bytes; zeros for whatever is bound, and no pixel looks at it
 _QUICK_S = 0.04  # of processor time: no compiler was at work
 _LOOKS = 8  # for a kernel in the disk cache, which drivers write behind our back
@@ -55,6 +55,14 @@ def full_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe:
     bound = {unit for unit, *_ in own.textures}
     bare = ((unit, channels, dtype, 1, 1) for unit, (channels, dtype) in KINDS.items() if unit not in bound)
     return replace(own, textures=(*own.textures, *bare))
+
+
+def common() -> list[Recipe]:
+    """The kernels of any scene: what a picture is shown with, and what the noise meter and `adaptive` ask of it."""
+    shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
+    metered = [("meter.comp", meter.defines(weigh)) for weigh in (0, 1)]
+    entries = [*shown, *metered, ("areas.comp", features.defines(frozenset()))]
+    return [Recipe(tuple(defines.items()), (), entry) for entry, defines in entries]
 
 
 def _textures(a: SceneArrays) -> tuple[tuple[int, int, str, int, int], ...]:

@@ -27,6 +27,11 @@ _BLOCKS = 1 << 20  # of pixels that are weighed at most, each as one
 _LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 
 
+def defines(weigh: int) -> dict[str, object]:
+    """What meter.comp is compiled with."""
+    return features.defines(frozenset()) | {"METER_WEIGH": weigh, "METER_LINE": LINE}
+
+
 class Meter:
     """Made for a picture of `size`; no more than `most` of its pixels are bound at once."""
 
@@ -87,8 +92,7 @@ class Meter:
         return float(np.sqrt(0.5 * (squared * places[:, 2]).sum() / pixels))
 
     def _kernel(self, weigh: int) -> Any:
-        defines = features.defines(frozenset()) | {"METER_WEIGH": weigh, "METER_LINE": LINE}
-        return self._kernels.get("meter.comp", defines)
+        return self._kernels.get("meter.comp", defines(weigh))
 
     def _vectors(self, slot: Slot) -> np.ndarray:
         return np.frombuffer(self.buffers[slot].read(), np.float32).reshape(-1, 4)

@@ -14,15 +14,19 @@ from gpu.layout import Slot
 _LINE = 1024  # pixels that resolve.comp takes for a row
 
 
+def defines(tone_map: str, dtype: str) -> dict[str, object]:
+    """What resolve.comp is compiled with."""
+    out = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve"}
+    return out | {"OUTPUT_FLOAT": int(dtype == "f4"), "LINE": _LINE}
+
+
 def resolve(
     context: Any, kernels: Kernels, sources: dict[Slot, Any], most: int, exposure: float, tone_map: str, dtype: str
 ) -> np.ndarray:
     """(n, 4) exposed, tone-mapped, sRGB: uint8, or float32 with dtype "f4". `sources`: SUM, and MOMENTS for the
     counts; no more than `most` pixels of them are bound at once."""
     floats = dtype == "f4"
-    defines = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve"}
-    defines |= {"OUTPUT_FLOAT": int(floats), "LINE": _LINE}
-    kernel = kernels.get("resolve.comp", defines)
+    kernel = kernels.get("resolve.comp", defines(tone_map, dtype))
     kernel["exposure"].value = 2.0**exposure
     pixels, parts = sources[Slot.SUM].size // 16, []
     for first in range(0, pixels, most):

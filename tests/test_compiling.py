@@ -13,10 +13,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, features
+from gpu import Recipe, Renderer, RenderSettings, features
+from gpu.ahead import common
 from service.pack import pack
 from service.rendering.engine import Engine
 from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
+from service.rendering.worker.compiler import Compiled, Compiler
 from service.rendering.worker.holding import Holding, kernel_of
 from service.scene import parse_scene
 from tests.documents import Shelf
@@ -30,22 +32,26 @@ LINEAR = View(encoding="linear")
 AHEAD = """
 import sys
 from gpu import features
-from gpu.ahead import ENTRY, GUIDES, Ahead, recipe
+from gpu.ahead import ENTRY, GUIDES, Ahead, common, recipe
 from tests.test_compiling import SETTINGS, arrays_of
-a = arrays_of(sys.argv[1])
+a, settings = arrays_of(sys.argv[1]), SETTINGS[sys.argv[1]]
 ahead = Ahead()
-print(all([ahead.compile(recipe(a, SETTINGS, features.flags(a), entry))[1] for entry in (ENTRY, GUIDES)]))
+recipes = [recipe(a, settings, features.flags(a), entry) for entry in (ENTRY, GUIDES)]
+print(all([ahead.compile(each)[1] for each in [*recipes, *common()]]))
 """
 RENDERER = """
 import sys
 from gpu import Renderer
 from tests.test_compiling import SETTINGS, arrays_of
 with Renderer() as renderer:
-    picture = renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS)
-    picture.trace(9.0, 2)
+    picture = renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS[sys.argv[1]])
+    picture.trace(9.0, 10)
     picture.read("normal")
+    picture.noise()
+    picture.display()
+    picture.display(tone_map="agx", dtype="f4")
 """
-SETTINGS = RenderSettings(32, 32, max_bounces=2)
+SETTINGS = {name: RenderSettings(32, 32, max_bounces=2, adaptive=name == "rich") for name in ("plain", "rich")}
 SCENES: dict[str, Any] = {
     "plain": SCENE,
     "rich": {
@@ -97,7 +103,8 @@ def helpers(parent: int | None) -> list[int]:
     for path in Path("/proc").glob("[0-9]*"):
         try:
             of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            if of == parent and b"compiling" in (path / "cmdline").read_bytes():
+            command = (path / "cmdline").read_bytes()
+            if of == parent and b"compiling" in command and b"--spare" not in command:
                 found.append(int(path.name))
         except OSError:
             continue
@@ -233,6 +240,37 @@ def test_without_a_cache_nobody_is_asked(
         assert helpers(engine.process_id) == [] and np.array_equal(pixels, in_the_loop(gpu, arrays))
 
     with_engine(test)
+
+
+class Instant:
+    """In the place of the helper's process."""
+
+    def __init__(self) -> None:
+        self.asked: list[Recipe] = []
+        self.answers = 0
+
+    def ask(self, recipe: Recipe) -> None:
+        self.asked.append(recipe)
+
+    def hear(self) -> Compiled:
+        if self.answers == len(self.asked):
+            raise BlockingIOError
+        self.answers += 1
+        return Compiled(5.0, cached=True)
+
+
+def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> None:
+    """What pictures are shown with, and what the noise meter and `adaptive` ask."""
+    asked = []
+    for _ in range(2):
+        compiler, helper = Compiler(gpu.info, None, lambda: True, spare=True), Instant()
+        compiler._helper = helper  # type: ignore[assignment]
+        compiler.prepare(common())
+        while compiler.left_s is not None:
+            compiler.hear()
+        assert all(compiler.has(recipe) for recipe in common())
+        asked.append(helper.asked)
+    assert asked == [common(), []] and len(common()) == 15
 
 
 @pytest.mark.parametrize("name", SCENES)

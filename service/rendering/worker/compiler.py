@@ -80,7 +80,8 @@ class Compiler:
         """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
         it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop.
         """
-        self.forget(told)
+        if told is not _nobody:
+            self.forget(told)
         if recipe in self._known:
             return False
         order = next((order for order in self._orders if order.recipe == recipe), None)
@@ -95,6 +96,11 @@ class Compiler:
             return False
         order.told.add(told)
         return True
+
+    def prepare(self, recipes: list[Recipe]) -> None:
+        """Has them compiled, those that no renderer here has met yet, though nobody waits."""
+        for recipe in recipes:
+            self.waits(recipe, _nobody)
 
     def met(self, recipe: Recipe) -> None:
         """The renderer has this kernel: the driver's disk cache too."""
@@ -181,6 +187,10 @@ class Compiler:
         log.warning("compiling in the loop from now on")
         while self._orders:
             self._tell(0.0)
+
+
+def _nobody(milliseconds: float) -> None:
+    """Waits."""
 
 
 def _has_cache() -> bool:

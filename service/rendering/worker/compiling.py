@@ -16,6 +16,7 @@ from service.rendering.worker.compiler import Compiled
 from service.rendering.worker.lifeline import end_with
 
 IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
+SPARE_IDLE_S = 5.0  # ... where kernels come seldom
 
 
 def main() -> int:
@@ -36,7 +37,7 @@ def main() -> int:
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
             ahead = Ahead(arguments.device)
-            while select.select([end], [], [], IDLE_S)[0]:
+            while select.select([end], [], [], SPARE_IDLE_S if arguments.spare else IDLE_S)[0]:
                 recipe = link.receive(end, wait=True)
                 try:
                     link.send(end, Compiled(*ahead.compile(recipe)))

@@ -9,7 +9,7 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 
-from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
+from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge, ahead
 from service.rendering import link
 from service.rendering.messages import (
     Appraise,
@@ -67,6 +67,7 @@ class Loop:
     def run(self) -> None:
         """Until the server is gone: raises link.Closed. Sleeps on its sockets when there is nothing to do."""
         busy = False
+        self._spare.prepare(ahead.common())
         while True:
             for message in coalesced(self._pending(wait=not busy)):
                 self._take(message)
