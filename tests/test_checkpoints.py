@@ -24,10 +24,10 @@ from tests.test_worker import Ears, settings
 ENDLESS = 1 << 24
 
 
-async def begun(engine: Engine, samples: int) -> tuple[int, Ears]:
+async def begun(engine: Engine, samples: int, **more: Any) -> tuple[int, Ears]:
     ears = Ears()
     task = engine.open(ears, "render")
-    await engine.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4), StopRule(samples)))
+    await engine.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4, **more), StopRule(samples)))
     return task, ears
 
 
@@ -51,9 +51,10 @@ async def picture(engine: Engine, task: int, ears: Ears) -> np.ndarray:
     return np.array((await ears.next(Image)).pixels)
 
 
-def test_it_goes_on_to_the_same_bits(gpu: Renderer) -> None:
+@pytest.mark.parametrize("adaptive", [False, True])
+def test_it_goes_on_to_the_same_bits(gpu: Renderer, adaptive: bool) -> None:
     async def test(engine: Engine) -> None:
-        task, ears = await begun(engine, ENDLESS)
+        task, ears = await begun(engine, ENDLESS, adaptive=adaptive)
         elapsed_s = 0.0
         for _ in range(3):
             saved = await lost(engine, ears)
@@ -68,7 +69,7 @@ def test_it_goes_on_to_the_same_bits(gpu: Renderer) -> None:
         assert engine.statistics.checkpoints >= 3 and engine.statistics.restarts["killed"] == 3
         pixels = await picture(engine, task, ears)
         engine.drop(task)
-        task, ears = await begun(engine, done.progress.samples)
+        task, ears = await begun(engine, done.progress.samples, adaptive=adaptive)
         await ears.next(Done)
         assert np.array_equal(pixels, await picture(engine, task, ears))
 
@@ -142,8 +143,9 @@ def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> No
     assert not kept.due(small)
     now = 10.0
     assert kept.due(small)
-    large: Any = SimpleNamespace(samples=1, settings=RenderSettings(4096, 4096))
-    assert not kept.due(large)
+    for side, kept_too in ((2236, True), (2400, False)):  # up to 5 megapixels, as the configuration says
+        large: Any = SimpleNamespace(samples=1, settings=RenderSettings(side, side))
+        assert kept.due(large) is kept_too
     kept.begin(small)
     steps = [kept.step() for _ in range(5)]
     assert steps == [None] * 4 + ["saved"] and not kept.under_way
