@@ -140,6 +140,14 @@ def png(pixels: np.ndarray, width: int | None = None, height: int | None = None)
     )
 
 
+def low_png(rows: list[int], width: int, bits: int, gamma: float | None = None) -> bytes:
+    """One line of grey, its bytes as given, of so many bits a texel."""
+    header = struct.pack(">IIBBBBB", width, 1, bits, 0, 0, 0, 0)
+    gammas = b"" if gamma is None else _chunk(b"gAMA", struct.pack(">I", round(gamma * 100000)))
+    body = _chunk(b"IDAT", zlib.compress(b"\0" + bytes(rows)))
+    return b"\x89PNG\r\n\x1a\n" + _chunk(b"IHDR", header) + gammas + body + _chunk(b"IEND", b"")
+
+
 def _chunk(kind: bytes, data: bytes) -> bytes:
     return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
 

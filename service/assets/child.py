@@ -132,7 +132,7 @@ def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Pieces]
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
         return {"scene": [np.frombuffer(told, np.uint8)], "files": files}, {}
     if isinstance(parsed, ImageData):
-        return {"pixels": [parsed.pixels]}, {}
+        return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}
     arrays: dict[str, Pieces] = {
         name: [array] for name, array in vars(parsed).items() if isinstance(array, np.ndarray)
     }

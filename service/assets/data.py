@@ -31,6 +31,7 @@ class ImageData:
     """Texels as stored, row 0 at the top of the image; nothing is decoded from sRGB. The array is read-only."""
 
     pixels: npt.NDArray[np.float32] | npt.NDArray[np.uint8]  # (height, width, 1 | 3 | 4), finite; 16 bits became 0..1
+    warnings: tuple[str, ...] = ()  # what the file says that is not followed
 
     @property
     def is_8bit(self) -> bool:

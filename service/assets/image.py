@@ -3,6 +3,7 @@
 import io
 import re
 import struct
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -23,7 +24,11 @@ SIGNATURES: dict[str, tuple[bytes, ...]] = {
 }
 PNG_END = b"IEND\xaeB`\x82"
 HDR_SIZE = re.compile(rb"\n([-+])([XY]) +(\d{1,9}) +([-+])(?!\2)[XY] +(\d{1,9})\n")
-COLOUR = ("R", "G", "B")
+COLOUR = (("r", "g", "b"), ("red", "green", "blue"))  # channels' names, of whatever case
+ALPHA = ("a", "alpha")
+ORIENTATION = 0x0112  # the EXIF tag
+SRGB_NAMES = (b"sRGB", "sRGB".encode("utf-16-be"))  # in the description of a profile
+SRGB_GAMMA = 1 / 2.2
 
 
 def parse_image(format: str, data: bytes, path: str, limits: AssetLimits) -> ImageData:
@@ -35,7 +40,8 @@ def parse_image(format: str, data: bytes, path: str, limits: AssetLimits) -> Ima
         raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
     is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
     if is_8bit:
-        return ImageData(np.ascontiguousarray(_pillow(format, data, limits)))
+        texels, warnings = _pillow(format, data, limits)
+        return ImageData(np.ascontiguousarray(texels), tuple(warnings))
     pixels = _openimageio(format, data, path, limits)
     if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
@@ -48,7 +54,7 @@ def check_size(width: int, height: int, limits: AssetLimits) -> None:
         raise ParseError(f"{width} x {height} texels; 1 to {limits.max_texels} are allowed")
 
 
-def _pillow(format: str, data: bytes, limits: AssetLimits) -> npt.NDArray[np.uint8]:
+def _pillow(format: str, data: bytes, limits: AssetLimits) -> tuple[npt.NDArray[np.uint8], list[str]]:
     from PIL import Image, UnidentifiedImageError
 
     Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
@@ -59,11 +65,27 @@ def _pillow(format: str, data: bytes, limits: AssetLimits) -> npt.NDArray[np.uin
     check_size(*image.size, limits)
     if format == "png" and PNG_END not in data:
         raise ParseError("the file is cut off: it has no IEND chunk")
+    warnings = list(_unfollowed(image))
     image.load()
     grey = image.mode in ("1", "L")
     transparent = image.mode in ("LA", "PA", "La", "RGBa", "RGBA") or "transparency" in image.info
     converted = image.convert("RGBA" if transparent else "L" if grey else "RGB")
-    return np.asarray(converted).reshape(converted.height, converted.width, -1)
+    return np.asarray(converted).reshape(converted.height, converted.width, -1), warnings
+
+
+def _unfollowed(image: Any) -> Iterator[str]:
+    """What the file says beside its texels. Row 0 is v = 1, says the contract; sRGB or linear, says the texture."""
+    frames = getattr(image, "n_frames", 1)
+    if frames > 1:
+        yield f"it moves: the first of its {frames} frames is shown"
+    turned = image.getexif().get(ORIENTATION, 1)
+    if turned in range(2, 9):
+        yield f"its EXIF orientation ({turned}) is not followed: texels are used as they are stored"
+    profile = image.info.get("icc_profile", b"")
+    if profile and not any(name in profile for name in SRGB_NAMES):
+        yield "its colour profile is not sRGB, and is not followed"
+    elif not profile and "srgb" not in image.info and abs(image.info.get("gamma", SRGB_GAMMA) - SRGB_GAMMA) > 0.01:
+        yield f"its gamma ({image.info['gamma']:g}) is not followed: set the texture's color_space"
 
 
 def _openimageio(format: str, data: bytes, path: str, limits: AssetLimits) -> Floats:
@@ -110,24 +132,34 @@ def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
 
 
 def _part(file: Any) -> tuple[int, list[int]]:
-    """The first part with a colour image, and the places of its channels: RGB, RGBA or a single one."""
+    """The first part with a colour image, or else a grey one, and the places of its channels: RGB, RGBA or one."""
     seen: list[str] = []
+    grey: tuple[int, list[int]] | None = None
     part = 0
     while file.seek_subimage(part, 0):
-        spec = file.spec()
-        names = list(spec.channelnames)
-        layers = dict.fromkeys(["", *(name.rpartition(".")[0] + "." for name in names if "." in name)])
-        for layer in layers:
-            if all(layer + c in names for c in COLOUR):
-                alpha = [layer + "A"] if layer + "A" in names else []
-                return _plain(spec, part, [names.index(n) for n in [*(layer + c for c in COLOUR), *alpha]])
-        if len(names) == 1:
-            return _plain(spec, part, [0])
-        if names == ["Y", "A"]:
-            return _plain(spec, part, [0, 0, 0, 1])
+        names = list(file.spec().channelnames)
+        found = _colored(names)
+        if found:
+            return _plain(file.spec(), part, found)
+        if grey is None and (len(names) == 1 or names == ["Y", "A"]):
+            grey = part, [0] if len(names) == 1 else [0, 0, 0, 1]
         seen += names
         part += 1
+    if grey is not None and file.seek_subimage(grey[0], 0):
+        return _plain(file.spec(), *grey)
     raise ParseError(f"it has no channels R, G and B; it has {', '.join(seen[:20])}")
+
+
+def _colored(names: list[str]) -> list[int]:
+    """The places of red, green, blue and perhaps alpha, of the first layer that has them; [] without any."""
+    places = {name.lower(): k for k, name in reversed(list(enumerate(names)))}
+    for layer in dict.fromkeys(["", *(name.rpartition(".")[0].lower() + "." for name in names if "." in name)]):
+        for colour in COLOUR:
+            wanted = [layer + name for name in colour]
+            if all(name in places for name in wanted):
+                alpha = [layer + name for name in ALPHA if layer + name in places][:1]
+                return [places[name] for name in wanted + alpha]
+    return []
 
 
 def _plain(spec: Any, part: int, channels: list[int]) -> tuple[int, list[int]]:
@@ -145,6 +177,8 @@ def _framed(pixels: npt.NDArray[Any], spec: Any) -> Floats:
         return pixels
     framed = np.zeros((spec.full_height, spec.full_width, pixels.shape[2]), np.float32)
     x, y = max(left, 0), max(top, 0)
+    if x >= spec.full_width or y >= spec.full_height or min(spec.width + left, spec.height + top) <= 0:
+        raise ParseError("its data window lies outside of its display window: nothing of it is to be seen")
     inside = pixels[y - top : spec.full_height - top, x - left : spec.full_width - left]
     framed[y : y + inside.shape[0], x : x + inside.shape[1]] = inside
     return framed

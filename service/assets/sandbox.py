@@ -196,7 +196,7 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
     finally:
         os.close(fd)
     if "pixels" in arrays:
-        return ImageData(arrays["pixels"])
+        return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
     if "scene" in arrays:
         return _scene(arrays["scene"], arrays["files"])
     get = arrays.get

@@ -270,10 +270,11 @@ def _format(data: bytes) -> str:
 
 
 def _describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
+    warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
     if isinstance(parsed, ImageData):
         height, width, channels = parsed.pixels.shape
-        return AssetInfo(id, KINDS[format], format, size, width=width, height=height, channels=channels)
-    warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
+        size_ = {"width": width, "height": height, "channels": channels}
+        return AssetInfo(id, KINDS[format], format, size, **size_, warnings=warnings)
     counts = {"vertices": len(parsed.vertices), "triangles": len(parsed.faces)}
     return AssetInfo(id, KINDS[format], format, size, **counts, bounds=_bounds(parsed), warnings=warnings)
 

@@ -76,7 +76,7 @@ def make_sky(environment: Environment, assets: Assets) -> Sky:
     height, width = image.pixels.shape[:2]
     if max(height, width) > LARGEST_SIDE:
         raise _refused("/environment/asset", f"is {width} x {height}; at most {LARGEST_SIDE} a side")
-    return _sky(*_clamped(_linear(image), "/environment/asset"))
+    return _sky(*_clamped(image, "/environment/asset"))
 
 
 def _image(reference: str, assets: Assets, pointer: str) -> ImageData:
@@ -105,7 +105,7 @@ def _cube(faces: CubeFaces, assets: Assets) -> Sky:
             errors.append(FieldError(pointers[name], f"is {width} x {height}, others are {wanted} x {wanted}"))
     if errors:
         raise InvalidDocument(errors)
-    parts, warnings = zip(*(_clamped(_linear(image), pointers[name]) for name, image in images.items()), strict=True)
+    parts, warnings = zip(*(_clamped(image, pointers[name]) for name, image in images.items()), strict=True)
     texels = np.vstack([np.hstack(parts[:3]), np.hstack(parts[3:])]).astype(np.float32)
     probability, cells = cube_tables(texels)
     solid = np.tile(cube_solid_angles(wanted), (2, 3))
@@ -139,15 +139,17 @@ def _linear(image: ImageData) -> np.ndarray:
     return np.asarray(LINEAR_OF_BYTE, np.float32)[pixels] if image.is_8bit else pixels
 
 
-def _clamped(texels: np.ndarray, pointer: str) -> tuple[np.ndarray, tuple[str, ...]]:
-    warnings = []
+def _clamped(image: ImageData, pointer: str) -> tuple[np.ndarray, tuple[str, ...]]:
+    """Radiance within its range, and what is told of that and of the image."""
+    texels, warnings = _linear(image), list[str]()
     for count, what in (
         (np.count_nonzero((texels < 0).any(axis=2)), "negative texels raised to 0"),
         (np.count_nonzero((texels > BRIGHTEST).any(axis=2)), f"texels beyond {BRIGHTEST:g} lowered to it"),
     ):
         if count:
             warnings.append(f"{pointer}: {count} {what}")
-    return np.clip(texels, 0, np.float32(BRIGHTEST)) if warnings else texels, tuple(warnings)
+    texels = np.clip(texels, 0, np.float32(BRIGHTEST)) if warnings else texels
+    return texels, (*warnings, *(f"{pointer}: {warning}" for warning in image.warnings))
 
 
 def _sky(texels: np.ndarray, warnings: tuple[str, ...]) -> Sky:

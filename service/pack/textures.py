@@ -112,7 +112,7 @@ def pack_textures(
     key = " ".join(f"{asset}@{first}" for asset, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
     arrays = TextureArrays(slots, words, texels.texels, texels.floats, key)
-    return arrays, uses, texels, list(_warnings(uses, images))
+    return arrays, uses, texels, [*_told(wanted, images), *_warnings(uses, images)]
 
 
 def _images(scene: Scene, assets: Assets) -> dict[str, ImageData]:
@@ -297,6 +297,12 @@ def values_of(use: Use, pixels: np.ndarray) -> np.ndarray:
     if channel != layout.CHANNEL_COLOR:
         pixels = pixels[..., [min(channel - layout.CHANNEL_R, pixels.shape[-1] - 1)]]
     return np.asarray(pixels[..., :3] * np.array(_factor(use.reference), np.float32))
+
+
+def _told(wanted: Mapping[str, str], images: Mapping[str, ImageData]) -> Iterator[str]:
+    """What is odd about the images of these textures."""
+    for asset, name in wanted.items():
+        yield from (f"/textures/{escaped(name)}/asset: {warning}" for warning in images[asset].warnings)
 
 
 def _warnings(uses: list[Use], images: Mapping[str, ImageData]) -> Iterator[str]:
