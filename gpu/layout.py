@@ -190,6 +190,7 @@ class Material(Record):
     sheen_color: vec3  # ABSENT: from sheen_tint
     anisotropic_rotation: f32  # degrees
     ior: f32  # inside over outside; ABSENT: from `specular`
+    cutoff: f32  # an opacity of at least this counts as 1, any other as 0; ABSENT: it is a chance
 
 
 class TextureSlot(Record):
@@ -209,7 +210,7 @@ class TextureSlot(Record):
 class TextureUse(Record):
     """How a texel becomes a member of a material: that channel (or all three), times the factor."""
 
-    factor: vec3  # of a normal map x is its strength; of an opacity y is its cutoff, or ABSENT
+    factor: vec3  # of a normal map x is its strength
     channel: u32  # CHANNEL_*
 
 
@@ -364,7 +365,7 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
     "ior": (1.0, 4.0),
 }  # fmt: skip
 NORMALS = ("normal", "coat_normal")
-OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "ambient": LARGE}
+OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "cutoff": UNIT, "ambient": LARGE}
 TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
 TEXELS_A_ROW = 8192  # of the textures that hold texels and coordinates, one after the other
 

@@ -101,16 +101,19 @@ Material texture_material(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) 
 
 // The chance that a ray meets the surface there. An alpha's cutoff is compared with the filtered texel.
 float texture_opacity(Point at) {
-    float opacity = material_pick(at.material).opacity;
+    Material m = material_pick(at.material);
+    float opacity = m.opacity;
 #if TEXTURE_OPACITY >= 0
     texture_use_opacity(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_OPACITY)), at), opacity);
 #endif
 #if HAS_VERTEX_COLORS
     opacity *= at.color.a;
 #endif
-#if TEXTURE_OPACITY >= 0
-    TextureUse use = texture_use_pick(at.material, TEXTURE_OPACITY_USE);
-    if (use.channel != TEXTURE_CHANNEL_NONE && use.factor.y >= 0.0) opacity = opacity >= use.factor.y ? 1.0 : 0.0;
+#if TEXTURE_CUTOFF >= 0
+    texture_use_cutoff(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_CUTOFF)), at), m.cutoff);
+#endif
+#if TEXTURE_OPACITY >= 0 || TEXTURE_CUTOFF >= 0 || HAS_VERTEX_COLORS
+    if (m.cutoff >= 0.0) opacity = opacity >= m.cutoff ? 1.0 : 0.0;
 #endif
     return opacity;
 }

@@ -146,7 +146,7 @@ STRUCTURE = {
     "/materials/t/normal_map/factor": (1,),
     "/materials/t/clearcoat_normal_map": ({"texture": "tiles"},),
     "/materials/a/normal_map": (0.5, None, "wood"),
-    "/materials/b/alpha_cutoff": ({"texture": "wood"},),
+    "/materials/b/alpha_cutoff": ([0.5], "half"),
     "/shapes/3/uvs": ([[0, 0]] * 2, [[0, 0]] * 4, [], 5, None),
     "/shapes/3/colors": ([[0, 0, 0]] * 2, 5, None),
     "/version": (GONE, 2, "1", 1.0, True, None),

@@ -94,7 +94,7 @@ def test_every_colour_and_number_of_a_material_may_be_a_texture() -> None:
         if not name.endswith("Material"):
             continue
         for field, prop in model["properties"].items():
-            if is_numeric(prop) and field != "alpha_cutoff":  # a threshold is one number
+            if is_numeric(prop):
                 reference = "ColorTexture" if prop["x-widget"] == "color" else "ScalarTexture"
                 assert prop["anyOf"][-1] == {"$ref": f"#/$defs/{reference}"}, (name, field)
 

@@ -198,6 +198,11 @@ def test_alpha_cuts_out(gpu: Renderer) -> None:
     scene["materials"]["m"]["alpha_cutoff"] = 0.5
     cut = seen(gpu, scene, "color", 64, assets=Images(a=alpha), max_bounces=0)[..., 0].mean(0)
     assert (cut[:19] == 1).all() and (cut[20:] == 0).all(), "the edge lies within a pixel"
+    # The cutoff, too, may be a texture: here of an even alpha, and the other way round.
+    scene["materials"]["m"] |= {"alpha": 0.5, "alpha_cutoff": {"texture": "t", "channel": "a"}}
+    cut = seen(gpu, scene, "color", 64, assets=Images(a=alpha), max_bounces=0)[..., 0].mean(0)
+    assert (cut[:19] == 0).all() and (cut[20:] == 1).all()
+    scene["materials"]["m"] |= {"alpha": {"texture": "t", "channel": "a"}, "alpha_cutoff": 0.5}
     lamp = {"type": "point", "position": [0, 0, 1], "intensity": 1}
     floor = {"type": "quad", "origin": [-9, -9, -1], "u": [18, 0, 0], "v": [0, 18, 0], "material": "floor"}
     below = {"position": [0, 0, -0.5], "target": [0, 0, -1], "up": [0, 1, 0], "vfov": 150}
@@ -218,6 +223,9 @@ def test_vertex_colours_multiply(gpu: Renderer) -> None:
     faint = {**mesh, "colors": [[*c, 0.25] for c in mesh["colors"]]}
     scene = scene_of({}, {}, faint, environment={"type": "constant", "radiance": 1})
     assert seen(gpu, scene, "color", 64, max_bounces=0)[..., 0].mean() == pytest.approx(0.75, abs=0.02)
+    for cutoff, alpha, through in ((0.2, 1.0, 0), (0.3, 1.0, 1), (0.3, 0.5, 1), (0.1, 0.5, 0)):
+        cut = scene_of({}, {"alpha": alpha, "alpha_cutoff": cutoff}, faint, environment=scene["environment"])
+        assert (seen(gpu, cut, "color", 4, max_bounces=0)[..., 0] == through).all()
 
 
 EVERY = {

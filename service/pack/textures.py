@@ -252,7 +252,7 @@ def record_of(use: Use, texels: Texels) -> np.ndarray:
 
 
 def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
-    """Factors, channels and cutoffs into the uses of `words`: what an edit of a material may change of them."""
+    """Factors and channels into the uses of `words`: what an edit of a material may change of them."""
     first = (max(slots.values()) + 1) * layout.TextureSlot.words
     records = words[:, first:].copy().view(layout.TextureUse.dtype)
     records[:] = 0
@@ -261,9 +261,6 @@ def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
         for key, reference in references(material).items():
             record = records[i, places[member_of(material, key)]]
             record["channel"], record["factor"] = _channel(reference), _factor(reference)
-        if "opacity" in places:
-            cutoff = material.alpha_cutoff
-            records[i, places["opacity"]]["factor"][1] = layout.ABSENT if cutoff is None else cutoff
     words[:, first:] = records.view(np.uint32)
 
 

@@ -15,7 +15,7 @@ from service.scene.numbers import Vec3
 from service.scene.texture import ColorTexture, ScalarTexture
 
 # What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
-RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity"}
+RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}
 RENAMED |= {"normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
 # Where a name means another thing in one model.
 RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
@@ -57,6 +57,8 @@ def pack_materials(scene: Scene) -> np.ndarray:
                     value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
                 record[member] = layout.ABSENT if value is None else value
         record["opacity"] = opacity(material)
+        if isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
+            record["cutoff"] /= material.alpha  # the opacity is 1 or 0 already, and a vertex's alpha a share of that
     return records
 
 
@@ -69,7 +71,7 @@ def opacity(material: Material) -> float:
     """The chance that a ray meets the surface."""
     if isinstance(material.alpha, ScalarTexture):
         return layout.TEXTURED
-    if material.alpha_cutoff is None:
+    if material.alpha_cutoff is None or isinstance(material.alpha_cutoff, ScalarTexture):
         return material.alpha
     return 1.0 if material.alpha >= material.alpha_cutoff else 0.0
 

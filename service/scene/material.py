@@ -7,7 +7,6 @@ from typing import Annotated, Literal
 from pydantic import Field
 
 from service.scene.base import OMITTABLE, Model, hint
-from service.scene.numbers import Fraction
 from service.scene.texture import (
     AnyDegrees,
     AnyFactor,
@@ -46,7 +45,7 @@ class _Surface(Model):
         ),
     ] = 1.0
     alpha_cutoff: Annotated[
-        Fraction | None,
+        AnyFraction | None,
         OMITTABLE,
         hint(
             "Alpha cutoff",
