@@ -46,7 +46,7 @@ class Recipe:
 def recipe(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str], entry: str = ENTRY) -> Recipe:
     """What a picture of `arrays` needs compiled where these flags are raised: its kernel, or that of its GUIDES."""
     defines = features.defines(raised, settings, features.counts(arrays))
-    return Recipe(tuple(defines.items()), _textures(arrays), entry)
+    return Recipe(tuple(defines.items()), _textures(arrays, raised), entry)
 
 
 def full_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe:
@@ -65,7 +65,7 @@ def common() -> list[Recipe]:
     return [Recipe(tuple(defines.items()), (), entry) for entry, defines in entries]
 
 
-def _textures(a: SceneArrays) -> tuple[tuple[int, int, str, int, int], ...]:
+def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, str, int, int], ...]:
     height, width = (1, 1) if a.environment is None else a.environment.texels.shape[:2]
     out = [(layout.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
     rows = [
@@ -76,6 +76,8 @@ def _textures(a: SceneArrays) -> tuple[tuple[int, int, str, int, int], ...]:
     if a.textures is not None:
         rows += [(layout.BYTES_TEXTURE, a.textures.texels, 4, "f1")]
         rows += [(layout.FLOATS_TEXTURE, a.textures.floats, 4, "f4")]
+    if "HAS_LIGHT_TREE" in raised:
+        rows += [(layout.LIGHT_TREE_TEXTURE, a.light_words, 4, "u4")]
     for unit, values, channels, dtype in rows:
         if len(values):
             height = -(-values.nbytes // (layout.TEXELS_A_ROW * channels * BYTES[dtype]))

@@ -90,6 +90,7 @@ class SceneArrays:
     triangle_uvs_1: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # of set 1
     triangle_colors: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 4), np.float16))
     lights: np.ndarray = field(default_factory=lambda: _empty(layout.Light))
+    light_tree: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint32))  # as by gpu.light_tree.build
     nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # as by gpu.bvh.thread
     node_count: int = 0  # of one octant's order
     node_origin: Vec3 = (0.0, 0.0, 0.0)
@@ -100,3 +101,8 @@ class SceneArrays:
     textures: TextureArrays | None = None
     radiance_scale: float = 1.0  # about the largest radiance a picture of it will hold; a power of two
     origin: Vec3 = (0.0, 0.0, 0.0)
+
+    @property
+    def light_words(self) -> np.ndarray:
+        """The lights' tree; where there is none, for kernels that ask: a head by which no number goes down a tree."""
+        return self.light_tree if len(self.light_tree) else np.zeros((2, 4), np.uint32)

@@ -130,6 +130,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     ),
     "HAS_LIGHTS": lambda s: len(s.lights) > 0,
     "HAS_MANY_LIGHTS": lambda s: len(s.lights) > 1,
+    "HAS_LIGHT_TREE": lambda s: len(s.light_tree) > 0,
     "HAS_POINT_LIGHTS": _light(LightKind.POINT),
     "HAS_SPOT_LIGHTS": _light(LightKind.SPOT),
     "HAS_DIRECTIONAL_LIGHTS": _light(LightKind.DIRECTIONAL),

@@ -114,8 +114,11 @@ def _constants() -> str:
         "LEAF_FIRST_MASK",
         "TREELET_BIT",
         "TREELET_MAX_NODES",
+        "LIGHT_CODES",
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
+    out.append(f"#define LIGHT_TREE_TEXTURE {layout.LIGHT_TREE_TEXTURE}")
+    out.append(f"const uint LIGHT_TREE_ROW = {layout.TEXELS_A_ROW}u;")
     out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in layout.ENERGY_TEXTURES.items()]
     sizes = ("ETAS", "ASPECTS", "STEPS", "AZIMUTHS", "COSINES")
     out += [f"#define ENERGY_{name} {size}" for name, size in zip(sizes, energy.STRETCHED_SHAPE, strict=True)]

@@ -16,7 +16,8 @@ def _cache() -> Path:
     numba alone would miss a change in a function or constant that came from another file.
     """
     folder = Path(__file__).parent
-    sources = [*sorted(folder.glob("bvh*.py")), *sorted(folder.glob("energy_*.py")), folder / "layout.py"]
+    names = ("bvh*.py", "energy_*.py", "light_*.py", "layout.py")
+    sources = [source for name in names for source in sorted(folder.glob(name))]
     digest = sha256(b"".join(source.read_bytes() for source in sources)).hexdigest()
     home = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
     return home / "sunbox" / "numba" / digest[:16]

@@ -124,6 +124,7 @@ ENVIRONMENT_TEXTURE = 0  # texture units
 BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
 UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
 COLORS_TEXTURE = 12
+LIGHT_TREE_TEXTURE = 13
 ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
 
 
@@ -287,12 +288,34 @@ class Light(Record):
     kind: u32  # LightKind
     intensity: vec3  # W/sr, points and spots; directional: radiance of the disk, or irradiance; 0 for shapes
     index: u32  # into the array of the shape's kind
-    probability: f32  # of being picked
+    probability: f32  # of being picked; of a light in the tree: the part that does not go by the tree
     threshold: f32  # alias table: keep this light where u < threshold
-    alias: u32  # else take that one
+    alias: u32  # else take that one; of a light in the tree: bit k says which child leads to it at depth k
     material: u32
     direction: vec3  # the way the light travels; a spot's is scaled, see spot.glsl
     spread: f32  # spot: see spot.glsl; directional: 1 - cos of the disk's half angle, 0: no disk
+
+
+class LightTreeHead(Record):
+    """The first words of the lights' tree: how the numbers 0 .. LIGHT_CODES - 1 are dealt out, and its grid."""
+
+    near: u32  # below: the tree's lights; from there on those at infinity, by their alias table
+    even: u32  # below: the tree's lights alike; from there to `near` down the tree
+    even_shift: u32  # the power of two of numbers that each then has
+    far_first: u32  # the first light that is not in the tree
+    origin: vec3  # world position of grid coordinate 0
+    inverse_step: f32  # grid steps a metre
+
+
+class LightNode(Record):
+    """Bounds of some lights; the two children of a node stand side by side, the pair k at 2 k and 2 k + 1."""
+
+    place: u32  # middle of a ball around them, in grid steps: x, y << 16
+    reach: u32  # z; the ball's radius << 16; sine of half the angle of the normals' cone << 24, of 255
+    # The cone's axis, octahedral 2 x 8 bits; sine of half the angle from a normal at which light leaves << 16, of 31
+    # for a right one; intensity << 21
+    shine: u32
+    link: u32  # the pair of its children; a light: LEAF_BIT | its index
 
 
 class EnvironmentCell(Record):
@@ -378,6 +401,8 @@ LEAF_MAX_COUNT = 16
 # A treelet's link: bit 31 not set, bit 30 set, nodes << LEAF_COUNT_SHIFT, first: from where the octants' orders end
 TREELET_BIT = 0x40000000
 TREELET_MAX_NODES = 63
+
+LIGHT_CODES = 1 << 30  # numbers that lights are picked by, in a scene with a tree of them
 
 BUFFERS: dict[str, tuple[type[Record], Slot]] = {
     "material": (Material, Slot.MATERIALS),

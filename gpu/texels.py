@@ -11,13 +11,14 @@ import numpy as np
 from gpu import layout
 from gpu.errors import OutOfMemory
 
-BYTES = {"f1": 1, "f2": 2, "f4": 4}
+BYTES = {"f1": 1, "f2": 2, "f4": 4, "u4": 4}
 KINDS = {  # channels and dtype, by texture unit
     layout.UVS_TEXTURES[0]: (2, "f4"),
     layout.UVS_TEXTURES[1]: (2, "f4"),
     layout.COLORS_TEXTURE: (4, "f2"),
     layout.BYTES_TEXTURE: (4, "f1"),
     layout.FLOATS_TEXTURE: (4, "f4"),
+    layout.LIGHT_TREE_TEXTURE: (4, "u4"),
 }
 
 

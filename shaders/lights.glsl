@@ -22,7 +22,26 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 #include "lights/quad.glsl"
 #include "lights/triangle.glsl"
 #include "lights/ellipsoid.glsl"
+#include "light_tree.glsl"
 
+#if HAS_LIGHT_TREE
+// All 32 bits: a light among many has a chance too small for the 24 of a float. `probability` of what is drawn is all
+// that it is picked with at `at`.
+Light lights_pick(uint bits, Asker at) {
+    uvec4 head = light_tree_head();
+    uint code = bits >> 2u, far = frame.light_count - head.w;
+    bool near = code < head.x, even = code < head.y;
+    float x = float(code - head.x) * (float(far) / float(max(LIGHT_CODES - head.x, 1u)));
+    uint i = head.w + min(uint(x), far - 1u), first = near ? (even ? code >> head.z : 0u) : i;
+    Light drawn = light_pick(first);
+    uint found;
+    float chance = light_tree_walk(near, even, code, drawn.alias, at, found);
+    uint other = fract(x) >= drawn.threshold ? drawn.alias : i;
+    Light l = light_pick(near ? (even ? first : found) : other);
+    if (near) l.probability += chance;
+    return l;
+}
+#else
 Light lights_pick(float u) {
 #if HAS_MANY_LIGHTS
     float x = u * float(frame.light_count);
@@ -33,6 +52,7 @@ Light lights_pick(float u) {
     return light_load(0u);
 #endif
 }
+#endif
 
 #if HAS_QUAD_LIGHTS
 // Loads at a constant place where there is one emitting quad, as in many a room: a third of a frame's time there.
@@ -116,11 +136,16 @@ vec3 lights_glow(LightSample s, vec3 p) {
 }
 #endif
 
-// p: the shaded point; u_pick chooses the light, the bits of two more numbers the direction.
-LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
+// at: who asks; the bits of one number choose the light, those of two more the direction.
+LightSample lights_sample(Asker at, uint pick_bits, uvec2 bits) {
     LightSample s = lights_none();
+    vec3 p = at.p;
     vec2 u = sobol_units(bits);
-    Light l = lights_pick(u_pick);
+#if HAS_LIGHT_TREE
+    Light l = lights_pick(pick_bits, at);
+#else
+    Light l = lights_pick(sobol_unit(pick_bits));
+#endif
 #if HAS_POINT_LIGHTS
     if (l.kind == LIGHT_POINT) s = point_light_sample(l, p);
 #endif
@@ -168,10 +193,15 @@ LightSample lights_sample(vec3 p, float u_pick, uvec2 bits) {
     return s;
 }
 
-// Density of lights_sample at p for the direction wi that met the emitting shape n.id at distance n.t.
-float lights_pdf(uint light, Nearest n, Point at, vec3 p, vec3 wi) {
+// Density of lights_sample for who asks and the direction wi, which met the emitting shape n.id at distance n.t.
+float lights_pdf(uint light, Nearest n, Point at, Asker asker, vec3 wi) {
 #if HAS_EMISSION
+    vec3 p = asker.p;
     Light l = light_pick(light);
+#if HAS_LIGHT_TREE
+    uint same;
+    l.probability += light_tree_walk(light != NONE && light_tree_head().x > 0u, true, 0u, l.alias, asker, same);
+#endif
     Emitter e = lights_emitter(l);
     uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK; // as the light has them, without a load
     float pdf = 0.0;

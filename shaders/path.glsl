@@ -118,14 +118,29 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
             if (clear && !inside) beyond = medium_entered(medium, rate);
 #endif
             uint pair = PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE;
-            vec2 choice = sobol_pair(rng, pair + PAIR_CHOICE);
+            uvec2 choice_bits = sobol_bits(rng, pair + PAIR_CHOICE);
+            vec2 choice = sobol_units(choice_bits);
             uint flat_id = at.flat_id;
             vec3 from = at.p;
 #if HAS_EMISSION_BOTH
             from = shapes_leave(at, front); // inside or outside of the very shape that shines
 #endif
+#if HAS_LIGHT_TREE
+#if HAS_NORMAL_MAPS
+            vec3 facing = mapped ? front : basis.z; // a lobe that folds reaches all that is in front
+#else
+            vec3 facing = basis.z;
+#endif
+#if HAS_TRANSMISSION
+            Asker asker = Asker(from, facing, surface_transmits(m));
+#else
+            Asker asker = Asker(from, facing, false);
+#endif
+#else
+            Asker asker = Asker(from);
+#endif
 #if HAS_LIGHTS
-            LightSample light = lights_sample(from, choice.x, sobol_bits(rng, pair + PAIR_LIGHT));
+            LightSample light = lights_sample(asker, choice_bits.x, sobol_bits(rng, pair + PAIR_LIGHT));
 #if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
             bool wanted = light.pdf > 0.0 && !light.extended;
 #else
@@ -284,7 +299,7 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #if HAS_EMISSION
             vec3 arriving = arriving_emission(at, d);
 #if ESTIMATOR == ESTIMATOR_MIS
-            if (at.light != NONE) arriving *= arriving_weight(found_pdf, lights_pdf(at.light, n, at, from, d));
+            if (at.light != NONE) arriving *= arriving_weight(found_pdf, lights_pdf(at.light, n, at, asker, d));
 #endif
 #if HAS_TRANSMISSION
             arriving *= dense;

@@ -72,6 +72,7 @@ SCENES: dict[str, Doc] = {
     "SPHERE_LIGHTS": made_of(LAMP, ball("m")), "QUAD_LIGHTS": made_of(LAMP, FLOOR),
     "TRIANGLE_LIGHTS": made_of(LAMP, TRIANGLE), "ELLIPSOID_LIGHTS": made_of(LAMP, ball("m", **ODD)),
     "LIGHTS": lit(), "MANY_LIGHTS": lit(lights=[{"type": "point", "position": [0, 2, 0], "intensity": 4}]),
+    "LIGHT_TREE": lit(lights=[{"type": "point", "position": [i, 2, 0], "intensity": 4} for i in range(9)]),
     "POINT_LIGHTS": lit(lights=[{"type": "point", "position": [0, 2, 0], "intensity": 4}]),
     "SPOT_LIGHTS": lit(lights=[{"type": "spot", "position": [0, 2, 0], "direction": [0, -1, 0], "intensity": 4,
                                 "inner_angle": 20, "outer_angle": 30}]),

@@ -10,6 +10,7 @@ import pytest
 from gpu import Renderer
 from service.pack import pack
 from service.scene import parse_scene
+from tests.light_trees import nodes_of, ways
 from tests.rendering import Images, document, render
 
 STRIPES = np.zeros((2, 4, 3), np.float32)
@@ -89,5 +90,6 @@ def test_dark_triangles_are_rarely_picked() -> None:
     arrays = pack(parse_scene(scene_of(mesh)), Images(s=stripe)).arrays
     uvs = arrays.triangle_uvs[arrays.lights["index"]].mean(1)
     bright = (uvs[:, 0] > 0.25) & (uvs[:, 0] < 0.5)
-    assert arrays.lights["probability"][bright].sum() > 0.85
+    shares = nodes_of(arrays.light_tree).intensity[[way[-1] for way in ways(arrays)]]
+    assert shares[bright].sum() > 0.85 * shares.sum()
     assert (arrays.lights["probability"] > 0).all(), "none may be missed for good"

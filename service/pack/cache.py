@@ -62,10 +62,10 @@ def content(shape: Shape) -> Hashable:
     """A key that is equal for equal shapes, arrays by their bytes."""
     if not isinstance(shape, MeshShape):
         return shape
-    return tuple(_digest(getattr(shape, name)) for name in MeshShape.model_fields)
+    return tuple(digest(getattr(shape, name)) for name in MeshShape.model_fields)
 
 
-def _digest(value: Any) -> Hashable:
+def digest(value: Any) -> Hashable:
     if not isinstance(value, np.ndarray):
         return value  # type: ignore[no-any-return]
     data = np.ascontiguousarray(value).data

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 
 import numpy as np
 
@@ -24,10 +24,16 @@ EVEN = 0.05  # share of the picks that goes to all lights alike
 # Bounds on the share of the sky and the suns where there are nearer lights; a wide floor makes their power look huge
 FAR_SHARE = (0.2, 0.8)
 
+# From so many bounded lights on they are picked by a tree.
+LEAST_TREE = 8
+
 # Share of a spot's cone that its fading rim takes at least: its inverse, and what is added to it, fit into float32.
 LEAST_RIM = 1e-6
 # Radians: a disk narrower than this is a point, as float32 directions have no digits for a place on it.
 LEAST_DISK = 1e-6
+
+# Bounded lights (n,), their power (n,) and their share of all picks -> as `gpu.light_tree.build`
+Grow = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, float]]
 
 
 def mark(shapes: dict[ShapeKind, np.ndarray], emissive: np.ndarray) -> np.ndarray:
@@ -144,19 +150,23 @@ def _unit(v: Sequence[float]) -> np.ndarray:
     return np.divide(v, math.hypot(*v))
 
 
-def weigh(lights: np.ndarray, power: np.ndarray, sky_power: float) -> np.ndarray:
-    """The records, the sky's appended where it has power, with the alias table by which they are picked.
+def weigh(
+    lights: np.ndarray, power: np.ndarray, sky_power: float, grow: Grow | None = None
+) -> tuple[np.ndarray, np.ndarray]:
+    """The records, the sky's appended where it has power, with how they are picked; and the words of the tree that
+    the bounded ones are picked by, none where they are too few to be worth it: then an alias table knows them all.
 
     `power` (n,), W of luminance, all positive. The sky's is for a brightness of 1: turning that up or down edits no
     table, and the picture stays the same as one packed anew.
     """
     power = power.astype(np.float64)
+    words = np.zeros((0, 4), np.uint32)
     if sky_power > 0:
         sky = np.zeros(1, layout.Light.dtype)
         sky["kind"] = LightKind.ENVIRONMENT
         lights, power = np.concatenate([lights, sky]), np.append(power, sky_power)
     if not len(lights):
-        return lights
+        return lights, words
     far = (lights["kind"] == LightKind.ENVIRONMENT) | (lights["kind"] == LightKind.DIRECTIONAL)
     low, high = FAR_SHARE if far.any() and not far.all() else (0.0, 1.0)
     share = min(max(float(power[far].sum() / power.sum()), low), high)
@@ -165,8 +175,16 @@ def weigh(lights: np.ndarray, power: np.ndarray, sky_power: float) -> np.ndarray
         if group.any():
             mine = power[group]
             weights[group] = part * ((1 - EVEN) * mine / mine.sum() + EVEN / len(mine))
-    lights["threshold"], lights["alias"], lights["probability"] = alias_table(weights)
-    return lights
+    n = int((~far).sum())  # they come first
+    if grow is None or n < LEAST_TREE:
+        lights["threshold"], lights["alias"], lights["probability"] = alias_table(weights)
+        return lights, words
+    words, lights["alias"][:n], lights["probability"][:n] = grow(lights[:n], power[:n], 1 - share)
+    if n < len(lights):
+        threshold, alias, probability = alias_table(weights[n:])
+        lights["threshold"][n:], lights["alias"][n:] = threshold, n + alias
+        lights["probability"][n:] = share * probability
+    return lights, words
 
 
 def luminance(color: np.ndarray) -> np.ndarray:

@@ -13,6 +13,7 @@ from gpu import EnvironmentArrays, SceneArrays
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets
 from service.pack import lights
+from service.pack.bounded import tree
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
 from service.pack.glow import glow
@@ -69,7 +70,16 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
             sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
     standing, standing_power = lights.standing(scene.lights, built.origin, built.radius)
     emission, brightest = glow(materials, uses, texels, built)
-    area_power = np.pi * built.areas * lights.luminance(emission) * lights.sides(built.lights, materials)
+    built_sides = lights.sides(built.lights, materials)
+    area_power = np.pi * built.areas * lights.luminance(emission) * built_sides
+
+    def grow(near: np.ndarray, power: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray, float]:
+        sides = np.concatenate([built_sides, np.ones(len(near) - len(built_sides), built_sides.dtype)])
+        return tree(near, power, share, built.shapes, sides, 2 * built.radius, cache)
+
+    weighed, light_tree = lights.weigh(
+        np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power, grow
+    )
     reached = np.where(standing["kind"] == LightKind.DIRECTIONAL, 1.0, math.pi * built.radius**2)
     peak = max(
         peak,
@@ -89,9 +99,8 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         triangle_uvs=built.triangle_uvs,
         triangle_uvs_1=built.triangle_uvs_1,
         triangle_colors=built.triangle_colors,
-        lights=lights.weigh(
-            np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power
-        ),
+        lights=weighed,
+        light_tree=light_tree,
         nodes=built.nodes,
         node_count=built.node_count,
         node_origin=built.node_origin,

@@ -1,0 +1,120 @@
+"""Where bounded lights are, where they send light to and how much: what their tree is made from."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from gpu.layout import LightKind, ShapeKind
+from service.pack.cache import PackCache, digest
+
+LASTING = 4096  # lights whose tree is worth keeping beside geometries: it takes some ms
+
+_FLAT = np.array([0.0, 0.0, 1.0])
+
+
+class Bounds:
+    """Arrays over n lights, as `gpu.light_tree.build` takes them."""
+
+    def __init__(self, n: int) -> None:
+        self.low, self.high = np.zeros((n, 3)), np.zeros((n, 3))
+        self.radius = np.zeros(n)
+        self.axis = np.tile(_FLAT, (n, 1))
+        self.normals = np.full(n, -1.0)  # all directions
+        self.beyond = np.zeros(n)
+        self.solid_angle = np.full(n, 4 * np.pi)  # sr: power over intensity
+
+    def set_box(self, mine: np.ndarray, low: np.ndarray, high: np.ndarray, radius: np.ndarray) -> None:
+        self.low[mine], self.high[mine], self.radius[mine] = low, high, radius
+
+
+def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray) -> Bounds:
+    """Of `layout.Light` records of bounded lights (n,); `sides` (n,): how many of a flat one's send light."""
+    out = Bounds(len(lights))
+    kinds = lights["kind"]
+
+    def of(kind: LightKind, shape: ShapeKind | None = None) -> tuple[np.ndarray, np.ndarray]:
+        mine = np.flatnonzero(kinds == kind)
+        return mine, lights[mine] if shape is None else shapes[shape][lights["index"][mine]]
+
+    mine, points = of(LightKind.POINT)
+    out.set_box(mine, points["position"], points["position"], np.zeros(len(mine)))
+    mine, spots = of(LightKind.SPOT)
+    _spots(out, mine, spots)
+    mine, balls = of(LightKind.SPHERE, ShapeKind.SPHERE)
+    center, radius = balls["center"].astype(np.float64), balls["radius"].astype(np.float64)
+    out.set_box(mine, center - radius[:, None], center + radius[:, None], radius)
+    mine, solids = of(LightKind.ELLIPSOID, ShapeKind.ELLIPSOID)
+    _ellipsoids(out, mine, solids)
+    mine, quads = of(LightKind.QUAD, ShapeKind.QUAD)
+    o, u, v = (quads[name].astype(np.float64) for name in ("origin", "u", "v"))
+    _flats(out, mine, np.stack([o, o + u, o + u + v, o + v], axis=1), quads["normal"], sides)
+    mine, triangles = of(LightKind.TRIANGLE, ShapeKind.TRIANGLE)
+    corners = np.stack([triangles[name].astype(np.float64) for name in ("v0", "v1", "v2")], axis=1)
+    _flats(out, mine, corners, np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), sides)
+    return out
+
+
+def _flats(out: Bounds, mine: np.ndarray, corners: np.ndarray, across: np.ndarray, sides: np.ndarray) -> None:
+    """`corners` (n, k, 3), `across` (n, 3) along the outward normals."""
+    low, high = corners.min(axis=1), corners.max(axis=1)
+    away = np.linalg.norm(corners - 0.5 * (low + high)[:, None], axis=2).max(axis=1)
+    out.set_box(mine, low, high, away)
+    across = across.astype(np.float64)
+    peak = np.abs(across).max(axis=1, keepdims=True)  # first, or squares of tiny areas would be denormal
+    across = across / np.where(peak > 0, peak, 1.0)
+    length = np.linalg.norm(across, axis=1, keepdims=True)
+    one = (sides[mine] == 1) & (length[:, 0] > 0)
+    out.axis[mine[one]] = across[one] / length[one]
+    out.normals[mine[one]] = 1.0
+    out.solid_angle[mine] = np.pi * sides[mine]
+
+
+def _ellipsoids(out: Bounds, mine: np.ndarray, solids: np.ndarray) -> None:
+    rows = np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(np.float64)
+    axes = np.linalg.inv(rows) if len(rows) else rows  # columns: half axes
+    half = np.linalg.norm(axes, axis=2)
+    center = solids["center"].astype(np.float64)
+    longest = np.linalg.svd(axes, compute_uv=False)[:, 0] if len(rows) else np.zeros(0)
+    out.set_box(mine, center - half, center + half, longest)
+
+
+def _spots(out: Bounds, mine: np.ndarray, spots: np.ndarray) -> None:
+    """What spot.glsl has of the two angles: 1 / (2 rim) as the square of the direction, outer / rim."""
+    out.set_box(mine, spots["position"], spots["position"], np.zeros(len(mine)))
+    direction = spots["direction"].astype(np.float64)
+    length2 = (direction**2).sum(axis=1)
+    rim = 0.5 / length2
+    outer = np.minimum(spots["spread"] * rim * (1 + 1e-6), 1.0)  # 1 - cos
+    inner = np.maximum(outer - rim, 0.0)
+    out.axis[mine] = direction / np.sqrt(length2)[:, None]
+    out.normals[mine] = 1 - inner
+    beyond = 2 * (np.arcsin(np.sqrt(outer / 2)) - np.arcsin(np.sqrt(inner / 2)))
+    out.beyond[mine] = np.maximum(np.cos(beyond), 0.0)
+    out.solid_angle[mine] = np.pi * (inner + outer)
+
+
+def tree(
+    lights: np.ndarray, power: np.ndarray, share: float, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray,
+    reach: float, cache: PackCache | None,
+) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+    """As `gpu.light_tree.build`, of `layout.Light` records (n,) with their `power` (n,), W of luminance."""
+    from gpu.light_tree import build  # here, as it loads numba
+
+    b = bounds(lights, shapes, sides)
+    given = (b.low, b.high, b.radius, b.axis, b.normals, b.beyond, power / b.solid_angle)
+
+    def make() -> _Kept:
+        return _Kept(*build(*given, share, reach))
+
+    if cache is None or len(lights) < LASTING:
+        kept = make()
+    else:
+        kept = cache.get(("light tree", *map(digest, given), share, reach), make)
+    return kept.words, kept.trails, kept.even
+
+
+class _Kept:
+    def __init__(self, words: np.ndarray, trails: np.ndarray, even: float) -> None:
+        self.words, self.trails, self.even = words, trails, even

@@ -1,0 +1,99 @@
+// Which of many bounded lights: down a binary tree, at each pair of nodes to the one that may matter more, by what its
+// lights can give at most where they are asked for [Conty Estevez & Kulla 2018; Pharr, Jakob, Humphreys 2023,
+// section 12.6.3]. gpu/light_tree.py makes the tree.
+
+// A point that light is sampled for.
+struct Asker {
+    vec3 p;
+#if HAS_LIGHT_TREE
+    vec3 n;       // unit; no light counts that comes from behind it ...
+    bool through; // ... unless the surface transmits
+#endif
+};
+
+#if HAS_LIGHT_TREE
+layout(binding = LIGHT_TREE_TEXTURE) uniform usampler2D light_tree_words;
+
+uvec4 light_tree_fetch(uint i) {
+    return texelFetch(light_tree_words, ivec2(i & (LIGHT_TREE_ROW - 1u), i / LIGHT_TREE_ROW), 0);
+}
+
+uvec4 light_tree_head() { return texelFetch(light_tree_words, ivec2(0), 0); }
+
+vec3 light_tree_axis(uint bits) {
+    vec2 e = vec2(bits & 0xffu, (bits >> 8u) & 0xffu) / 127.0 - 1.0;
+    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
+    float fold = max(-n.z, 0.0);
+    n.xy -= fold * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));
+    return normalize(n);
+}
+
+float light_tree_intensity(uvec4 node) { return uintBitsToFloat(((node.z >> 21u) << 19u) + (40u << 23u)); }
+
+float light_tree_sine(float c) { return sqrt(max(0.0, 1.0 - c * c)); }
+
+// Cosine and sine of the angle a - b, of 0 where b is larger; a and b, 0..pi, by theirs.
+vec2 light_tree_less(vec2 a, vec2 b) {
+    return a.x >= b.x ? vec2(1.0, 0.0) : vec2(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y);
+}
+
+// x: a bound on what a node's lights give, times y, the square of their distance. p is on the tree's grid.
+vec2 light_tree_importance(uvec4 node, vec3 p, Asker at) {
+    vec3 to = vec3(node.x & 0xffffu, node.x >> 16u, node.y & 0xffffu) - p;
+    float radius = uintBitsToFloat(((node.y & 0xff0000u) << 4u) + (123u << 23u));
+    float d2 = dot(to, to), r2 = radius * radius;
+    float inv = inversesqrt(max(d2, 1e-30)), sin_ball = min(radius * inv, 1.0);
+    vec2 ball = vec2(light_tree_sine(sin_ball), sin_ball); // the angle that the ball around them fills
+    float cos_in = dot(to, at.n) * inv;
+#if HAS_TRANSMISSION
+    if (at.through) cos_in = abs(cos_in);
+#endif
+    cos_in = light_tree_less(vec2(cos_in, light_tree_sine(cos_in)), ball).x;
+    float half_sine = float(node.y >> 24u) * (1.0 / 255.0);
+    float cos_cone = 1.0 - 2.0 * half_sine * half_sine;
+    float cos_out = -dot(to, light_tree_axis(node.z)) * inv;
+    vec2 off = light_tree_less(vec2(cos_out, light_tree_sine(cos_out)), vec2(cos_cone, light_tree_sine(cos_cone)));
+    cos_out = light_tree_less(off, ball).x;
+    float edge = float((node.z >> 16u) & 31u) * (1.0 / 31.0);
+    bool inside = d2 <= r2;
+    if (inside) cos_in = cos_out = 1.0;
+    bool reached = cos_in > 0.0 && cos_out > 0.0 && cos_out >= 1.0 - edge * edge;
+    return vec2(reached ? light_tree_intensity(node) * cos_in * cos_out : 0.0, max(d2, r2));
+}
+
+// The chance of coming down the tree to a light: to the one that `code` leads to, or, `told`, to the one whose trail
+// it is. `near`: there is anything to do. The codes of a node are an interval, which its children share.
+float light_tree_walk(bool near, bool told, uint code, uint trail, Asker at, out uint found) {
+    uvec4 head = light_tree_head(), grid = texelFetch(light_tree_words, ivec2(1, 0), 0);
+    vec3 p = (at.p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
+    int rest = int(code) - int(head.y), width = int(head.x - head.y);
+    uint pair = 1u, depth = 0u;
+    bool more = near;
+    found = 0u;
+    do {
+        uvec4 a = light_tree_fetch(2u * pair), b = light_tree_fetch(2u * pair + 1u);
+        vec2 x = light_tree_importance(a, p, at), y = light_tree_importance(b, p, at);
+        float far = max(x.y, y.y);
+        float first = x.x * (y.y / far), second = y.x * (x.y / far);
+        // Neither seems to matter, as where only their parent's bounds reach: by intensity alone.
+        bool lost = !(first + second > 0.0);
+        if (lost) {
+            first = light_tree_intensity(a);
+            second = light_tree_intensity(b);
+        }
+        int cut = int(float(width) * (first / (first + second)));
+        cut = max(min(max(cut, 1), width - 1), 0); // both stay possible
+        bool right = told ? ((trail >> depth) & 1u) != 0u : rest >= cut;
+        if (more) {
+            uint link = right ? b.w : a.w;
+            rest -= right ? cut : 0;
+            width = right ? width - cut : cut;
+            more = (link & LEAF_BIT) == 0u;
+            found = link & ~LEAF_BIT;
+            pair = more ? link : pair;
+        }
+        depth++;
+    } while (more && depth < 32u);
+    return float(width) * (1.0 / float(LIGHT_CODES));
+}
+#endif

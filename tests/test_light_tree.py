@@ -1,0 +1,311 @@
+"""Lights picked by where they are: exactly as often as it is said, none missed that gives light, one picture."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, SceneArrays, layout
+from gpu.features import flags
+from gpu.layout import LightKind
+from service.pack import PackCache, lights, pack
+from service.scene import parse_scene
+from tests import stats
+from tests.extremes.scenes import Seen, everything, scaled
+from tests.light_trees import Picker, head_of, nodes_of, ways
+from tests.rendering import Images, document
+
+Doc = dict[str, Any]
+MATERIALS: Doc = {
+    "m": {"type": "diffuse", "albedo": 0.5},
+    **{f"lamp {k}": {"type": "diffuse", "albedo": 0, "emission": 10.0**k} for k in (-2, 0, 1, 3)},
+    "both": {"type": "diffuse", "albedo": 0, "emission": 4, "emission_sides": "both"},
+}
+LAMPS = [name for name in MATERIALS if name != "m"]
+
+
+def _room(seed: int, count: int = 60, spread: float = 1.0, **more: Any) -> Doc:
+    """Lamps of every kind, size, side and brightness about the origin."""
+    rng = np.random.default_rng(seed)
+    shapes: list[Doc] = []
+    standing: list[Doc] = []
+    for i in range(count):
+        at, size = rng.normal(size=3) * spread, 10 ** rng.uniform(-2.5, 0) * spread
+        u, v = rng.normal(size=(2, 3)) * size
+        name = LAMPS[rng.integers(len(LAMPS))]
+        here = {"material": name, "transform": {"translate": at.tolist()}}
+        kind = i % 6
+        if kind == 0:
+            shapes.append({"type": "sphere", "center": at.tolist(), "radius": size, "material": name})
+        elif kind == 1:
+            shapes.append({"type": "quad", "origin": at.tolist(), "u": u.tolist(), "v": v.tolist(), "material": name})
+        elif kind == 2:
+            corners = [[0, 0, 0], u.tolist(), v.tolist()]
+            shapes.append({"type": "mesh", "vertices": corners, "faces": [[0, 1, 2]], "smooth": False, **here})
+        elif kind == 3:
+            turn = {"scale": (size * rng.uniform(0.2, 1, 3)).tolist(), "rotate": rng.uniform(0, 360, 3).tolist()}
+            ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1}
+            shapes.append({**ball, "material": name, "transform": {"translate": at.tolist(), **turn}})
+        elif kind == 4:
+            standing.append({"type": "point", "position": at.tolist(), "intensity": 10 ** rng.uniform(-2, 2)})
+        else:
+            outer = float(rng.uniform(1, 90))
+            beam = {"outer_angle": outer, "inner_angle": outer * float(rng.choice([0, 0.5, 1]))}
+            spot = {"type": "spot", "position": at.tolist(), "direction": rng.normal(size=3).tolist()}
+            standing.append({**spot, **beam, "intensity": 10 ** rng.uniform(-2, 2)})
+    return document(shapes, MATERIALS, lights=standing, **more)
+
+
+def _packed(scene: Doc) -> SceneArrays:
+    used = {shape["material"] for shape in scene["shapes"]}
+    kept = {name: m for name, m in scene["materials"].items() if name in used}
+    return pack(parse_scene({**scene, "materials": kept}), Images()).arrays
+
+
+@pytest.fixture
+def pickers(gpu: Renderer) -> Iterator[Any]:
+    made: list[Picker] = []
+
+    def picker(arrays: SceneArrays) -> Picker:
+        made.append(Picker(gpu, arrays))
+        return made[-1]
+
+    yield picker
+    for one in made:
+        one.close()
+
+
+SUNS = {
+    "lights": [{"type": "directional", "direction": [0, -1, 0.1], "irradiance": 2}] * 2,
+    "environment": {"type": "constant", "radiance": 0.1},
+}
+
+
+def _places(seed: int, count: int, spread: float = 1.0) -> Iterator[tuple[np.ndarray, np.ndarray, bool]]:
+    rng = np.random.default_rng(seed)
+    for i in range(count):
+        n = rng.normal(size=3)
+        yield rng.normal(size=3) * spread * 10 ** rng.uniform(-1, 1), n / np.linalg.norm(n), i % 3 == 0
+
+
+def test_lights_are_drawn_as_often_as_they_say(pickers: Any) -> None:
+    scene = _room(1)
+    arrays = _packed({**scene, **SUNS, "lights": scene["lights"] + SUNS["lights"]})
+    picker = pickers(arrays)
+    assert len(arrays.lights) == 63 and set(arrays.lights["kind"]) == set(LightKind)
+    bits = np.random.default_rng(2).integers(0, 1 << 32, 200_000, dtype=np.uint32)
+    for p, n, through in _places(3, 6):
+        p = p.astype(np.float32) - arrays.origin
+        chances, _ = picker.chances(p, n, through)
+        assert chances.sum() == pytest.approx(1, abs=1e-5) and chances.min() > 0
+        which, said = picker.drawn(bits, p, n, through)
+        np.testing.assert_allclose(said, chances[which], rtol=1e-5)
+        counts = np.bincount(which, minlength=len(chances))
+        assert stats.chi_square(counts, chances * len(bits)) > stats.sidak(1e-3, 6)
+    far = np.isin(arrays.lights["kind"], [LightKind.DIRECTIONAL, LightKind.ENVIRONMENT])
+    shares = [picker.chances(p, n)[0][far].sum() for p, n, _ in _places(4, 3)]
+    assert shares == pytest.approx([shares[0]] * 3)  # a fixed share, wherever light is asked for
+
+
+def test_near_numbers_draw_near_lights(pickers: Any) -> None:
+    """What a stratified sampler had gained is kept: in order, the numbers go through the lights once."""
+    arrays = _packed(_room(5))
+    even = int(head_of(arrays.light_tree)["even"]) << 2
+    bits = np.linspace(even, (1 << 32) - 1, 50_000).astype(np.uint32)
+    which, _ = pickers(arrays).drawn(bits, (0.3, 0.2, 0.1), (0, 1, 0))
+    assert (np.diff(which) != 0).sum() == len(set(which.tolist())) - 1
+
+
+def _outline(arrays: SceneArrays, k: int) -> tuple[np.ndarray, np.ndarray | None]:
+    """Places (n, 3) of light k, and the unit normals there of a shape, float64."""
+    light = arrays.lights[k]
+    kind = LightKind(int(light["kind"]))
+    rng = np.random.default_rng(k)
+    if kind in (LightKind.SPHERE, LightKind.ELLIPSOID):
+        q = rng.normal(size=(400, 3))
+        q /= np.linalg.norm(q, axis=1, keepdims=True)
+        if kind == LightKind.SPHERE:
+            ball = arrays.spheres[light["index"]]
+            return ball["center"] + float(ball["radius"]) * q, q
+        solid = arrays.ellipsoids[light["index"]]
+        rows = np.stack([solid["row_x"], solid["row_y"], solid["row_z"]]).astype(float)
+        out = q @ rows
+        return solid["center"] + q @ np.linalg.inv(rows).T, out / np.linalg.norm(out, axis=1, keepdims=True)
+    a, b = rng.random((2, 400, 1))
+    if kind == LightKind.QUAD:
+        quad = arrays.quads[light["index"]]
+        places = quad["origin"] + a * quad["u"].astype(float) + b * quad["v"].astype(float)
+        return places, np.broadcast_to(quad["normal"].astype(float), places.shape)
+    if kind == LightKind.TRIANGLE:
+        tri = arrays.triangles[light["index"]]
+        v0, v1, v2 = (tri[name].astype(float) for name in ("v0", "v1", "v2"))
+        across = np.cross(v1 - v0, v2 - v0)
+        places = v0 + np.minimum(a, b) * (v1 - v0) + np.abs(a - b) * (v2 - v0)
+        return places, np.broadcast_to(across / np.linalg.norm(across), places.shape)
+    return light["position"].astype(float)[None], None
+
+
+def _lit(arrays: SceneArrays, k: int, p: np.ndarray, n: np.ndarray, through: bool) -> bool:
+    """Whether any of many places of light k sends light to p from in front of n."""
+    light = arrays.lights[k]
+    both = arrays.materials["emission_sides"][light["material"]] == 2
+    places, out = _outline(arrays, k)
+    wi = places - p
+    wi /= np.linalg.norm(wi, axis=1, keepdims=True)
+    lit = wi @ n > 1e-5
+    if through:
+        lit |= wi @ n < -1e-5
+    if out is not None and not both:
+        lit &= np.einsum("ij,ij->i", out, wi) < -1e-5
+    if light["kind"] == LightKind.SPOT:
+        d = light["direction"].astype(float)
+        off = d + np.linalg.norm(d) * wi[0]
+        lit &= float(light["spread"]) - off @ off > 1e-4
+    return bool(lit.any())
+
+
+@pytest.mark.parametrize("spread", [1.0, 1e-4, 1e5])
+def test_no_light_that_gives_anything_is_held_for_dark(pickers: Any, spread: float) -> None:
+    """In the air, on lamps, at their edges and in the middle of them, from facing surfaces and from glass."""
+    lit, dark = 0, 0
+    for seed in range(4):
+        arrays = _packed(_room(10 + seed, 48, spread))
+        picker = pickers(arrays)
+        own = nodes_of(arrays.light_tree).center[[way[-1] for way in ways(arrays)]]
+        rng = np.random.default_rng(seed)
+        places = [*_places(20 + seed, 8, spread)]
+        for k in rng.integers(0, len(own), 6).tolist():  # on a lamp, or as near as float32 can be
+            n = rng.normal(size=3)
+            places.append((own[k], n / np.linalg.norm(n), False))
+        quads = arrays.quads[arrays.quads["light"] != layout.NONE]
+        for quad in quads[:3]:  # on its edge, along it
+            places.append((quad["origin"].astype(float), quad["normal"].astype(float), False))
+            u = quad["u"].astype(float)
+            places.append((quad["origin"] + 0.5 * u, u / np.linalg.norm(u), False))
+        for p, n, through in places:
+            p = p.astype(np.float32)
+            _, least = picker.chances(p, n, through)
+            for k in range(len(arrays.lights)):
+                if _lit(arrays, k, p.astype(float), n, through):
+                    assert least[k] > 0, (seed, k, p, n)
+                    lit += 1
+                else:
+                    dark += least[k] == 0
+    assert lit > 1500 and dark > 500  # and what is behind, or turned away, is mostly known
+
+
+def test_nodes_hold_what_is_under_them() -> None:
+    arrays = _packed(_room(30, 90))
+    nodes = nodes_of(arrays.light_tree)
+    paths = ways(arrays)
+    assert max(map(len, paths)) < 16 and len(nodes.link) == 2 * len(arrays.lights)
+    step = 1 / float(head_of(arrays.light_tree)["inverse_step"])
+    for k, way in enumerate(paths):
+        places, out = _outline(arrays, k)
+        both = arrays.materials["emission_sides"][arrays.lights["material"][k]] == 2
+        for node in way:
+            assert np.linalg.norm(places - nodes.center[node], axis=1).max() <= nodes.radius[node]
+            if out is not None and not both:
+                assert np.arccos(np.clip(out @ nodes.axis[node], -1, 1)).max() <= nodes.cone[node] + 1e-6
+                assert nodes.beyond[node] == pytest.approx(np.pi / 2)
+        assert nodes.radius[way[-1]] <= 1.4 * np.linalg.norm(np.ptp(places, axis=0)) + 2 * step  # nor much more
+        above = [sum(nodes.intensity[p[-1]] for p in paths if node in p) for node in way[:-1]]
+        np.testing.assert_allclose(nodes.intensity[way[:-1]], above, rtol=0.08)
+
+
+ODD: dict[str, list[Doc]] = {
+    "one place": [{"type": "point", "position": [1, 2, 3], "intensity": 1}] * 40,
+    "ever brighter": [{"type": "point", "position": [i, 0, 0], "intensity": 10.0 ** (i - 20)} for i in range(40)],
+    "ever farther": [{"type": "point", "position": [2.0**i * 1e-3, 0, 0], "intensity": 1} for i in range(40)],
+    "far away": [{"type": "point", "position": [9e8 + i, -1e9, i], "intensity": 1e20} for i in range(40)],
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", ODD)
+def test_odd_crowds_are_drawn_as_often_as_they_say(pickers: Any, name: str) -> None:
+    arrays = _packed(document([], MATERIALS, lights=ODD[name]))
+    assert max(map(len, ways(arrays))) <= 32
+    picker, bits = pickers(arrays), np.random.default_rng(1).integers(0, 1 << 32, 20_000, dtype=np.uint32)
+    for p in ((0, 0, 0), (1, 2, 3), (1e9, -1e9, 1e9)):
+        chances, _ = picker.chances(p, (0, 1, 0))
+        assert chances.sum() == pytest.approx(1, abs=1e-5)
+        assert chances.min() > 0.02 / 40  # none is lost, whatever the others are
+        counts = np.bincount(picker.drawn(bits, p, (0, 1, 0))[0], minlength=40)
+        assert stats.chi_square(counts, chances * len(bits)) > stats.sidak(1e-3, 12)
+
+
+def _both(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, scene: Doc, **settings: Any) -> tuple[Seen, Seen]:
+    """By the tree, and by the table of powers that small scenes have."""
+    seen = []
+    for least in (2, 1 << 30):
+        monkeypatch.setattr(lights, "LEAST_TREE", least)
+        seen.append(
+            Seen(gpu, scene, **{"samples": 256, "sampler": "independent", "width": 48, "height": 32, **settings})
+        )
+    return seen[0], seen[1]
+
+
+def test_the_picture_is_that_of_the_table(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Every shape, light and material, glass and the two-sided among them."""
+    tree, table = _both(gpu, monkeypatch, everything(), max_bounces=4)
+    assert tree.deviation(table, 16) < 2.0
+    error = np.sqrt(tree.variance.mean() + table.variance.mean()) / np.sqrt(48 * 32)
+    assert abs(tree.color.mean() - table.color.mean()) < 5 * error
+
+
+@pytest.mark.parametrize("factor", [1e-4, 1e5])
+def test_in_any_size_it_is_the_same(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
+    monkeypatch.setattr(lights, "LEAST_TREE", 2)
+    one, other = Seen(gpu, everything(), max_bounces=2), Seen(gpu, scaled(everything(), factor), max_bounces=2)
+    assert other.alike(one) > 0.99
+
+
+def _hall(count: int) -> Doc:
+    """A long low room under many small lamps."""
+    rng = np.random.default_rng(3)
+    walls = [
+        ([0, 0, 0], [0, 0, 8], [40, 0, 0]),
+        ([0, 4, 0], [40, 0, 0], [0, 0, 8]),
+        ([0, 0, 0], [40, 0, 0], [0, 4, 0]),
+    ]
+    shapes: list[Doc] = [{"type": "quad", "origin": o, "u": u, "v": v, "material": "m"} for o, u, v in walls]
+    for center in rng.uniform((0, 3, 0), (40, 4, 8), (count, 3)).tolist():
+        shapes.append({"type": "sphere", "center": center, "radius": 0.03, "material": "lamp 3"})
+    camera = {"position": [1, 1.7, 4.4], "target": [20, 1.3, 3.6], "vfov": 60}
+    return document(shapes, {k: MATERIALS[k] for k in ("m", "lamp 3")}, camera=camera)
+
+
+def test_it_pays(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The relative variance of as many samples in a hall of 100 lamps; less than a third was measured."""
+    tree, table = (seen.variance / (seen.color**2 + 0.01) for seen in _both(gpu, monkeypatch, _hall(100), samples=64))
+    assert table.mean() > 2.5 * tree.mean()
+
+
+def test_few_lights_keep_their_table_and_raise_no_flag() -> None:
+    few, many = (_packed(_room(40, n)) for n in (lights.LEAST_TREE - 1, lights.LEAST_TREE))
+    assert "HAS_LIGHT_TREE" not in flags(few) and not len(few.light_tree)
+    assert "HAS_LIGHT_TREE" in flags(many)
+    assert few.lights["probability"].sum() == pytest.approx(1)
+
+
+def test_a_large_tree_is_kept_while_its_lights_are() -> None:
+    n = 48
+    x, z = np.meshgrid(np.linspace(0, 1, n + 1), np.linspace(0, 1, n + 1))
+    at = np.arange((n + 1) * n).reshape(n, n + 1)[:, :-1].reshape(-1)
+    faces = np.concatenate([np.stack([at, at + 1, at + n + 2], 1), np.stack([at, at + n + 2, at + n + 1], 1)])
+    vertices = np.stack([x, 0 * x, z], -1).reshape(-1, 3)
+    mesh = {"type": "mesh", "material": "lamp 0", "faces": faces.tolist(), "vertices": vertices.tolist()}
+    cache = PackCache()
+
+    def tree(x: float, **lamp: Any) -> np.ndarray:
+        ball = {"type": "sphere", "center": [x, 3, 0], "radius": 1, "material": "m"}
+        materials = {"m": MATERIALS["m"], "lamp 0": {**MATERIALS["lamp 0"], **lamp}}
+        return pack(parse_scene(document([mesh, ball], materials)), Images(), cache).arrays.light_tree
+
+    first = tree(0)
+    assert len(first) == 2 * 2 * n * n
+    assert tree(0.25) is first  # a ball moved
+    assert tree(0.25, emission=[3, 2, 1]) is not first
