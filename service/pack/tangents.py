@@ -9,7 +9,7 @@ import numpy as np
 
 from gpu import layout
 from service.pack.chunks import chunks
-from service.pack.normals import decode, same
+from service.pack.normals import add_up, decode, same
 
 
 @dataclass(frozen=True)
@@ -88,8 +88,8 @@ def _charted(
             left[some] = turned < 0
         return Tangents(_small(rows), np.repeat(np.arange(len(faces), dtype=np.int32)[:, None], 3, axis=1), left)
     own = [normals] if normal_faces is faces else []  # else there is one normal for each position
-    place = same(vertices, *own, uvs).astype(np.int32)
-    sums = np.zeros((2 * (int(place.max(initial=-1)) + 1), 3))
+    place = same(vertices, *own, uvs)
+    sums = np.zeros((3, 2 * (int(place.max(initial=-1)) + 1)))
     flat, left = np.empty(len(faces), bool), np.empty(len(faces), bool)
     for some in chunks(len(faces)):
         p = vertices.take(faces[some], axis=0)
@@ -97,15 +97,14 @@ def _charted(
         flat[some], left[some] = turned == 0, turned < 0
         weighted = _weighted(p, along, normals.take(normal_faces[some], axis=0))
         which = 2 * place.take(faces[some]) + left[some, None]
-        met, local = np.unique(which, return_inverse=True)
-        for axis in range(3):
-            sums[met, axis] += np.bincount(local.reshape(-1), weighted[..., axis].reshape(-1), len(met))
-    length = np.linalg.norm(sums, axis=1, keepdims=True)
-    sums[length[:, 0] < 1e-9] = 0  # of directions that cancel there is nothing left but rounding
+        add_up(sums, which.reshape(-1), weighted.reshape(-1, 3))
+    # Of directions that cancel there is nothing left but rounding.
+    sums *= np.einsum("ij,ij->j", sums, sums) > 1e-18
+    rows = _small(sums.T)
     if flat.any():
         lone = 2 * place.take(faces[flat])
-        left[flat] = ~sums[lone].any(axis=(1, 2)) & sums[lone + 1].any(axis=(1, 2))
-    return Tangents(_small(sums), 2 * place.take(faces) + left[:, None].astype(np.int32), left)
+        left[flat] = ~rows[lone].any(axis=(1, 2)) & rows[lone + 1].any(axis=(1, 2))
+    return Tangents(rows, 2 * place.take(faces) + left[:, None].astype(np.int32), left)
 
 
 def _small(rows: np.ndarray) -> np.ndarray:
