@@ -3,7 +3,9 @@
 // are kept once for all octants, and walked in one order; a register remembers where to go on after. Boxes are 16-bit
 // coordinates on the scene's grid, rounded outwards.
 //
-// Two loops, one to find a leaf and one to test it: llvmpipe runs both sides of every `if`, but ends loops early.
+// Two loops, one to find leaves and one to test them: llvmpipe runs both sides of every `if`, but ends loops early.
+// A ray that has met a leaf walks on to a second one, for its neighbours have still to meet their first: of a mesh's
+// bounces 1.7 times fewer turns of the outer loop, for 4 % more boxes.
 
 // Far distances grow by this against rounding in the slab test [Ize 2013]: 1 + 2 gamma(3), rounded up.
 const float TRAVERSE_SLACK = 1.0000007;
@@ -17,6 +19,17 @@ struct Nearest {
     uint id; // kind << 28 | index
     vec2 uv; // barycentric, triangles only
 };
+
+struct LeafRange {
+    uint kind;
+    uint index;
+    uint end;
+};
+
+LeafRange traverse_range(uint leaf) {
+    uint first = leaf & LEAF_FIRST_MASK;
+    return LeafRange((leaf >> LEAF_KIND_SHIFT) & 7u, first, first + ((leaf >> LEAF_COUNT_SHIFT) & 15u) + 1u);
+}
 
 void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 skip, inout Nearest n) {
     uint id = (kind << LEAF_KIND_SHIFT) | index;
@@ -56,7 +69,7 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
     float start = n.t;
     float reach = any && skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
     do {
-        uint leaf = 0u;
+        uint leaf = 0u, earlier = 0u; // the last two that were met
         do {
             uvec4 w = node_words[i];
             vec3 lo = vec3((w.xyz >> swap) & 0xffffu) * scale + bias;
@@ -65,7 +78,10 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
             float far = min(min(min(hi.x, hi.y), hi.z) * TRAVERSE_SLACK, n.t * reach);
             bool met = near <= far;
             bool is_leaf = (w.w & LEAF_BIT) != 0u;
-            if (met && is_leaf) leaf = w.w;
+            if (met && is_leaf) {
+                earlier = leaf;
+                leaf = w.w;
+            }
             bool is_treelet = (w.w & (LEAF_BIT | TREELET_BIT)) == TREELET_BIT;
             uint next = met || is_leaf || is_treelet ? i + 1u : w.w;
             if (met && is_treelet) {
@@ -79,15 +95,18 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
             }
             i = next;
             more = i < end || last != NONE;
-        } while (leaf == 0u && more);
-        uint kind = (leaf >> LEAF_KIND_SHIFT) & 7u;
-        uint index = leaf & LEAF_FIRST_MASK;
-        uint stop = index + ((leaf >> LEAF_COUNT_SHIFT) & 15u) + 1u;
+        } while (earlier == 0u && more);
         if (leaf != 0u) {
+            LeafRange range = traverse_range(leaf);
             do {
-                traverse_test(kind, index, o, d, shear, skip, n);
-                index++;
-            } while (index < stop && !(any && n.t < start));
+                traverse_test(range.kind, range.index, o, d, shear, skip, n);
+                range.index++;
+                if (range.index == range.end) {
+                    leaf = earlier;
+                    earlier = 0u;
+                    range = traverse_range(leaf);
+                }
+            } while (leaf != 0u && !(any && n.t < start));
         }
     } while (more && !(any && n.t < start));
 }
