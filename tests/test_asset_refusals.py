@@ -144,6 +144,7 @@ REFUSED: dict[str, tuple[str, bytes, str]] = {
         changed("buffers/0/byteLength", 4000),
         r"/buffers/0/byteLength: promises",
     ),
+    "GLB for later readers": ("m.glb", changed("asset/minVersion", "2.1"), "/asset/minVersion: .* asks for '2.1'"),
     "GLB of another version": ("m.glb", changed("asset/version", "1.0"), "/asset/version: .*version '1.0'"),
     "GLB index out of range": (
         "m.glb",

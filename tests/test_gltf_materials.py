@@ -237,3 +237,11 @@ def test_specular_glossiness_textures_are_converted(store: AssetStore) -> None:
     assert np.abs(color[1].astype(int) - [255, 226, 158, 255]).max() <= 1
     assert rough[:, 1].tolist() == [191, 0] and rough[0, 2] <= 1 and rough[1, 2] == 255
     assert (made["roughness"]["channel"], made["metallic"]["channel"], made["alpha"]["channel"]) == ("g", "b", "a")
+
+
+def test_factors_beyond_their_range_are_lowered_with_a_word(store: AssetStore) -> None:
+    rough = {"pbrMetallicRoughness": {"baseColorFactor": [2, 0.5, 0.5, 3]}, "alphaMode": "BLEND"}
+    found = imported(store, Gltf().of(rough))
+    (document,) = found.document["materials"].values()
+    assert document["base_color"] == [1, 0.5, 0.5] and "alpha" not in document
+    assert list(noted(found)) == ["/materials/0/pbrMetallicRoughness/baseColorFactor"]

@@ -57,6 +57,36 @@ def test_what_is_not_finite_is_refused_by_its_place(store: AssetStore, name: str
         store.add(file.glb())
 
 
+def test_the_alpha_of_vertices_counts_where_the_material_fades(store: AssetStore) -> None:
+    colors = np.array([[255, 255, 255, 255], [255, 255, 255, 0], [255, 255, 255, 51], [255, 0, 255, 255]], np.uint8)
+    for mode, width in (("OPAQUE", 3), ("BLEND", 4), ("MASK", 4)):
+        file = Gltf()
+        material = file.add("materials", {"alphaMode": mode})
+        file.node(mesh=file.mesh(file.primitive({"POSITION": QUAD, "COLOR_0": colors}, material=material)))
+        found = imported(store, file)
+        mesh = store.mesh(found.document["shapes"][0]["asset"])
+        assert mesh.colors is not None and mesh.colors.shape == (4, width) and not found.warnings
+        assert np.allclose(mesh.colors, (colors / 255)[:, :width])
+
+
+def test_hidden_nodes_are_not_there(store: AssetStore) -> None:
+    """KHR_node_visibility: with all below them, lights too; and required extensions that change nothing are read."""
+    file = Gltf()
+    mesh = file.mesh()
+    file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [{"type": "point"}]},
+                               "KHR_materials_variants": {"variants": [{"name": "red"}]}}  # fmt: skip
+    file.tree["extensionsRequired"] = ["KHR_node_visibility", "KHR_materials_variants"]
+    lamp = file.node(False, extensions={"KHR_lights_punctual": {"light": 0}})
+    child = file.node(False, mesh=mesh, extensions={"KHR_node_visibility": {"visible": True}})
+    file.node(mesh=mesh, children=[child, lamp], extensions={"KHR_node_visibility": {"visible": False}})
+    file.node(mesh=mesh, extensions={"KHR_node_visibility": {}})
+    found = imported(store, file)
+    assert len(found.document["shapes"]) == 1 and not found.lit
+    assert noted(found) == {
+        "/extensions/KHR_materials_variants": "is not chosen from: primitives have the materials they name themselves"
+    }
+
+
 def test_nodes_share_their_mesh_and_mirror(store: AssetStore) -> None:
     file = Gltf()
     mesh = file.mesh()

@@ -21,7 +21,7 @@ class MeshData:
     normals: Floats | None  # (n, 3), unit length; None where the file has none
     uvs: Floats | None = None  # (n, 2), finite, v pointing up: of set 0
     uvs_1: Floats | None = None  # the same of set 1
-    colors: Floats | None = None  # (n, 3), linear, 0..1
+    colors: Floats | None = None  # (n, 3), linear, 0..1; or (n, 4), with an alpha that multiplies the material's
     warnings: tuple[str, ...] = ()  # what is odd about it, for whoever made it
     tangents: Floats | None = None  # (n, 4), as glTF's TANGENT: a direction of any length, zero of none; handedness
 

@@ -21,7 +21,7 @@ class Parts:
     normals: Numbers | None = None  # (n, 3), of any length; zero: to be computed
     uvs: Numbers | None = None  # (n, 2), v pointing up
     uvs_1: Numbers | None = None
-    colors: Numbers | None = None  # (n, 3 or more), linear
+    colors: Numbers | None = None  # (n, 3 or 4), linear
     warnings: list[str] = field(default_factory=list)
     tangents: Numbers | None = None  # (n, 4), as glTF's TANGENT; zero: none
 
@@ -73,12 +73,11 @@ def unit_normals(vertices: Doubles, faces: Indices, normals: Numbers) -> Floats:
 
 
 def unit_colors(colors: Numbers, warnings: list[str]) -> Floats:
-    """Red, green and blue within 0 and 1, which the contract asks of an albedo."""
-    rgb = colors[:, :3]
-    beyond = int(np.count_nonzero(((rgb < 0) | (rgb > 1)).any(axis=1)))
+    """Red, green, blue and perhaps alpha within 0 and 1, which the contract asks of an albedo."""
+    beyond = int(np.count_nonzero(((colors < 0) | (colors > 1)).any(axis=1)))
     if beyond:
         warnings.append(f"the colours of {beyond} vertices were clamped to 0..1")
-    return np.ascontiguousarray(np.clip(rgb, 0, 1), np.float32)
+    return np.ascontiguousarray(np.clip(colors, 0, 1), np.float32)
 
 
 def linear(encoded: Numbers) -> Floats:

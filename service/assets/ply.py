@@ -25,10 +25,12 @@ TYPES = {
 HEADER_BYTES = 1 << 20
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 FACE_LISTS = ("vertex_indices", "vertex_index")
-# As Blender, pbrt, MeshLab and others write them; the second set and tangents are our own.
+# As Blender, pbrt, MeshLab and others write them; the second set, tangents and the alpha are our own: what others
+# call alpha is seldom meant.
 UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UVS_1 = (("s1", "t1"),)
 TANGENTS = (("tx", "ty", "tz", "tw"),)
+ALPHA = "vertex_alpha"
 COLORS = (("red", "green", "blue"), ("r", "g", "b"))
 
 
@@ -126,7 +128,8 @@ def _colors(columns: Columns, declared: dict[str, str]) -> Floats | None:
         return None
     found = _stack(columns, names)
     kind = declared[names[0]]
-    return found.astype(np.float32) if kind[0] == "f" else linear(found / np.iinfo(kind).max)
+    colors = found.astype(np.float32) if kind[0] == "f" else linear(found / np.iinfo(kind).max)
+    return np.column_stack([colors, columns[ALPHA].astype(np.float32)]) if ALPHA in columns else colors
 
 
 def _header(view: memoryview) -> tuple[list[Element], str, int]:

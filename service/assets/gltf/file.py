@@ -21,8 +21,8 @@ KNOWN = {
     "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
     "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_pbrSpecularGlossiness",
     "KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_volume", "KHR_mesh_quantization", "KHR_texture_transform", "EXT_mesh_gpu_instancing",
-    "EXT_texture_webp",
+    "KHR_materials_variants", "KHR_materials_volume", "KHR_mesh_quantization", "KHR_node_visibility",
+    "KHR_texture_transform", "EXT_mesh_gpu_instancing", "EXT_texture_webp",
 }  # fmt: skip
 OPTIONAL = {"KHR_xmp", "KHR_xmp_json_ld"}
 MOST_ITEMS = 1 << 20  # of one kind; the time to look at them all is bounded, and a stranger's file may list anything
@@ -41,9 +41,12 @@ class GltfFile:
         text, self._binary = _chunks(view) if binary else (view, None)
         self.root = _root(bytes(text), binary)
         self._buffers: dict[int, Bytes] = {}
-        version = self.root.need("asset").text("version")
+        asset = self.root.need("asset")
+        version, least = asset.text("version"), asset.text("minVersion", "2.0")
         if not version.startswith("2."):
             raise ParseError(f"glTF 2.0 is read, this is version {shown(version)}", "/asset/version")
+        if least != "2.0":
+            raise ParseError(f"glTF 2.0 is read, this asks for {shown(least)}", "/asset/minVersion")
         for k, name in enumerate(self.root.array("extensionsRequired")):
             if name not in KNOWN | OPTIONAL:
                 detail = f"the file requires {shown(name)}, which is not supported"

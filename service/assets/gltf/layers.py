@@ -94,7 +94,7 @@ def _sheen(read: Reading, document: dict[str, Any]) -> None:
     extension = read.place.extension("KHR_materials_sheen")
     if extension is None:
         return
-    color = tuple(min(value, 1.0) for value in extension.color("sheenColorFactor", (0.0, 0.0, 0.0)))
+    color = read.share(extension, "sheenColorFactor", (0.0, 0.0, 0.0))
     if not max(color):
         return
     document["sheen"] = 1.0
@@ -146,9 +146,7 @@ def _volume(read: Reading, document: dict[str, Any], ior: float) -> None:
             read.notes.add(volume.at("thicknessTexture"), "is not used: rays go through the geometry itself")
         if "attenuationDistance" in volume:
             document["attenuation_distance"] = volume.number("attenuationDistance", 1, 1e-9, 1e9)
-            document["attenuation_color"] = factor(
-                tuple(min(value, 1.0) for value in volume.color("attenuationColor", (1.0, 1.0, 1.0)))
-            )
+            document["attenuation_color"] = factor(read.share(volume, "attenuationColor", (1.0, 1.0, 1.0)))
         return
     # A thin wall bends nothing: an index of 1 lets light straight through, and a coat does the reflecting.
     extension = read.place.extension("KHR_materials_transmission")

@@ -28,6 +28,13 @@ class Reading:
         texture = self.texture(owner, name, "srgb")
         return factor(values) if texture is None else {"texture": texture, "factor": factor(values)}
 
+    def share(self, owner: Place, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """A colour within 0..1, perhaps with alpha."""
+        found = owner.color(name, default)
+        if max(found) > 1:
+            self.notes.add(owner.at(name), "what lies beyond 1 is lowered to it")
+        return tuple(min(value, 1.0) for value in found)
+
     def scalar(self, owner: Place, name: str, value: float, channel: str) -> Any:
         texture = self.texture(owner, name, "linear")
         return value if texture is None else {"texture": texture, "channel": channel, "factor": value}
@@ -74,7 +81,7 @@ class Materials:
     def _rough(self, read: Reading) -> dict[str, Any]:
         place = read.place
         rough = place.object("pbrMetallicRoughness") or Place({}, place.at("pbrMetallicRoughness"))
-        base = rough.color("baseColorFactor", (1.0,) * 4)
+        base = read.share(rough, "baseColorFactor", (1.0,) * 4)
         metallic, roughness = rough.number("metallicFactor", 1, 0, 1), rough.number("roughnessFactor", 1, 0, 1)
         document: dict[str, Any] = {
             "type": "principled",
@@ -119,7 +126,7 @@ class Materials:
         if owner is None:
             owner, color, texture = place.object("pbrMetallicRoughness"), "baseColorFactor", "baseColorTexture"
         if owner is not None:
-            alpha = min(owner.color(color, (1.0,) * 4)[3], 1.0)
+            alpha = read.share(owner, color, (1.0,) * 4)[3]
             image = read.texture(owner, texture, "srgb")
             value = alpha if image is None else {"texture": image, "channel": "a", "factor": alpha}
             if value != 1:

@@ -42,6 +42,9 @@ class Nodes:
             if index in seen:  # also every cycle
                 raise ParseError(f"reaches /nodes/{index} a second time; nodes must form a tree", pointer)
             seen.add(index)
+            hidden = place.extension("KHR_node_visibility")
+            if hidden is not None and not hidden.flag("visible", True):
+                continue  # with all below it
             world = parent @ local_matrix(place)
             found.append(Node(place, index, world))
             children = place.array("children")

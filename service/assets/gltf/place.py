@@ -87,8 +87,8 @@ class Place:
             raise self.error(name, f"times its strength or intensity must be at most {BRIGHTEST:g}: {max(found):g}")
         return found
 
-    def flag(self, name: str) -> bool:
-        found = self.value.get(name, False)
+    def flag(self, name: str, default: bool = False) -> bool:
+        found = self.value.get(name, default)
         if type(found) is not bool:
             raise self.error(name, f"must be true or false, not {shown(found)}")
         return found

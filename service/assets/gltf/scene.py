@@ -138,18 +138,21 @@ class _Importer:
             if primitive is not None:
                 primitive = morphed(self.file, primitive, place, morph) if morph else primitive
                 primitive = skin.posed(primitive, place) if skin else primitive
-                primitive = primitive if self._directed(place) else replace(primitive, tangents=None)
+                primitive = self._asked(primitive, place)
             self._parts[key] = self._write(primitive, place) if primitive else None
         return self._parts[key]
 
-    def _directed(self, place: Place) -> bool:
-        """Whether a primitive's material asks for tangents."""
-        if "material" not in place:
-            return False
-        material = self.file.follow(place, "material", "materials")
+    def _asked(self, primitive: Primitive, place: Place) -> Primitive:
+        """The primitive without tangents, and without its colours' alpha, where its material has no use for them."""
+        material = self.file.follow(place, "material", "materials") if "material" in place else Place({}, "")
         coat = material.extension("KHR_materials_clearcoat")
-        stretched = material.extension("KHR_materials_anisotropy") is not None
-        return stretched or "normalTexture" in material or (coat is not None and "clearcoatNormalTexture" in coat)
+        bent = "normalTexture" in material or (coat is not None and "clearcoatNormalTexture" in coat)
+        directed = bent or material.extension("KHR_materials_anisotropy") is not None
+        fades = material.text("alphaMode", "OPAQUE") != "OPAQUE"
+        colors = primitive.colors
+        if colors is not None and colors.shape[1] == 4 and not (fades and (colors[:, 3] != 1).any()):
+            colors = colors[:, :3]
+        return replace(primitive, tangents=primitive.tangents if directed else None, colors=colors)
 
     def _write(self, primitive: Primitive, place: Place) -> Part:
         vertices = primitive.vertices
@@ -173,15 +176,13 @@ class _Importer:
         attributes = place.need("attributes")
         if part.colored and material.extension("KHR_materials_unlit") is not None:
             self.notes.add(attributes.at("COLOR_0"), "colours don't tint an unlit material")
-        primitive = self._read[place.pointer]
-        colors = primitive.colors if primitive else None
-        fading = colors is not None and colors.shape[1] == 4 and (colors[:, 3] != 1).any()
-        if fading and material.text("alphaMode", "OPAQUE") != "OPAQUE":
-            self.notes.add(attributes.at("COLOR_0"), "the alpha of a vertex is not used")
 
     def _unread(self) -> None:
         """Notes whatever else the file holds that would change the picture."""
         root = self.file.root
+        variants = root.extension("KHR_materials_variants")
+        if variants is not None:
+            self.notes.add(variants.pointer, "is not chosen from: primitives have the materials they name themselves")
         if root.array("animations"):
             self.notes.add("/animations", "are not played: the file's own pose is shown")
         if self.file.count("scenes") > 1:

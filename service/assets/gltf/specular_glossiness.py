@@ -26,8 +26,8 @@ CHUNK = 1 << 18  # texels at once: float copies of a whole image take gigabytes
 
 
 def converted(read: Reading, place: Place) -> dict[str, Any]:
-    diffuse = place.color("diffuseFactor", (1.0,) * 4)
-    specular = place.color("specularFactor", (1.0, 1.0, 1.0))
+    diffuse = read.share(place, "diffuseFactor", (1.0,) * 4)
+    specular = read.share(place, "specularFactor", (1.0, 1.0, 1.0))
     glossiness = place.number("glossinessFactor", 1, 0, 1)
     textured = _textured(read, place, (diffuse[:3], specular, glossiness))
     if textured:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from service.assets.gltf.primitives import Primitive
+from service.assets.ply import ALPHA
 
 
 def ply(primitive: Primitive) -> bytes:
@@ -18,7 +19,8 @@ def ply(primitive: Primitive) -> bytes:
         if uvs is not None:
             columns |= {names[0]: uvs[:, 0], names[1]: 1 - uvs[:, 1]}
     if primitive.colors is not None:
-        columns |= {name: primitive.colors[:, k] for k, name in enumerate(("red", "green", "blue"))}
+        channels = ("red", "green", "blue", ALPHA)[: primitive.colors.shape[1]]
+        columns |= {name: primitive.colors[:, k] for k, name in enumerate(channels)}
     vertices = np.empty(len(primitive.vertices), [(name, "<f4") for name in columns])
     for name, column in columns.items():
         vertices[name] = column
