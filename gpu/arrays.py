@@ -74,6 +74,9 @@ class SceneArrays:
 
     The first `large` of a kind in `bvh_kinds` stand in the loop, too, instead of among the leaves.
 
+    Triangles from the first that an instance has on are those of instances, in the order of their trees' leaves, in
+    whose `instance_nodes` links and leaves count from the first node and the first triangle of the instance.
+
     Positions are relative to `origin` (float64, world): what was subtracted before rounding to float32.
     """
 
@@ -95,6 +98,9 @@ class SceneArrays:
     node_count: int = 0  # of one octant's order
     node_origin: Vec3 = (0.0, 0.0, 0.0)
     node_scale: Vec3 = (0.0, 0.0, 0.0)
+    instances: np.ndarray = field(default_factory=lambda: _empty(layout.Instance))  # in the order of the leaves
+    instance_nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # of all trees
+    instance_shift: int = 0  # bits of the number of the most triangles that an instance has
     bvh_kinds: frozenset[ShapeKind] = frozenset()
     large: Mapping[ShapeKind, int] = field(default_factory=dict)
     environment: EnvironmentArrays | None = None

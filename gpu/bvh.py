@@ -15,7 +15,7 @@ import numpy as np
 from gpu.bvh_grow import WORDS, grow, measure
 from gpu.bvh_threads import lay_treelets, thread_octant, top_sizes
 from gpu.errors import SceneTooLarge
-from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, TREELET_MAX_NODES, Node
+from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, TREELET_MAX_NODES, Node, ShapeKind
 
 LEAF_SIZE = 4  # at most so many primitives in a leaf; the surface area heuristic splits most of them further
 LEAF_SIZE_LARGE = 8  # exactly that many wherever counts allow, for scenes whose eight orders would pass 2 GiB
@@ -75,7 +75,7 @@ def build(
     boxes = np.concatenate([lower, upper], axis=1, dtype=np.float32)
     kinds = np.ascontiguousarray(kinds, np.uint8)
     order = np.arange(n, dtype=np.uint32)
-    mixed = bool((kinds != kinds[0]).any())
+    mixed = bool((kinds != kinds[0]).any() or kinds[0] == ShapeKind.INSTANCE)
     grid = _grid(lower, upper)
 
     workers = os.cpu_count() or 1

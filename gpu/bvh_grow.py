@@ -38,8 +38,8 @@ def grow(
 ) -> tuple[int, int]:  # fmt: skip
     """Grows the subtree over boxes [first, last), its root into `slot`, the others from slot `free` on.
 
-    Reorders `boxes` and `index`. Splits ranges of more than `leaf_max` boxes or of several `kinds` always,
-    others of `leaf_min` or fewer never. A range of at most `whole` boxes, unless it is the root's, is left to
+    Reorders `boxes` and `index`. Splits ranges of more than `leaf_max` boxes, of several `kinds` or of instances
+    always, others of `leaf_min` or fewer never. A range of at most `whole` boxes, unless it is the root's, is left to
     another call: its slot, first and last go into `tasks`. Returns (first slot left free, number of tasks).
     """
     # The smaller child is always done first, so the stack holds at most log2(boxes) ranges.
@@ -70,6 +70,8 @@ def grow(
                 cut = partition(boxes, index, a, b, axis, middle[axis], rate, split)
             elif of_several_kinds:
                 cut = partition_kind(boxes, index, kinds, a, b)
+                if cut == b:
+                    cut = a + n // 2
             elif n > leaf_max:  # all centroids are one point
                 cut = a + n // 2
         if cut == a:

@@ -8,7 +8,9 @@ from __future__ import annotations
 import numpy as np
 
 from gpu.jit import jit
+from gpu.layout import ShapeKind
 
+INSTANCE = int(ShapeKind.INSTANCE)
 BINS = 16
 FEW = 24  # below this many boxes half the bins do: most nodes are small, and their time went into empty bins
 
@@ -141,8 +143,9 @@ def partition_kind(boxes: np.ndarray, index: np.ndarray, kinds: np.ndarray, firs
 
 @jit
 def is_mixed(index: np.ndarray, kinds: np.ndarray, first: int, last: int) -> bool:
+    """Whether these can't be one leaf: they are of several kinds, or instances, of which each is one."""
     kind = kinds[index[first]]
-    found = False
+    found = last > first + 1 and kind == INSTANCE
     for i in range(first + 1, last):
         found |= kinds[index[i]] != kind
     return found

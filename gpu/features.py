@@ -108,10 +108,11 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_BVH_BOXES": _tree(ShapeKind.BOX),
     "HAS_BVH_ELLIPSOIDS": _tree(ShapeKind.ELLIPSOID),
     "HAS_BVH_TRIANGLES": _tree(ShapeKind.TRIANGLE),
+    "HAS_INSTANCES": lambda s: len(s.instances) > 0,
     "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
     "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
     "HAS_TANGENTS": lambda s: s.tangents,
-    "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in COUNTS.values()),
+    "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in (*COUNTS.values(), "instances")),
     "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s),
     "HAS_TEXTURES": lambda s: s.textures is not None or len(s.triangle_colors) > 0,
     "HAS_BYTE_TEXELS": _slot(0, layout.SLOT_FLOATS | layout.SLOT_CHECKER),
@@ -201,7 +202,7 @@ PICK_MAX = 2
 def counts(scene: SceneArrays) -> dict[str, object]:
     """How many shapes of each kind stand in the kernel's loops, how many materials and lights, where few; and where
     textures belong."""
-    kinds = zip(COUNTS.items(), ShapeKind, strict=True)
+    kinds = zip(COUNTS.items(), ShapeKind, strict=False)  # instances are never looped over
     out: dict[str, object] = {name: _looped(scene, kind, records) for (name, records), kind in kinds}
     few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
     slots = {} if scene.textures is None else scene.textures.slots

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpu import energy, glsl_textures, layout
+from gpu import energy, glsl_instances, glsl_textures, layout
 from gpu.layout import Frame, LightKind, Model, Record, ShapeKind, Slot
 
 
@@ -43,7 +43,7 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
     return "\n".join(lines)
 
 
-_SHAPES = frozenset(kind.name.lower() for kind in ShapeKind)
+_SHAPES = frozenset(kind.name.lower() for kind in ShapeKind if kind != ShapeKind.INSTANCE)
 
 
 def _split(name: str) -> str:
@@ -59,9 +59,7 @@ def _stride(name: str, record: type[Record]) -> str:
 
 def _storage(name: str, record: type[Record], slot: Slot, words: str) -> str:
     group = 4 if record.words % 4 == 0 else 2
-    return (
-        f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_{words}[]; }};"
-    )
+    return f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_{words}[]; }};"
 
 
 def _load(name: str, record: type[Record], function: str, words: str) -> str:
@@ -96,7 +94,7 @@ def _picker(name: str, record: type[Record]) -> str:
 def _constants() -> str:
     out = []
     for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", Model)):
-        out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum]
+        out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
     out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
     out += [f"#define FRAME_BLOCK {layout.FRAME_BLOCK}", f"#define FILTER_BLOCK {layout.FILTER_BLOCK}"]
     for name in (
@@ -133,6 +131,16 @@ def text() -> str:
     loaders = [_loader(name, r, slot) for name, (r, slot) in layout.BUFFERS.items()]
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in layout.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
-    body = " ".join(f"{k.glsl} {name};" for name, k in Frame.members.items())
-    frame = f"layout(std140, binding = {layout.FRAME_BLOCK}) uniform frame_block {{ {body} }} frame;"
-    return "\n".join([_constants(), *structs, *loaders, nodes, frame, glsl_textures.text()]) + "\n"
+    parts = [_constants(), *structs, *loaders, nodes, _frame(), glsl_instances.text(), glsl_textures.text()]
+    return "\n".join(parts) + "\n"
+
+
+def _frame() -> str:
+    members = {name: f"{kind.glsl} {name};" for name, kind in Frame.members.items()}
+    last = " ".join(members.pop(name) for name in glsl_instances.FRAME)
+    body = " ".join(members.values())
+    return f"""layout(std140, binding = {layout.FRAME_BLOCK}) uniform frame_block {{ {body}
+#if HAS_INSTANCES
+{last}
+#endif
+}} frame;"""

@@ -72,6 +72,7 @@ class ShapeKind(IntEnum):
     BOX = 2
     ELLIPSOID = 3
     TRIANGLE = 4
+    INSTANCE = 5  # of triangles that have a tree of their own; never in a loop
 
 
 class LightKind(IntEnum):
@@ -125,6 +126,7 @@ BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
 UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
 COLORS_TEXTURE = 12
 LIGHT_TREE_TEXTURE = 13
+INSTANCES_TEXTURE = 14  # records: all storage buffers are taken
 ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
 
 
@@ -264,6 +266,32 @@ class Triangle(Record):
     shape: u32  # index in the scene document, with SINGLE_SIDED
 
 
+class Instance(Record):
+    """Triangles with a tree of their own under an affine map: object = rows (world - center).
+
+    Their normals and what they have at their corners are where theirs are; material, shape and its bits are here.
+    """
+
+    row_x: vec3  # rows of object_from_world
+    first: u32  # triangle; the leaves count from there
+    row_y: vec3
+    shape: u32  # index in the scene document, with HIDDEN
+    row_z: vec3
+    side: f32  # -1 where the map mirrors, else 1
+    center: vec3
+    material: u32
+    node_origin: vec3  # object position of grid coordinate 0
+    node_first: u32  # of its tree's nodes, whose links count from there
+    node_scale: vec3
+    node_count: u32  # of one octant's order of the top
+    axis_x: vec3  # columns of world_from_object
+    axis_z_x: f32
+    axis_y: vec3
+    axis_z_y: f32
+    error: vec3  # in units of a rounding: what the maps lose of a place on the way out and back
+    axis_z_z: f32
+
+
 class TriangleNormals(Record):
     slot = Slot.TRIANGLE_NORMALS
     n0: u32  # octahedral, 2 x 16 bits snorm (packSnorm2x16)
@@ -366,6 +394,8 @@ class Frame(Record):
     slot_first: u32  # the pixel at the beginning of the bound part of the accumulators
     sun_first: u32  # among the lights: directional ones with a disk stand side by side
     sun_count: u32
+    node_first: u32  # of the tree's nodes: those of instances lie before
+    instance_shift: u32  # of an instance's number in an id, above its triangle's
 
 
 SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
@@ -398,6 +428,8 @@ LEAF_KIND_SHIFT = 28
 LEAF_COUNT_SHIFT = 24
 LEAF_FIRST_MASK = 0x00FFFFFF
 LEAF_MAX_COUNT = 16
+# A hit: kind << LEAF_KIND_SHIFT, index. One in an instance: this, its number << frame.instance_shift, the triangle's
+INSTANCED = 0x80000000
 # A treelet's link: bit 31 not set, bit 30 set, nodes << LEAF_COUNT_SHIFT, first: from where the octants' orders end
 TREELET_BIT = 0x40000000
 TREELET_MAX_NODES = 63

@@ -100,6 +100,8 @@ class Scene:
     def _upload_all(self) -> None:
         for slot, name in _BUFFERS.items():
             array = getattr(self.arrays, name)
+            if slot == Slot.NODES and len(self.arrays.instances):
+                array = np.concatenate([self.arrays.instance_nodes, array])
             self._buffers[slot] = pin(self._context, array) or self._upload(array)
         self._buffers[Slot.MATERIALS] = self._upload(self._materials())
         self._upload_details()
@@ -121,6 +123,7 @@ class Scene:
             layout.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
             layout.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
             layout.COLORS_TEXTURE: (a.triangle_colors, 4, "f2"),
+            layout.INSTANCES_TEXTURE: (a.instances, 4, "u4"),
         }
         for unit, (values, channels, dtype) in asked.items():
             if len(values):
@@ -236,6 +239,7 @@ class Scene:
         frame["node_origin"] = a.node_origin
         frame["node_scale"] = a.node_scale
         frame["node_count"] = a.node_count
+        frame["node_first"], frame["instance_shift"] = len(a.instance_nodes), a.instance_shift
         frame["light_count"] = len(a.lights)
         suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
         frame["sun_first"], frame["sun_count"] = suns.min(initial=len(a.lights)), len(suns)

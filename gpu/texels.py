@@ -19,6 +19,7 @@ KINDS = {  # channels and dtype, by texture unit
     layout.BYTES_TEXTURE: (4, "f1"),
     layout.FLOATS_TEXTURE: (4, "f4"),
     layout.LIGHT_TREE_TEXTURE: (4, "u4"),
+    layout.INSTANCES_TEXTURE: (4, "u4"),
 }
 
 

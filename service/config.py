@@ -70,7 +70,10 @@ class Config(BaseSettings):
     )
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(
-        16_000_000, ge=1, le=2**24, description="Most triangles of a scene; at most 2^24 (float32 counts no further)."
+        16_000_000,
+        ge=1,
+        le=2**24,
+        description="Most triangles that a scene holds, shared ones once; at most 2^24 (float32 counts no further).",
     )
     max_texels: int = Field(
         2**26, ge=1, le=2**27, description="Most texels of an image, and of a scene's textures: four of 4096 x 4096."

@@ -25,6 +25,7 @@ struct Point {
 #include "shapes/sphere.glsl"
 #include "shapes/quad.glsl"
 #include "shapes/solid.glsl"
+#include "shapes/instance.glsl"
 #include "shapes/triangle.glsl"
 #include "traverse.glsl"
 
@@ -108,7 +109,23 @@ Point shapes_point(Nearest n, vec3 o, vec3 d) {
 #if HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS
     if (kind == SHAPE_ELLIPSOID) r = ellipsoid_point(ellipsoid_pick(index), p);
 #endif
-#if HAS_TRIANGLES || HAS_BVH_TRIANGLES
+#if HAS_INSTANCES
+    // Of what is in an instance, below NONE. Asked as `n.id != NONE && ...` a driver takes n.id for NONE in lanes that
+    // have left the loop of passing.glsl (Mesa 22.3).
+    bool within = int(n.id) < -1;
+    if (within || kind == SHAPE_TRIANGLE) {
+        Instance it = instance_none();
+        if (within) {
+            it = instance_load(instance_number(n.id));
+            index = it.first + instance_triangle(n.id);
+        }
+        r = triangle_point(triangle_pick(index), n.uv, index, n.id, it);
+        if (within) {
+            r.material = it.material;
+            r.shape = it.shape;
+        }
+    }
+#elif HAS_TRIANGLES || HAS_BVH_TRIANGLES
     if (kind == SHAPE_TRIANGLE) r = triangle_point(triangle_pick(index), n.uv, index, n.id);
 #endif
     return r;

@@ -3,6 +3,8 @@
 // are kept once for all octants, and walked in one order; a register remembers where to go on after. Boxes are 16-bit
 // coordinates on the scene's grid, rounded outwards.
 //
+// An instance is a leaf of the scene's tree with a tree of its own, through which the ray goes in its space.
+//
 // Two loops, one to find leaves and one to test them: llvmpipe runs both sides of every `if`, but ends loops early.
 // A ray that has met a leaf walks on to a second one, for its neighbours have still to meet their first: of a mesh's
 // bounces 1.7 times fewer turns of the outer loop, for 4 % more boxes.
@@ -16,7 +18,7 @@ const float TRAVERSE_REACH = 0.9999847;
 
 struct Nearest {
     float t;
-    uint id; // kind << 28 | index
+    uint id; // kind << 28 | index; of what is in an instance see instance_id
     vec2 uv; // barycentric, triangles only
 };
 
@@ -31,8 +33,21 @@ LeafRange traverse_range(uint leaf) {
     return LeafRange((leaf >> LEAF_KIND_SHIFT) & 7u, first, first + ((leaf >> LEAF_COUNT_SHIFT) & 15u) + 1u);
 }
 
+#if HAS_INSTANCES
+// Which tree a walk is in: an instance's, or where its number is NONE the scene's.
+struct Within {
+    uint number;
+    uint node_first;
+    uint first; // triangle
+    uint material;
+};
+
+void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, Within at, uvec2 skip, inout Nearest n) {
+    uint id = at.number != NONE ? instance_id(at.number, index) : (kind << LEAF_KIND_SHIFT) | index;
+#else
 void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 skip, inout Nearest n) {
     uint id = (kind << LEAF_KIND_SHIFT) | index;
+#endif
     float t = n.t;
     vec2 uv = n.uv;
 #if HAS_BVH_SPHERES
@@ -47,7 +62,13 @@ void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 ski
 #if HAS_BVH_ELLIPSOIDS
     if (kind == SHAPE_ELLIPSOID) t = ellipsoid_hit(ellipsoid_tree_load(index), o, d, n.t);
 #endif
-#if HAS_BVH_TRIANGLES
+#if HAS_INSTANCES
+    if (kind == SHAPE_TRIANGLE) {
+        Triangle tri = triangle_tree_load(at.first + index);
+        if (at.number != NONE) tri.material = at.material;
+        t = triangle_hit(tri, shear, d, n.t, uv);
+    }
+#elif HAS_BVH_TRIANGLES
     if (kind == SHAPE_TRIANGLE) t = triangle_hit(triangle_tree_load(index), shear, d, n.t, uv);
 #endif
     if (t < n.t && id != skip.x && id != skip.y) n = Nearest(t, id, uv);
@@ -67,18 +88,40 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
     uint after = 0u, last = NONE; // where to go on after a treelet, and where it ends; NONE: in none
     bool more;
     float start = n.t;
+#if HAS_INSTANCES
+    // In an instance o and d are the ray in its space: t is the same there. The rest: where the scene's tree goes on.
+    vec3 o_w = o, d_w = d;
+    Within at = Within(NONE, frame.node_first, 0u, 0u);
+    bool ended = any && n.id != NONE; // before it began
+    uint on = 0u, on_after = 0u, on_last = NONE;
+#endif
     float reach = any && skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
+#if HAS_INSTANCES
+    uint met_instance = NONE; // where a stretch of the walk ends; else at the end of a tree
+    do {
+    met_instance = NONE;
+#endif
     do {
         uint leaf = 0u, earlier = 0u; // the last two that were met
         do {
+#if HAS_INSTANCES
+            uvec4 w = node_words[at.node_first + i];
+#else
             uvec4 w = node_words[i];
+#endif
             vec3 lo = vec3((w.xyz >> swap) & 0xffffu) * scale + bias;
             vec3 hi = vec3((w.xyz >> swap_far) & 0xffffu) * scale + bias;
             float near = max(max(lo.x, lo.y), max(lo.z, 0.0));
             float far = min(min(min(hi.x, hi.y), hi.z) * TRAVERSE_SLACK, n.t * reach);
             bool met = near <= far;
             bool is_leaf = (w.w & LEAF_BIT) != 0u;
+#if HAS_INSTANCES
+            bool is_instance = (w.w ^ LEAF_BIT) >> LEAF_KIND_SHIFT == SHAPE_INSTANCE;
+            if (met && is_instance && !ended) met_instance = w.w & LEAF_FIRST_MASK;
+            if (met && is_leaf && !is_instance) {
+#else
             if (met && is_leaf) {
+#endif
                 earlier = leaf;
                 leaf = w.w;
             }
@@ -95,11 +138,19 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
             }
             i = next;
             more = i < end || last != NONE;
+#if HAS_INSTANCES
+        } while (earlier == 0u && more && met_instance == NONE);
+#else
         } while (earlier == 0u && more);
+#endif
         if (leaf != 0u) {
             LeafRange range = traverse_range(leaf);
             do {
+#if HAS_INSTANCES
+                traverse_test(range.kind, range.index, o, d, shear, at, skip, n);
+#else
                 traverse_test(range.kind, range.index, o, d, shear, skip, n);
+#endif
                 range.index++;
                 if (range.index == range.end) {
                     leaf = earlier;
@@ -108,5 +159,39 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
                 }
             } while (leaf != 0u && !(any && n.t < start));
         }
+#if HAS_INSTANCES
+    } while (more && met_instance == NONE && !(any && n.t < start));
+    // All lanes change trees together: in the loop above it would be done, masked, with every leaf.
+    bool enters = met_instance != NONE;
+    if (enters || (!more && at.number != NONE)) {
+        Instance it = instance_load(met_instance);
+        if (enters) {
+            on = i;
+            on_after = after;
+            on_last = last;
+        }
+        o = enters ? instance_rows(it, o_w - it.center) : o_w;
+        d = enters ? instance_rows(it, d_w) : d_w;
+        at = enters ? Within(met_instance, it.node_first, it.first, it.material)
+                    : Within(NONE, frame.node_first, 0u, 0u);
+        shear = triangle_shear(o, d);
+        safe = mix(d, vec3(1e-20), lessThan(abs(d), vec3(1e-20)));
+        inv = 1.0 / safe;
+        scale = (enters ? it.node_scale : frame.node_scale) * inv;
+        bias = ((enters ? it.node_origin : frame.node_origin) - o) * inv;
+        swap = 16u * uvec3(lessThan(safe, vec3(0.0)));
+        swap_far = 16u - swap;
+        octant = (safe.x < 0.0 ? 1u : 0u) | (safe.y < 0.0 ? 2u : 0u) | (safe.z < 0.0 ? 4u : 0u);
+        uint count = enters ? it.node_count : frame.node_count;
+        i = enters ? octant * count : on;
+        end = octant * count + count;
+        treelets = 8u * count;
+        after = on_after;
+        last = enters ? NONE : on_last;
+        more = i < end || last != NONE;
+    }
     } while (more && !(any && n.t < start));
+#else
+    } while (more && !(any && n.t < start));
+#endif
 }

@@ -91,7 +91,7 @@ SCENES: dict[str, Doc] = {
     "PRINCIPLED": made_of({"type": "principled"}), "TRANSMISSION": made_of(GLASS),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
 }  # fmt: skip
-ELSEWHERE = {"UVS_1", "TEXTURED_LIGHTS"}  # raised in the tests of glTF files and of textured lights
+ELSEWHERE = {"UVS_1", "TEXTURED_LIGHTS", "INSTANCES"}  # raised in the tests of glTF files, textured lights, instances
 
 
 def _packed(name: str) -> Packed:

@@ -11,6 +11,7 @@ import pytest
 
 from service.assets import AssetStore, MeshData
 from service.assets.importing import Imported
+from service.pack import instances, pack
 from service.problems import AssetError
 from service.scene import parse_scene
 from tests.gltf_files import QUAD, QUAD_FACES, QUAD_UVS, Gltf
@@ -85,6 +86,19 @@ def test_hidden_nodes_are_not_there(store: AssetStore) -> None:
     assert noted(found) == {
         "/extensions/KHR_materials_variants": "is not chosen from: primitives have the materials they name themselves"
     }
+
+
+def test_nodes_of_a_mesh_are_its_instances(store: AssetStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its triangles are held once."""
+    monkeypatch.setattr(instances, "LEAST", 1)
+    monkeypatch.setattr(instances, "WORTH", 0)
+    file = Gltf()
+    mesh = file.mesh()
+    for x in range(3):
+        file.node(mesh=mesh, translation=[x, 0, 0], scale=[-1, 1, 1 + x])
+    arrays = pack(parse_scene(imported(store, file).document), store).arrays
+    assert len(arrays.instances) == 3 and len(arrays.triangles) == len(QUAD_FACES.reshape(-1, 3))
+    assert sorted(arrays.instances["side"]) == [-1, -1, -1]
 
 
 def test_nodes_share_their_mesh_and_mirror(store: AssetStore) -> None:

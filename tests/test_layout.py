@@ -8,15 +8,16 @@ import pytest
 from gpu import Renderer, glsl, layout
 from gpu.features import COUNTS, FEW, FLAGS, defines
 from gpu.layout import BUFFERS, COUNTED, LayoutError, Record, f32, vec3
+from gpu.texels import rows
 
 
-@pytest.mark.parametrize("name", BUFFERS)
+@pytest.mark.parametrize("name", [*BUFFERS, "instance"])
 @pytest.mark.parametrize("block", [False, True])
 def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
-    record, slot = BUFFERS[name]
+    record, slot = (layout.Instance, None) if name == "instance" else BUFFERS[name]
     if block and name not in COUNTED:
         pytest.skip("this buffer is always a storage buffer")
-    count = 3
+    count = 3 if slot is not None else 2000  # those of instances are texels of several rows
     rng = np.random.default_rng(5)
     # Any bits but those of a NaN's or denormal's exponent, which some GPUs do not keep in float registers.
     words = rng.integers(0x00800000, 0x7F000000, (count, record.words), np.uint32)
@@ -29,7 +30,8 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
             bits = value if kind.base is np.uint32 else f"floatBitsToUint({value})"
             lines.append(f"    echo[i * {out_words}u + {at}u] = {bits};")
             at += 1
-    known = defines(frozenset()) | ({f"{name.upper()}_COUNT": count} if block else {})
+    known = defines(frozenset({"HAS_INSTANCES"} if slot is None else ()))
+    known |= {f"{name.upper()}_COUNT": count} if block else {}
     head = "\n".join(f"#define {k} {v}" for k, v in known.items())
     kernel = gpu._context.compute_shader(
         f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{glsl.text()}\n"
@@ -37,14 +39,16 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
         f"void main() {{\n    uint i = gl_GlobalInvocationID.x;\n    if (i >= {count}u) return;\n"
         f"    {record.__name__} r = {name}_load(i);\n" + "\n".join(lines) + "\n}\n"
     )
-    data = gpu._context.buffer(words.tobytes())
+    data = rows(gpu._context, words, 4, "u4") if slot is None else gpu._context.buffer(words.tobytes())
     echo = gpu._context.buffer(reserve=4 * count * out_words)
-    if block:
+    if slot is None:
+        data.use(layout.INSTANCES_TEXTURE)
+    elif block:
         data.bind_to_uniform_block(COUNTED[name])
     else:
         data.bind_to_storage_buffer(int(slot))
     echo.bind_to_storage_buffer(15)
-    kernel.run(1)
+    kernel.run(-(-count // 8))
     got = np.frombuffer(echo.read(), np.uint32).reshape(count, out_words)
     members = [np.ascontiguousarray(values[m]).view(np.uint32).reshape(count, -1) for m in record.members]
     assert (got == np.concatenate(members, axis=1)).all()
@@ -62,7 +66,7 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
             bits = value if kind.base is np.uint32 else f"floatBitsToUint({value})"
             lines.append(f"    echo[{len(expected)}] = {bits};")
             expected.append(words[record.offsets[member] + k])
-    head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset()).items())
+    head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset({"HAS_INSTANCES"})).items())
     kernel = gpu._context.compute_shader(
         f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"

@@ -46,12 +46,17 @@ def contents(scene: Scene, packed: Packed) -> list[tuple[str, str]]:
     """What the scene is made of, a row for each kind of thing, and the kernel flags that it raises."""
     rows = [
         ("shapes", _counted(shape.type for shape in scene.shapes)),
-        ("triangles", str(len(packed.arrays.triangles))),
+        ("triangles", _triangles(packed)),
         ("materials", _counted(material.type for material in scene.materials.values())),
         ("lights", _counted(light.type for light in scene.lights)),
         ("environment", scene.environment.type if scene.environment else "none"),
     ]
     return rows + [("warning", warning) for warning in packed.warnings]
+
+
+def _triangles(packed: Packed) -> str:
+    held, shown = len(packed.arrays.triangles), len(packed.arrays.instances)
+    return f"{held}, shared by {shown} instances" if shown else str(held)
 
 
 def kernel(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple[str, str]]:

@@ -2,6 +2,7 @@
 
 values      camera, materials, the environment's turn: an edit of one of them needs nothing else from here
 placing     document -> `placed` (analytic shapes) and `meshes` with their `normals`, in the world, float64
+instances   which meshes share their triangles, as `models` with trees of their own, and where each of them stands
 records     placed shapes -> records, relative to an origin; `tree` orders those that are many, in `chunks`
 geometry    all of that together, with the shapes that shine
 sky         environment -> texels and the tables that draw from them

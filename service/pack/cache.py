@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Hashable, Iterable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -45,6 +45,11 @@ class PackCache:
         """The newest that fits; or None."""
         with self._lock:
             return next((value for value, _ in reversed(self._kept.values()) if fits(value)), None)
+
+    def gather(self, parts: Callable[[Any], Iterable[T]]) -> list[T]:
+        """Parts of all that is kept, of the oldest first."""
+        with self._lock:
+            return [part for value, _ in self._kept.values() for part in parts(value)]
 
 
 def _freeze(value: object) -> int:

@@ -126,6 +126,14 @@ class Triangles:
         """Whether a mesh has `uvs`, `uvs_1` or `colors`."""
         return any(getattr(mesh, name) is not None for mesh in self.meshes)
 
+    def doubled_areas(self) -> np.ndarray:
+        """(n,) float64: twice the area of each."""
+        out = [np.zeros(0)]
+        for number, which in enumerate(self.kept):
+            a, b, c = self._corners(number, slice(None) if which is None else which)
+            out.append(np.sqrt(_squares(np.cross(b - a, c - a))))
+        return np.concatenate(out)
+
     def write(self, places: np.ndarray | None, out: np.ndarray) -> None:
         """Fills `layout.Triangle` records."""
 

@@ -2,38 +2,92 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Hashable, Mapping, Sequence
+from dataclasses import dataclass, field
 
 import numpy as np
 
+from gpu import SceneTooLarge
 from service.assets import Assets, MeshData
 from service.assets.oddities import oddities
-from service.pack import meshes
+from service.pack import instances, meshes
+from service.pack.instances import Standing, Wanted
 from service.pack.meshes import Chart, PlacedMesh
+from service.pack.models import Model, blank, model
 from service.pack.placed import Placed, check_reach
 from service.pack.textures import Reads
 from service.problems import AssetError, FieldError, InvalidDocument
+from service.scene.numbers import LARGEST
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
 
 MOST_ODD = 20  # warnings: a model of a thousand parts may have them all
 
 
+@dataclass
+class World:
+    """The shapes of a scene in the world."""
+
+    placed: Placed = field(default_factory=Placed)
+    meshes: list[PlacedMesh] = field(default_factory=list)
+    standing: list[Standing] = field(default_factory=list)  # meshes that share their triangles
+    odd: list[str] = field(default_factory=list)  # about meshes
+
+    @property
+    def models(self) -> list[Model]:
+        return list({id(each.model): each.model for each in self.standing}.values())
+
+
 def place(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    reads: Mapping[str, Reads], known_meshes: bool = False,
-) -> tuple[Placed, list[PlacedMesh], list[str]]:  # fmt: skip
-    """(analytic shapes, meshes, what is odd about them) in the world; `names` and `emissive` are materials, `reads`
-    what these read of them. With `known_meshes` these are left out.
+    reads: Mapping[str, Reads], known: Mapping[Hashable, Model] | None = None,
+) -> World:  # fmt: skip
+    """`names` and `emissive` are materials, `reads` what these read of them; `known`: models that
+    need not be made again.
 
     Raises InvalidDocument.
     """
-    materials = {name: i for i, name in enumerate(names)}
-    placed, placed_meshes, odd, count = Placed(), [], list[str](), 0
+    out = World(place_analytic(shapes, names, emissive, reads))
+    materials, files = {name: i for i, name in enumerate(names)}, dict[str, MeshData]()
+    wanted = list[Wanted]()
     for i, shape in enumerate(shapes):
-        matrix = None if shape.transform is None else shape.transform.matrix4()
-        used = materials[shape.material], i
-        read = reads.get(shape.material, Reads())
-        if 1 in read.uv_sets and not isinstance(shape, MeshShape):
+        if isinstance(shape, MeshShape):
+            data = _data(shape, i, assets, files)
+            out.odd += [f"/shapes/{i}: {warning}" for warning in data.warnings]
+            read = reads.get(shape.material, Reads())
+            _check_charts(i, shape, data, read.uv_sets)
+            used, matrix = (materials[shape.material], i), _matrix(shape)
+            wanted.append(Wanted(shape, data, matrix, used, read, shape.material in emissive))
+    if len(out.odd) > MOST_ODD:
+        out.odd[MOST_ODD:] = [f"and {len(out.odd) - MOST_ODD} more like these"]
+    made = dict[Hashable, Model | None]()
+    room = max_triangles
+    for each, key in zip(wanted, instances.keys(wanted, {}), strict=True):
+        if key is not None and key not in made:
+            _check_room(each, room)
+            made[key] = (known or {}).get(key) or _model(key, each)
+            room -= len(each.data.faces)
+        shared = made.get(key)
+        standing = None if shared is None else instances.stand(shared, each.matrix, each.used)
+        if standing is not None:
+            _check_reach(standing, each)
+            out.standing.append(standing)
+        else:
+            _check_room(each, room)
+            room -= len(each.data.faces)
+            out.meshes.append(_mesh(each, each.matrix))
+            if each.matrix is not None:
+                check_reach(each.used[1], float(np.abs(out.meshes[-1].vertices).max(initial=0.0)))
+    return out
+
+
+def place_analytic(
+    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], reads: Mapping[str, Reads]
+) -> Placed:
+    """All shapes but meshes. Raises InvalidDocument."""
+    materials, placed = {name: i for i, name in enumerate(names)}, Placed()
+    for i, shape in enumerate(shapes):
+        matrix, used = _matrix(shape), (materials[shape.material], i)
+        if 1 in reads.get(shape.material, Reads()).uv_sets and not isinstance(shape, MeshShape):
             raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
         match shape:
             case SphereShape():
@@ -42,46 +96,61 @@ def place(
                 placed.quad(shape.origin, shape.u, shape.v, matrix, used)
             case BoxShape():
                 placed.box(shape.min, shape.max, matrix, used, shape.material in emissive)
-            case MeshShape() if not known_meshes:
-                data = _data(shape, i, assets)
-                odd += [f"/shapes/{i}: {warning}" for warning in data.warnings]
-                mesh = _mesh(shape, data, matrix, used, max_triangles - count, read)
-                count += len(mesh.faces)
-                placed_meshes.append(mesh)
-    if len(odd) > MOST_ODD:
-        odd[MOST_ODD:] = [f"and {len(odd) - MOST_ODD} more like these"]
-    return placed, placed_meshes, odd
+    return placed
 
 
-def _mesh(
-    shape: MeshShape, data: MeshData, matrix: np.ndarray | None, used: tuple[int, int], room: int,
-    read: Reads,
-) -> PlacedMesh:  # fmt: skip
-    if len(data.faces) > room:
-        detail = f"has {len(data.faces)} triangles; this server has room for {room} more in a scene"
-        raise InvalidDocument([FieldError(f"/shapes/{used[1]}", detail)])
-    for number, uvs in ((0, data.uvs), (1, data.uvs_1)):
-        if number in read.uv_sets and uvs is None:
-            field = "uvs" if shape.asset is None and number == 0 else "material" if shape.asset is None else "asset"
-            raise _uncharted(used[1], field, shape.material, f"uv set {number}, which this mesh does not have")
-    mesh = meshes.place(
-        data.vertices, data.faces, data.normals, shape.smooth, matrix, not shape.double_sided, used,
+def _matrix(shape: Shape) -> np.ndarray | None:
+    return None if shape.transform is None else shape.transform.matrix4()
+
+
+def _mesh(each: Wanted, matrix: np.ndarray | None) -> PlacedMesh:
+    data, shape, read = each.data, each.shape, each.read
+    return meshes.place(
+        data.vertices, data.faces, data.normals, shape.smooth, matrix, not shape.double_sided, each.used,
         data.uvs if read.uv_sets else None, data.uvs_1 if 1 in read.uv_sets else None,
         None if data.colors is None or (data.colors == 1).all() else data.colors,
         None if read.tangents is None else Chart(data.uvs_1 if read.tangents else data.uvs, data.tangents),
     )  # fmt: skip
-    if matrix is not None:
-        check_reach(used[1], float(np.abs(mesh.vertices).max(initial=0.0)))
-    return mesh
 
 
-def _data(shape: MeshShape, number: int, assets: Assets) -> MeshData:
+def _model(key: Hashable, each: Wanted) -> Model | None:
+    try:
+        return model(key, blank(_mesh(each, None)))
+    except SceneTooLarge as error:
+        raise InvalidDocument([FieldError(f"/shapes/{each.used[1]}", str(error))]) from None
+
+
+def _check_room(each: Wanted, room: int) -> None:
+    if len(each.data.faces) > room:
+        detail = f"has {len(each.data.faces)} triangles; this server has room for {room} more in a scene"
+        raise InvalidDocument([FieldError(f"/shapes/{each.used[1]}", detail)])
+
+
+def _check_reach(standing: Standing, each: Wanted) -> None:
+    """By the boxes of its parts where they suffice."""
+    reach = float(np.abs(standing.box()).max())
+    if reach > LARGEST:
+        matrix = np.eye(4) if each.matrix is None else each.matrix
+        reach = float(np.abs(each.data.vertices @ matrix[:3, :3].T + matrix[:3, 3]).max())
+        check_reach(each.used[1], reach)
+
+
+def _check_charts(number: int, shape: MeshShape, data: MeshData, sets: frozenset[int]) -> None:
+    for which, uvs in ((0, data.uvs), (1, data.uvs_1)):
+        if which in sets and uvs is None:
+            field = "uvs" if shape.asset is None and which == 0 else "material" if shape.asset is None else "asset"
+            raise _uncharted(number, field, shape.material, f"uv set {which}, which this mesh does not have")
+
+
+def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshData]) -> MeshData:
     if shape.asset is None:
         assert shape.vertices is not None and shape.faces is not None
         odd = tuple(oddities(shape.vertices, shape.faces))
         return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors, odd)
     try:
-        return assets.mesh(shape.asset)
+        if shape.asset not in files:
+            files[shape.asset] = assets.mesh(shape.asset)
+        return files[shape.asset]
     except AssetError as error:
         raise InvalidDocument([FieldError(f"/shapes/{number}/asset", error.detail)]) from None
 

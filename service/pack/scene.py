@@ -17,6 +17,7 @@ from service.pack.bounded import tree
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
 from service.pack.glow import glow
+from service.pack.models import shift
 from service.pack.sky import Sky, make_sky, sky_key
 from service.pack.textures import pack_textures, reads
 from service.pack.values import pack_camera, pack_materials, pack_turn
@@ -105,6 +106,9 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         node_count=built.node_count,
         node_origin=built.node_origin,
         node_scale=built.node_scale,
+        instances=built.instances,
+        instance_nodes=built.instance_nodes,
+        instance_shift=shift(built.models),
         bvh_kinds=built.bvh_kinds,
         large=built.large,
         environment=environment,
@@ -135,7 +139,9 @@ def _geometry(
         earlier = None
         if mesh_key is not None:
             earlier = cache.find(lambda kept: isinstance(kept, Geometry) and kept.meshes.key == mesh_key)
-        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, earlier)
+        known = cache.gather(lambda kept: kept.models if isinstance(kept, Geometry) else ())
+        by_key = {each.key: each for each in known}
+        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, earlier, by_key)
 
     return cache.get(("geometry", contents, shining, *shared), make)
 

@@ -27,6 +27,7 @@ LARGE = {
     ShapeKind.BOX: 4,
     ShapeKind.ELLIPSOID: 3,
     ShapeKind.TRIANGLE: 6,
+    ShapeKind.INSTANCE: 0,
 }
 LARGE_SHARE = 1 / 32  # of the area of the box around everything, at least
 LARGE_RATIO = 16.0  # times the median of its kind, at least: a ball of few triangles is none the better for it
@@ -53,6 +54,8 @@ def stand_out(bounds: dict[ShapeKind, Bounds]) -> dict[ShapeKind, np.ndarray]:
 
 def _largest(values: np.ndarray, count: int) -> np.ndarray:
     """Their indices, the largest first, of equal ones the first first."""
+    if not count:
+        return np.zeros(0, np.intp)
     if len(values) > count:
         least = np.partition(values, len(values) - count)[len(values) - count]
         some = np.flatnonzero(values >= least)

@@ -110,12 +110,25 @@ vec3 triangle_tangent(uint normal, uint bits, uint k) {
 }
 #endif
 
+#if HAS_INSTANCES
+Point triangle_point(Triangle tri, vec2 uv, uint index, uint id, Instance it) {
+    Point r;
+    mat3 axes = instance_axes(it);
+    tri.v0 = axes * tri.v0;
+    tri.v1 = axes * tri.v1;
+    tri.v2 = axes * tri.v2;
+    vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, across = it.side * cross(e1, e2);
+    float twice_area = length(across);
+    r.ng = across / twice_area;
+    r.error = gamma_error(7.0) * (abs(tri.v0) + abs(tri.v1) + abs(tri.v2)) + ULP * it.error;
+#else
 Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     Point r;
     vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, across = cross(e1, e2);
     float twice_area = length(across);
     r.ng = across / twice_area;
     r.error = gamma_error(7.0) * (abs(tri.v0) + abs(tri.v1) + abs(tri.v2));
+#endif
     // Off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
     vec3 edge = vec3(length(e2 - e1), length(e2), length(e1)) * (max_component(r.error) / twice_area);
     vec3 b = max(vec3(1.0 - uv.x - uv.y, uv), min(edge, vec3(1.0 / 3.0)));
@@ -124,6 +137,9 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     uv = b.yz;
     r.p = b0 * tri.v0 + uv.x * tri.v1 + uv.y * tri.v2;
     r.ns = r.ng;
+#if HAS_INSTANCES
+    r.p += it.center;
+#endif
     r.tangent = e1;
 #if HAS_TEXTURES || HAS_ANISOTROPIC
     r.handed = 1.0;
@@ -133,14 +149,28 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
 #endif
 #if HAS_SMOOTH_NORMALS
     TriangleNormals n = triangle_normals_load(index);
+#if HAS_INSTANCES
+    vec3 ns = b0 * instance_normal(it, triangle_decode(n.n0)) + uv.x * instance_normal(it, triangle_decode(n.n1))
+            + uv.y * instance_normal(it, triangle_decode(n.n2));
+#else
     vec3 ns = b0 * triangle_decode(n.n0) + uv.x * triangle_decode(n.n1) + uv.y * triangle_decode(n.n2);
+#endif
     if ((n.bits & NORMALS_SMOOTH) != 0u && dot(ns, ns) > 0.0) r.ns = normalize(ns);
 #if HAS_TANGENTS
+#if HAS_INSTANCES
+    vec3 along = b0 * instance_tangent(it, triangle_decode(n.n0), triangle_tangent(n.n0, n.bits, 0u))
+               + uv.x * instance_tangent(it, triangle_decode(n.n1), triangle_tangent(n.n1, n.bits, 1u))
+               + uv.y * instance_tangent(it, triangle_decode(n.n2), triangle_tangent(n.n2, n.bits, 2u));
+#else
     vec3 along = b0 * triangle_tangent(n.n0, n.bits, 0u) + uv.x * triangle_tangent(n.n1, n.bits, 1u)
                + uv.y * triangle_tangent(n.n2, n.bits, 2u);
+#endif
     if ((n.bits >> TANGENT_SHIFT) != 0u && dot(along, along) > 0.0) r.tangent = along;
 #if HAS_TEXTURES || HAS_ANISOTROPIC
     if ((n.bits & NORMALS_LEFT) != 0u) r.handed = -1.0;
+#if HAS_INSTANCES
+    if ((n.bits >> TANGENT_SHIFT) != 0u) r.handed *= it.side;
+#endif
 #endif
 #endif
 #endif
@@ -150,3 +180,9 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     r.flat_id = id;
     return r;
 }
+
+#if HAS_INSTANCES
+Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
+    return triangle_point(tri, uv, index, id, instance_none());
+}
+#endif

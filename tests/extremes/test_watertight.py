@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.pack import instances
 from tests.extremes.scenes import Seen, ball, icosphere, packed, placed, quad, rows
 from tests.rendering import document
 from tests.test_shapes import _matrix, _trace
@@ -34,6 +35,7 @@ ROOMS: dict[str, list[dict[str, Any]]] = {
     "a mesh of a cube": [_cube()],
     "an icosahedron": [icosphere("m", 0)],
     "1 280 triangles": [icosphere("m", 3)],
+    "an instance": [icosphere("m", 3), icosphere("m", 3, translate=[9, 0, 0])],
     "a sphere": [ball("m")],
 }
 PLACES = {
@@ -45,6 +47,12 @@ PLACES = {
     "1e5": {"scale": 1e5, "rotate": [5, 0, 0], "translate": [3e5, 1e5, 3e5]},
 }
 N = 100_000
+
+
+@pytest.fixture(autouse=True)
+def worth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Meshes share their triangles, whatever that spares."""
+    monkeypatch.setattr(instances, "WORTH", 0)
 
 
 def _corners(room: str) -> tuple[np.ndarray, np.ndarray]:

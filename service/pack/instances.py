@@ -1,0 +1,142 @@
+"""Which meshes share their triangles, and where each of them stands."""
+
+from __future__ import annotations
+
+import hashlib
+from collections import Counter
+from collections.abc import Hashable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpu import layout
+from service.assets import MeshData
+from service.pack.models import MOST_SEEN, Model, shift
+from service.pack.textures import Reads
+from service.problems import FieldError, InvalidDocument
+from service.scene.shape import MeshShape
+
+LEAST = 1024  # triangles of a mesh from which on several shapes share it: smaller ones cost less in the scene's tree
+WORTH = 1 << 17  # triangles that sharing spares a scene at least: 26 MB, for what a walk through two levels costs
+# Bounds on a transform whose inverse float32 holds well enough: lengths, and what both maps make of a length at most.
+SCALES = 1e-9, 1e9
+TWIST = 32.0
+# Twice the area of a triangle in the world, so that its square stays inside float32.
+AREAS = 1e-18, 1e18
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """A mesh of the document, before it is known whether it shares its triangles."""
+
+    shape: MeshShape
+    data: MeshData
+    matrix: np.ndarray | None
+    used: tuple[int, int]  # material, shape
+    read: Reads  # by its material
+    shines: bool
+
+
+@dataclass(frozen=True)
+class Standing:
+    """A shape that shows a model: world = axes (model) + center, float64."""
+
+    model: Model
+    used: tuple[int, int]
+    axes: np.ndarray
+    center: np.ndarray
+
+    def box(self) -> np.ndarray:
+        """(6,) float64 around it in the world."""
+        low, high = self.model.parts[:, :3], self.model.parts[:, 3:]
+        middle, half = (low + high) / 2 @ self.axes.T + self.center, (high - low) / 2 @ np.abs(self.axes).T
+        return np.concatenate([(middle - half).min(axis=0), (middle + half).max(axis=0)])
+
+
+def keys(wanted: Sequence[Wanted], digests: dict[int, Hashable]) -> list[Hashable | None]:
+    """Of each mesh what is equal where its triangles are; None where it shares them with no other."""
+    sized = [None if each.shines or len(each.data.faces) < LEAST else _size(each) for each in wanted]
+    many = Counter(sized)
+    found = [
+        None if size is None or many[size] < 2 else (*size, _content(each, digests))
+        for each, size in zip(wanted, sized, strict=True)
+    ]
+    many_of, first = Counter(found), dict(zip(found, wanted, strict=True))
+    shared = {key for key, count in many_of.items() if key is not None and count > 1}
+    spared = sum((many_of[key] - 1) * len(first[key].data.faces) for key in shared)
+    return [key if spared >= WORTH and key in shared else None for key in found]
+
+
+def _size(each: Wanted) -> tuple[Hashable, ...]:
+    """What is quickly found out of that key."""
+    shape = each.shape
+    same = shape.asset, shape.smooth, shape.double_sided, bool(each.read.uv_sets), 1 in each.read.uv_sets
+    return *same, each.read.tangents, len(each.data.vertices), len(each.data.faces)
+
+
+def _content(each: Wanted, digests: dict[int, Hashable]) -> Hashable:
+    shape = each.shape
+    if shape.asset is not None:
+        return None
+    if id(shape) not in digests:
+        arrays = (shape.vertices, shape.faces, shape.normals, shape.uvs, shape.colors)
+        whole = hashlib.blake2b(digest_size=16)
+        for array in arrays:
+            whole.update(b"-" if array is None else np.ascontiguousarray(array).data)
+        digests[id(shape)] = whole.digest()
+    return digests[id(shape)]
+
+
+def stand(model: Model, matrix: np.ndarray | None, used: tuple[int, int]) -> Standing | None:
+    """None where the transform is none that a ray can be taken through in float32."""
+    matrix = np.eye(4) if matrix is None else matrix
+    axes = np.asarray(matrix[:3, :3], np.float64)
+    lengths = np.linalg.svd(axes, compute_uv=False)
+    if not (lengths.min() > SCALES[0] and lengths.max() < SCALES[1]):
+        return None
+    twist = np.abs(axes) @ np.abs(np.linalg.inv(axes))
+    least, greatest = model.least * lengths[1] * lengths[2], model.greatest * lengths[0] * lengths[1]
+    if not (twist.sum(axis=1).max() < TWIST and least > AREAS[0] and greatest < AREAS[1]):
+        return None
+    return Standing(model, used, axes, axes @ model.center + matrix[:3, 3])
+
+
+def records(standing: Sequence[Standing], models: Sequence[Model], origin: np.ndarray, first: int) -> np.ndarray:
+    """`layout.Instance` of each; the models' triangles begin at `first`, in this order, and so do their nodes at 0.
+
+    Raises InvalidDocument.
+    """
+    out = np.zeros(len(standing), layout.Instance.dtype)
+    if not len(out):
+        return out
+    bits = shift(models)
+    if len(out) << bits > MOST_SEEN:
+        detail = f"show {len(out)} instances of up to {1 << bits} triangles; at most {MOST_SEEN + 1} in all"
+        raise InvalidDocument([FieldError("/shapes", detail)])
+    number = {id(model): i for i, model in enumerate(models)}
+    which = np.array([number[id(each.model)] for each in standing])
+    triangles = first + np.cumsum([0, *(model.count for model in models)])
+    nodes = np.cumsum([0, *(len(model.nodes) for model in models)])
+    axes, center = np.array([each.axes for each in standing]), np.array([each.center for each in standing])
+    rows = np.linalg.inv(axes)
+    out["row_x"], out["row_y"], out["row_z"] = rows[:, 0], rows[:, 1], rows[:, 2]
+    out["axis_x"], out["axis_y"] = axes[:, :, 0], axes[:, :, 1]
+    out["axis_z_x"], out["axis_z_y"], out["axis_z_z"] = axes[:, :, 2].T
+    out["center"] = center - origin
+    out["error"] = _errors(axes, rows, np.abs(center - origin), np.array([model.reach for model in models])[which])
+    out["side"] = np.where(np.linalg.det(axes) < 0, -1.0, 1.0)
+    out["material"], out["shape"] = np.array([each.used for each in standing], np.uint32).T
+    out["first"], out["node_first"] = triangles[which], nodes[which]
+    for name in ("node_count", "node_origin", "node_scale"):
+        out[name] = np.array([getattr(model, name) for model in models])[which]
+    return out
+
+
+def _errors(axes: np.ndarray, rows: np.ndarray, away: np.ndarray, reach: np.ndarray) -> np.ndarray:
+    """(n, 3), in units of a rounding: how far a place of each model is at most from where a ray that begins there is
+    taken to begin. Seven roundings go into it, two more when the center is added; eight into the way back, as the
+    float32 numbers of the two maps are not quite each other's inverse. `reach` (n, 3): the models' half extents.
+    """
+    far: np.ndarray = np.einsum("nij,nj->ni", np.abs(axes), reach)
+    back = np.einsum("nij,njk,nk->ni", np.abs(axes), np.abs(rows), far)
+    return np.asarray(7 * far + 2 * (far + away) + 8 * back)

@@ -1,0 +1,180 @@
+"""Meshes that share their triangles look as if each had its own: in every way that a surface is asked about."""
+
+from __future__ import annotations
+
+import re
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings, features
+from gpu.program import Source
+from service.pack import instances, pack
+from service.scene import parse_scene
+from tests.extremes.scenes import LONG, icosphere, moved, quad, rows
+from tests.rendering import Images, document
+from tests.test_shapes import _trace
+
+Doc = dict[str, Any]
+SKY = {"type": "constant", "radiance": 0.6}
+SUN = {"type": "directional", "direction": [-1, -2, -1], "irradiance": 2, "angular_diameter": 3}
+FLOOR = quad("white", (-9, -1.4, 9), (18, 0, 0), (0, 0, -18))
+TURNED = {"translate": [-1.2, 0.1, 0], "rotate": [20, 30, 40]}
+MIRRORED = {"translate": [1.1, 0, 0.2], "rotate": [10, 0, 60], "scale": [-0.6, 1.2, 0.8]}
+RNG = np.random.default_rng(2)
+IMAGES = Images(t=RNG.integers(0, 256, (16, 16, 4)).astype(np.uint8))
+
+
+@pytest.fixture(autouse=True)
+def worth(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Whatever it spares."""
+    monkeypatch.setattr(instances, "WORTH", 0)
+
+
+def bumpy(**more: Any) -> Doc:
+    """An icosphere that no symmetry maps onto itself, with texture coordinates and colours."""
+    ball = icosphere("m", 3)
+    v = np.array(ball["vertices"])
+    uvs = np.stack([v[:, 0], v[:, 1] + 0.3 * v[:, 2]], axis=1)
+    v *= 1 + 0.15 * np.sin(5 * v[:, :1]) * np.cos(4 * v[:, 1:2] + 1)
+    return {**ball, "vertices": v.tolist(), "uvs": uvs.tolist(), **more}
+
+
+def two(material: Doc, *more: Doc, **mesh: Any) -> Doc:
+    shapes = [bumpy(transform=TURNED, **mesh), bumpy(transform=MIRRORED, **mesh), FLOOR, *more]
+    materials = {"m": material, "white": {"type": "diffuse", "albedo": 0.6}}
+    texture = {"asset": "t", "scale": [2, 2]}
+    textures = {"t": texture, "n": {**texture, "color_space": "linear"}}
+    used = {name: value for name, value in textures.items() if f"'texture': '{name}'" in str(material)}
+    lit = {"environment": SKY, "lights": [SUN]}
+    return document(shapes, materials, textures=used, camera={"position": [0, 1, 5.5], "target": [0, 0, 0]}, **lit)
+
+
+T = {"texture": "t"}
+GLASS = {"type": "principled", "transmission": 1, "roughness": 0, "attenuation_color": [0.5, 0.8, 0.9],
+         "attenuation_distance": 1}  # fmt: skip
+BALL = {"type": "sphere", "center": [-1.2, 0.1, 0], "radius": 0.4, "material": "m"}
+BENT = {"alpha": {**T, "channel": "a"}, "normal_map": {"texture": "n", "scale": 0.4}}
+SCENES = rows(
+    {
+        "textured, in part there, single-sided": two({"type": "diffuse", "albedo": T, **BENT}, double_sided=False),
+        "glass with glass inside": two(GLASS, BALL, bumpy(transform={**MIRRORED, "scale": 0.4})),
+        "hidden": two({"type": "diffuse", "albedo": 0.7}, visible_to_camera=False),
+    },
+    {
+        "textured": two(
+            {
+                "type": "principled",
+                "base_color": T,
+                "roughness": 0.3,
+                "anisotropic": 0.6,
+                "normal_map": BENT["normal_map"],
+            }
+        ),
+        "matte": two({"type": "diffuse", "albedo": 0.7}),
+        "flat": two({"type": "diffuse", "albedo": 0.7}, smooth=False),
+        "brushed": two({"type": "disney", "metallic": 1, "anisotropic": 0.8, "roughness": 0.4}, smooth=False),
+        "single-sided glass": two(GLASS, double_sided=False),
+    },
+)
+
+
+def seen(gpu: Renderer, scene: Doc, aovs: tuple[str, ...] = ("color",), **more: Any) -> tuple[list[np.ndarray], Any]:
+    arrays = pack(parse_scene(scene), IMAGES).arrays
+    loaded = gpu.load(arrays)
+    settings: Doc = {"width": 72, "height": 48, "max_bounces": 5, "filter": "box", **more}
+    made = gpu.picture(loaded, RenderSettings(**settings))
+    made.trace(60.0, 8)
+    out = [made.read(aov) for aov in aovs]
+    made.release()
+    loaded.release()
+    return out, arrays
+
+
+@pytest.fixture
+def apart(monkeypatch: pytest.MonkeyPatch) -> Any:
+    """Takes sharing away."""
+    return lambda: monkeypatch.setattr(instances, "LEAST", 10**9)
+
+
+@pytest.mark.parametrize("row", SCENES)
+def test_shared_triangles_look_as_one_s_own(gpu: Renderer, apart: Any, row: str) -> None:
+    aovs = ("color", "albedo", "normal", "depth", "shape_id", "material_id")
+    if "glass" in row and not LONG:
+        aovs = aovs[:1]
+    shared, arrays = seen(gpu, SCENES[row], aovs)
+    assert len(arrays.instances) == sum(shape["type"] == "mesh" for shape in SCENES[row]["shapes"])
+    apart()
+    own, arrays = seen(gpu, SCENES[row], aovs)
+    assert not len(arrays.instances)
+    for name, a, b in zip(aovs, shared, own, strict=True):
+        # Tangents have ten bits, in the one space or the other; and a rounding turns a path at an edge.
+        least = 4e-3 if {"normal_map", "anisotropic"} & SCENES[row]["materials"]["m"].keys() else 2e-4
+        assert np.isclose(a, b, rtol=2e-3, atol=least).all(2).mean() > 0.98, name
+    assert shared[0].mean() == pytest.approx(own[0].mean(), rel=2e-3)
+
+
+def test_far_away_they_look_the_same(gpu: Renderer) -> None:
+    scene = two({"type": "diffuse", "albedo": 0.7})
+    (near,), _ = seen(gpu, scene)
+    (far,), arrays = seen(gpu, moved(scene, [1e6, -1e6, 3e5]))
+    assert len(arrays.instances) == 2
+    assert np.isclose(near, far, rtol=1e-3).all(2).mean() > 0.99
+
+
+def test_closed_glass_loses_and_gains_nothing(gpu: Renderer) -> None:
+    clear = {"type": "principled", "base_color": 1, "transmission": 1, "roughness": 0}
+    scene = two(clear, smooth=False)
+    scene = {**scene, "shapes": scene["shapes"][:2], "lights": [], "environment": {"type": "constant", "radiance": 1}}
+    (color,), arrays = seen(gpu, scene, max_bounces=64, roulette_depth=64, width=32, height=24)
+    assert len(arrays.instances) == 2
+    assert color.min() > 0.99 and color.max() < 1.003
+
+
+def test_a_ray_meets_the_same_triangle_of_another_instance(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From one square, across to its likeness; and not the one it leaves, neither itself nor from the next."""
+    monkeypatch.setattr(instances, "LEAST", 1)
+    corners, faces = [[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0]], [[0, 1, 2], [0, 2, 3]]
+    square = {"type": "mesh", "vertices": corners, "faces": faces, "material": "m"}
+    shapes = [{**square, "transform": {"rotate": [5, 0, 0], "translate": [0, 0, z]}} for z in (0, 1e-3)]
+    arrays = pack(parse_scene(document(shapes)), IMAGES).arrays
+    assert len(arrays.instances) == 2
+    scene = gpu.load(arrays)
+    rng = np.random.default_rng(3)
+    o = np.concatenate([rng.uniform(-0.5, 0.5, (20_000, 2)), np.full((20_000, 1), -2.0)], axis=1)
+    down, up = np.tile([0.0, 0, -1], (20_000, 1)), np.tile([0.0, 0, 1], (20_000, 1))
+    hits, _, leaves = _trace(gpu, scene, o, up, down)  # back to where it came from: nothing is there
+    assert (hits[:, 3] > 0).all() and not leaves[:, 0].any()
+    between = o * [1, 1, 0] + [0, 0, 5e-4] + np.outer(o[:, 1] * np.tan(np.radians(5)), [0, 0, 1])
+    hits, _, leaves = _trace(gpu, scene, between, up, down)
+    assert (hits[:, 3] > 0).all() and leaves[:, 0].all()
+    scene.release()
+
+
+def test_kernels_of_other_scenes_have_nothing_of_it() -> None:
+    """Of what a kernel is compiled from, without the flag, no line knows of instances."""
+    flags = frozenset(features.FLAGS) - {"HAS_INSTANCES"}
+    for entry in ("pathtrace.comp", "guides.comp"):
+        text = Source(entry, features.defines(flags)).text.replace("#define HAS_INSTANCES 0\n", "")
+        assert re.search("instance", text, re.IGNORECASE)
+        assert not re.search("instance|node_first", _without_instances(text), re.IGNORECASE)
+
+
+def _without_instances(text: str) -> str:
+    """The lines that are left where HAS_INSTANCES is 0, comments taken out."""
+    out, depth, skipped = list[str](), list[str](), 0
+    for line in text.splitlines():
+        word = line.strip()
+        if word.startswith("#if"):
+            depth.append(word)
+            skipped += word == "#if HAS_INSTANCES"
+        elif word.startswith(("#else", "#elif")) and depth[-1] == "#if HAS_INSTANCES":
+            depth[-1] = word
+            skipped -= 1
+        elif word.startswith("#endif"):
+            skipped -= depth.pop() == "#if HAS_INSTANCES"
+        elif not skipped and not word.startswith("#line"):
+            out.append(line.split("//")[0])
+    assert not depth and not skipped
+    return "\n".join(out)
