@@ -49,7 +49,7 @@ def expected(texture: dict[str, Any], reference: dict[str, Any], uv: np.ndarray)
     pixels = image.astype(float) / (255 if image.dtype == np.uint8 else 1)
     if pixels.shape[2] == 1:
         pixels = np.repeat(pixels, 3, axis=2)
-    if image.dtype == np.uint8 and texture.get("color_space", "srgb") == "srgb":
+    if texture.get("color_space", "srgb" if image.dtype == np.uint8 else "linear") == "srgb":
         c = pixels[..., :3]
         pixels[..., :3] = np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
     angle = np.radians(texture.get("rotation", 0))
@@ -80,6 +80,7 @@ TEXTURES: list[dict[str, Any]] = [
     *({"wrap": wrap, "asset": asset} for wrap in ("repeat", "clamp", "mirror") for asset in IMAGES),
     {"asset": "rgb", "color_space": "linear"},
     {"asset": "floats", "color_space": "linear", "rotation": 90},
+    {"asset": "floats", "color_space": "srgb"},
     {"asset": "rgb", "rotation": 30, "scale": [2, -3], "offset": [0.3, -5.7]},
     {"asset": "rgba", "rotation": -120.5, "scale": [0.1, 40], "wrap": "mirror"},
     {"asset": "floats", "rotation": 725, "offset": [1e3, 7], "wrap": "clamp"},
@@ -290,6 +291,15 @@ def test_floats_beyond_the_range_are_clamped_with_a_word(gpu: Renderer) -> None:
     assert result.warnings == ["/materials/m/albedo: 1 texels of 't' are clamped to 0..1"]
     np.testing.assert_allclose(seen(gpu, scene, assets=Images(wild=wild))[:, :8].mean((0, 1)), [1, 0.5, 0], atol=1e-6)
     assert not pack(parse_scene(scene_of({"t": {"asset": "rgb"}}, ALBEDO)), Images(**IMAGES)).warnings
+
+
+def test_a_float_image_that_is_srgb_and_linear_is_there_twice() -> None:
+    scene = scene_of({"a": {"asset": "floats", "color_space": "srgb"}, "b": {"asset": "floats"}},
+                     {"albedo": {"texture": "a"}, "emission": {"texture": "b"}})  # fmt: skip
+    made = pack(parse_scene(scene), Images(**IMAGES))
+    assert made.arrays.textures is not None and len(made.arrays.textures.floats) == 2 * 24
+    beyond = int((IMAGES["floats"] > 1).any(axis=2).sum())
+    assert made.warnings == [f"/materials/m/albedo: {beyond} texels of 'a' are clamped to 0..1"]
 
 
 def test_members_share_a_look_where_they_can() -> None:

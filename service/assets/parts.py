@@ -83,7 +83,8 @@ def unit_colors(colors: Numbers, warnings: list[str]) -> Floats:
 def linear(encoded: Numbers) -> Floats:
     """Of sRGB [IEC 61966-2-1]."""
     low = encoded <= 0.04045
-    decoded: Floats = np.where(low, encoded / 12.92, ((encoded + 0.055) / 1.055) ** 2.4).astype(np.float32)
+    curved = ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4
+    decoded: Floats = np.where(low, encoded / 12.92, curved).astype(np.float32)
     return decoded
 
 

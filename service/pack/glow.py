@@ -44,7 +44,7 @@ def _levels(use: Use, texels: Texels) -> tuple[np.ndarray, float]:
     if isinstance(use.texture, CheckerTexture):
         pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
     else:
-        pixels = texels.places[use.texture.asset][1].pixels
+        pixels = texels.places[use.kept][1].pixels
     low, high = layout.TEXTURABLE[use.member]
     total, greatest = np.zeros(3), 0.0
     for rows in np.array_split(pixels, max(1, pixels.shape[0] // 256)):  # floats of a part of it at a time
@@ -78,7 +78,7 @@ def nearest(use: Use, texels: Texels, uv: np.ndarray) -> np.ndarray:
     if isinstance(use.texture, CheckerTexture):
         odd = np.floor(uv).sum(axis=1) % 2 != 0
         return np.where(odd[:, None], use.texture.b, use.texture.a).astype(np.float32)
-    pixels = texels.places[use.texture.asset][1].pixels
+    pixels = texels.places[use.kept][1].pixels
     if use.texture.wrap == "repeat":
         uv = uv - np.floor(uv)
     elif use.texture.wrap == "mirror":

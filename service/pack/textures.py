@@ -11,6 +11,7 @@ import numpy as np
 
 from gpu import TextureArrays, layout
 from service.assets import Assets, ImageData
+from service.assets.parts import linear
 from service.pack.cache import PackCache, lasting
 from service.pack.values import member_of
 from service.problems import AssetError, FieldError, InvalidDocument
@@ -29,6 +30,7 @@ from service.scene.texture import (
 )
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
+DECODED = " decoded"  # after an asset's reference
 MAX_TEXELS = 2**27  # what two textures of the device hold, 16384 rows each
 
 
@@ -45,8 +47,15 @@ class Use:
     member: str
     reference: Reference
     texture: ImageTexture | CheckerTexture
-    srgb: bool
+    srgb: bool  # bytes that the kernel decodes
     pointer: str
+    decoded: bool = False  # floats that are said to be sRGB
+
+    @property
+    def kept(self) -> str:
+        """Under which the texels of an image are found."""
+        assert isinstance(self.texture, ImageTexture)
+        return self.texture.asset + (DECODED if self.decoded else "")
 
     @property
     def look(self) -> tuple[str, bool]:
@@ -56,7 +65,7 @@ class Use:
 
 @dataclass(frozen=True)
 class Texels:
-    """All images of a scene; `places`: asset -> (first texel among those of its kind, image)."""
+    """All images of a scene; `places`: `Use.kept` -> (first texel among those of its kind, image)."""
 
     texels: np.ndarray
     floats: np.ndarray
@@ -102,17 +111,18 @@ def pack_textures(
     images = _images(scene, assets)
     uses = list(_uses(scene, images))
     _check_channels(uses, images)
+    used = {use.kept: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
     wanted = {use.texture.asset: use.reference.texture for use in uses if isinstance(use.texture, ImageTexture)}
-    texels = _texels({asset: (name, images[asset]) for asset, name in wanted.items()}, cache, limits)
+    texels = _texels({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, cache, limits)
     if not uses:
         return None, uses, texels, []
     slots = _slots(uses)
     words = _words(len(scene.materials), uses, slots, texels)
     write_uses(words, scene, slots)
-    key = " ".join(f"{asset}@{first}" for asset, (first, _) in texels.places.items())
+    key = " ".join(f"{kept}@{first}" for kept, (first, _) in texels.places.items())
     key = key if all(map(lasting, texels.places)) else ""
     arrays = TextureArrays(slots, words, texels.texels, texels.floats, key)
-    return arrays, uses, texels, [*_told(wanted, images), *_warnings(uses, images)]
+    return arrays, uses, texels, [*_told(wanted, images), *_warnings(uses, texels)]
 
 
 def _images(scene: Scene, assets: Assets) -> dict[str, ImageData]:
@@ -134,12 +144,14 @@ def _uses(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[Use]:
     for i, (name, material) in enumerate(scene.materials.items()):
         for key, reference in references(material).items():
             texture = scene.textures[reference.texture]
-            srgb = False
-            if isinstance(texture, ImageTexture) and images[texture.asset].is_8bit:
-                colour = isinstance(reference, ColorTexture)
-                srgb = colour if texture.color_space is None else texture.color_space == "srgb"
+            srgb = is_8bit = False
+            if isinstance(texture, ImageTexture):
+                is_8bit = images[texture.asset].is_8bit
+                assumed = is_8bit and isinstance(reference, ColorTexture)
+                srgb = assumed if texture.color_space is None else texture.color_space == "srgb"
             pointer = f"/materials/{escaped(name)}/{key}"
-            yield Use(i, member_of(material, key), reference, texture, srgb, pointer)
+            member = member_of(material, key)
+            yield Use(i, member, reference, texture, srgb and is_8bit, pointer, srgb and not is_8bit)
 
 
 def _check_channels(uses: list[Use], images: Mapping[str, ImageData]) -> None:
@@ -166,7 +178,7 @@ def _texels(wanted: dict[str, tuple[str, ImageData]], cache: PackCache | None, l
             detail = f"has {width} x {height} texels; this server has room for {room} more in a scene"
             raise InvalidDocument([FieldError(f"/textures/{escaped(name)}/asset", detail)])
         room -= width * height
-    images = {asset: image for asset, (_, image) in wanted.items()}
+    images = {kept: image for kept, (_, image) in wanted.items()}
     if cache is None or not images or not all(map(lasting, images)):
         return _laid(images)
     return cache.get(("texels", tuple(images)), lambda: _laid(images))
@@ -175,8 +187,8 @@ def _texels(wanted: dict[str, tuple[str, ImageData]], cache: PackCache | None, l
 def _laid(images: dict[str, ImageData]) -> Texels:
     places: dict[str, tuple[int, ImageData]] = {}
     ends = {True: 0, False: 0}
-    for asset, image in images.items():
-        places[asset] = ends[image.is_8bit], image
+    for kept, image in images.items():
+        places[kept] = ends[image.is_8bit], _decoded(image) if kept.endswith(DECODED) else image
         ends[image.is_8bit] += image.pixels.shape[0] * image.pixels.shape[1]
     out: dict[bool, np.ndarray] = {
         True: np.empty((ends[True], 4), np.uint8),
@@ -188,6 +200,13 @@ def _laid(images: dict[str, ImageData]) -> Texels:
         part[..., :3] = image.pixels[..., :3]  # a grey one three times
         part[..., 3] = image.pixels[..., 3] if channels == 4 else 255 if image.is_8bit else 1
     return Texels(out[True], out[False], places)
+
+
+def _decoded(image: ImageData) -> ImageData:
+    """Linear floats of sRGB ones, such as a PNG of 16 bits has; its alpha as it is."""
+    pixels = np.array(image.pixels, np.float32)
+    pixels[..., :3] = linear(pixels[..., :3])
+    return ImageData(pixels)
 
 
 def _slots(uses: list[Use]) -> dict[str, int]:
@@ -237,7 +256,7 @@ def record_of(use: Use, texels: Texels) -> np.ndarray:
         record["turn"] = (texture.scale[0], 0, 0, texture.scale[1])
         record["color_a"], record["color_b"] = texture.a, texture.b
         return record
-    first, image = texels.places[texture.asset]
+    first, image = texels.places[use.kept]
     flags = {"repeat": 0, "clamp": layout.SLOT_CLAMP, "mirror": layout.SLOT_MIRROR}[texture.wrap]
     flags |= layout.SLOT_SRGB if use.srgb else 0
     flags |= 0 if image.is_8bit else layout.SLOT_FLOATS
@@ -302,7 +321,7 @@ def _told(wanted: Mapping[str, str], images: Mapping[str, ImageData]) -> Iterato
         yield from (f"/textures/{escaped(name)}/asset: {warning}" for warning in images[asset].warnings)
 
 
-def _warnings(uses: list[Use], images: Mapping[str, ImageData]) -> Iterator[str]:
+def _warnings(uses: list[Use], texels: Texels) -> Iterator[str]:
     charts = {use.material: getattr(use.texture, "uv", 0) for use in uses if use.member == "normal"}
     for use in uses:
         if isinstance(use.reference, NormalTexture):
@@ -315,10 +334,10 @@ def _warnings(uses: list[Use], images: Mapping[str, ImageData]) -> Iterator[str]
         pixels: np.ndarray
         if isinstance(use.texture, CheckerTexture):
             pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
-        elif images[use.texture.asset].is_8bit:
+        elif texels.places[use.kept][1].is_8bit:
             continue  # 0..1: what the factor makes of that keeps to the range by definition
         else:
-            pixels = images[use.texture.asset].pixels
+            pixels = texels.places[use.kept][1].pixels
         values = values_of(use, pixels)
         if isinstance(use.reference, ScalarTexture):
             values = values[..., :1]
