@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore
+from service.pack import pack
+from service.scene import parse_scene
 from tests.gltf_files import QUAD, Gltf
 from tests.test_gltf_scene import imported, noted
 
@@ -245,3 +247,28 @@ def test_factors_beyond_their_range_are_lowered_with_a_word(store: AssetStore) -
     (document,) = found.document["materials"].values()
     assert document["base_color"] == [1, 0.5, 0.5] and "alpha" not in document
     assert list(noted(found)) == ["/materials/0/pbrMetallicRoughness/baseColorFactor"]
+
+
+def test_an_image_without_alpha_is_opaque(store: AssetStore) -> None:
+    """Most pictures of faded materials are JPEGs; alphas of the extensions likewise."""
+    shown = (("BLEND", 1), ("BLEND", 0.25), ("MASK", 0.25))
+    for channels, textured in ((1, False), (3, False), (4, True)):
+        for mode, alpha in shown:
+            file = Gltf()
+            texture = {"index": file.texture(PIXELS[..., :channels])}
+            rough = {"baseColorTexture": texture, "baseColorFactor": [1, 1, 1, alpha]}
+            sheen = {"sheenColorFactor": [1, 1, 1], "sheenRoughnessFactor": 0.5, "sheenRoughnessTexture": texture}
+            made = material(store, {"pbrMetallicRoughness": rough, "alphaMode": mode,
+                                    "extensions": {"KHR_materials_sheen": sheen}}, file)  # fmt: skip
+            if textured:
+                assert made["alpha"]["channel"] == "a" and made["sheen_roughness"]["channel"] == "a"
+            else:
+                assert made.get("alpha", 1) == alpha and made["sheen_roughness"] == 0.5
+            pack(parse_scene(store.scene(store.add(file.glb()).id).document), store)
+
+
+@pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
+def test_a_grey_normal_map_is_left_out_with_a_word(store: AssetStore, dtype: Any) -> None:
+    file = Gltf()
+    found = imported(store, file.of({"normalTexture": {"index": file.texture(PIXELS[..., :1].astype(dtype))}}))
+    assert noted(found) == {"/materials/0/normalTexture": "is grey, and no normal map: left out"}

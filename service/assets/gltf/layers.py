@@ -35,6 +35,9 @@ def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[s
     info = owner.object(name)
     if info is None:
         return {}
+    if read.textures.channels(info) == "L":
+        read.notes.add(info.pointer, "is grey, and no normal map: left out")
+        return {}
     texture = read.textures.use(info, "linear", read.sets)
     if texture is None:
         return {}

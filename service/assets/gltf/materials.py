@@ -35,8 +35,12 @@ class Reading:
             self.notes.add(owner.at(name), "what lies beyond 1 is lowered to it")
         return tuple(min(value, 1.0) for value in found)
 
-    def scalar(self, owner: Place, name: str, value: float, channel: str) -> Any:
-        texture = self.texture(owner, name, "linear")
+    def scalar(self, owner: Place, name: str, value: float, channel: str, space: ColorSpace = "linear") -> Any:
+        """A number, or the texture's channel that it multiplies; an image without alpha has 1 there."""
+        info = owner.object(name)
+        if channel == "a" and info is not None and "A" not in self.textures.channels(info):
+            return value
+        texture = self.texture(owner, name, space)
         return value if texture is None else {"texture": texture, "channel": channel, "factor": value}
 
 
@@ -127,8 +131,7 @@ class Materials:
             owner, color, texture = place.object("pbrMetallicRoughness"), "baseColorFactor", "baseColorTexture"
         if owner is not None:
             alpha = read.share(owner, color, (1.0,) * 4)[3]
-            image = read.texture(owner, texture, "srgb")
-            value = alpha if image is None else {"texture": image, "channel": "a", "factor": alpha}
+            value = read.scalar(owner, texture, alpha, "a", "srgb")
             if value != 1:
                 document["alpha"] = value
         if mode == "MASK":

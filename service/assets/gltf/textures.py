@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
+from service.assets.errors import ParseError
 from service.assets.gltf.file import GltfFile
 from service.assets.gltf.notes import Notes
 from service.assets.gltf.place import Place, number
@@ -30,6 +32,7 @@ class Textures:
     made: dict[tuple[str, str], list[str]] = field(default_factory=dict)  # references to images of our own
     _names: dict[tuple[Any, ...], str] = field(default_factory=dict)
     _kept: dict[str, str] = field(default_factory=dict)
+    _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
     def use(self, info: Place | None, space: ColorSpace, sets: tuple[bool, ...]) -> str | None:
         """The name of a texture. None, and noted, where it can't be had; `sets`: the uv sets that the mesh has."""
@@ -81,6 +84,15 @@ class Textures:
             self._kept[place.pointer] = self.keep(data, place.pointer)
         return self._kept[place.pointer]
 
+    def channels(self, info: Place) -> str:
+        """Which of "L" (grey), "RGB" and "A" the image of a texture has; "" where there is none that is read."""
+        place = self.source(self.file.follow(info, "index", "textures"))
+        if place is None:
+            return ""
+        if place.pointer not in self._channels:
+            self._channels[place.pointer] = _channels(self.file.image(place), place)
+        return self._channels[place.pointer]
+
     def _wrap(self, texture: Place) -> str:
         if "sampler" not in texture:
             return "repeat"
@@ -126,6 +138,20 @@ class Textures:
         source = self.source(texture)
         named = (source.text("name") if source else "") or texture.text("name")
         return unique(named or texture.pointer[1:].replace("/", " "), self.documents)
+
+
+def _channels(data: bytes, place: Place) -> str:
+    """From the image's header."""
+    from PIL import Image
+
+    Image.MAX_IMAGE_PIXELS = None  # opening decodes nothing
+    try:
+        image = Image.open(io.BytesIO(data), formats=[name.upper() for name in READ])
+    except (OSError, SyntaxError, ValueError):
+        raise ParseError("is a broken image", place.pointer) from None
+    transparent = "A" in image.getbands() or "transparency" in image.info
+    grey = len(image.getbands()) == 1 and image.mode != "P" and not transparent
+    return ("L" if grey else "RGB") + ("A" if transparent else "")
 
 
 def unique(base: str, taken: dict[str, Any]) -> str:
