@@ -74,6 +74,20 @@ def test_estimators_agree(gpu: Renderer, shape: str, more: Any) -> None:
         np.testing.assert_allclose(mean, means["mis"], rtol=0.03, err_msg=str(means))
 
 
+@pytest.mark.parametrize("shape", ["quad", "mesh"])
+def test_a_black_texture_makes_no_lamp(gpu: Renderer, shape: str) -> None:
+    """Files of glTF are full of them. Red alone where there is none is black, too."""
+    black = Images(s=np.zeros((2, 2, 3), np.uint8), g=np.array([[[0, 9, 9]]], np.uint8))
+    for asset, factor in (("s", 1), ("g", [1, 0, 0])):
+        scene = scene_of(SHAPES[shape], emission={"texture": "s", "factor": factor})
+        scene |= {"textures": {"s": {"asset": asset}}, "environment": {"type": "constant", "radiance": 1}}
+        arrays = pack(parse_scene(scene), black).arrays
+        assert len(arrays.lights) == 1 and np.isfinite(arrays.lights["probability"]).all()
+        lit, plain = (render(gpu, one, 8, assets=black) for one in (scene, scene_of(
+            SHAPES[shape], emission=0) | {"environment": scene["environment"]}))  # fmt: skip
+        np.testing.assert_allclose(lit, plain, rtol=1e-4)
+
+
 def test_dark_triangles_are_rarely_picked() -> None:
     """Ten thousand triangles of which the bright stripe covers a quarter: they get the picks."""
     n = 70

@@ -21,6 +21,22 @@ PLACES = np.array(
 LEAST = 0.02  # of the whole texture's mean: what a triangle is taken to shine with where the places found nothing
 
 
+def dark(uses: Sequence[Use], texels: Texels) -> list[int]:
+    """Materials whose emission is a black texture: lamps without a power that they could be picked by."""
+    return [
+        use.material
+        for use in uses
+        if use.member == "emission" and not (values_of(use, _pixels(use, texels).max(axis=(0, 1))) > 0).any()
+    ]
+
+
+def _pixels(use: Use, texels: Texels) -> np.ndarray:
+    """(height, width, channels) of an image, or of a checker its two fields."""
+    if isinstance(use.texture, CheckerTexture):
+        return np.array([[use.texture.a, use.texture.b]], np.float32)
+    return texels.places[use.kept][1].pixels
+
+
 def glow(materials: np.ndarray, uses: Sequence[Use], texels: Texels, built: Geometry) -> tuple[np.ndarray, float]:
     """(mean emission of each light of `built` (n, 3), the greatest radiance of any emission or ambient)."""
     emission, used = materials["emission"].astype(np.float64), built.lights["material"]
@@ -40,11 +56,7 @@ def glow(materials: np.ndarray, uses: Sequence[Use], texels: Texels, built: Geom
 
 def _levels(use: Use, texels: Texels) -> tuple[np.ndarray, float]:
     """(mean (3,), greatest) of what a texture gives a radiance."""
-    pixels: np.ndarray
-    if isinstance(use.texture, CheckerTexture):
-        pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
-    else:
-        pixels = texels.places[use.kept][1].pixels
+    pixels = _pixels(use, texels)
     low, high = layout.TEXTURABLE[use.member]
     total, greatest = np.zeros(3), 0.0
     for rows in np.array_split(pixels, max(1, pixels.shape[0] // 256)):  # floats of a part of it at a time

@@ -16,7 +16,7 @@ from service.pack import lights
 from service.pack.bounded import tree
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
-from service.pack.glow import glow
+from service.pack.glow import dark, glow
 from service.pack.models import shift
 from service.pack.sky import Sky, make_sky, sky_key
 from service.pack.textures import pack_textures, reads
@@ -53,6 +53,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
     materials = pack_materials(scene)
     textures, uses, texels, told = pack_textures(scene, assets, cache, limits)
     emissive = np.any(materials["emission"] > 0, axis=1)
+    emissive[dark(uses, texels)] = False
     built = _geometry(scene, emissive, assets, cache, limits)
     warnings = [*built.warnings, *told]
     environment, sky_power, peak = None, 0.0, 0.0
