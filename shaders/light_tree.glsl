@@ -49,16 +49,19 @@ vec2 light_tree_importance(uvec4 node, vec3 p, Asker at) {
     if (at.through) cos_in = abs(cos_in);
 #endif
     cos_in = light_tree_less(vec2(cos_in, light_tree_sine(cos_in)), ball).x;
+#if HAS_QUAD_LIGHTS || HAS_TRIANGLE_LIGHTS || HAS_SPOT_LIGHTS
     float half_sine = float(node.y >> 24u) * (1.0 / 255.0);
     float cos_cone = 1.0 - 2.0 * half_sine * half_sine;
     float cos_out = -dot(to, light_tree_axis(node.z)) * inv;
     vec2 off = light_tree_less(vec2(cos_out, light_tree_sine(cos_out)), vec2(cos_cone, light_tree_sine(cos_cone)));
     cos_out = light_tree_less(off, ball).x;
     float edge = float((node.z >> 16u) & 31u) * (1.0 / 31.0);
-    bool inside = d2 <= r2;
-    if (inside) cos_in = cos_out = 1.0;
-    bool reached = cos_in > 0.0 && cos_out > 0.0 && cos_out >= 1.0 - edge * edge;
-    return vec2(reached ? light_tree_intensity(node) * cos_in * cos_out : 0.0, max(d2, r2));
+    if (cos_out < 1.0 - edge * edge) cos_out = 0.0;
+#else
+    float cos_out = 1.0; // all shine into all directions
+#endif
+    float share = d2 <= r2 ? 1.0 : max(cos_in, 0.0) * max(cos_out, 0.0);
+    return vec2(light_tree_intensity(node) * share, max(d2, r2));
 }
 
 // The chance of coming down the tree to a light: to the one that `code` leads to, or, `told`, to the one whose trail

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from gpu import Renderer, SceneArrays, layout
-from gpu.layout import LightNode, LightTreeHead, Slot
+from gpu.features import FLAGS
+from gpu.layout import LightKind, LightNode, LightTreeHead, Slot
 from gpu.texels import rows
 from tests.probing import Prober
 
@@ -79,10 +80,11 @@ class Picker:
         self._texture.use(layout.LIGHT_TREE_TEXTURE)
         frame = np.zeros((), layout.Frame.dtype)
         frame["light_count"] = len(self._lights)
-        flags = frozenset({"HAS_LIGHTS", "HAS_MANY_LIGHTS", "HAS_LIGHT_TREE", "HAS_TRANSMISSION", "HAS_PRINCIPLED"})
+        kinds = {f"HAS_{LightKind(int(kind)).name}_LIGHTS" for kind in set(self._lights["kind"])} & set(FLAGS)
+        flags = kinds | {"HAS_LIGHTS", "HAS_MANY_LIGHTS", "HAS_LIGHT_TREE", "HAS_TRANSMISSION", "HAS_PRINCIPLED"}
         inputs = {Slot.SUM: asks, Slot.LIGHTS: self._lights}
         return self._prober.run(
-            "light_tree.comp", count, inputs, (Slot.OUTPUT,), {"SAMPLE": sample}, flags, frame,
+            "light_tree.comp", count, inputs, (Slot.OUTPUT,), {"SAMPLE": sample}, frozenset(flags), frame,
             p=tuple(map(float, p)), n=tuple(map(float, n)), through=int(through),
         )[0].astype(float)  # fmt: skip
 

@@ -11,7 +11,7 @@ import pytest
 from gpu import Renderer, SceneArrays, layout
 from gpu.features import flags
 from gpu.layout import LightKind
-from service.pack import PackCache, lights, pack
+from service.pack import PackCache, bounded, pack
 from service.scene import parse_scene
 from tests import stats
 from tests.extremes.scenes import Seen, everything, scaled
@@ -240,8 +240,8 @@ def test_odd_crowds_are_drawn_as_often_as_they_say(pickers: Any, name: str) -> N
 def _both(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, scene: Doc, **settings: Any) -> tuple[Seen, Seen]:
     """By the tree, and by the table of powers that small scenes have."""
     seen = []
-    for least in (2, 1 << 30):
-        monkeypatch.setattr(lights, "LEAST_TREE", least)
+    for worth in (True, False):
+        monkeypatch.setattr(bounded, "worth", lambda _, worth=worth: worth)
         seen.append(
             Seen(gpu, scene, **{"samples": 256, "sampler": "independent", "width": 48, "height": 32, **settings})
         )
@@ -257,8 +257,7 @@ def test_the_picture_is_that_of_the_table(gpu: Renderer, monkeypatch: pytest.Mon
 
 
 @pytest.mark.parametrize("factor", [1e-4, 1e5])
-def test_in_any_size_it_is_the_same(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, factor: float) -> None:
-    monkeypatch.setattr(lights, "LEAST_TREE", 2)
+def test_in_any_size_it_is_the_same(gpu: Renderer, factor: float) -> None:
     one, other = Seen(gpu, everything(), max_bounces=2), Seen(gpu, scaled(everything(), factor), max_bounces=2)
     assert other.alike(one) > 0.99
 
@@ -284,11 +283,27 @@ def test_it_pays(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     assert table.mean() > 2.5 * tree.mean()
 
 
-def test_few_lights_keep_their_table_and_raise_no_flag() -> None:
-    few, many = (_packed(_room(40, n)) for n in (lights.LEAST_TREE - 1, lights.LEAST_TREE))
-    assert "HAS_LIGHT_TREE" not in flags(few) and not len(few.light_tree)
-    assert "HAS_LIGHT_TREE" in flags(many)
-    assert few.lights["probability"].sum() == pytest.approx(1)
+def test_lights_in_one_place_keep_their_table_and_raise_no_flag() -> None:
+    def packed(*places: float, **more: Any) -> SceneArrays:
+        balls = [
+            {"type": "sphere", "center": [x, 0, 0], "radius": 1, "material": f"lamp {k}"}
+            for k, x in zip((0, 1, 3, -2), places, strict=False)
+        ]
+        return _packed(document(balls, MATERIALS, **more))
+
+    corners = [[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]]
+    square = {"type": "mesh", "vertices": corners, "faces": [[0, 1, 2], [0, 2, 3]], "material": "lamp 0"}
+    for alike in (
+        packed(0),
+        packed(0, 2),
+        packed(0, 2, 4),
+        _packed(document([square], MATERIALS)),
+        packed(0, **SUNS),
+    ):
+        assert "HAS_LIGHT_TREE" not in flags(alike) and not len(alike.light_tree)
+        assert alike.lights["probability"].sum() == pytest.approx(1)
+    for several in (packed(0, 5), packed(0, 2, 5), packed(0, 2, 4, 6), packed(0, 5, **SUNS)):
+        assert "HAS_LIGHT_TREE" in flags(several)
 
 
 def test_a_large_tree_is_kept_while_its_lights_are() -> None:

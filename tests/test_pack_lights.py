@@ -8,6 +8,7 @@ import pytest
 from gpu import layout
 from gpu.features import counts, flags
 from gpu.layout import LightKind, ShapeKind
+from service.pack import bounded
 from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere
 
 MANY = {
@@ -123,19 +124,25 @@ def test_lights_and_shapes_name_each_other():
     assert lamp["position"].tolist() == [1, 2, 3] and lamp["intensity"].tolist() == [1, 2, 3]
 
 
-def test_lights_are_picked_as_their_records_say():
-    lights = packed(*SHINING[:9], environment={"type": "constant", "radiance": 1}).arrays.lights
+def test_lights_are_picked_as_their_records_say(by_power):
+    lights = packed(*SHINING, environment={"type": "constant", "radiance": 1}).arrays.lights
     drawn = lights["threshold"].astype(float)
     np.add.at(drawn, lights["alias"], 1 - lights["threshold"].astype(float))
     np.testing.assert_allclose(lights["probability"], drawn / len(lights), rtol=1e-6)
     assert lights["probability"].min() > 0
 
 
+@pytest.fixture
+def by_power(monkeypatch):
+    """As if all lights were in one place, where there is no tree of them."""
+    monkeypatch.setattr(bounded, "worth", lambda _: False)
+
+
 def pick(*shapes, **fields):
     return packed(*shapes, **fields).arrays.lights["probability"].astype(float)
 
 
-def test_stronger_lights_are_picked_more_often():
+def test_stronger_lights_are_picked_more_often(by_power):
     quads = [quad(material="lamp"), quad(material="lamp", u=[2, 0, 0], v=[0, 3, 0])]
     one, six = pick(*quads)
     assert (one - 0.025) * 6 == pytest.approx(six - 0.025, rel=1e-5)  # 5 % go to all alike
@@ -144,12 +151,11 @@ def test_stronger_lights_are_picked_more_often():
     assert pick(sphere(material="lamp"), lights=[point]) == pytest.approx([0.5, 0.5])
     solid = sphere(material="lamp", transform={"scale": [1, 1, 1.00001]})
     assert pick(sphere(material="lamp"), solid) == pytest.approx([0.5, 0.5], abs=1e-4)
-    triangles = {"type": "mesh", "vertices": [[0, 0, 0], [1, 0, 0], [0, 2, 0], [0, 0, 3]], "material": "lamp"}
-    tetra = packed({**triangles, "faces": [[0, 2, 1], [0, 1, 3], [0, 3, 2], [1, 2, 3]]})
+    tetra = packed(mesh(material="lamp", transform={"scale": [1, 1, 2]}))
     areas = np.linalg.norm(np.cross(tetra.arrays.triangles["v1"] - tetra.arrays.triangles["v0"],
                                     tetra.arrays.triangles["v2"] - tetra.arrays.triangles["v0"]), axis=1)  # fmt: skip
     shares = tetra.arrays.lights["probability"][tetra.arrays.triangles["light"]]
-    np.testing.assert_allclose(shares, 0.95 * areas / areas.sum() + 0.05 / 4, rtol=1e-5)
+    np.testing.assert_allclose(shares, 0.95 * areas / areas.sum() + 0.05 / 12, rtol=1e-5)
 
 
 def test_neither_the_sky_nor_the_lamps_starve():
@@ -234,7 +240,7 @@ def test_suns_with_a_disk_stand_side_by_side_behind_all_lights_but_the_sky():
     np.testing.assert_allclose(lights["intensity"][4], np.array([3, 2, 1]) / (np.pi * np.sin(half) ** 2), rtol=1e-6)
 
 
-def test_spots_and_suns_are_picked_by_their_power():
+def test_spots_and_suns_are_picked_by_their_power(by_power):
     cone = 2 * np.pi * (1 - (np.cos(np.radians(20)) + np.cos(np.radians(60))) / 2)
     share = np.array([cone * np.dot([1, 2, 3], [0.2126, 0.7152, 0.0722]), 4 * np.pi * 2])
     np.testing.assert_allclose(pick(lights=[SPOT, POINT]), 0.95 * share / share.sum() + 0.025, rtol=1e-5)

@@ -33,6 +33,7 @@ def cases() -> list[Case]:
         Case("Cornell box, two boxes", presets.get("scenes", "cornell-boxes"), 4),
         Case("Cornell box, two spheres", presets.get("scenes", "cornell-spheres"), 4),
         Case("1 000 spheres, HDR image", presets.get("scenes", "sphere-field"), 8),
+        Case("hall, 240 lamps", _hall(), 4),
         Case("mesh on a plane, HDR image", _mesh(), 2),
         Case("mesh on a plane, HDR image", _mesh(), 8),
     ]
@@ -91,6 +92,33 @@ def _sphere(material: Document) -> Document:
         "environment": presets.get("environments", STUDIO),
         "materials": {"subject": _disney(**material)},
         "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "subject"}],
+    }
+
+
+def _hall(lamps: int = 240) -> Document:
+    """A long hall with pillars, under small lamps of six colours."""
+    rng = np.random.default_rng(3)
+    x, y, z = [40, 0, 0], [0, 4, 0], [0, 0, 8]
+    walls = [([0, 0, 0], z, x), (y, x, z), ([0, 0, 0], x, y), (z, y, x), ([0, 0, 0], y, z), (x, z, y)]
+    shapes: list[Document] = [
+        {"type": "quad", "origin": origin, "u": u, "v": v, "material": "wall"} for origin, u, v in walls
+    ]
+    for i in range(6):
+        for side in (1.5, 5.9):
+            low, high = [4 + 6 * i, 0, side], [4.6 + 6 * i, 4, side + 0.6]
+            shapes.append({"type": "box", "min": low, "max": high, "material": "wall"})
+    places = rng.uniform((0.3, 3, 0.3), (39.7, 3.9, 7.7), (lamps, 3)).tolist()
+    shapes += [
+        {"type": "sphere", "center": place, "radius": 0.04, "material": f"lamp {i % 6}"}
+        for i, place in enumerate(places)
+    ]
+    colors = 120 * (1 + 0.5 * np.cos(np.arange(6)[:, None] + np.arange(3) * 2))
+    glowing = {f"lamp {i}": {"type": "diffuse", "albedo": 0, "emission": c} for i, c in enumerate(colors.tolist())}
+    return {
+        "version": 1,
+        "camera": {"position": [1, 1.7, 4.4], "target": [20, 1.3, 3.6], "vfov": 60},
+        "materials": {"wall": {"type": "diffuse", "albedo": [0.7, 0.65, 0.6]}, **glowing},
+        "shapes": shapes,
     }
 
 

@@ -24,16 +24,13 @@ EVEN = 0.05  # share of the picks that goes to all lights alike
 # Bounds on the share of the sky and the suns where there are nearer lights; a wide floor makes their power look huge
 FAR_SHARE = (0.2, 0.8)
 
-# From so many bounded lights on they are picked by a tree.
-LEAST_TREE = 8
-
 # Share of a spot's cone that its fading rim takes at least: its inverse, and what is added to it, fit into float32.
 LEAST_RIM = 1e-6
 # Radians: a disk narrower than this is a point, as float32 directions have no digits for a place on it.
 LEAST_DISK = 1e-6
 
-# Bounded lights (n,), their power (n,) and their share of all picks -> as `gpu.light_tree.build`
-Grow = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, float]]
+# Bounded lights (n,), their power (n,) and their share of all picks -> as `gpu.light_tree.build`; None: no tree
+Grow = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, float] | None]
 
 
 def mark(shapes: dict[ShapeKind, np.ndarray], emissive: np.ndarray) -> np.ndarray:
@@ -154,7 +151,7 @@ def weigh(
     lights: np.ndarray, power: np.ndarray, sky_power: float, grow: Grow | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """The records, the sky's appended where it has power, with how they are picked; and the words of the tree that
-    the bounded ones are picked by, none where they are too few to be worth it: then an alias table knows them all.
+    the bounded ones are picked by, none where it would not pay: then an alias table knows them all.
 
     `power` (n,), W of luminance, all positive. The sky's is for a brightness of 1: turning that up or down edits no
     table, and the picture stays the same as one packed anew.
@@ -176,10 +173,11 @@ def weigh(
             mine = power[group]
             weights[group] = part * ((1 - EVEN) * mine / mine.sum() + EVEN / len(mine))
     n = int((~far).sum())  # they come first
-    if grow is None or n < LEAST_TREE:
+    grown = grow(lights[:n], power[:n], 1 - share) if grow is not None else None
+    if grown is None:
         lights["threshold"], lights["alias"], lights["probability"] = alias_table(weights)
         return lights, words
-    words, lights["alias"][:n], lights["probability"][:n] = grow(lights[:n], power[:n], 1 - share)
+    words, lights["alias"][:n], lights["probability"][:n] = grown
     if n < len(lights):
         threshold, alias, probability = alias_table(weights[n:])
         lights["threshold"][n:], lights["alias"][n:] = threshold, n + alias

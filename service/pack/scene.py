@@ -13,7 +13,7 @@ from gpu import EnvironmentArrays, SceneArrays
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets
 from service.pack import lights
-from service.pack.bounded import tree
+from service.pack.bounded import Grown, tree
 from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
 from service.pack.glow import dark, glow
@@ -75,7 +75,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
     built_sides = lights.sides(built.lights, materials)
     area_power = np.pi * built.areas * lights.luminance(emission) * built_sides
 
-    def grow(near: np.ndarray, power: np.ndarray, share: float) -> tuple[np.ndarray, np.ndarray, float]:
+    def grow(near: np.ndarray, power: np.ndarray, share: float) -> Grown | None:
         sides = np.concatenate([built_sides, np.ones(len(near) - len(built_sides), built_sides.dtype)])
         return tree(near, power, share, built.shapes, sides, 2 * built.radius, cache)
 
