@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import ESTIMATORS, Renderer
-from tests.extremes.scenes import LIGHTS, MATERIALS, SKY, Seen, ball, everything, quad, rows
+from tests.extremes.scenes import LIGHTS, LONG, MATERIALS, SKY, Seen, ball, everything, quad, rows
 
 LAMPS: dict[str, dict[str, Any]] = {
     "point": {"lights": LIGHTS[:1]},
@@ -28,7 +28,8 @@ def _scene(lobe: str, lamp: str) -> dict[str, Any]:
     given = LAMPS[lamp]
     material = dict(MATERIALS[lobe])
     if material["type"] in ("disney", "principled"):  # no narrow lobes: lights sampled alone would need for ever
-        material |= {"roughness": max(0.4, material.get("roughness", 0.5)), "clearcoat_gloss": 0}
+        least = 0.8 if "transmission" in material else 0.4  # ... as would uniform directions through glass
+        material |= {"roughness": max(least, material.get("roughness", 0.5)), "clearcoat_gloss": 0}
     camera = {"position": [0, 1.4, 4], "target": [0, 0.2, 0], "vfov": 40}
     shapes = [ball(lobe), quad("white", (-3, -1, 3), (6, 0, 0), (0, 0, -6)), *given.get("shapes", [])]
     scene = everything(shapes=shapes, camera=camera, lights=given.get("lights", []))
@@ -43,8 +44,10 @@ def _scene(lobe: str, lamp: str) -> dict[str, Any]:
 def test_they_converge_to_the_same_picture(gpu: Renderer, row: str) -> None:
     scene = _scene(*PAIRS[row])
     settings = {"width": 48, "height": 32, "max_bounces": 2, "sampler": "independent"}
-    seen = {name: Seen(gpu, scene, 256, estimator=name, **settings) for name in ESTIMATORS}
-    assert seen["mis"].color.mean() > 0.01
+    # Of few samples the variance is not known where light is found seldom: 256 found a block 7 deviations off.
+    samples = 4096 if LONG else 256
+    seen = {name: Seen(gpu, scene, samples, estimator=name, **settings) for name in ESTIMATORS}
+    assert seen["mis"].color.mean() > 0.005
     for name in ESTIMATORS[1:]:
         assert seen[name].deviation(seen["mis"], 16) < 2.0, name
         error = np.sqrt(seen[name].variance.mean() + seen["mis"].variance.mean()) / np.sqrt(48 * 32)
