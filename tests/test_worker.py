@@ -38,7 +38,7 @@ from service.rendering.process import Options
 from service.rendering.scheduler import FIRST_FRAME_LEAD_S, Scheduler
 from service.rendering.worker.ladder import FULL_S, NEXT_S, Ladder
 from service.rendering.worker.loop import coalesced
-from service.rendering.worker.stopping import eta_s, late, reached
+from service.rendering.worker.stopping import late, reached
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -131,13 +131,6 @@ def test_reached(stop: StopRule, samples: int, noise: float | None, expected: st
 def test_late(now_s: float, sample_s: float, even: bool, expected: bool) -> None:
     assert late(StopRule(time_limit=2.0), now_s, sample_s, even) is expected
     assert not late(StopRule(), now_s, sample_s, even)
-
-
-def test_eta_is_that_of_the_first_limit() -> None:
-    assert eta_s(StopRule(100), 25, None, 2.0) == pytest.approx(6.0)
-    assert eta_s(StopRule(100, time_limit=5.0), 25, None, 2.0) == pytest.approx(3.0)
-    assert eta_s(StopRule(target_noise=0.1), 100, 0.2, 2.0) == pytest.approx(6.0)
-    assert eta_s(StopRule(), 25, 0.1, 2.0) is None and eta_s(StopRule(100), 0, None, 0.0) is None
 
 
 class Pictures:

@@ -8,7 +8,8 @@ from service.rendering.messages import Progress, Reason, StopRule
 from service.rendering.worker.beyond import Beyond
 from service.rendering.worker.held import Held
 from service.rendering.worker.meter import Meter
-from service.rendering.worker.stopping import MAX_SAMPLES, Clock, eta_s, late, reached
+from service.rendering.worker.pace import Pace
+from service.rendering.worker.stopping import MAX_SAMPLES, Clock, late, reached
 
 if TYPE_CHECKING:
     from gpu import Renderer
@@ -27,18 +28,24 @@ class Course:
     def restart(self) -> None:
         """At zero samples; what was learnt of their price stays."""
         self.beyond.restart()
-        self.clock, self.meter = Clock(), Meter()
+        self.clock, self.meter, self.pace = Clock(), Meter(), Pace()
         self.even = True  # as many samples in every pixel, as far as is known
 
     def progress(self, held: Held, scale: float = 1.0) -> Progress:
         if held.holding is None:
             return Progress()
         samples, elapsed_s = held.ladder.picture(scale).samples, self.clock.elapsed_s
-        noise = self.meter.read(held.full) if scale == 1.0 else None
+        noise = self.noise(held) if scale == 1.0 else None
         stopped = self.reason == "stopped"
         done = self.reason is not None and not stopped
-        eta = 0.0 if done else eta_s(self.stop, held.full.samples, noise, elapsed_s)
+        eta = 0.0 if done else self.pace.eta_s(self.stop, elapsed_s)
         return Progress(samples, noise, elapsed_s, None if stopped else eta, self.beyond.shares)
+
+    def noise(self, held: Held, fresh: bool = False) -> float | None:
+        """Of the picture at full size, as the meter has it."""
+        noise = self.meter.read(held.full, fresh)
+        self.pace.heard(self.meter.at, noise)
+        return noise
 
     def cap(self, held: Held) -> int:
         """How many samples to trace for: all, or what fits into the time, so that every pixel ends with as many."""
@@ -53,7 +60,7 @@ class Course:
 
     def enough(self, held: Held) -> Reason | None:
         """Why it ends now, if it does."""
-        noise = self.meter.read(held.full) if self.stop.target_noise is not None else None
+        noise = self.noise(held) if self.stop.target_noise is not None else None
         reason = reached(self.stop, held.full.samples, noise)
         if held.full.under_way[0]:  # is finished first: a picture of so many samples is to come out the same again
             reason = None

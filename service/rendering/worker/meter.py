@@ -14,17 +14,17 @@ PAUSE = 20  # times what reading took until the next reading, which so costs 5 %
 class Meter:
     def __init__(self) -> None:
         self.noise: float | None = None  # as it was last read
-        self._at = 0  # samples at the last reading
+        self.at = 0  # samples at the last reading
         self._due = 0.0  # the time of the next
 
     def set(self, samples: int, noise: float | None) -> None:
-        self._at, self.noise = samples, noise
+        self.at, self.noise = samples, noise
 
     def read(self, picture: Picture, fresh: bool = False) -> float | None:
         """`Picture.noise`, not the newest unless `fresh`."""
         samples, began = picture.samples, time.monotonic()
-        if samples >= 2 and samples > self._at and (fresh or began >= self._due):
-            self.noise, self._at = picture.noise(), samples
+        if samples >= 2 and samples > self.at and (fresh or began >= self._due):
+            self.noise, self.at = picture.noise(), samples
             now = time.monotonic()
             self._due = now + PAUSE * (now - began)
         return self.noise

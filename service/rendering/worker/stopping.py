@@ -1,4 +1,4 @@
-"""When a render has had enough, how long that will take, and what time it is by its own clock."""
+"""When a render has had enough, and what time it is by its own clock."""
 
 from __future__ import annotations
 
@@ -59,15 +59,3 @@ def late(stop: StopRule, now_s: float, sample_s: float, even: bool) -> bool:
     if now_s >= stop.time_limit + overrun_s:
         return True
     return even and (now_s >= stop.time_limit or (now_s > 0 and now_s + sample_s > stop.time_limit + overrun_s))
-
-
-def eta_s(stop: StopRule, samples: int, noise: float | None, elapsed_s: float) -> float | None:
-    """Seconds to the first of the limits; None: can't be said. Noise falls with the root of the samples."""
-    totals = [] if stop.time_limit is None else [stop.time_limit]
-    if samples and elapsed_s > 0.0:
-        per_sample = elapsed_s / samples
-        if stop.max_samples is not None:
-            totals.append(per_sample * stop.max_samples)
-        if stop.target_noise is not None and noise is not None:
-            totals.append(per_sample * max(TRUSTED_SAMPLES, samples * (noise / stop.target_noise) ** 2))
-    return max(0.0, min(totals) - elapsed_s) if totals else None

@@ -178,6 +178,7 @@ class Task:
             course.clock.pause()
         if scale == 1.0:
             course.even = picture.samples >= cap
+            course.pace.passed(picture.samples, course.clock.elapsed_s)
             if not self._end_if_reached():
                 self._report()
 
@@ -250,6 +251,7 @@ class Task:
         course.reason, self._showing.scale = restore.reason, 1.0
         course.clock.set(restore.progress.elapsed_s)
         course.meter.set(restore.progress.samples, restore.progress.noise)
+        course.pace.passed(restore.saved.samples, restore.progress.elapsed_s)
         course.even = not restore.saved.under_way[0]
         self._keeping.restart()
 

@@ -1,0 +1,75 @@
+"""How long a render will still take: by what its samples took of late, and how its noise has fallen so far."""
+
+from __future__ import annotations
+
+import pytest
+
+from service.rendering.messages import StopRule
+from service.rendering.worker.pace import Pace
+
+
+def gone(samples: int, sample_s: float = 0.1, slow: float = 0.0, power: float | None = None, step: int = 1) -> Pace:
+    """As many samples, of which the first ten took `slow` more; noise .8 of one, falling by that power."""
+    pace, elapsed_s = Pace(), 0.0
+    for n in range(step, samples + 1, step):
+        elapsed_s += step * sample_s + (slow if n <= 10 else 0.0)
+        pace.passed(n, elapsed_s)
+        if power is not None and n >= 2:
+            pace.heard(n, 0.8 * n**-power)
+    return pace
+
+
+def test_it_is_that_of_the_first_limit() -> None:
+    pace = gone(25)
+    assert pace.eta_s(StopRule(100), 2.5) == pytest.approx(7.5)
+    assert pace.eta_s(StopRule(100), 2.7) == pytest.approx(7.3)  # some of the next one is there
+    assert pace.eta_s(StopRule(100, time_limit=5.0), 2.5) == pytest.approx(2.5)
+    assert pace.eta_s(StopRule(20), 2.5) == 0
+    assert pace.eta_s(StopRule(), 2.5) is None and pace.eta_s(StopRule(target_noise=0.1), 2.5) is None
+    assert Pace().eta_s(StopRule(100), 0.3) is None and Pace().eta_s(StopRule(time_limit=2.0), 0.5) == 1.5
+
+
+def test_what_was_slow_once_is_not_expected_again() -> None:
+    pace = gone(100, slow=2.0)
+    assert pace.eta_s(StopRule(400), 30.0) == pytest.approx(30.0)
+    pace = gone(1000, sample_s=0.1)
+    for n in range(1001, 2001):  # others came
+        pace.passed(n, 100 + 0.3 * (n - 1000))
+    assert pace.eta_s(StopRule(2500), 400.0) == pytest.approx(150, rel=0.1)  # as far back as ahead
+    assert pace.eta_s(StopRule(4000), 400.0) == pytest.approx(400, rel=0.1)
+
+
+@pytest.mark.parametrize("power", [0.5, 0.65, 0.8])
+def test_noise_falls_as_it_has(power: float) -> None:
+    """The target of 400 samples, at 100 of them. By the root alone it is 1.9 times too long at a power of .8."""
+    eta_s = gone(100, power=power).eta_s(StopRule(target_noise=0.8 * 400**-power), 10.0)
+    assert eta_s == pytest.approx(30, rel=0.2)
+
+
+def test_noise_that_tells_nothing_yet() -> None:
+    pace = gone(10)
+    pace.heard(10, 0.2)
+    assert pace.eta_s(StopRule(target_noise=0.1), 1.0) == pytest.approx(2 ** (1 / 0.55) - 1)  # as is usual
+    assert pace.eta_s(StopRule(target_noise=0.5), 1.0) == pytest.approx(0.6)  # 16 there are to be
+    pace.heard(16, 0.0)
+    assert pace.eta_s(StopRule(target_noise=0.1), 1.6) == 0
+    rising = Pace()
+    for n in (16, 32, 64):
+        rising.passed(n, n / 10)
+        rising.heard(n, 0.1 * n)
+    assert 0 < (rising.eta_s(StopRule(target_noise=3.2), 6.4) or 0) < 6.4 * 4
+
+
+def test_it_goes_on_after_a_checkpoint() -> None:
+    pace = Pace()
+    pace.passed(5000, 50.0)
+    assert pace.eta_s(StopRule(10000), 50.0) == pytest.approx(50)
+    pace.passed(5001, 50.1)
+    assert pace.eta_s(StopRule(10000), 50.1) == pytest.approx(50, rel=0.1)
+
+
+def test_marks_stay_few() -> None:
+    pace = Pace()
+    for n in range(1, 200_000):
+        pace.passed(n, n * 1e-3)
+    assert len(pace._marks) < 250 and pace.eta_s(StopRule(400_000), 200.0) == pytest.approx(200, rel=0.01)
