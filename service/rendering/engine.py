@@ -208,6 +208,8 @@ class Engine:
             self._is_ready(message)
         elif isinstance(message, Unable):
             self._detail = message.detail
+            if self._process is not None:
+                self._process.unable = True
             log.error("no renderer: %s", message.detail)
         elif isinstance(message, Usage):
             self._account(message)
@@ -291,7 +293,7 @@ class Engine:
 
     async def _replace(self, process: Process) -> None:
         cause = await process.end(LAST_WORDS_S)
-        by_others = cause in BY_OTHERS
+        by_others = cause in BY_OTHERS and not process.unable  # which, dying slowly, was given the last blow
         self._failures = 0 if process.ready else self._failures + (1 / SHOTS if by_others else 1)
         self.statistics.restarts[cause] += 1
         log.error("renderer lost cause=%s lived_s=%.1f failures=%.1f", cause, process.lived_s, self._failures)

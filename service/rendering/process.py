@@ -41,6 +41,7 @@ class Process:
     def __init__(self, options: Options, received: Callable[[Any], None], lost: Callable[[], None]) -> None:
         self.began = time.monotonic()
         self.ready = False
+        self.unable = False  # to render, as it says itself
         self.pulse, self._options = _Watched(), options
         self._condemned: Cause | None = None
         self._oom_kills = _oom_kills()
