@@ -113,6 +113,7 @@ def _constants() -> str:
         "TREELET_BIT",
         "TREELET_MAX_NODES",
         "LIGHT_CODES",
+        "METER_REPLICATES",
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
     out.append(f"#define LIGHT_TREE_TEXTURE {layout.LIGHT_TREE_TEXTURE}")

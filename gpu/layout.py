@@ -380,7 +380,7 @@ class Frame(Record):
     node_scale: vec3  # world size of one grid step
     node_count: u32  # of one octant's order of the top
     light_count: u32
-    replicate: u32  # which independent scramble of the sampler
+    replicate: u32  # 0: the picture's own scramble of the sampler; 1: the noise meter's, from the first one on
     clamp_radiance: f32  # of indirect light; 0: off
     environment_probability: f32  # of picking the environment among the lights
     moment_scale: f32  # second moments are of radiance times this
@@ -397,6 +397,8 @@ class Frame(Record):
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's
 
+
+METER_REPLICATES = 8  # more than the noise meter takes of a pixel; which one it is, in so many parts of its place's x
 
 SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
 CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a

@@ -20,7 +20,7 @@ void main() {
     vec4 albedo = albedos[slot], normal = normals[slot];
     uint i = 0u;
     do {
-        Sampler rng = sobol_begin(pixel, frame.sample_first + i);
+        Sampler rng = sobol_begin(pixel, frame.sample_first + i, 0u);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
         Point at;

@@ -30,7 +30,11 @@ void main() {
     // million samples 4e-8, where a plain sum has 9e-5 and a running average 4e-4.
     precise vec4 sum = sums[slot], lost = compensations[slot];
     vec4 moment = moments[slot];
-    if (frame.replicate != 0u) pixel = uvec2(moment.xy); // the meter's buffers say where (gpu/meter.py)
+    uint replicate = frame.replicate;
+    if (replicate != 0u) { // the meter's buffers say where, and which of a pixel's (gpu/meter.py)
+        replicate += uint(fract(moment.x) * float(METER_REPLICATES));
+        pixel = uvec2(moment.xy);
+    }
 #if ADAPTIVE
     uint first = uint(moment.w), count = plan_due(pixel, first);
     if (count == 0u) return;
@@ -42,7 +46,7 @@ void main() {
 #endif
     uint i = 0u;
     do {
-        Sampler rng = sobol_begin(pixel, first + i);
+        Sampler rng = sobol_begin(pixel, first + i, replicate);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
 #if HAS_ATTENUATION

@@ -51,8 +51,9 @@ uint sobol_pascal(uint v) {
 
 float sobol_unit(uint x) { return float(x >> 8u) * 5.9604645e-8; } // 2^-24: never rounds up to 1
 
-Sampler sobol_begin(uvec2 pixel, uint index) {
-    uint seed = sobol_hash(pixel.x ^ sobol_hash(pixel.y ^ sobol_hash(frame.seed ^ sobol_hash(frame.replicate))));
+// `replicate`: which of the independent scrambles; 0 is the picture's own.
+Sampler sobol_begin(uvec2 pixel, uint index, uint replicate) {
+    uint seed = sobol_hash(pixel.x ^ sobol_hash(pixel.y ^ sobol_hash(frame.seed ^ sobol_hash(replicate))));
     return Sampler(seed, index, bitfieldReverse(index));
 }
 

@@ -152,7 +152,8 @@ def test_a_black_picture(gpu: Renderer) -> None:
 
 @pytest.mark.parametrize(("name", "samplers"), [("cornell", ("sobol", "independent")), ("rough metal", ("sobol",))])
 def test_its_noise_is_true_and_less(gpu: Renderer, name: str, samplers: tuple[str, ...]) -> None:
-    """Within 20 % of the real error, and below what as many samples of each pixel leave."""
+    """Within 20 % of the real error, and below what as many samples of each pixel leave; over four seeds, as of 32
+    pictures one is told a third too much: its meter met a path that few find."""
     settings: dict[str, Any] = {"width": 64, "height": 64, "max_bounces": 4, "filter": "blackman_harris"}
     assets: Any = Images()
     halves = [luminance(picture(gpu, SCENES[name], 400, assets, adaptive=True, seed=s, **settings)) for s in (11, 12)]
@@ -160,7 +161,8 @@ def test_its_noise_is_true_and_less(gpu: Renderer, name: str, samplers: tuple[st
     for sampler in samplers:
         made = [
             picture(gpu, SCENES[name], 1, assets, sampler=sampler, seed=s, adaptive=adaptive, **settings)
-            for s, adaptive in ((1, True), (2, True), (1, False), (2, False))
+            for adaptive in (True, False)
+            for s in (1, 2, 3, 4)
         ]
         for samples in (16, 64):
             squares, said = [], []
@@ -168,9 +170,9 @@ def test_its_noise_is_true_and_less(gpu: Renderer, name: str, samplers: tuple[st
                 one.trace(600, samples)
                 squares.append(((luminance(one) - reference) ** 2).mean() - doubt)
                 said.append(one.noise() or 0.0)
-            error = np.sqrt(np.mean(squares[:2])) / reference.mean()
-            assert np.mean(said[:2]) == pytest.approx(error, rel=0.2), (sampler, samples)
-            assert np.mean(squares[:2]) < 0.7 * np.mean(squares[2:]), (sampler, samples)
+            error = np.sqrt(np.mean(squares[:4])) / reference.mean()
+            assert np.mean(said[:4]) == pytest.approx(error, rel=0.2), (sampler, samples)
+            assert np.mean(squares[:4]) < 0.7 * np.mean(squares[4:]), (sampler, samples)
 
 
 def test_no_mean_is_bent(gpu: Renderer) -> None:

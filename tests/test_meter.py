@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.meter import FROM, draw, inclusion
+from gpu.layout import METER_REPLICATES, Slot
+from gpu.meter import FROM, draw, inclusion, squared_error
 from service import presets
 from tests.rendering import Images, document, picture
 
@@ -98,11 +99,36 @@ def test_pixels_are_drawn_by_their_weights() -> None:
     weights = np.zeros((40, 50))
     weights[20, 5:45] = 1  # a thin bright edge carries all that is known
     drawn = np.concatenate([draw(weights, (50, 40), 1, 200, seed) for seed in range(200)])
-    seen = np.zeros((40, 50))
+    seen, first = np.zeros((40, 50)), drawn[:, 0] % 1 == 0
     np.add.at(seen, (drawn[:, 1].astype(int), drawn[:, 0].astype(int)), 1 / 200)
-    assert seen[20, 5:45] == pytest.approx(1) and seen.max() == pytest.approx(1)  # always, and never twice
-    assert seen[:20].mean() == pytest.approx(160 / 1960, rel=0.05)
-    assert drawn[:, 2].sum() / 200 == pytest.approx(2000, rel=0.02)  # each stands for as many as its chance says
+    assert seen[20, 5:45] == pytest.approx(100 / 40 + 0.05, rel=0.02)  # half of all go there
+    assert seen[:20].mean() == pytest.approx(0.05, rel=0.05)
+    assert first.sum() / 200 == pytest.approx(40 + 0.05 * 1960, rel=0.02)  # the edge always, the others once at most
+    assert drawn[first, 2].sum() / 200 == pytest.approx(2000, rel=0.02)  # each stands for as many as its chance says
+    numbers = (drawn[:, 0] % 1) * METER_REPLICATES
+    assert set(numbers) == {0, 1, 2} and (np.diff(numbers)[~first[1:]] == 1).all()
+    assert (drawn[:, 1] == 20)[~first].all()
+
+
+def test_of_several_estimates_the_mean_counts() -> None:
+    """Each with its own variance: the expected square of the difference is the picture's, whatever their number."""
+    rng = np.random.default_rng(1)
+    places = np.array([[3, 2, 1], [3.125, 2, 1], [3.25, 2, 1], [7, 2, 1], [9, 5, 4], [0, 0, 0]])
+    trials = 4000
+    seen, other = rng.normal(0, 2, (trials, 4)).repeat([3, 1, 1, 1], axis=1), rng.normal(0, 2, (trials, 6))
+    found = [squared_error(places, *both) for both in zip(seen, other, strict=True)]
+    assert np.mean(found) == pytest.approx(4 * (1 + 1 + 4), rel=0.08)
+    assert squared_error(places[-1:], np.ones(1), np.zeros(1)) == 0
+
+
+@pytest.mark.parametrize("sampler", ["sobol", "independent"])
+def test_estimates_of_a_pixel_differ(gpu: Renderer, sampler: str) -> None:
+    made = picture(gpu, SCENES["rough metal"], 24, width=64, height=64, sampler=sampler)
+    places, sums = made._meter._vectors(Slot.MOMENTS), made._meter._vectors(Slot.SUM)
+    again = np.flatnonzero(places[:, 0] % 1 > 0)
+    assert len(again) > 20 and (places[:, 3] == 24).all()
+    differ = (sums[again] != sums[again - 1]).any(axis=1) & (places[again, 1] == places[again - 1, 1])
+    assert differ.sum() > 20, "but for those beside the lamp's edge, where all samples are alike"
 
 
 def test_blocks_at_the_rim_have_fewer_pixels() -> None:
@@ -113,6 +139,8 @@ def test_blocks_at_the_rim_have_fewer_pixels() -> None:
 
 def test_chances_sum_to_the_count_and_end_at_one() -> None:
     shares = np.array([1000.0, 100.0, 1.0, 1.0, 1.0, 1.0])
+    times = inclusion(shares, 6, most=4)
+    assert times.sum() == pytest.approx(6) and times[0] == 4 and times[1] < 4
     chances = inclusion(shares, 3)
     assert chances.sum() == pytest.approx(3) and chances[:2] == pytest.approx(1)
     assert inclusion(np.ones(5), 5) == pytest.approx(1)

@@ -24,7 +24,7 @@ void main() {
     bool finite = true;
     uint k = 0u;
     do {
-        Sampler rng = sobol_begin(uvec2(i, 7u), k);
+        Sampler rng = sobol_begin(uvec2(i, 7u), k, 0u);
         Sampled picked = bsdf_pick(s, wo, sobol_pair(rng, 0u).x, sobol_pair(rng, 1u));
         Scatter f = bsdf_eval(s, wo, picked.wi);
         if (picked.specular) f = picked.there;

@@ -12,7 +12,7 @@ uniform uint count;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    vec2 u = sobol_pair(sobol_begin(pixel, i), pair);
+    vec2 u = sobol_pair(sobol_begin(pixel, i, frame.replicate), pair);
     vec4 a = vec4(u, 0.0, 0.0);
 #if WHAT == 1
     a.xy = sampling_disk(u);
