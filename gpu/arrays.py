@@ -98,7 +98,7 @@ class SceneArrays:
     node_count: int = 0  # of one octant's order
     node_origin: Vec3 = (0.0, 0.0, 0.0)
     node_scale: Vec3 = (0.0, 0.0, 0.0)
-    instances: np.ndarray = field(default_factory=lambda: _empty(layout.Instance))  # in the order of the leaves
+    instances: np.ndarray = field(default_factory=lambda: _empty(layout.Instance))
     instance_nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # of all trees
     instance_shift: int = 0  # bits of the number of the most triangles that an instance has
     bvh_kinds: frozenset[ShapeKind] = frozenset()

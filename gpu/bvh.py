@@ -60,12 +60,13 @@ def _grid(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
 
 def build(
     lower: np.ndarray, upper: np.ndarray, kinds: np.ndarray, leaf_size: int | None = None,
-    firsts: Mapping[int, int] | None = None,
+    firsts: Mapping[int, int] | None = None, staying: Mapping[int, int] | None = None,
 ) -> Tree:  # fmt: skip
     """The tree over n boxes: `lower`, `upper` (n, 3) float32, finite; `kinds` (n,) `layout.ShapeKind`.
 
-    A leaf holds one kind only. `firsts`: where, not at 0, the boxes of a kind begin in its array. The tree
-    does not depend on the number of threads. Raises SceneTooLarge.
+    A leaf holds one kind only. `firsts`: where, not at 0, the boxes of a kind begin in its array. `staying`: where
+    those of a kind begin among the boxes whose array is not brought into the leaves' order. The tree does not
+    depend on the number of threads. Raises SceneTooLarge.
     """
     n = len(kinds)
     if not 0 < n <= MAX_PRIMITIVES:
@@ -104,6 +105,9 @@ def build(
     ranks = _ranks(kinds[order], mixed)
     for kind, first in (firsts or {}).items():
         ranks[kinds[order] == kind] += np.uint32(first)
+    for kind, first in (staying or {}).items():
+        mine = kinds[order] == kind
+        ranks[mine] = order[mine] - np.uint32(first)
     return Tree(order, ranks, rows, np.array(regions, np.int64), *_as_tuples(grid))
 
 

@@ -144,6 +144,9 @@ def test_what_moves_leaves_the_models_as_they_are(monkeypatch: pytest.MonkeyPatc
 
     assert trees(at(0), at(3)) == [1280, 2]
     assert trees(at(0), at(5)) == [2]
+    before, after = (pack(parse_scene(document(at(0), at(x))), SHELF, cache).arrays for x in (3, 6))
+    assert after.triangles is before.triangles and after.instance_nodes is before.instance_nodes
+    assert np.array_equal(before.instances != after.instances, [False, True])
     assert trees(at(0), at(5), sphere()) == []
     assert trees(at(0), at(5), at(8), sphere()) == [3]
     assert trees(at(0), at(5), at(0, "large"), at(8, "large")) == [20480, 4]

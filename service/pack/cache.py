@@ -5,7 +5,7 @@ from __future__ import annotations
 import hashlib
 import threading
 from collections import OrderedDict
-from collections.abc import Callable, Hashable, Iterable
+from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
 
 import numpy as np
@@ -41,15 +41,10 @@ class PackCache:
                 self._kept.popitem(last=False)
         return value
 
-    def find(self, fits: Callable[[Any], bool]) -> Any:
-        """The newest that fits; or None."""
+    def gather(self, kind: type[T]) -> list[T]:
+        """All of that kind, the newest last."""
         with self._lock:
-            return next((value for value, _ in reversed(self._kept.values()) if fits(value)), None)
-
-    def gather(self, parts: Callable[[Any], Iterable[T]]) -> list[T]:
-        """Parts of all that is kept, of the oldest first."""
-        with self._lock:
-            return [part for value, _ in self._kept.values() for part in parts(value)]
+            return [value for value, _ in self._kept.values() if isinstance(value, kind)]
 
 
 def _freeze(value: object) -> int:

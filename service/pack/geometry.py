@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+import operator
 from collections.abc import Collection, Hashable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from gpu import layout
-from gpu.layout import Node, ShapeKind, Triangle, TriangleNormals
+from gpu.layout import Node, ShapeKind
 from service.assets import Assets
 from service.pack import instances, lights, meshes, records
-from service.pack.meshes import Triangles
+from service.pack.details import Details, written
 from service.pack.models import Model
 from service.pack.origin import choose
 from service.pack.origin import warnings as lost
@@ -61,28 +61,38 @@ class Geometry:
     instances: np.ndarray
     instance_nodes: np.ndarray
     models: tuple[Model, ...]  # that the instances show, in the order of their triangles
+    flats: Hashable  # equal where all other triangles are; None: of nothing that can be compared, or that shines
     origin: Vec3
     radius: float  # of a ball around everything; 1 where there is nothing
     meshes: Meshes
     warnings: tuple[str, ...]
 
+    @property
+    def details(self) -> Details:
+        corners = self.triangle_uvs, self.triangle_uvs_1, self.triangle_colors
+        own = self.shapes[ShapeKind.TRIANGLE], self.triangle_normals, self.tangents
+        return Details(*own, *corners, self.instance_nodes)
+
 
 def geometry(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    reads: Mapping[str, Reads], key: Hashable = None, earlier: Geometry | None = None,
-    known: Mapping[Hashable, Model] | None = None,
+    reads: Mapping[str, Reads], key: Hashable = None, contents: Sequence[Hashable] | None = None,
+    kept: Sequence[Geometry] = (), apart: bool = False,
 ) -> Geometry:  # fmt: skip
     """`names`: the materials in order; `emissive`: those that shine; `reads`: what they read of their shapes;
-    `key`: of the meshes, none of which shines, for `earlier`: a geometry of the same meshes, whose triangles and tree
-    serve again where nothing else is in that tree; `known`: models of other geometries, which serve again.
+    `kept`: other geometries, the newest last, of which parts serve again: models; all of the triangles where shapes
+    that show them have moved; the tree as well where `key`, of the meshes, none of which shines, is the same, and
+    nothing else is in that tree. `contents`: keys of the shapes. `apart`: large meshes shall move without the others.
 
     Raises InvalidDocument.
     """
-    if earlier is not None:
-        again = _among_other_shapes(earlier, shapes, names, emissive, reads)
-        if again is not None:
-            return again
-    every = place(shapes, names, emissive, assets, max_triangles, reads, known)
+    for earlier in reversed(kept):
+        if key is not None and earlier.meshes.key == key:
+            same = _among_other_shapes(earlier, shapes, names, emissive, reads)
+            if same is not None:
+                return same
+    known = {each.key: each for earlier in kept for each in earlier.models}
+    every = place(shapes, names, emissive, assets, max_triangles, reads, known, apart)
     shared: Sequence[Model] = every.models
     analytic = _analytic(every.placed, np.zeros(3))
     own = _mesh_extents(every, key)
@@ -98,7 +108,7 @@ def geometry(
         bounds[ShapeKind.TRIANGLE] = boxes[:, :3], boxes[:, 3:]
     placed = instances.records(every.standing, shared, origin, len(triangles))
     if len(placed):
-        around = np.array([each.box() for each in every.standing]) - np.tile(origin, 2)
+        around = np.array([each.box for each in every.standing]) - np.tile(origin, 2)
         bounds[ShapeKind.INSTANCE] = around[:, :3], around[:, 3:]
     nodes, node_origin, node_scale = np.zeros(0, Node.dtype), (0.0, 0.0, 0.0), (0.0, 0.0, 0.0)
     standing, order = dict[ShapeKind, np.ndarray](), dict[ShapeKind, np.ndarray]()
@@ -108,19 +118,23 @@ def geometry(
         nodes, node_count, order, node_origin, node_scale = plant(bounds, standing)
     kinds, large = frozenset(bounds), {kind: len(places) for kind, places in standing.items()}
     if len(placed):  # triangles are met through trees, though perhaps not through the scene's
-        placed = placed[order[ShapeKind.INSTANCE]]
         large.setdefault(ShapeKind.TRIANGLE, len(triangles))
         kinds |= {ShapeKind.TRIANGLE}
     del boxes, bounds
     if len(triangles) > MANY:
         trim()
     places = _inverse(order.get(ShapeKind.TRIANGLE))
-    details, shared = _written(triangles, places, shared)
+    flats = _flats(every, origin, names, reads, emissive, contents)
+    again = _same_triangles(flats, shared, kept) if ShapeKind.TRIANGLE not in order else None
+    if again is None:
+        details, shared = written(triangles, places, shared)
+    else:
+        details, shared = again.details, again.models
     shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes, placed)))
     nodes, placed = shelf.put(nodes), shelf.put(placed)
     found = {kind: shelf.put(array, order.get(kind)) for kind, array in found.items()}
     found[ShapeKind.TRIANGLE] = details.triangles[: len(triangles)]
-    _hide((*found.values(), placed), shapes)
+    _hide((*found.values(), placed) if again is None else _others(found, placed), shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))
     areas = lights.areas(found, shining)
     found[ShapeKind.TRIANGLE] = details.triangles
@@ -134,7 +148,7 @@ def geometry(
         trim()
     return Geometry(
         found, details.normals, details.tangents, details.uvs, details.uvs_1, details.colors, shining, areas,
-        nodes, node_count, node_origin, node_scale, kinds, large, placed, details.nodes, tuple(shared),
+        nodes, node_count, node_origin, node_scale, kinds, large, placed, details.nodes, tuple(shared), flats,
         vec3(origin), radius, own, tuple(warnings),
     )  # fmt: skip
 
@@ -165,6 +179,29 @@ def _among_other_shapes(
     return replace(earlier, shapes=found, lights=shining, areas=areas, radius=radius, warnings=tuple(warnings))
 
 
+def _flats(
+    every: World, origin: np.ndarray, names: Sequence[str], reads: Mapping[str, Reads], emissive: Collection[str],
+    contents: Sequence[Hashable] | None,
+) -> Hashable:  # fmt: skip
+    if contents is None or any(names[mesh.material] in emissive for mesh in every.meshes):
+        return None
+    own = tuple((mesh.shape, contents[mesh.shape]) for mesh in every.meshes)
+    return own, vec3(origin) if own else None, tuple(names), tuple(reads.items())
+
+
+def _same_triangles(flats: Hashable, shared: Sequence[Model], kept: Sequence[Geometry]) -> Geometry | None:
+    """The newest of `kept` with the same triangles in the same places."""
+    for earlier in reversed(kept):
+        same = len(earlier.models) == len(shared) and all(map(operator.is_, earlier.models, shared))
+        if same and flats is not None and earlier.flats == flats:
+            return earlier
+    return None
+
+
+def _others(found: dict[ShapeKind, np.ndarray], placed: np.ndarray) -> tuple[np.ndarray, ...]:
+    return *(array for kind, array in found.items() if kind != ShapeKind.TRIANGLE), placed
+
+
 def _vanished(placed: Placed) -> list[str]:
     return [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
 
@@ -182,66 +219,6 @@ def _degenerate(counts: Mapping[int, int]) -> tuple[str, ...]:
     return tuple(
         f"/shapes/{i}: {n} degenerate triangle{'s' if n > 1 else ''} skipped" for i, n in sorted(counts.items())
     )
-
-
-@dataclass(frozen=True)
-class _Details:
-    """What triangles have, in final order, those of the models last, and the models' nodes."""
-
-    triangles: np.ndarray
-    normals: np.ndarray
-    tangents: bool
-    uvs: np.ndarray
-    uvs_1: np.ndarray
-    colors: np.ndarray
-    nodes: np.ndarray
-
-    @property
-    def arrays(self) -> tuple[np.ndarray, ...]:
-        return self.triangles, self.normals, self.uvs, self.uvs_1, self.colors, self.nodes
-
-
-def _written(
-    triangles: Triangles, places: np.ndarray | None, shared: Sequence[Model]
-) -> tuple[_Details, tuple[Model, ...]]:
-    """All of it on one shelf, which is what the models are kept on from now on."""
-    own = len(triangles)
-    count, node_count = own + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
-    tangents = triangles.any_tangents or any(each.any_tangents for each in shared)
-    smooth = count if tangents or triangles.any_smooth or any(each.any_smooth for each in shared) else 0
-    shapes = {name: (count * _some_have(name, triangles, shared), 3, width) for name, width in CORNERS.items()}
-    sizes = [int(np.prod(shape)) * _at_corner(name).itemsize for name, shape in shapes.items()]
-    parts = count * Triangle.dtype.itemsize, smooth * TriangleNormals.dtype.itemsize, node_count * Node.dtype.itemsize
-    shelf = Shelf(*parts, *sizes)
-    out, normals = shelf.room((count,), Triangle.dtype), shelf.room((smooth,), TriangleNormals.dtype)
-    nodes = shelf.room((node_count,), Node.dtype)
-    corners = {name: shelf.room(shape, _at_corner(name)) for name, shape in shapes.items()}
-    triangles.write(places, out[:own])
-    if smooth:
-        triangles.write_normals(places, normals[:own])
-    for name, values in corners.items():
-        if len(values):
-            triangles.write_corners(name, places, values[:own])
-    kept, node = list[Model](), 0
-    for each in shared:
-        part = slice(own, own + each.count)
-        nodes[node : node + len(each.nodes)] = each.nodes
-        at = nodes[node : node + len(each.nodes)]
-        own, node = part.stop, node + len(at)
-        written = each.write(out[part], normals[part], {name: values[part] for name, values in corners.items()})
-        kept.append(replace(written, nodes=at))
-    return _Details(out, normals, tangents, corners["uvs"], corners["uvs_1"], corners["colors"], nodes), tuple(kept)
-
-
-CORNERS = {"uvs": 2, "uvs_1": 2, "colors": 4}  # what triangles have there: how many numbers
-
-
-def _at_corner(name: str) -> np.dtype[Any]:
-    return np.dtype(np.float16 if name == "colors" else np.float32)
-
-
-def _some_have(name: str, triangles: Triangles, shared: Sequence[Model]) -> bool:
-    return triangles.have(name) or any(each.has(name) for each in shared)
 
 
 def _hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
@@ -265,7 +242,7 @@ def _analytic(placed: Placed, origin: np.ndarray) -> dict[ShapeKind, tuple[np.nd
 def _mesh_extents(every: World, key: Hashable) -> Meshes:
     some = [mesh for mesh in every.meshes if len(mesh.vertices)]
     boxes = [np.concatenate([mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)]) for mesh in some]
-    boxes += [each.box() for each in every.standing]
+    boxes += [each.box for each in every.standing]
     around = np.array(boxes).reshape(-1, 6)
     owners = [mesh.shape for mesh in some] + [each.used[1] for each in every.standing]
     return Meshes(key, around[:, :3], around[:, 3:], np.array(owners, np.uint32), tuple(every.odd))

@@ -39,28 +39,28 @@ class Wanted:
 
 @dataclass(frozen=True)
 class Standing:
-    """A shape that shows a model: world = axes (model) + center, float64."""
+    """A shape that shows a model: world = axes (model) + center, float64; `box` (6,) is around it there."""
 
     model: Model
     used: tuple[int, int]
     axes: np.ndarray
     center: np.ndarray
-
-    def box(self) -> np.ndarray:
-        """(6,) float64 around it in the world."""
-        low, high = self.model.parts[:, :3], self.model.parts[:, 3:]
-        middle, half = (low + high) / 2 @ self.axes.T + self.center, (high - low) / 2 @ np.abs(self.axes).T
-        return np.concatenate([(middle - half).min(axis=0), (middle + half).max(axis=0)])
+    box: np.ndarray
 
 
-def keys(wanted: Sequence[Wanted], digests: dict[int, Hashable]) -> list[Hashable | None]:
-    """Of each mesh what is equal where its triangles are; None where it shares them with no other."""
+def keys(wanted: Sequence[Wanted], apart: bool = False) -> list[Hashable | None]:
+    """Of each mesh what is equal where its triangles are; None where they shall be the scene's own, as nobody shares
+    them or that is not worth it. `apart`: all that are large enough shall move without the others.
+    """
+    digests = dict[int, Hashable]()
     sized = [None if each.shines or len(each.data.faces) < LEAST else _size(each) for each in wanted]
     many = Counter(sized)
-    found = [
-        None if size is None or many[size] < 2 else (*size, _content(each, digests))
+    found: list[Hashable | None] = [
+        None if size is None or (many[size] < 2 and not apart) else (*size, _content(each, digests))
         for each, size in zip(wanted, sized, strict=True)
     ]
+    if apart:
+        return found
     many_of, first = Counter(found), dict(zip(found, wanted, strict=True))
     shared = {key for key, count in many_of.items() if key is not None and count > 1}
     spared = sum((many_of[key] - 1) * len(first[key].data.faces) for key in shared)
@@ -87,18 +87,21 @@ def _content(each: Wanted, digests: dict[int, Hashable]) -> Hashable:
     return digests[id(shape)]
 
 
-def stand(model: Model, matrix: np.ndarray | None, used: tuple[int, int]) -> Standing | None:
-    """None where the transform is none that a ray can be taken through in float32."""
-    matrix = np.eye(4) if matrix is None else matrix
-    axes = np.asarray(matrix[:3, :3], np.float64)
+def stand(model: Model, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -> list[Standing | None]:
+    """Of shapes under these transforms (n, 4, 4); None where float32 can't take a ray through one and back."""
+    axes = matrices[:, :3, :3]
     lengths = np.linalg.svd(axes, compute_uv=False)
-    if not (lengths.min() > SCALES[0] and lengths.max() < SCALES[1]):
-        return None
-    twist = np.abs(axes) @ np.abs(np.linalg.inv(axes))
-    least, greatest = model.least * lengths[1] * lengths[2], model.greatest * lengths[0] * lengths[1]
-    if not (twist.sum(axis=1).max() < TWIST and least > AREAS[0] and greatest < AREAS[1]):
-        return None
-    return Standing(model, used, axes, axes @ model.center + matrix[:3, 3])
+    least, greatest = model.least * lengths[:, 1] * lengths[:, 2], model.greatest * lengths[:, 0] * lengths[:, 1]
+    fits = (lengths[:, 2] > SCALES[0]) & (lengths[:, 0] < SCALES[1]) & (least > AREAS[0]) & (greatest < AREAS[1])
+    twist = np.abs(axes) @ np.abs(np.linalg.inv(np.where(fits[:, None, None], axes, np.eye(3))))
+    fits &= twist.sum(axis=2).max(axis=1) < TWIST
+    centers = axes @ model.center + matrices[:, :3, 3]
+    low, high = model.parts[:, :3], model.parts[:, 3:]
+    middle = (low + high) / 2 @ axes.transpose(0, 2, 1) + centers[:, None]
+    half = (high - low) / 2 @ np.abs(axes).transpose(0, 2, 1)
+    boxes = np.concatenate([(middle - half).min(axis=1), (middle + half).max(axis=1)], axis=1)
+    rows = zip(fits, used, axes, centers, boxes, strict=True)
+    return [Standing(model, *row) if fit else None for fit, *row in rows]
 
 
 def records(standing: Sequence[Standing], models: Sequence[Model], origin: np.ndarray, first: int) -> np.ndarray:

@@ -39,10 +39,10 @@ class World:
 
 def place(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    reads: Mapping[str, Reads], known: Mapping[Hashable, Model] | None = None,
+    reads: Mapping[str, Reads], known: Mapping[Hashable, Model] | None = None, apart: bool = False,
 ) -> World:  # fmt: skip
-    """`names` and `emissive` are materials, `reads` what these read of them; `known`: models that
-    need not be made again.
+    """`names` and `emissive` are materials, `reads` what these read of them; `known`: models that need not be made
+    again; `apart`: large meshes shall move without the others.
 
     Raises InvalidDocument.
     """
@@ -59,25 +59,41 @@ def place(
             wanted.append(Wanted(shape, data, matrix, used, read, shape.material in emissive))
     if len(out.odd) > MOST_ODD:
         out.odd[MOST_ODD:] = [f"and {len(out.odd) - MOST_ODD} more like these"]
-    made = dict[Hashable, Model | None]()
-    room = max_triangles
-    for each, key in zip(wanted, instances.keys(wanted, {}), strict=True):
-        if key is not None and key not in made:
-            _check_room(each, room)
-            made[key] = (known or {}).get(key) or _model(key, each)
-            room -= len(each.data.faces)
-        shared = made.get(key)
-        standing = None if shared is None else instances.stand(shared, each.matrix, each.used)
-        if standing is not None:
-            _check_reach(standing, each)
-            out.standing.append(standing)
-        else:
-            _check_room(each, room)
-            room -= len(each.data.faces)
-            out.meshes.append(_mesh(each, each.matrix))
-            if each.matrix is not None:
-                check_reach(each.used[1], float(np.abs(out.meshes[-1].vertices).max(initial=0.0)))
+    standing, room = _standing(wanted, known or {}, apart, max_triangles)
+    for each, stands in zip(wanted, standing, strict=True):
+        if stands is not None:
+            _check_reach(stands, each)
+            out.standing.append(stands)
+            continue
+        _check_room(each, room)
+        room -= len(each.data.faces)
+        out.meshes.append(_mesh(each, each.matrix))
+        if each.matrix is not None:
+            check_reach(each.used[1], float(np.abs(out.meshes[-1].vertices).max(initial=0.0)))
     return out
+
+
+def _standing(
+    wanted: Sequence[Wanted], known: Mapping[Hashable, Model], apart: bool, room: int
+) -> tuple[list[Standing | None], int]:
+    """Those that stand as instances, and for how many triangles there is room beside their models."""
+    out: list[Standing | None] = [None] * len(wanted)
+    groups = dict[Hashable, list[int]]()
+    for i, key in enumerate(instances.keys(wanted, apart)):
+        if key is not None:
+            groups.setdefault(key, []).append(i)
+    for key, group in groups.items():
+        first = wanted[group[0]]
+        _check_room(first, room)
+        shared = known.get(key) or _model(key, first)
+        if shared is None:
+            continue
+        room -= len(first.data.faces)
+        matrices = np.array([np.eye(4) if wanted[i].matrix is None else wanted[i].matrix for i in group])
+        stood = instances.stand(shared, matrices, [wanted[i].used for i in group])
+        for i, stands in zip(group, stood, strict=True):
+            out[i] = stands
+    return out, room
 
 
 def place_analytic(
@@ -128,7 +144,7 @@ def _check_room(each: Wanted, room: int) -> None:
 
 def _check_reach(standing: Standing, each: Wanted) -> None:
     """By the boxes of its parts where they suffice."""
-    reach = float(np.abs(standing.box()).max())
+    reach = float(np.abs(standing.box).max())
     if reach > LARGEST:
         matrix = np.eye(4) if each.matrix is None else each.matrix
         reach = float(np.abs(each.data.vertices @ matrix[:3, :3].T + matrix[:3, 3]).max())

@@ -137,12 +137,8 @@ def _geometry(
         mesh_key = (tuple((i, contents[i]) for i, _ in meshes), *shared)
 
     def make() -> Geometry:
-        earlier = None
-        if mesh_key is not None:
-            earlier = cache.find(lambda kept: isinstance(kept, Geometry) and kept.meshes.key == mesh_key)
-        known = cache.gather(lambda kept: kept.models if isinstance(kept, Geometry) else ())
-        by_key = {each.key: each for each in known}
-        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, earlier, by_key)
+        kept = cache.gather(Geometry)
+        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, contents, kept)
 
     return cache.get(("geometry", contents, shining, *shared), make)
 

@@ -85,6 +85,7 @@ def plant(
     bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.ndarray]
 ) -> tuple[np.ndarray, int, dict[ShapeKind, np.ndarray], Vec3, Vec3]:
     """(nodes, nodes of one octant, each kind's order: the `large` ones, then the leaves'; grid origin and scale).
+    Instances stay in theirs.
 
     Raises InvalidDocument.
     """
@@ -99,14 +100,18 @@ def plant(
         for k in range(2)
     )
     del rest
+    starts = np.cumsum([0, *counts])
+    firsts = {int(k): len(places) for k, places in large.items() if len(places)}
+    staying = {int(k): int(at) for k, at in zip(small, starts, strict=False) if k == ShapeKind.INSTANCE}
     try:
-        tree = bvh.build(low, high, kinds, firsts={int(k): len(places) for k, places in large.items() if len(places)})
+        tree = bvh.build(low, high, kinds, firsts=firsts, staying=staying)
     except SceneTooLarge as error:
         raise InvalidDocument([FieldError("/shapes", str(error))]) from None
     nodes, count = bvh.thread(tree)
-    starts = np.cumsum([0, *counts])
-    order = {}
+    order = dict[ShapeKind, np.ndarray]()
     for (kind, places), start in zip(small.items(), starts, strict=False):
+        if kind == ShapeKind.INSTANCE:
+            continue
         leaves = tree.order if len(small) == 1 else tree.order[kinds[tree.order] == kind] - np.uint32(start)
         order[kind] = np.concatenate([large[kind].astype(np.uint32), places[leaves]])
     return nodes, count, order, tree.origin, tree.scale

@@ -1,0 +1,74 @@
+"""What triangles have, written once into their last place: their records, normals, corners, and the models' trees."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from gpu.layout import Node, Triangle, TriangleNormals
+from service.pack.meshes import Triangles
+from service.pack.models import Model
+from service.shared import Shelf
+
+
+@dataclass(frozen=True)
+class Details:
+    """What triangles have, in final order, those of the models last, and the models' nodes."""
+
+    triangles: np.ndarray
+    normals: np.ndarray
+    tangents: bool
+    uvs: np.ndarray
+    uvs_1: np.ndarray
+    colors: np.ndarray
+    nodes: np.ndarray
+
+    @property
+    def arrays(self) -> tuple[np.ndarray, ...]:
+        return self.triangles, self.normals, self.uvs, self.uvs_1, self.colors, self.nodes
+
+
+def written(
+    triangles: Triangles, places: np.ndarray | None, shared: Sequence[Model]
+) -> tuple[Details, tuple[Model, ...]]:
+    """All of it on one shelf, which is what the models are kept on from now on."""
+    own = len(triangles)
+    count, node_count = own + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
+    tangents = triangles.any_tangents or any(each.any_tangents for each in shared)
+    smooth = count if tangents or triangles.any_smooth or any(each.any_smooth for each in shared) else 0
+    shapes = {name: (count * _some_have(name, triangles, shared), 3, width) for name, width in CORNERS.items()}
+    sizes = [int(np.prod(shape)) * _at_corner(name).itemsize for name, shape in shapes.items()]
+    parts = count * Triangle.dtype.itemsize, smooth * TriangleNormals.dtype.itemsize, node_count * Node.dtype.itemsize
+    shelf = Shelf(*parts, *sizes)
+    out, normals = shelf.room((count,), Triangle.dtype), shelf.room((smooth,), TriangleNormals.dtype)
+    nodes = shelf.room((node_count,), Node.dtype)
+    corners = {name: shelf.room(shape, _at_corner(name)) for name, shape in shapes.items()}
+    triangles.write(places, out[:own])
+    if smooth:
+        triangles.write_normals(places, normals[:own])
+    for name, values in corners.items():
+        if len(values):
+            triangles.write_corners(name, places, values[:own])
+    kept, node = list[Model](), 0
+    for each in shared:
+        part = slice(own, own + each.count)
+        nodes[node : node + len(each.nodes)] = each.nodes
+        at = nodes[node : node + len(each.nodes)]
+        own, node = part.stop, node + len(at)
+        written = each.write(out[part], normals[part], {name: values[part] for name, values in corners.items()})
+        kept.append(replace(written, nodes=at))
+    return Details(out, normals, tangents, corners["uvs"], corners["uvs_1"], corners["colors"], nodes), tuple(kept)
+
+
+CORNERS = {"uvs": 2, "uvs_1": 2, "colors": 4}  # what triangles have there: how many numbers
+
+
+def _at_corner(name: str) -> np.dtype[Any]:
+    return np.dtype(np.float16 if name == "colors" else np.float32)
+
+
+def _some_have(name: str, triangles: Triangles, shared: Sequence[Model]) -> bool:
+    return triangles.have(name) or any(each.has(name) for each in shared)
