@@ -95,7 +95,7 @@ def edited(arrays: SceneArrays, edits: dict[str, Any]) -> SceneArrays:
     changes: dict[str, Any] = {name: edits[name] for name in ("camera", "materials") if name in edits}
     if "texture_words" in edits and arrays.textures is not None:
         changes["textures"] = replace(arrays.textures, words=edits["texture_words"])
-    return replace(arrays, **changes)
+    return replace(arrays, **changes, **edits.get("moved", {}))
 
 
 class Ahead:

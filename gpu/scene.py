@@ -4,33 +4,21 @@ from __future__ import annotations
 
 import logging
 import math
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gpu import context as contexts
-from gpu import energy, features, layout
+from gpu import energy, features, layout, uploads
 from gpu.arrays import CameraArrays, SceneArrays
 from gpu.errors import OutOfMemory
 from gpu.layout import LightKind, Slot
-from gpu.pinned import pin
 from gpu.settings import RenderSettings
 from gpu.texels import KINDS, Texels, bare, rows
 
 log = logging.getLogger(__name__)
-
-_BUFFERS = {
-    Slot.SPHERES: "spheres",
-    Slot.QUADS: "quads",
-    Slot.BOXES: "boxes",
-    Slot.ELLIPSOIDS: "ellipsoids",
-    Slot.TRIANGLES: "triangles",
-    Slot.TRIANGLE_NORMALS: "triangle_normals",
-    Slot.NODES: "nodes",
-    Slot.LIGHTS: "lights",
-}
-
 
 _BLOCKS = {layout.BUFFERS[name][1]: block for name, block in layout.COUNTED.items()}
 _BLOCK_MAX = 16384  # bytes that every driver gives a uniform block; of longer buffers kernels see the first records
@@ -87,6 +75,7 @@ class Scene:
         self._details: dict[int, Any] = {}  # textures by unit
         self._images: dict[int, Any] = {}  # those of images, perhaps shared
         self._key = ""  # under which they are
+        self.uploaded = 0  # bytes, since shapes first moved
         try:
             self._upload_all()
         except OutOfMemory:
@@ -98,15 +87,12 @@ class Scene:
         log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
 
     def _upload_all(self) -> None:
-        for slot, name in _BUFFERS.items():
-            array = getattr(self.arrays, name)
-            if slot == Slot.NODES and len(self.arrays.instances):
-                array = np.concatenate([self.arrays.instance_nodes, array])
-            self._buffers[slot] = pin(self._context, array) or self._upload(array)
-        self._buffers[Slot.MATERIALS] = self._upload(self._materials())
+        for slot in uploads.BUFFERS:
+            self._buffers[slot] = uploads.shared(self._context, slot, self.arrays)
+        self._buffers[Slot.MATERIALS] = uploads.upload(self._context, self._materials())
         self._upload_details()
         self._texels, cells = self._upload_environment()
-        self._buffers[Slot.ENVIRONMENT_CELLS] = self._upload(cells)
+        self._buffers[Slot.ENVIRONMENT_CELLS] = uploads.upload(self._context, cells)
 
     def _materials(self) -> np.ndarray:
         """Bytes of all materials, each followed by its slots and uses of textures."""
@@ -145,11 +131,6 @@ class Scene:
     def _raise_flags(self) -> None:
         raised = features.everything() if self._everything else features.flags(self.arrays, self._editing)
         self._raised = self._raised | raised if self._editing else raised
-
-    def _upload(self, array: np.ndarray) -> Any:
-        # An empty binding still needs a buffer: llvmpipe reads it, masked, on the way past.
-        data = np.ascontiguousarray(array).view(np.uint8).reshape(-1) if array.size else np.zeros(96, np.uint8)
-        return contexts.allocate(self._context, data)
 
     def _upload_environment(self) -> tuple[Any, np.ndarray]:
         e = self.arrays.environment
@@ -190,11 +171,15 @@ class Scene:
         materials: np.ndarray | None = None,
         texture_words: np.ndarray | None = None,
         environment: tuple[float, float] | None = None,
+        moved: Mapping[str, Any] | None = None,
     ) -> None:
         """Replace the camera, the materials' bytes (as many as before), what they have of textures
-        (`TextureArrays.words`), the environment's (rotation, scale).
+        (`TextureArrays.words`), the environment's (rotation, scale); `moved`: members of the arrays that tell where
+        shapes stand, with the scene's tree and the lights, as many as before. The tree may change where there are
+        instances.
 
-        Uploads nothing else. Pictures of this scene must be reset by the caller.
+        Uploads nothing else. Pictures of this scene must be reset by the caller. Raises OutOfMemory, and nothing has
+        changed then.
         """
         contexts.use(self._context)
         changes: dict[str, Any] = {}
@@ -209,6 +194,10 @@ class Scene:
         if environment is not None and self.arrays.environment is not None:
             rotation, scale = environment
             changes["environment"] = replace(self.arrays.environment, rotation=rotation, scale=scale)
+        if moved is not None:
+            arrays = replace(self.arrays, **moved)
+            self.uploaded += uploads.move(self._context, self.arrays, arrays, self._buffers, self._details)
+            self.arrays = arrays
         self.arrays = replace(self.arrays, **changes)
         if len(self.arrays.materials) and changes.keys() & {"materials", "textures"}:
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))

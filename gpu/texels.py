@@ -47,6 +47,19 @@ def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
     return texture
 
 
+def rewrite(texture: Any, values: np.ndarray, part: slice) -> int:
+    """Writes these of the values that `rows` made a texture of 32-bit numbers of, four to a texel; their bytes."""
+    words = np.ascontiguousarray(values[part]).view(np.uint32).reshape(-1, 4)
+    texel = part.start * (values.itemsize // 16)
+    sent = words.nbytes
+    while len(words):
+        x, y = texel % layout.TEXELS_A_ROW, texel // layout.TEXELS_A_ROW
+        count = min(len(words), layout.TEXELS_A_ROW - x)
+        texture.write(np.ascontiguousarray(words[:count]), viewport=(x, y, count, 1))
+        words, texel = words[count:], texel + count
+    return sent
+
+
 def bare(context: Any, unit: int) -> Any:
     """A texture of one texel, as something has to be bound there."""
     channels, dtype = KINDS[unit]

@@ -9,10 +9,12 @@ sky         environment -> texels and the tables that draw from them
 textures    images -> texels, and which number of which material reads which of them
 glow        what textured shapes shine with
 lights      how often each light is picked
+moved       what of it differs where shapes have moved
 scene       the whole; `cache` keeps geometries and skies between edits
 """
 
 from service.pack.cache import PackCache
+from service.pack.moved import moved
 from service.pack.scene import Packed, pack
 from service.pack.textures import repacked
 from service.pack.tree import warm as warm_builder
@@ -21,6 +23,7 @@ from service.pack.values import pack_camera, pack_materials, pack_turn
 __all__ = [
     "PackCache",
     "Packed",
+    "moved",
     "pack",
     "pack_camera",
     "pack_materials",

@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any
 
-from service.pack import PackCache, pack_camera, pack_materials, pack_turn, repacked
+from service.pack import PackCache, moved, pack_camera, pack_materials, pack_turn, repacked
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.rendering import protocol
@@ -13,8 +13,6 @@ from service.rendering.change import change, risky
 from service.rendering.messages import Update
 from service.rendering.reading import Reader, stop_rule
 from service.scene import Scene, merge_patch
-
-Origin = tuple[float, float, float]
 
 
 @dataclass(frozen=True)
@@ -30,11 +28,10 @@ class Version:
 
 @dataclass(frozen=True)
 class Good:
-    """A version, and what the renderer's arrays of it are relative to."""
+    """A version, and the arrays that it was last packed as."""
 
     version: Version
-    origin: Origin
-    textures: Any
+    arrays: Any
 
 
 class Live:
@@ -48,8 +45,7 @@ class Live:
         self._given: Version | None = None  # the last one that the renderer has
         self._good: dict[int, Good] = {}  # that the renderer may go back to, by generation
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
-        self._origin: Origin = (0.0, 0.0, 0.0)  # what its coordinates are relative to
-        self._textures: Any = None  # a gpu.TextureArrays: how its materials use textures
+        self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
 
     def take(self, message: protocol.Start | protocol.Update) -> Update | None:
         """What the renderer must be told at once; None where that can wait for `settle`, after newer updates.
@@ -82,7 +78,7 @@ class Live:
         good = None if fallback is None else self._good.get(fallback)
         self._given = None
         if good is not None:
-            self._given, self._origin, self._textures = good.version, good.origin, good.textures
+            self._given, self._arrays = good.version, good.arrays
         if version is None or version.generation <= generation:
             self.version = self._given
         elif given is not None and given.generation > generation:  # it was told as a change of what failed
@@ -113,7 +109,7 @@ class Live:
         newest = max((g for g in self._good if g <= self.works), default=None)
         if newest is not None:
             self._good = {g: kept for g, kept in self._good.items() if g >= newest}
-        self._good[version.generation] = Good(version, self._origin, self._textures)
+        self._good[version.generation] = Good(version, self._arrays)
         return update
 
     def _difference(self, new: Version) -> Update:
@@ -127,14 +123,22 @@ class Live:
         touched = change(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
             arrays = self._reader.pack(new.scene, self._cache).arrays
-            self._origin, self._textures = arrays.origin, arrays.textures
-            return replace(update, scene=arrays)
+            elsewhere = None if old is None else moved(self._arrays, arrays)
+            self._arrays, lit = arrays, arrays.environment
+            if old is None or elsewhere is None:
+                return replace(update, scene=arrays)
+            return replace(
+                update, base=old.generation, moved=elsewhere, camera=arrays.camera, materials=arrays.materials,
+                texture_words=None if arrays.textures is None else arrays.textures.words,
+                environment=None if lit is None else (lit.rotation, lit.scale),
+            )  # fmt: skip
         environment = new.scene.environment
+        textures = self._arrays.textures
         return replace(
             update,
             base=None if old is None else old.generation,
-            camera=pack_camera(new.scene.camera, self._origin) if touched.camera else None,
+            camera=pack_camera(new.scene.camera, self._arrays.origin) if touched.camera else None,
             materials=pack_materials(new.scene) if touched.materials else None,
-            texture_words=repacked(self._textures, new.scene) if touched.materials and self._textures else None,
+            texture_words=repacked(textures, new.scene) if touched.materials and textures else None,
             environment=pack_turn(environment) if touched.environment and environment is not None else None,
         )

@@ -10,7 +10,7 @@ import numpy as np
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
-EDITS = ("camera", "materials", "texture_words", "environment")  # what `Scene.edit` takes
+EDITS = ("camera", "materials", "texture_words", "environment", "moved")  # what `Scene.edit` takes
 
 
 @dataclass(frozen=True)
@@ -61,6 +61,7 @@ class Update:
     materials: np.ndarray | None = None
     texture_words: np.ndarray | None = None
     environment: tuple[float, float] | None = None
+    moved: dict[str, Any] | None = None
     denoise: bool | None = None
     base: int | None = None  # the generation that it changes; without one it is whole
     client: str = ""  # whose; tasks of one client share its part of the GPU's time

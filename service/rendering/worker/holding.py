@@ -114,7 +114,7 @@ def kernel_of(
     elif holding is not None:
         arrays, editing, raised = holding.scene.arrays, holding.editing, holding.scene.flags
         aperture = update.camera is None or update.camera.aperture_radius == arrays.camera.aperture_radius
-        if update.settings is None and aperture and not edits.keys() & {"materials", "texture_words"}:
+        if update.settings is None and aperture and not edits.keys() & {"materials", "texture_words", "moved"}:
             return None
     elif aside is not None:
         arrays, editing, raised = aside.arrays, aside.editing, aside.flags

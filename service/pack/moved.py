@@ -1,0 +1,51 @@
+"""What differs between the arrays of two scenes in which shapes stand elsewhere: all that must then be uploaded."""
+
+from __future__ import annotations
+
+from dataclasses import fields
+from typing import Any
+
+import numpy as np
+
+from gpu import EnvironmentArrays, SceneArrays, TextureArrays
+
+# Members that may differ; of these arrays those of MANY in length, too.
+MOVED = (
+    "spheres", "quads", "boxes", "ellipsoids", "lights", "light_tree", "instances", "nodes", "node_count",
+    "node_origin", "node_scale", "radiance_scale",
+)  # fmt: skip
+MANY = ("nodes", "light_tree")
+EDITED = ("camera", "materials")  # as many as before; see Scene.edit
+SMALL = 1 << 20  # bytes that are compared; of more it is asked whether they are the very same
+
+
+def moved(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
+    """What `Scene.edit` takes for this; None where it is not enough."""
+    if len(old.materials) != len(new.materials) or bool(len(old.light_tree)) != bool(len(new.light_tree)):
+        return None
+    if not len(new.instances) and not _same(old.nodes, new.nodes):  # in which triangles lie, too
+        return None
+    for name in (field.name for field in fields(SceneArrays)):
+        a, b = getattr(old, name), getattr(new, name)
+        if name in EDITED or name in MANY:
+            continue
+        fits = _as_many(a, b) if name in MOVED else _same(a, b)
+        if not fits:
+            return None
+    return {name: getattr(new, name) for name in MOVED}
+
+
+def _as_many(a: Any, b: Any) -> bool:
+    return not isinstance(a, np.ndarray) or len(a) == len(b)
+
+
+def _same(a: Any, b: Any) -> bool:
+    if isinstance(a, np.ndarray) and isinstance(b, np.ndarray):
+        return a is b or (a.dtype == b.dtype and a.nbytes <= SMALL and np.array_equal(a, b))
+    if isinstance(a, EnvironmentArrays) and isinstance(b, EnvironmentArrays):
+        still = (field.name for field in fields(a) if field.name not in ("rotation", "scale"))
+        return all(_same(getattr(a, name), getattr(b, name)) for name in still)
+    if isinstance(a, TextureArrays) and isinstance(b, TextureArrays):
+        images = a.key == b.key != "" or (_same(a.texels, b.texels) and _same(a.floats, b.floats))
+        return a.slots == b.slots and a.words.shape == b.words.shape and images
+    return type(a) is type(b) and bool(a == b)

@@ -1,0 +1,88 @@
+"""What stands elsewhere is uploaded, and nothing else; the picture is that of a scene that was loaded so."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings, SceneArrays
+from gpu.layout import Instance, Node
+from service.pack import PackCache, instances, moved, pack
+from service.scene import parse_scene
+from tests.test_instances import IMAGES, two
+
+Doc = dict[str, Any]
+MATTE = {"type": "diffuse", "albedo": 0.7}
+BALL = {"type": "sphere", "center": [0, -1, 1], "radius": 0.3, "material": "m"}
+LAMP = {"type": "quad", "origin": [0, 3, 0], "u": [1, 0, 0], "v": [0, 0, 1], "material": "lamp"}
+
+
+@pytest.fixture(autouse=True)
+def worth(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(instances, "WORTH", 0)
+
+
+def scene(place: float = 1.1, ball: float = 0.0, lamp: float = 0.0, material: Doc = MATTE) -> Doc:
+    made = two(material, {**BALL, "center": [ball, -1, 1]}, {**LAMP, "origin": [lamp, 3, 0]})
+    made["shapes"][1]["transform"] = {"translate": [place, 0, 0.2], "rotate": [10, 0, 60], "scale": [-0.6, 1.2, 0.8]}
+    made["materials"]["lamp"] = {"type": "diffuse", "albedo": 0, "emission": 4}
+    return made
+
+
+def arrays_of(document: Doc, cache: PackCache) -> SceneArrays:
+    return pack(parse_scene(document), IMAGES, cache).arrays
+
+
+@pytest.mark.parametrize(
+    "changes, sent",
+    [
+        ({"place": 1.5}, Instance.dtype.itemsize + 8 * 3 * Node.dtype.itemsize),
+        ({"ball": 0.4}, 48),
+        ({"place": 0.6, "ball": -0.4, "lamp": 1.0}, 2000),
+    ],
+)
+def test_what_moves_is_uploaded_and_nothing_else(gpu: Renderer, changes: dict[str, float], sent: int) -> None:
+    cache = PackCache()
+    old, new = (arrays_of(scene(**given), cache) for given in ({}, changes))
+    assert len(new.instances) == 2
+    difference = moved(old, new)
+    assert difference is not None
+    loaded, fresh = gpu.load(old), gpu.load(new)
+    loaded.edit(moved=difference)
+    assert 0 < loaded.uploaded <= sent
+    seen = []
+    for each in (loaded, fresh):
+        picture = gpu.picture(each, RenderSettings(48, 32, max_bounces=3))
+        picture.trace(60.0, 4)
+        seen.append(picture.read())
+        picture.release()
+        each.release()
+    assert np.array_equal(*seen)
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        {**scene(), "shapes": scene()["shapes"][1:]},
+        scene(material={"type": "diffuse", "albedo": {"texture": "t"}}),
+        {**scene(), "environment": {"type": "sky", "sun_elevation": 30, "sun_azimuth": 0}},
+        {**scene(), "lights": []},
+        {**scene(), "shapes": [{**shape, "smooth": False} for shape in scene()["shapes"] if shape["type"] == "mesh"]},
+    ],
+)
+def test_what_else_differs_is_another_scene(other: Doc) -> None:
+    cache = PackCache()
+    assert moved(arrays_of(scene(), cache), arrays_of(other, cache)) is None
+
+
+def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
+    cache = PackCache()
+    old, new = (arrays_of(scene(), cache) for _ in range(2))
+    difference = moved(old, new)
+    assert difference is not None
+    loaded = gpu.load(old)
+    loaded.edit(moved=difference)
+    assert loaded.uploaded == 0
+    loaded.release()
