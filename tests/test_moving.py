@@ -9,7 +9,7 @@ import pytest
 
 from gpu import Renderer, RenderSettings, SceneArrays
 from gpu.layout import Instance, Node
-from service.pack import PackCache, instances, moved, pack
+from service.pack import PackCache, instances, moved, moves, pack
 from service.scene import parse_scene
 from tests.test_instances import IMAGES, two
 
@@ -86,3 +86,28 @@ def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
     loaded.edit(moved=difference)
     assert loaded.uploaded == 0
     loaded.release()
+
+
+def test_a_large_mesh_that_a_stream_moves_becomes_an_instance(monkeypatch: pytest.MonkeyPatch) -> None:
+    """From the first move on, with all others that are large; not before, and not where nothing is kept."""
+    monkeypatch.setattr(instances, "WORTH", 10**9)
+    monkeypatch.setattr(moves, "HEAVY", 1280)
+    cache, first = PackCache(), scene()
+    assert not len(arrays_of(first, cache).instances)
+    assert not len(arrays_of(scene(ball=1), cache).instances)
+    turned = arrays_of(scene(place=1.4, ball=1), cache)
+    assert len(turned.instances) == 2 and len(turned.triangles) == 1280
+    again = arrays_of(scene(place=1.5, ball=1, material={**MATTE, "albedo": 0.3}), cache)
+    assert moved(turned, again) is not None and again.triangles is turned.triangles
+    back = arrays_of(first, cache)
+    assert len(back.instances) == 2 and moved(again, back) is not None
+    assert not len(pack(parse_scene(scene(place=1.4)), IMAGES).arrays.instances)
+    assert not len(arrays_of({**first, "shapes": first["shapes"][2:]}, cache).instances)
+    assert not len(arrays_of(first, cache).instances)
+
+
+def test_a_small_mesh_that_moves_stays_among_the_others(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(instances, "WORTH", 10**9)
+    cache = PackCache()
+    for place in (1.1, 1.2, 1.3):
+        assert not len(arrays_of(scene(place=place), cache).instances)

@@ -10,7 +10,7 @@ textures    images -> texels, and which number of which material reads which of 
 glow        what textured shapes shine with
 lights      how often each light is picked
 moved       what of it differs where shapes have moved
-scene       the whole; `cache` keeps geometries and skies between edits
+scene       the whole; `cache` keeps geometries and skies between edits, and `moves` which meshes these have moved
 """
 
 from service.pack.cache import PackCache

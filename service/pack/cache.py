@@ -10,6 +10,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
+from service.pack.moves import Moves
 from service.scene.shape import MeshShape, Shape
 
 T = TypeVar("T")
@@ -23,6 +24,7 @@ class PackCache:
         self._max_bytes = max_bytes
         self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
+        self.moves = Moves()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """What was made for an equal key, or else `make()`, which runs outside the lock."""

@@ -171,5 +171,13 @@ def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshDa
         raise InvalidDocument([FieldError(f"/shapes/{number}/asset", error.detail)]) from None
 
 
+def triangles(shape: MeshShape, assets: Assets) -> int:
+    """How many it has; 0 of a file that can't be had, which is told elsewhere."""
+    try:
+        return len(_data(shape, 0, assets, {}).faces)
+    except InvalidDocument:
+        return 0
+
+
 def _uncharted(shape: int, field: str, material: str, what: str) -> InvalidDocument:
     return InvalidDocument([FieldError(f"/shapes/{shape}/{field}", f"material {material[:80]!r} reads {what}")])

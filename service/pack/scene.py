@@ -18,6 +18,7 @@ from service.pack.cache import PackCache, content, lasting
 from service.pack.geometry import Geometry, geometry
 from service.pack.glow import dark, glow
 from service.pack.models import shift
+from service.pack.placing import triangles
 from service.pack.sky import Sky, make_sky, sky_key
 from service.pack.textures import pack_textures, reads
 from service.pack.values import pack_camera, pack_materials, pack_turn
@@ -130,7 +131,9 @@ def _geometry(
     read = reads(scene)
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
         return geometry(scene.shapes, names, shining, assets, room, read)
-    contents, shared = tuple(map(content, scene.shapes)), (tuple(names), room, tuple(read.items()))
+    contents = tuple(map(content, scene.shapes))
+    apart = cache.moves.apart(scene.shapes, contents, lambda shape: triangles(shape, assets))
+    shared = tuple(names), room, tuple(read.items()), apart
     meshes = [(i, shape) for i, shape in enumerate(scene.shapes) if isinstance(shape, MeshShape)]
     mesh_key = None
     if meshes and not any(shape.material in shining for _, shape in meshes):
@@ -138,7 +141,7 @@ def _geometry(
 
     def make() -> Geometry:
         kept = cache.gather(Geometry)
-        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, contents, kept)
+        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, contents, kept, apart)
 
     return cache.get(("geometry", contents, shining, *shared), make)
 
