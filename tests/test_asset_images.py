@@ -173,6 +173,27 @@ def test_what_an_image_says_beside_its_texels_is_told_and_not_followed(store: As
     assert warning.startswith("its gamma (1) is not followed")
 
 
+def test_headers_of_floats_are_told_of_too(store: AssetStore) -> None:
+    plain = make.hdr(PIXELS + 0.1)
+    for line, warnings in (
+        (b"EXPOSURE=          1.0000000000000\nPRIMARIES=0.640 0.330 0.290 0.600 0.150 0.060 0.333 0.333\n", []),
+        (b"EXPOSURE= 2.5\nCOLORCORR=1 .9 1\n",
+         ["its EXPOSURE (2.5) is not followed", "its COLORCORR (1 .9 1) is not followed"]),
+        (b"PRIMARIES=0.7 0.3 0.2 0.8 0.1 0.05 0.3 0.3\n",
+         ["its PRIMARIES (0.7 0.3 0.2 0.8 0.1 0.05 0.3 0.3) is not followed"]),
+        (b"EXPOSURE=e\n", ["its EXPOSURE (e) is not followed"]),
+    ):  # fmt: skip
+        assert told(store, plain.replace(b"FORMAT", line + b"FORMAT"))[1] == warnings
+    for chromaticities, warnings in (
+        ((0.64, 0.33, 0.3, 0.6, 0.15, 0.06, 0.3127, 0.329), []),
+        ((0.7347, 0.2653, 0, 1, 0.0001, -0.077, 0.32168, 0.33767),  # ACES
+         ["its chromaticities are not those of Rec.709, and are not followed"]),
+    ):  # fmt: skip
+        spec = oiio.ImageSpec(4, 4, 3, "float")
+        spec.attribute("chromaticities", "float[8]", chromaticities)
+        assert told(store, saved([spec], [PIXELS[:4, :4]]))[1] == warnings
+
+
 def test_a_render_repeats_what_is_told_of_its_images() -> None:
     image = ImageData(SMALL[..., :3], ("odd",))
     textured = {
@@ -228,10 +249,14 @@ def written_parts(parts: list[tuple[str, np.ndarray, Sequence[str]]], dtype: str
         if name:
             spec.attribute("oiio:subimagename", name)
         specs.append(spec)
+    return saved(specs, [pixels for _, pixels, _ in parts])
+
+
+def saved(specs: list[oiio.ImageSpec], parts: list[np.ndarray]) -> bytes:
     with tempfile.NamedTemporaryFile(suffix=".exr") as file:
         output = oiio.ImageOutput.create(file.name)
         assert output.open(file.name, specs), output.geterror()
-        for k, (_, pixels, _) in enumerate(parts):
+        for k, pixels in enumerate(parts):
             assert not k or output.open(file.name, specs[k], "AppendSubimage"), output.geterror()
             assert output.write_image(np.ascontiguousarray(pixels)), output.geterror()
         output.close()

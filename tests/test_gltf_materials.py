@@ -272,3 +272,18 @@ def test_a_grey_normal_map_is_left_out_with_a_word(store: AssetStore, dtype: Any
     file = Gltf()
     found = imported(store, file.of({"normalTexture": {"index": file.texture(PIXELS[..., :1].astype(dtype))}}))
     assert noted(found) == {"/materials/0/normalTexture": "is grey, and no normal map: left out"}
+
+
+def test_what_is_brushed_needs_a_direction(store: AssetStore) -> None:
+    """Texture coordinates, or tangents."""
+    rows = {"POSITION": QUAD, "NORMAL": np.tile(np.array([[0, 0, 1]], "<f4"), (4, 1))}
+    tangents = {"TANGENT": np.tile(np.array([[1, 0, 0, 1]], "<f4"), (4, 1))}
+    for given, brushed in ((rows, False), (rows | tangents, True)):
+        file = Gltf()
+        extension = {"KHR_materials_anisotropy": {"anisotropyStrength": 0.5}}
+        rough = {"roughnessFactor": 0.4}
+        made = file.add("materials", {"extensions": extension, "pbrMetallicRoughness": rough})
+        file.node(mesh=file.mesh(file.primitive(given, material=made)))
+        found = imported(store, file)
+        (document,) = found.document["materials"].values()
+        assert ("anisotropic" in document) == brushed and bool(found.warnings) != brushed

@@ -22,6 +22,9 @@ SIGNATURES: dict[str, tuple[bytes, ...]] = {
     "exr": (b"\x76\x2f\x31\x01",),
     "hdr": (b"#?",),
 }
+HDR_LINE = re.compile(rb"(?m)^(EXPOSURE|COLORCORR|PRIMARIES)[ \t]*=(.*)$")
+NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
+REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, green, blue and white
 PNG_END = b"IEND\xaeB`\x82"
 HDR_SIZE = re.compile(rb"\n([-+])([XY]) +(\d{1,9}) +([-+])(?!\2)[XY] +(\d{1,9})\n")
 COLOUR = (("r", "g", "b"), ("red", "green", "blue"))  # channels' names, of whatever case
@@ -43,10 +46,31 @@ def parse_image(format: str, data: bytes, path: str, limits: AssetLimits) -> Ima
         texels, warnings = _pillow(format, data, limits)
         return ImageData(np.ascontiguousarray(texels), tuple(warnings))
     pixels = _openimageio(format, data, path, limits)
+    told = tuple(_header(format, data))
     if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
         raise ParseError(f"the texel at x={x}, y={y} is not finite: {pixels[y, x].tolist()}")
-    return ImageData(np.ascontiguousarray(pixels, np.float32))
+    return ImageData(np.ascontiguousarray(pixels, np.float32), told)
+
+
+def _header(format: str, data: bytes) -> Iterator[str]:
+    """What the header of a file of floats says that is not followed."""
+    if format == "exr":
+        given = exr_attributes(data).get("chromaticities", b"")
+        if len(given) == 32 and np.abs(np.subtract(struct.unpack("<8f", given), REC_709)).max() > 0.01:
+            yield "its chromaticities are not those of Rec.709, and are not followed"
+    elif format == "hdr":
+        size = HDR_SIZE.search(data[:65536])
+        for name, value in HDR_LINE.findall(data[: size.start() if size else 0]):
+            numbers = re.findall(rb"[-+.\de]+", value.lower())
+            if not _neutral(name, [float(one) for one in numbers if NUMBER.fullmatch(one)]):
+                yield f"its {name.decode()} ({value[:40].decode('latin-1').strip()}) is not followed"
+
+
+def _neutral(name: bytes, values: list[float]) -> bool:
+    if name == b"PRIMARIES":  # Radiance's own differ from Rec.709's in the white, and a little in green
+        return len(values) == 8 and bool(np.abs(np.subtract(values[:6], REC_709[:6])).max() < 0.02)
+    return bool(values) and all(value == 1 for value in values)
 
 
 def check_size(width: int, height: int, limits: AssetLimits) -> None:

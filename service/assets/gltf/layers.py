@@ -112,8 +112,8 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
     strength = extension.number("anisotropyStrength", 0, 0, 1) if extension else 0.0
     if extension is None or not strength:
         return
-    if not read.sets[0]:
-        read.notes.add(extension.pointer, "needs TEXCOORD_0 to run along: left out on a mesh without")
+    if not read.directed:
+        read.notes.add(extension.pointer, "needs TEXCOORD_0 or TANGENT to run along: left out on a mesh without")
         return
     rotation = extension.number("anisotropyRotation", 0, -1e6, 1e6)
     if rotation:

@@ -15,10 +15,12 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 class Reading:
-    """One material for meshes that have these uv sets."""
+    """One material for meshes that have these uv sets, and perhaps a direction for what is brushed."""
 
-    def __init__(self, place: Place, textures: Textures, sets: tuple[bool, ...], notes: Notes) -> None:
-        self.place, self.textures, self.sets, self.notes = place, textures, sets, notes
+    def __init__(
+        self, place: Place, textures: Textures, sets: tuple[bool, ...], directed: bool, notes: Notes
+    ) -> None:
+        self.place, self.textures, self.sets, self.directed, self.notes = place, textures, sets, directed, notes
 
     def texture(self, owner: Place | None, name: str, space: ColorSpace) -> str | None:
         return self.textures.use(owner.object(name), space, self.sets) if owner else None
@@ -56,11 +58,13 @@ class Materials:
         """The document's name for a primitive's material, and the material."""
         given = "material" in primitive
         place = self.file.follow(primitive, "material", "materials") if given else Place({}, "")  # all defaults
-        read = Reading(place, self.textures, sets, self.notes)
-        key = place.pointer, sets
+        attributes = primitive.need("attributes")
+        directed = sets[0] or ("TANGENT" in attributes and "NORMAL" in attributes)
+        read = Reading(place, self.textures, sets, directed, self.notes)
+        key = place.pointer, sets, directed
         if key not in self._names:
             document = self._document(read)
-            same = [n for (pointer, _), n in self._names.items() if pointer == place.pointer]
+            same = [n for (pointer, *_), n in self._names.items() if pointer == place.pointer]
             found = next((name for name in same if self.documents[name] == document), None)
             if found is None:
                 found = unique(place.text("name") or place.pointer[1:].replace("/", " ") or "default", self.documents)
