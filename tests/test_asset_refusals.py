@@ -19,6 +19,7 @@ from service.config import Config
 from service.problems import AssetError
 from tests import asset_files as make
 from tests.asset_files import OBJ
+from tests.gltf_files import Gltf
 
 RNG = np.random.default_rng(11)
 SECONDS, MEGABYTES = 5, 1024  # what refusing any file may cost
@@ -243,8 +244,12 @@ def test_the_child_outlived_them_all(store: AssetStore) -> None:
 
 def test_too_many_triangles(tmp_path: Path) -> None:
     store = AssetStore(tmp_path, Config(max_triangles=3))
-    twice = make.gltf([{"mesh": 0, "children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "children": [3]}, {"mesh": 0}])
-    for data in (make.glb(twice), OBJ + FACES * 3, make.stl(np.zeros((4, 3, 3)))):
+    two = Gltf()
+    for scale in (1, 2):
+        two.node(mesh=two.mesh(two.primitive({"POSITION": QUAD * np.float32(scale)})))
+    four = make.gltf([{"mesh": 0, "children": [1, 2]}, {"mesh": 0}, {"mesh": 0, "children": [3]}, {"mesh": 0}])
+    assert store.add(make.glb(four)).triangles == 4  # of one mesh, held once
+    for data in (two.glb(), OBJ + FACES * 3, make.stl(np.zeros((4, 3, 3)))):
         with pytest.raises(AssetError, match="triangles"):
             store.add(data)
     store.add(OBJ + FACES * 2)

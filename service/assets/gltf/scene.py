@@ -64,7 +64,8 @@ class _Importer:
         self.materials = Materials(file, self.textures, self.notes)
         self.shapes: list[dict[str, Any]] = []
         self.triangles = 0
-        self._held: dict[str, int] = {}
+        self._held: set[str] = set()  # parts that stand somewhere: nodes share them
+        self._holds = 0  # triangles of these
         self._read: dict[str, Primitive | None] = {}
         self._parts: dict[tuple[Any, ...], Part | None] = {}
         self._corners: list[Doubles] = []
@@ -120,8 +121,10 @@ class _Importer:
             self.notes.add(node.place.pointer, "its transform makes its mesh flat: left out")
             return
         self.triangles += part.triangles
-        self._held[part.reference] = part.triangles  # nodes may share them
-        if sum(self._held.values()) > self.file.limits.max_triangles:
+        if part.reference not in self._held:
+            self._held.add(part.reference)
+            self._holds += part.triangles
+        if self._holds > self.file.limits.max_triangles:
             raise ParseError(f"its nodes hold more than the {self.file.limits.max_triangles} triangles allowed")
         if len(self.shapes) >= MOST_SHAPES:
             raise ParseError(f"its nodes hold more than the {MOST_SHAPES} primitives allowed")
