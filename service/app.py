@@ -7,6 +7,7 @@ import contextlib
 import ctypes
 import logging
 import os
+import resource
 import signal
 import socket
 import sys
@@ -47,6 +48,7 @@ STUCK_S = 10.0  # for the last bytes of a closed connection, and for the first r
 TICKS = 50  # of uvicorn, ten a second: how often closed connections are looked at
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
+DESCRIPTORS = 65_536
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
@@ -90,6 +92,7 @@ def create_app(config: Config) -> FastAPI:
 def run(config: Config) -> int:
     """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 when the address can't be had."""
     _give_memory_back()
+    _take_descriptors()
     try:
         listener = socket.create_server((config.host, config.port), family=_family(config.host), backlog=2048)
     except OSError as error:
@@ -111,6 +114,16 @@ def run(config: Config) -> int:
     server = _Server(settings, app.state.house, address)
     server.run([listener])
     return 1 if server.refused else 0
+
+
+def _take_descriptors() -> None:
+    """As many as the system lets this process have: clients, scenes and assets in memory hold some each, and what a
+    shell gives its programs by default (1 024) is meant for such as wait with select().
+    """
+    soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
+    most = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
+    if soft != resource.RLIM_INFINITY and soft < most:
+        resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
 
 
 class Stuck:

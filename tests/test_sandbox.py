@@ -200,6 +200,16 @@ def test_closing_ends_the_children() -> None:
         box.parse("obj", OBJ)
 
 
+@pytest.mark.parametrize("count, held", [(1 << 10, 0), (1 << 18, 1)])
+def test_small_arrays_hold_no_descriptor(count: int, held: int) -> None:
+    before = len(os.listdir("/proc/self/fd"))
+    fd, table = publish({"a": [np.arange(float(count))]})
+    arrays = adopt(fd, table)
+    os.close(fd)
+    assert len(os.listdir("/proc/self/fd")) == before + held
+    assert not arrays["a"].flags.writeable and np.array_equal(arrays["a"], np.arange(count))
+
+
 def test_unsealed_or_lying_memory_is_not_adopted() -> None:
     fd, table = publish({"a": [np.arange(6.0).reshape(2, 3)]})
     assert np.array_equal(adopt(fd, table)["a"], [[0, 1, 2], [3, 4, 5]])

@@ -16,6 +16,7 @@ import numpy.typing as npt
 
 MESSAGE_BYTES = 65536
 ALIGNMENT = 64
+COPIED = 1 << 20  # bytes; so little is not worth a descriptor, of which a process may have no more than 1 024
 SEALS = fcntl.F_SEAL_SEAL | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE
 DTYPES = ("|u1", "<f4", "<f8", "<i4")
 
@@ -69,11 +70,14 @@ def publish(arrays: dict[str, Pieces]) -> tuple[int, list[dict[str, Any]]]:
 
 
 def adopt(fd: int, table: list[dict[str, Any]]) -> dict[str, Array]:
-    """The arrays, read-only, without a copy; they keep the memory alive. Raises ValueError on a table that lies."""
+    """The arrays, read-only, and without a copy where they are large; then they keep the memory alive, and with it a
+    descriptor. Raises ValueError on a table that lies.
+    """
     if fcntl.fcntl(fd, fcntl.F_GET_SEALS) & SEALS != SEALS:
         raise ValueError("the memory is not sealed")
     size = os.fstat(fd).st_size
-    mapped = mmap.mmap(fd, size, access=mmap.ACCESS_READ)
+    large = size > COPIED
+    mapped: mmap.mmap | bytes = mmap.mmap(fd, size, access=mmap.ACCESS_READ) if large else os.pread(fd, size, 0)
     arrays = {}
     for row in table:
         if row["dtype"] not in DTYPES:
