@@ -12,7 +12,7 @@ import pytest
 from service.assets import AssetStore
 from service.pack import pack
 from service.scene import parse_scene
-from tests.gltf_files import QUAD, Gltf
+from tests.gltf_files import QUAD, QUAD_UVS, Gltf
 from tests.test_gltf_scene import imported, noted
 
 PIXELS = np.arange(4 * 4 * 4, dtype=np.uint8).reshape(4, 4, 4) * 4
@@ -287,3 +287,28 @@ def test_what_is_brushed_needs_a_direction(store: AssetStore) -> None:
         found = imported(store, file)
         (document,) = found.document["materials"].values()
         assert ("anisotropic" in document) == brushed and bool(found.warnings) != brushed
+
+
+REACHES = [
+    # how far u and v go, which wrap both then take, and whether that is told
+    ((1, 1), "clamp", False), ((1, 3), "mirror", False), ((3, 1), "clamp", False), ((3, 3), "clamp", True),
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("turned", [False, True])
+def test_of_two_wraps_that_counts_which_is_needed(store: AssetStore, turned: bool) -> None:
+    """One material on meshes that leave the image to a side, upwards, or not at all; the texture perhaps turned."""
+    file = Gltf()
+    sampler = file.add("samplers", {"wrapS": 33071, "wrapT": 33648})
+    transform = {"KHR_texture_transform": {"rotation": math.pi / 2, "offset": [0, 1]}} if turned else {}
+    texture = {"index": file.texture(PIXELS[..., :3], sampler=sampler), "extensions": transform}
+    made = file.add("materials", {"pbrMetallicRoughness": {"baseColorTexture": texture}})
+    for reach, _, _ in REACHES:
+        uvs = QUAD_UVS * np.float32(reach[::-1] if turned else reach)
+        file.node(mesh=file.mesh(file.primitive({"POSITION": QUAD, "TEXCOORD_0": uvs}, material=made)))
+    found = imported(store, file)
+    for shape, (_, wrap, _) in zip(found.document["shapes"], REACHES, strict=True):
+        name = found.document["materials"][shape["material"]]["base_color"]["texture"]
+        assert found.document["textures"][name]["wrap"] == wrap
+    assert list(noted(found)) == ["/samplers/0/wrapT"]
+    assert len(found.document["textures"]) == 2

@@ -38,7 +38,7 @@ def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[s
     if read.textures.channels(info) == "L":
         read.notes.add(info.pointer, "is grey, and no normal map: left out")
         return {}
-    texture = read.textures.use(info, "linear", read.sets)
+    texture = read.textures.use(info, "linear", read.charts)
     if texture is None:
         return {}
     scale = info.number("scale", 1, -1e6, 1e6)

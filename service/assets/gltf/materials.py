@@ -9,7 +9,7 @@ from service.assets.gltf.file import GltfFile
 from service.assets.gltf.notes import Notes
 from service.assets.gltf.place import Place
 from service.assets.gltf.specular_glossiness import converted
-from service.assets.gltf.textures import ColorSpace, Textures, factor, unique
+from service.assets.gltf.textures import Chart, ColorSpace, Textures, factor, unique
 
 WHITE = (1.0, 1.0, 1.0)
 
@@ -18,12 +18,12 @@ class Reading:
     """One material for meshes that have these uv sets, and perhaps a direction for what is brushed."""
 
     def __init__(
-        self, place: Place, textures: Textures, sets: tuple[bool, ...], directed: bool, notes: Notes
+        self, place: Place, textures: Textures, charts: tuple[Chart | None, ...], directed: bool, notes: Notes
     ) -> None:
-        self.place, self.textures, self.sets, self.directed, self.notes = place, textures, sets, directed, notes
+        self.place, self.textures, self.charts, self.directed, self.notes = place, textures, charts, directed, notes
 
     def texture(self, owner: Place | None, name: str, space: ColorSpace) -> str | None:
-        return self.textures.use(owner.object(name), space, self.sets) if owner else None
+        return self.textures.use(owner.object(name), space, self.charts) if owner else None
 
     def color(self, owner: Place, name: str, values: tuple[float, ...]) -> Any:
         """A colour, or the texture that it multiplies."""
@@ -54,14 +54,14 @@ class Materials:
         self.documents: dict[str, dict[str, Any]] = {}
         self._names: dict[tuple[Any, ...], str] = {}
 
-    def name(self, primitive: Place, sets: tuple[bool, ...]) -> tuple[str, Place]:
+    def name(self, primitive: Place, charts: tuple[Chart | None, ...]) -> tuple[str, Place]:
         """The document's name for a primitive's material, and the material."""
         given = "material" in primitive
         place = self.file.follow(primitive, "material", "materials") if given else Place({}, "")  # all defaults
         attributes = primitive.need("attributes")
-        directed = sets[0] or ("TANGENT" in attributes and "NORMAL" in attributes)
-        read = Reading(place, self.textures, sets, directed, self.notes)
-        key = place.pointer, sets, directed
+        directed = charts[0] is not None or ("TANGENT" in attributes and "NORMAL" in attributes)
+        read = Reading(place, self.textures, charts, directed, self.notes)
+        key = place.pointer, self.textures.kinds(charts), directed
         if key not in self._names:
             document = self._document(read)
             same = [n for (pointer, *_), n in self._names.items() if pointer == place.pointer]

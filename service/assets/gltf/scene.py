@@ -17,7 +17,7 @@ from service.assets.gltf.notes import Notes
 from service.assets.gltf.place import Place, escaped, whole
 from service.assets.gltf.pose import Skin, morphed, weights
 from service.assets.gltf.primitives import Primitive, read_primitive
-from service.assets.gltf.textures import Textures
+from service.assets.gltf.textures import Chart, Textures
 from service.assets.gltf.written import ply
 from service.assets.parts import MAX_COORDINATE
 
@@ -33,7 +33,7 @@ class Part:
     reference: str
     bounds: tuple[Doubles, Doubles]
     triangles: int
-    sets: tuple[bool, ...]
+    charts: tuple[Chart | None, ...]
     colored: bool
     smooth: bool  # without normals triangles are flat, says the specification
 
@@ -102,7 +102,7 @@ class _Importer:
             part = self._part(place, morph, skin, node)
             if part is None:
                 continue
-            material, described = self.materials.name(place, part.sets)
+            material, described = self.materials.name(place, part.charts)
             self._mention(place, part, described)
             shape = {
                 "type": "mesh",
@@ -171,7 +171,7 @@ class _Importer:
             self.files.keep(ply(primitive), place.pointer, len(vertices), len(primitive.faces)),
             (vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)),
             len(primitive.faces),
-            tuple(uv is not None for uv in primitive.uvs),
+            tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs),
             primitive.colors is not None and bool((primitive.colors[:, :3] != 1).any()),
             primitive.normals is not None,
         )

@@ -68,7 +68,7 @@ def _textured(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> d
     textures = read.textures
     names = ("diffuseTexture", "specularGlossinessTexture")
     infos = [info for info in (place.object(name) for name in names) if info]
-    placings = [textures.documents[name] for info in infos if (name := textures.use(info, "srgb", read.sets))]
+    placings = [textures.documents[name] for info in infos if (name := textures.use(info, "srgb", read.charts))]
     if not placings:
         return {}
     placing = [{k: p.get(k) for k in ("uv", "scale", "offset", "rotation", "wrap")} for p in placings]

@@ -6,7 +6,10 @@ import io
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field
+from functools import cached_property
 from typing import Any, Literal
+
+import numpy as np
 
 from service.assets.errors import ParseError
 from service.assets.gltf.file import GltfFile
@@ -19,6 +22,8 @@ ColorSpace = Literal["srgb", "linear"]
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST = (9728, 9984, 9986)
 READ = ("png", "jpeg", "webp")
+SLACK = 1e-3  # of an image: a rounding beyond its edge is none
+Chart = tuple[np.ndarray, np.ndarray]  # the least and the greatest coordinates of a mesh (2,), v pointing down
 
 
 @dataclass
@@ -34,8 +39,8 @@ class Textures:
     _kept: dict[str, str] = field(default_factory=dict)
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
-    def use(self, info: Place | None, space: ColorSpace, sets: tuple[bool, ...]) -> str | None:
-        """The name of a texture. None, and noted, where it can't be had; `sets`: the uv sets that the mesh has."""
+    def use(self, info: Place | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
+        """The name of a texture. None, and noted, where it can't be had; `charts`: the uv sets of the mesh."""
         if info is None:
             return None
         texture = self.file.follow(info, "index", "textures")
@@ -47,10 +52,24 @@ class Textures:
         if uv >= UV_SETS:
             self.notes.add(info.at("texCoord"), f"TEXCOORD_{uv} is not read, only 0 and 1: the texture is left out")
             return None
-        if not sets[uv]:
+        chart = charts[uv]
+        if chart is None:
             self.notes.add(info.pointer, f"a mesh with this material has no TEXCOORD_{uv}: there it goes untextured")
             return None
-        return self.add(image, {"color_space": space, "wrap": self._wrap(texture), **placing}, texture)
+        wrap = self._wrap(texture, _reach(chart, placing))
+        return self.add(image, {"color_space": space, "wrap": wrap, **placing}, texture)
+
+    def kinds(self, charts: tuple[Chart | None, ...]) -> tuple[Any, ...]:
+        """Equal where `use` does the same for all textures of the file."""
+        if not self._mixed:
+            return tuple(chart is not None for chart in charts)
+        return tuple(chart if chart is None else tuple(np.concatenate(chart).tolist()) for chart in charts)
+
+    @cached_property
+    def _mixed(self) -> bool:
+        """Whether a sampler wraps u and v in different ways."""
+        samplers = self.file.root.objects("samplers")
+        return any(one.value.get("wrapS", 10497) != one.value.get("wrapT", 10497) for one in samplers)
 
     def add(self, image: str, settings: dict[str, Any], named: Place) -> str:
         """The name of a texture with these settings; the same ones get the same name."""
@@ -93,7 +112,8 @@ class Textures:
             self._channels[place.pointer] = _channels(self.file.image(place), place)
         return self._channels[place.pointer]
 
-    def _wrap(self, texture: Place) -> str:
+    def _wrap(self, texture: Place, reach: tuple[bool, bool]) -> str:
+        """The way that both axes take: where these differ that of the one along which the mesh leaves the image."""
         if "sampler" not in texture:
             return "repeat"
         sampler = self.file.follow(texture, "sampler", "samplers")
@@ -103,7 +123,9 @@ class Textures:
             if mode not in WRAPS:
                 raise sampler.error(name, f"must be one of {', '.join(map(str, WRAPS))}, not {mode}")
             found.append(WRAPS[mode])
-        if found[0] != found[1]:
+        if found[0] != found[1] and not all(reach):
+            found = found[::-1] if reach[1] else found
+        elif found[0] != found[1]:
             self.notes.add(sampler.at("wrapT"), f"{found[1]} is not had beside {found[0]} in u, which both take")
         if sampler.whole("magFilter", 9729) in NEAREST:
             self.notes.add(sampler.at("magFilter"), "nearest texels are not had: bilinear is")
@@ -138,6 +160,17 @@ class Textures:
         source = self.source(texture)
         named = (source.text("name") if source else "") or texture.text("name")
         return unique(named or texture.pointer[1:].replace("/", " "), self.documents)
+
+
+def _reach(chart: Chart, placing: dict[str, Any]) -> tuple[bool, bool]:
+    """Whether the texture is read beyond 0..1 in u, and in v, by coordinates of a box (v points down there)."""
+    corners = np.stack(np.meshgrid(*zip(*chart, strict=True)), axis=-1).reshape(-1, 2).astype(np.float64)
+    corners[:, 1] = 1 - corners[:, 1]
+    turn = math.radians(placing.get("rotation", 0.0))
+    c, s = math.cos(turn), math.sin(turn)
+    read = (corners * placing.get("scale", (1, 1))) @ np.array([[c, s], [-s, c]]) + placing.get("offset", (0, 0))
+    beyond = (read.min(axis=0) < -SLACK) | (read.max(axis=0) > 1 + SLACK)
+    return bool(beyond[0]), bool(beyond[1])
 
 
 def _channels(data: bytes, place: Place) -> str:
