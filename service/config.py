@@ -64,7 +64,7 @@ class Config(BaseSettings):
         10.0, gt=0, description="Without progress for so long (s), and ten slices, the renderer is replaced."
     )
     checkpoint_s: float = Field(
-        10.0,
+        2.0,
         gt=0,
         description="A render of up to 5 megapixels is saved so often (s), or with 1 % of its time, to go on.",
     )

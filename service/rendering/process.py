@@ -32,7 +32,7 @@ class Options:
     device: int | None = None
     patience_s: float = 10.0  # without progress
     memory: int | None = None  # bytes that may be held on the device; None: the worker decides
-    checkpoint_s: float = 10.0  # between two of a render
+    checkpoint_s: float = 2.0  # between two of a render
 
 
 class Process:
