@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore
+from service.assets.importing import Imported
 from service.pack import pack
 from service.scene import parse_scene
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
@@ -312,3 +313,37 @@ def test_of_two_wraps_that_counts_which_is_needed(store: AssetStore, turned: boo
         assert found.document["textures"][name]["wrap"] == wrap
     assert list(noted(found)) == ["/samplers/0/wrapT"]
     assert len(found.document["textures"]) == 2
+
+
+def brushed(store: AssetStore, directions: np.ndarray, strength: Any = 255) -> tuple[dict[str, Any], Imported]:
+    """The material of an anisotropy texture that points at these angles (h, w), in degrees."""
+    texels = np.zeros((*directions.shape, 3), np.uint8)
+    texels[..., 0], texels[..., 1] = (np.rint((f(np.radians(directions)) + 1) / 2 * 255) for f in (np.cos, np.sin))
+    texels[..., 2] = strength
+    file = Gltf()
+    extension = {"anisotropyStrength": 1, "anisotropyRotation": math.radians(20),
+                 "anisotropyTexture": {"index": file.texture(texels)}}  # fmt: skip
+    found = imported(store, file.of({"extensions": {"KHR_materials_anisotropy": extension},
+                                     "pbrMetallicRoughness": {"roughnessFactor": 0.4}}))  # fmt: skip
+    (made,) = found.document["materials"].values()
+    return made, found
+
+
+def test_directions_of_an_anisotropy_texture_become_angles(store: AssetStore) -> None:
+    directions = np.linspace(-170, 180, 64).reshape(8, 8)
+    made, found = brushed(store, directions)
+    turned = made["anisotropic_rotation"]
+    image = store.image(found.document["textures"][turned["texture"]]["asset"]).pixels
+    assert image.shape == (8, 8, 1) and found.document["textures"][turned["texture"]]["color_space"] == "linear"
+    angles = image[..., 0] / 255 * turned["factor"]
+    off = (angles - directions - 20 + 90) % 180 - 90  # a stretch has no sense
+    assert np.abs(off).max() < 1.2
+    assert any("directions become angles" in detail for detail in noted(found).values())
+    # All the same, or the same where there is any strength: a number.
+    made, _ = brushed(store, np.full((4, 4), 30.0))
+    assert made["anisotropic_rotation"] % 180 == pytest.approx(50, abs=0.5)
+    strength = np.zeros((8, 8), np.uint8)
+    strength[2, 3] = 200
+    made, _ = brushed(store, directions, strength)
+    assert made["anisotropic_rotation"] % 180 == pytest.approx((directions[2, 3] + 20) % 180, abs=0.5)
+    assert brushed(store, directions, 0)[0]["anisotropic_rotation"] == pytest.approx(20)

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
+from service.assets.gltf import brushed
 from service.assets.gltf.place import Place
 from service.assets.gltf.textures import factor
 
@@ -115,12 +116,14 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
     if not read.directed:
         read.notes.add(extension.pointer, "needs TEXCOORD_0 or TANGENT to run along: left out on a mesh without")
         return
-    rotation = extension.number("anisotropyRotation", 0, -1e6, 1e6)
+    turn, info = extension.number("anisotropyRotation", 0, -1e6, 1e6), extension.object("anisotropyTexture")
+    rotation = brushed.rotation(read.textures, info, read.texture(extension, "anisotropyTexture", "linear"), turn)
     if rotation:
-        document["anisotropic_rotation"] = math.degrees(rotation)
+        document["anisotropic_rotation"] = rotation
+    if isinstance(rotation, dict):
+        where = extension.at("anisotropyTexture")
+        read.notes.add(where, "its directions become angles: a line of one texel is off where these begin anew")
     roughness = document["roughness"]
-    if "anisotropyTexture" in extension:
-        read.notes.add(extension.at("anisotropyTexture"), "gives the strength (blue); its directions are not read")
     if "anisotropyTexture" in extension or isinstance(roughness, dict):
         read.notes.add(extension.pointer, "stretches the highlight along and across under a texture")
         document["anisotropic"] = read.scalar(extension, "anisotropyTexture", strength * strength, "b")

@@ -6,13 +6,12 @@ where a dielectric reflects 4 % head-on.
 
 from __future__ import annotations
 
-import io
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from service.assets.data import Floats
-from service.assets.errors import ParseError
+from service.assets.gltf.baked import pixels, png
 from service.assets.gltf.place import Place
 from service.assets.gltf.textures import factor
 from service.assets.parts import linear
@@ -92,7 +91,7 @@ def _textured(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> d
 def _bake(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> list[bytes]:
     from PIL import Image
 
-    found = [_pixels(read, place.object(name)) for name in ("diffuseTexture", "specularGlossinessTexture")]
+    found = [pixels(read.textures, place.object(name)) for name in ("diffuseTexture", "specularGlossinessTexture")]
     width = min(max(image.width for image in found if image), LARGEST)
     height = min(max(image.height for image in found if image), LARGEST)
     white = Image.new("RGBA", (1, 1), (255, 255, 255, 255))
@@ -111,30 +110,4 @@ def _bake(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> list[
         made[0, at : at + CHUNK, 3] = a[:, 3]
         made[1, at : at + CHUNK] = (np.stack([0 * rough, rough, metallic, 0 * rough], axis=1) * 255).round()
     shaped = made.reshape(2, height, width, 4)
-    return [_png(shaped[0]), _png(shaped[1, :, :, :3])]
-
-
-def _pixels(read: Reading, info: Place | None) -> Any:
-    """RGBA of a texture's image; None without one."""
-    from PIL import Image
-
-    from service.assets.image import check_size
-
-    source = read.textures.source(read.textures.file.follow(info, "index", "textures")) if info else None
-    if source is None:
-        return None
-    Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
-    try:
-        image = Image.open(io.BytesIO(read.textures.file.image(source)), formats=["PNG", "JPEG", "WEBP"])
-        check_size(*image.size, read.textures.file.limits)
-        return image.convert("RGBA")
-    except (OSError, SyntaxError, ValueError):
-        raise ParseError("is a broken image", source.pointer) from None
-
-
-def _png(pixels: np.ndarray) -> bytes:
-    from PIL import Image
-
-    out = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(pixels)).save(out, "PNG", compress_level=1)
-    return out.getvalue()
+    return [png(shaped[0]), png(shaped[1, :, :, :3])]

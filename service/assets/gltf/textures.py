@@ -34,7 +34,7 @@ class Textures:
     notes: Notes
     keep: Callable[[bytes, str], str]
     documents: dict[str, dict[str, Any]] = field(default_factory=dict)
-    made: dict[tuple[str, str], list[str]] = field(default_factory=dict)  # references to images of our own
+    made: dict[tuple[str, str], list[Any]] = field(default_factory=dict)  # references to images of our own, and more
     _names: dict[tuple[Any, ...], str] = field(default_factory=dict)
     _kept: dict[str, str] = field(default_factory=dict)
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them

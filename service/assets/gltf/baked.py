@@ -1,0 +1,38 @@
+"""Images of our own in the place of a file's: its texels in, a PNG out."""
+
+from __future__ import annotations
+
+import io
+from typing import Any
+
+import numpy as np
+
+from service.assets.errors import ParseError
+from service.assets.gltf.place import Place
+from service.assets.gltf.textures import Textures
+
+
+def pixels(textures: Textures, info: Place | None) -> Any:
+    """RGBA of a texture's image; None without one."""
+    from PIL import Image
+
+    from service.assets.image import check_size
+
+    source = textures.source(textures.file.follow(info, "index", "textures")) if info else None
+    if source is None:
+        return None
+    Image.MAX_IMAGE_PIXELS = None  # ours is checked below: opening decodes nothing
+    try:
+        image = Image.open(io.BytesIO(textures.file.image(source)), formats=["PNG", "JPEG", "WEBP"])
+        check_size(*image.size, textures.file.limits)
+        return image.convert("RGBA")
+    except (OSError, SyntaxError, ValueError):
+        raise ParseError("is a broken image", source.pointer) from None
+
+
+def png(texels: np.ndarray) -> bytes:
+    from PIL import Image
+
+    out = io.BytesIO()
+    Image.fromarray(np.ascontiguousarray(texels)).save(out, "PNG", compress_level=1)
+    return out.getvalue()
