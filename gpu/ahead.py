@@ -11,8 +11,9 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import features, layout, meter, resolve
-from gpu.arrays import SceneArrays
+from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
 from gpu.errors import CompileError
+from gpu.layout import ShapeKind
 from gpu.program import Source
 from gpu.settings import TONE_MAPS, RenderSettings
 from gpu.texels import BYTES, KINDS
@@ -47,6 +48,24 @@ def recipe(arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str]
     """What a picture of `arrays` needs compiled where these flags are raised: its kernel, or that of its GUIDES."""
     defines = features.defines(raised, settings, features.counts(arrays))
     return Recipe(tuple(defines.items()), _textures(arrays, raised), entry)
+
+
+def moved_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe | None:
+    """What a stream will need when it first moves a large mesh of this scene; None where it has none, or instances.
+    A guess where there are small meshes beside it, some of which may stand in the kernel's loop.
+    """
+    if len(arrays.instances):
+        return None
+    owners = arrays.triangles["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.HIDDEN) & layout.NONE)
+    counts, lamps = np.bincount(owners), np.bincount(owners, arrays.triangles["light"] != layout.NONE)
+    if not ((counts >= HEAVY) & (lamps == 0)).any():
+        return None
+    small = ((counts > 0) & ((counts < SHAREABLE) | (lamps > 0))).any()
+    kinds = arrays.bvh_kinds | {ShapeKind.TRIANGLE, ShapeKind.INSTANCE}
+    large = {**arrays.large, ShapeKind.TRIANGLE: arrays.large.get(ShapeKind.TRIANGLE, 0) if small else 0}
+    one = np.zeros(1, layout.Instance.dtype)
+    apart = replace(arrays, instances=one, bvh_kinds=kinds, large=large)
+    return recipe(apart, settings, features.flags(apart, True))
 
 
 def full_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe:

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, SceneArrays
+from gpu import Renderer, RenderSettings, SceneArrays, ahead, features
 from gpu.layout import Instance, Node
 from service.pack import PackCache, instances, moved, moves, pack
 from service.scene import parse_scene
@@ -111,3 +111,16 @@ def test_a_small_mesh_that_moves_stays_among_the_others(monkeypatch: pytest.Monk
     cache = PackCache()
     for place in (1.1, 1.2, 1.3):
         assert not len(arrays_of(scene(place=place), cache).instances)
+
+
+def test_the_kernel_that_a_move_will_need_is_foreseen(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(instances, "WORTH", 10**9)
+    for module in (moves, ahead):
+        monkeypatch.setattr(module, "HEAVY", 1280)
+    cache, settings = PackCache(), RenderSettings(48, 32)
+    still, elsewhere = arrays_of(scene(), cache), arrays_of(scene(place=2.0), cache)
+    assert len(elsewhere.instances) == 2
+    foreseen = ahead.moved_recipe(still, settings)
+    assert foreseen == ahead.recipe(elsewhere, settings, features.flags(elsewhere, editing=True))
+    assert ahead.moved_recipe(elsewhere, settings) is None
+    assert ahead.moved_recipe(arrays_of({**scene(), "shapes": [BALL]}, cache), settings) is None

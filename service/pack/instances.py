@@ -10,13 +10,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu import layout
+from gpu.arrays import SHAREABLE
 from service.assets import MeshData
 from service.pack.models import MOST_SEEN, Model, shift
 from service.pack.textures import Reads
 from service.problems import FieldError, InvalidDocument
 from service.scene.shape import MeshShape
 
-LEAST = 1024  # triangles of a mesh from which on several shapes share it: smaller ones cost less in the scene's tree
+LEAST = SHAREABLE  # triangles of a mesh
 WORTH = 1 << 17  # triangles that sharing spares a scene at least: 26 MB, for what a walk through two levels costs
 # Bounds on a transform whose inverse float32 holds well enough: lengths, and what both maps make of a length at most.
 SCALES = 1e-9, 1e9

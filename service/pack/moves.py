@@ -4,10 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Hashable, Sequence
 
+from gpu.arrays import HEAVY
 from service.scene.shape import MeshShape, Shape
 
-# Triangles of a mesh that, moved, is worth another kernel, which takes a quarter longer: it is packed in .05 s.
-HEAVY = 1 << 15
 FIELDS = tuple(MeshShape.model_fields)
 TRANSFORM = FIELDS.index("transform")
 STILL = [FIELDS.index(name) for name in FIELDS if name not in ("transform", "material", "visible_to_camera")]

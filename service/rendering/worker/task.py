@@ -7,7 +7,7 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpu import GpuError, OutOfMemory, RenderSettings
+from gpu import GpuError, OutOfMemory, RenderSettings, ahead
 from service.rendering.messages import (
     Checkpoint,
     Done,
@@ -56,7 +56,8 @@ class Task:
         checkpoint_s: float = inf,
         spare: Compiler | None = None,
     ) -> None:
-        """With `compiler`, others need not wait for its kernels; `spare` is the one of `appraising`.
+        """With `compiler`, others need not wait for its kernels; `spare` is the one of `appraising`, and of
+        kernels that an edit may need.
 
         With `forget`, Done brings the picture of a render to the server; what is forgotten it can bring back;
         while it is under way, a Checkpoint does so every `checkpoint_s` seconds."""
@@ -70,6 +71,7 @@ class Task:
         smoothing = Smoothing(denoiser, yields=bool(renderer.info["software"]))
         self._showing = Showing(number, send, self._held, self._course, smoothing, self._finish, compiler)
         self.appraising = Appraising(number, send, renderer, spare)
+        self._spare = spare
         self._scale = 1.0  # of what is traced
         self._pending: Update | None = None  # not applied yet
         self._stopping = False  # when that was applied
@@ -232,6 +234,14 @@ class Task:
             compile_ms, self._compiled_ms = held.full.compile_ms + self._compiled_ms, 0.0
             kernel = compile_ms, held.full.scene.features, held.full.scene.spared
             self._send(Loaded(self.number, self.generation, setup_s, *kernel, warnings))
+            self._foresee(settings)
+
+    def _foresee(self, settings: RenderSettings) -> None:
+        """Has compiled, in spare time, what a large mesh would need that a person moves."""
+        if self._spare is not None and self._course.interactive:
+            wanted = ahead.moved_recipe(self._held.full.scene.arrays, settings)
+            if wanted is not None:
+                self._spare.prepare([wanted])
 
     def evict(self) -> None:
         """Leaves the device: to the machine's memory, or where the server has it already, altogether."""
