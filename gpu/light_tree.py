@@ -21,7 +21,7 @@ from gpu.light_split import AXIS, BEYOND, INTENSITY, NORMALS, RADIUS, WIDTH
 EVEN = 0.05
 STEPS = 65535  # of the grid that nodes' places are on
 WIDEST = 2.0**27  # steps that a node's radius is told to
-FARTHEST = 2.0**45  # steps from one end of the scene to the other: their squares stay inside float32
+FARTHEST = 2.0**38  # steps from one end of the scene to the other: squares times intensities stay inside float32
 
 
 def build(

@@ -76,8 +76,7 @@ float light_tree_walk(bool near, bool told, uint code, uint trail, Asker at, out
     do {
         uvec4 a = light_tree_fetch(2u * pair), b = light_tree_fetch(2u * pair + 1u);
         vec2 x = light_tree_importance(a, p, at), y = light_tree_importance(b, p, at);
-        float far = max(x.y, y.y);
-        float first = x.x * (y.y / far), second = y.x * (x.y / far);
+        float first = x.x * y.y, second = y.x * x.y; // gpu/light_tree.py keeps them inside float32
         // Neither seems to matter, as where only their parent's bounds reach: by intensity alone.
         bool lost = !(first + second > 0.0);
         if (lost) {

@@ -243,7 +243,7 @@ def _both(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, scene: Doc, **settings
     for worth in (True, False):
         monkeypatch.setattr(bounded, "worth", lambda _, worth=worth: worth)
         seen.append(
-            Seen(gpu, scene, **{"samples": 256, "sampler": "independent", "width": 48, "height": 32, **settings})
+            Seen(gpu, scene, **{"samples": 128, "sampler": "independent", "width": 48, "height": 32, **settings})
         )
     return seen[0], seen[1]
 
