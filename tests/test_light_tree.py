@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, SceneArrays, layout
+from gpu import Renderer, SceneArrays, layout, light_tree
 from gpu.features import flags
 from gpu.layout import LightKind
 from service.pack import PackCache, bounded, pack
@@ -214,6 +214,12 @@ def test_nodes_hold_what_is_under_them() -> None:
         assert nodes.radius[way[-1]] <= 1.4 * np.linalg.norm(np.ptp(places, axis=0)) + 2 * step  # nor much more
         above = [sum(nodes.intensity[p[-1]] for p in paths if node in p) for node in way[:-1]]
         np.testing.assert_allclose(nodes.intensity[way[:-1]], above, rtol=0.08)
+
+
+def test_packed_in_pieces_it_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
+    whole = _packed(_room(31)).light_tree
+    monkeypatch.setattr(light_tree, "PIECE", 7)
+    assert np.array_equal(_packed(_room(31)).light_tree, whole)
 
 
 ODD: dict[str, list[Doc]] = {
