@@ -102,8 +102,10 @@ def place_analytic(
     """All shapes but meshes. Raises InvalidDocument."""
     materials, placed = {name: i for i, name in enumerate(names)}, Placed()
     for i, shape in enumerate(shapes):
+        if isinstance(shape, MeshShape):
+            continue
         matrix, used = _matrix(shape), (materials[shape.material], i)
-        if 1 in reads.get(shape.material, Reads()).uv_sets and not isinstance(shape, MeshShape):
+        if 1 in reads.get(shape.material, Reads()).uv_sets:
             raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
         match shape:
             case SphereShape():
