@@ -90,7 +90,7 @@ def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, s
     rows = [
         (layout.UVS_TEXTURES[0], a.triangle_uvs, 2, "f4"),
         (layout.UVS_TEXTURES[1], a.triangle_uvs_1, 2, "f4"),
-        (layout.COLORS_TEXTURE, a.triangle_colors, 4, "f2"),
+        (layout.COLORS_TEXTURE, a.corner_colors if "HAS_VERTEX_COLORS" in raised else a.triangle_colors, 4, "f2"),
         (layout.INSTANCES_TEXTURE, a.instances, 4, "u4"),
     ]
     if a.textures is not None:

@@ -113,6 +113,12 @@ class SceneArrays:
     origin: Vec3 = (0.0, 0.0, 0.0)
 
     @property
+    def corner_colors(self) -> np.ndarray:
+        """The triangles' colours; white where none has any, for kernels that ask."""
+        missing = len(self.triangles) and not len(self.triangle_colors)
+        return np.ones((len(self.triangles), 3, 4), np.float16) if missing else self.triangle_colors
+
+    @property
     def light_words(self) -> np.ndarray:
         """The lights' tree; where there is none, for kernels that ask: a head by which no number goes down a tree."""
         return self.light_tree if len(self.light_tree) else np.zeros((2, 4), np.uint32)

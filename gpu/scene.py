@@ -105,10 +105,11 @@ class Scene:
     def _upload_details(self) -> None:
         """Textures of the images' texels and of what triangles have at their corners, each only where it is asked."""
         a = self.arrays
+        colors = a.corner_colors if "HAS_VERTEX_COLORS" in self._raised else a.triangle_colors
         asked = {
             layout.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
             layout.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
-            layout.COLORS_TEXTURE: (a.triangle_colors, 4, "f2"),
+            layout.COLORS_TEXTURE: (colors, 4, "f2"),
             layout.INSTANCES_TEXTURE: (a.instances, 4, "u4"),
         }
         for unit, (values, channels, dtype) in asked.items():
@@ -268,7 +269,11 @@ class Everything(Scene):
         self.__dict__.update(scene.__dict__)
         self._everything = True
         self._raise_flags()
-        self._own = {unit: bare(self._context, unit) for unit in KINDS if unit not in self._details | self._images}
+        missing = KINDS.keys() - self._details.keys() - self._images.keys()
+        self._own = {unit: bare(self._context, unit) for unit in missing}
+        if layout.COLORS_TEXTURE in missing and len(self.arrays.triangles):
+            self._own[layout.COLORS_TEXTURE].release()
+            self._own[layout.COLORS_TEXTURE] = rows(self._context, self.arrays.corner_colors, 4, "f2")
         self._details = self._details | self._own
         if not self._tables:
             self._tables = upload_tables(self._context)

@@ -123,6 +123,23 @@ def test_the_kernel_with_everything_shows_the_same(gpu: Renderer, name: str) -> 
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)
 
 
+@pytest.mark.parametrize(
+    ("name", "more"), [("TEXTURES", ["TRANSMISSION"]), ("TRIANGLES", ["TEXTURES", "VERTEX_COLORS"])]
+)
+def test_a_flag_more_shows_the_same(gpu: Renderer, name: str, more: list[str]) -> None:
+    """Glass elsewhere does not change how opaque surfaces are sampled; corners without colours are white."""
+    images = []
+    for raised in (frozenset[str](), frozenset(f"HAS_{flag}" for flag in more)):
+        loaded = gpu.load(_packed(name).arrays, editing=True, raised=raised)
+        assert loaded.flags >= raised
+        made = gpu.picture(loaded, RenderSettings(48, 32, 3, roulette_depth=99))
+        made.trace(60.0, 8)
+        images.append(made.read())
+        made.release()
+        loaded.release()
+    assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
+
+
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:
     price = kernel_price(gpu, _packed("CLEARCOAT").arrays)
     assert {"clearcoat", "disney", "spheres"} <= set(price.raised) and "bvh" in price.spared

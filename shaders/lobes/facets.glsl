@@ -70,10 +70,12 @@ float facets_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
 #if HAS_TRANSMISSION
 vec3 facets_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
 
+bool facets_folds(Surface s) { return s.transmission > 0.0 && s.metallic < 1.0; }
+
 // Density of wi as the image of a direction on the wrong side.
 float facets_reflect_folded(Surface s, vec3 wo, vec3 wi) {
     vec3 wm = wo + facets_image(wi);
-    if (wm.z <= 0.0) return 0.0;
+    if (wm.z <= 0.0 || !facets_folds(s)) return 0.0;
     wm = normalize(wm);
     return facets_reflect_pdf(s, wo, wm, dot(wo, wm));
 }
@@ -100,9 +102,8 @@ vec3 facets_sample(Surface s, vec3 wo, float v, vec2 u) {
 #endif
     vec3 reflected = 2.0 * c * wm - wo;
 #if HAS_TRANSMISSION
-    return vec3(reflected.xy, abs(reflected.z));
-#else
-    return reflected.z > 0.0 ? reflected : vec3(0.0);
+    if (facets_folds(s)) reflected.z = abs(reflected.z);
 #endif
+    return reflected.z > 0.0 ? reflected : vec3(0.0);
 }
 #endif
