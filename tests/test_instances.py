@@ -12,6 +12,7 @@ from gpu import Renderer, RenderSettings, features
 from gpu.program import Source
 from service.pack import instances, pack
 from service.scene import parse_scene
+from tests import documents
 from tests.extremes.scenes import LONG, icosphere, moved, quad, rows
 from tests.rendering import Images, document
 from tests.test_shapes import _trace
@@ -56,6 +57,11 @@ GLASS = {"type": "principled", "transmission": 1, "roughness": 0, "attenuation_c
          "attenuation_distance": 1}  # fmt: skip
 BALL = {"type": "sphere", "center": [-1.2, 0.1, 0], "radius": 0.4, "material": "m"}
 BENT = {"alpha": {**T, "channel": "a"}, "normal_map": {"texture": "n", "scale": 0.4}}
+CUBE = {"type": "mesh", **documents.CUBE, "smooth": False, "material": "white"}
+WIDE = {"type": "mesh", "vertices": [[-9, -1.3, 9], [9, -1.3, 9], [9, -1.3, -9], [-9, -1.3, -9]], "smooth": False,
+        "faces": [[0, 1, 2], [0, 2, 3]], "material": "white"}  # fmt: skip
+CUBES = [{**CUBE, "transform": {"translate": [i * 0.5 - 3, -1.2, 1], "scale": 0.2}} for i in range(8)]
+BALLS = [{**BALL, "center": [i * 0.3 - 3, -1, 1.5], "radius": 0.1} for i in range(20)]
 SCENES = rows(
     {
         "textured, in part there, single-sided": two({"type": "diffuse", "albedo": T, **BENT}, double_sided=False),
@@ -71,6 +77,10 @@ SCENES = rows(
                 "anisotropic": 0.6,
                 "normal_map": BENT["normal_map"],
             }
+        ),
+        "beside a cube in the loop": two({"type": "diffuse", "albedo": 0.7}, CUBE),
+        "among balls and cubes, on a floor of triangles": two(
+            {"type": "diffuse", "albedo": 0.7}, WIDE, *CUBES, *BALLS
         ),
         "matte": two({"type": "diffuse", "albedo": 0.7}),
         "flat": two({"type": "diffuse", "albedo": 0.7}, smooth=False),
@@ -104,7 +114,7 @@ def test_shared_triangles_look_as_one_s_own(gpu: Renderer, apart: Any, row: str)
     if "glass" in row and not LONG:
         aovs = aovs[:1]
     shared, arrays = seen(gpu, SCENES[row], aovs)
-    assert len(arrays.instances) == sum(shape["type"] == "mesh" for shape in SCENES[row]["shapes"])
+    assert len(arrays.instances) == sum(len(shape.get("faces", ())) == 1280 for shape in SCENES[row]["shapes"])
     apart()
     own, arrays = seen(gpu, SCENES[row], aovs)
     assert not len(arrays.instances)
