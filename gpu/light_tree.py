@@ -39,6 +39,8 @@ def build(
     apart at most.
     """
     n = len(low)
+    if n < 2:
+        raise ValueError(f"{n} lights: a tree is of two or more")  # compiled loops would write past their arrays
     lights = np.empty((n, WIDTH), np.float64)
     lights[:, 0:3], lights[:, 3:6], lights[:, AXIS : AXIS + 3] = low, high, axis
     lights[:, NORMALS], lights[:, BEYOND], lights[:, RADIUS] = normals, beyond, radius

@@ -216,6 +216,12 @@ def test_nodes_hold_what_is_under_them() -> None:
         np.testing.assert_allclose(nodes.intensity[way[:-1]], above, rtol=0.08)
 
 
+def test_one_light_is_no_tree(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bounded, "worth", lambda _: True)
+    with pytest.raises(ValueError, match="1 lights"):
+        _packed(document([], MATERIALS, lights=[{"type": "point", "position": [0, 1, 0], "intensity": 1}]))
+
+
 def test_packed_in_pieces_it_is_the_same(monkeypatch: pytest.MonkeyPatch) -> None:
     whole = _packed(_room(31)).light_tree
     monkeypatch.setattr(light_tree, "PIECE", 7)
