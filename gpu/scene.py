@@ -122,6 +122,9 @@ class Scene:
                 self._images, self._key = self._shared.take(a.textures.key, self._upload_images), a.textures.key
             else:
                 self._images = self._upload_images()
+        if self._everything:  # its kernels look everywhere: at what was bound for another scene, if at nothing else
+            missing = KINDS.keys() - self._details.keys() - self._images.keys()
+            self._details |= {unit: bare(self._context, unit) for unit in missing}
 
     def _upload_images(self) -> dict[int, Any]:
         textures = self.arrays.textures
