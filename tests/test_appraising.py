@@ -135,7 +135,7 @@ def test_nobody_waits_for_it(gpu: Renderer, no_cache: dict[str, str]) -> None:
         engine.send(Appraise(task))  # brought back
         assert (await ears.next(Appraised)).detail == NO_KERNEL
 
-    with_engine(test)
+    with_engine(test, patience_s=60.0)  # a starved renderer is not to be replaced a second time
 
 
 def test_a_status_says_why_it_is_not_known(tmp_path: Path, no_cache: dict[str, str]) -> None:
