@@ -60,6 +60,14 @@ def test_noise_that_tells_nothing_yet() -> None:
     assert 0 < (rising.eta_s(StopRule(target_noise=3.2), 6.4) or 0) < 6.4 * 4
 
 
+def test_there_is_time_left_while_the_target_is_not_reached() -> None:
+    """Though by the noise that was read last it should be, of fewer samples than there are by now."""
+    pace = gone(100, power=0.5)
+    for n in range(101, 131):
+        pace.passed(n, n / 10)
+    assert pace.eta_s(StopRule(target_noise=0.8 * 110**-0.5), 13.0) == pytest.approx(13 / 16, rel=0.1)
+
+
 def test_it_goes_on_after_a_checkpoint() -> None:
     pace = Pace()
     pace.passed(5000, 50.0)

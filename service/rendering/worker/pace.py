@@ -68,7 +68,7 @@ class Pace:
             return float(max(TRUSTED_SAMPLES, samples))
         level, power = self._line(samples, noise)
         wanted = samples * math.exp((level - math.log(target)) / power)
-        return max(float(TRUSTED_SAMPLES), wanted, (1 + LEAST_LEFT) * samples)
+        return max(float(TRUSTED_SAMPLES), wanted, (1 + LEAST_LEFT) * max(samples, self._latest[0]))
 
     def _line(self, samples: int, noise: float) -> tuple[float, float]:
         """The logarithm of the noise of so many samples, and the power of these with which it falls."""
