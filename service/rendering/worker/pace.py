@@ -24,12 +24,14 @@ class Pace:
     def __init__(self) -> None:
         self._marks: list[tuple[int, float]] = [(0, 0.0)]  # complete samples and the seconds to them
         self._latest = self._marks[0]
+        self._pass_s = 0.0  # what the last pass took
         self._noises: list[tuple[int, float]] = []
         self._noise: tuple[int, float] | None = None
 
     def passed(self, samples: int, elapsed_s: float) -> None:
         """So many are complete now."""
         if samples > self._latest[0]:
+            self._pass_s = elapsed_s - self._latest[1]
             self._latest = samples, elapsed_s
             if samples >= GROWTH * self._marks[-1][0]:
                 self._marks.append(self._latest)
@@ -45,11 +47,11 @@ class Pace:
     def eta_s(self, stop: StopRule, elapsed_s: float) -> float | None:
         """Seconds from `elapsed_s` to the first of the limits; None: can't be said."""
         totals = [] if stop.time_limit is None else [stop.time_limit]
-        counts = [] if stop.max_samples is None else [float(stop.max_samples)]
-        if stop.target_noise is not None and self._noise is not None:
-            counts.append(self._samples_to(stop.target_noise, *self._noise))
-        if counts and self._latest[0]:
-            totals.append(self._time_of(min(counts)))
+        if stop.max_samples is not None and self._latest[0]:
+            totals.append(self._time_of(stop.max_samples))
+        if stop.target_noise is not None and self._noise is not None and self._latest[0]:
+            # It is seen to be reached when the pass has ended that was under way.
+            totals.append(self._time_of(self._samples_to(stop.target_noise, *self._noise)) + self._pass_s)
         return max(0.0, min(totals) - elapsed_s) if totals else None
 
     def _time_of(self, samples: float) -> float:
