@@ -30,6 +30,13 @@ def places(value: Any, path: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
         yield from places(child, (*path, key))
 
 
+def _times(number: float, factor: float) -> float:
+    try:
+        return number * factor
+    except OverflowError:  # a whole number of hundreds of digits, from an earlier mutation
+        return number
+
+
 def mutated_document(document: Any, rng: random.Random) -> Any:
     """One to four values replaced, moved, doubled, left out or scaled; perhaps one more field.
 
@@ -48,7 +55,7 @@ def mutated_document(document: Any, rng: random.Random) -> Any:
         what = rng.randrange(7)
         if mild:
             if isinstance(holder[last], float | int) and not isinstance(holder[last], bool):
-                holder[last] = holder[last] * rng.choice((0.0, 0.5, 0.999, 1.001, 1.5, 3.0, -1.0))
+                holder[last] = _times(holder[last], rng.choice((0.0, 0.5, 0.999, 1.001, 1.5, 3.0, -1.0)))
         elif what == 0:
             del holder[last]
         elif what == 1 and isinstance(holder, list):
@@ -56,7 +63,7 @@ def mutated_document(document: Any, rng: random.Random) -> Any:
         elif what == 2 and isinstance(holder, dict):
             holder[rng.choice(KEYS)] = copy.deepcopy(rng.choice(VALUES))
         elif what == 3 and isinstance(holder[last], int | float) and not isinstance(holder[last], bool):
-            holder[last] = holder[last] * rng.choice((-1, 0, 1e-30, 1e30, 1e9, 2))
+            holder[last] = _times(holder[last], rng.choice((-1, 0, 1e-30, 1e30, 1e9, 2)))
         elif what == 4:
             other = out
             for step in rng.choice(known):
