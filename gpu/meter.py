@@ -76,11 +76,12 @@ class Meter:
             output = contexts.allocate(self._context, 4 * columns * lines)
             moments.bind_to_storage_buffer(int(Slot.MOMENTS), offset=16 * width * first, size=16 * width * rows)
             output.bind_to_storage_buffer(int(Slot.OUTPUT))
-            kernel["size"].value, kernel["block"].value = (width, rows), side
+            kernel["size"].value, kernel["block"].value, kernel["rim"].value = (width, rows), side, int(side > 1)
             kernel.run(-(-columns // 8), -(-lines // 8))
             parts.append(np.frombuffer(output.read(), np.float32).reshape(lines, columns))
             output.release()
-        return np.concatenate(parts)
+        weights = np.concatenate(parts)
+        return weights if side > 1 else around(weights)
 
     def noise(self, main: dict[Slot, Any], metered: bool, scale: float) -> float:
         """Estimated RMSE of the picture's luminance over its mean; `metered`: the pixels were placed and sampled.
@@ -145,33 +146,55 @@ def draw(weights: np.ndarray, size: tuple[int, int], side: int, count: int, seed
     width, height = size
     across = np.minimum(side, width - side * np.arange(weights.shape[1]))
     down = np.minimum(side, height - side * np.arange(weights.shape[0]))
-    members = np.outer(down, across).astype(float)
-    wanted = weights * members
-    total = wanted.sum()
-    share = wanted / total if 0 < total < np.inf else members / members.sum()
-    most = MOST if side == 1 and count < members.sum() else 1
-    times = inclusion((1 - _EVEN) * share.ravel() + _EVEN * members.ravel() / members.sum(), count, most)
+    members = np.outer(down.astype(weights.dtype), across.astype(weights.dtype)).ravel()
+    shares = members * weights.ravel()
+    total, pixels = shares.sum(dtype=float), width * height
+    if 0 < total < np.inf:
+        shares *= (1 - _EVEN) / total
+        shares += members * (_EVEN / pixels)
+    else:
+        shares = members / pixels
+    times = inclusion(shares, count, MOST if side == 1 and count < pixels else 1)
     rng = np.random.default_rng([seed, 0x6E6F6973])
-    ends = np.cumsum(times)
+    ends = np.cumsum(times, dtype=float)
     blocks = np.searchsorted(ends, np.arange(int(ends[-1] + 1)) + rng.random())
     blocks = blocks[blocks < len(ends)]
-    inside = rng.integers(0, members.ravel()[blocks].astype(int))
+    inside = rng.integers(0, members[blocks].astype(int))
     row, column = np.divmod(blocks, weights.shape[1])
     x, y = column * side + inside % across[column], row * side + inside // across[column]
     place = np.arange(len(blocks))
     number = place - np.maximum.accumulate(np.where(np.diff(blocks, prepend=-1) > 0, place, 0))
-    weight = members.ravel()[blocks] / np.minimum(times[blocks], 1)
+    weight = members[blocks] / np.minimum(times[blocks], 1)
     drawn: np.ndarray = np.stack([x + number / METER_REPLICATES, y, weight], axis=1)
     return drawn[:count]
 
 
+def around(values: np.ndarray) -> np.ndarray:
+    """Mean of each place of a (rows, columns) and its up to eight neighbours."""
+    down, counts = values.copy(), [np.full(n, 3, values.dtype) for n in values.shape]
+    down[1:] += values[:-1]
+    down[:-1] += values[1:]
+    both = down.copy()
+    both[:, 1:] += down[:, :-1]
+    both[:, :-1] += down[:, 1:]
+    for count in counts:
+        count[0] -= 1
+        count[-1] -= 1
+    both /= counts[0][:, None]
+    both /= counts[1]
+    return both
+
+
 def inclusion(shares: np.ndarray, count: int, most: int = 1) -> np.ndarray:
     """Numbers, at most `most`, in proportion to `shares` where below that, that sum to `count`."""
-    times: np.ndarray = np.minimum(shares * (count / shares.sum()), most)
+    factor, full = count / float(shares.sum(dtype=float)), 0
     for _ in range(8):  # each round fills some more to `most`; what is left after these is a rounding error
-        free = times < most
-        rest = count - most * np.count_nonzero(~free)
-        if rest <= 0 or not free.any():
+        free = shares < most / factor
+        before, full = full, len(shares) - int(np.count_nonzero(free))
+        rest = count - most * full
+        if full == before or rest <= 0 or full == len(shares):
             break
-        times[free] = np.minimum(shares[free] * (rest / shares[free].sum()), most)
+        factor = rest / float(shares.sum(dtype=float, where=free))
+    times: np.ndarray = shares * factor
+    np.minimum(times, most, out=times)
     return times

@@ -12,12 +12,12 @@ float meter_spread(uint slot) { return spread_luminance(moments[slot].rgb); }
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };
 uniform uvec2 size; // of the bound rows
 uniform uint block; // pixels a side
+uniform uint rim;   // pixels around it that count too: where few samples found a thin edge, its neighbours lie on it
 
 void main() {
     uvec2 b = gl_GlobalInvocationID.xy, blocks = (size + block - 1u) / block;
     if (b.x >= blocks.x || b.y >= blocks.y) return;
-    // One pixel around it: where few samples found a thin edge, its neighbours lie on the edge as well.
-    uvec2 low = uvec2(max(ivec2(b * block) - 1, ivec2(0))), high = min((b + 1u) * block + 1u, size);
+    uvec2 low = uvec2(max(ivec2(b * block) - int(rim), ivec2(0))), high = min((b + 1u) * block + rim, size);
     float sum = 0.0;
     uint y = low.y;
     do {

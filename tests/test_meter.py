@@ -9,7 +9,7 @@ import pytest
 
 from gpu import Renderer
 from gpu.layout import METER_REPLICATES, Slot
-from gpu.meter import FROM, draw, inclusion, squared_error
+from gpu.meter import FROM, around, draw, inclusion, squared_error
 from service import presets
 from tests.rendering import Images, document, picture
 
@@ -144,3 +144,10 @@ def test_chances_sum_to_the_count_and_end_at_one() -> None:
     chances = inclusion(shares, 3)
     assert chances.sum() == pytest.approx(3) and chances[:2] == pytest.approx(1)
     assert inclusion(np.ones(5), 5) == pytest.approx(1)
+
+
+def test_a_place_weighs_as_its_neighbours_do() -> None:
+    values = np.random.default_rng(3).random((5, 7)).astype(np.float32)
+    means = [[values[max(y - 1, 0) : y + 2, max(x - 1, 0) : x + 2].mean() for x in range(7)] for y in range(5)]
+    assert around(values) == pytest.approx(np.array(means), rel=1e-6)
+    assert around(values[:1, :1]) == pytest.approx(values[:1, :1]), "no neighbours"
