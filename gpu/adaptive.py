@@ -8,8 +8,8 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import features
+from gpu.bindings import Slot
 from gpu.kernels import Kernels
-from gpu.layout import Slot
 from gpu.plan import AREA, CLASSES, WORDS, Plan, pixels_of, weights_of
 from gpu.tiles import GUESS_S, PASS_S, SLICE_S, USUAL_BOUNCES, Tile
 

@@ -9,8 +9,8 @@ from typing import Any
 
 import numpy as np
 
+from gpu import bindings, features, layout, meter, resolve
 from gpu import context as contexts
-from gpu import features, layout, meter, resolve
 from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
 from gpu.errors import CompileError
 from gpu.layout import ShapeKind
@@ -86,22 +86,22 @@ def common() -> list[Recipe]:
 
 def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, str, int, int], ...]:
     height, width = (1, 1) if a.environment is None else a.environment.texels.shape[:2]
-    out = [(layout.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
+    out = [(bindings.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
     rows = [
-        (layout.UVS_TEXTURES[0], a.triangle_uvs, 2, "f4"),
-        (layout.UVS_TEXTURES[1], a.triangle_uvs_1, 2, "f4"),
-        (layout.COLORS_TEXTURE, a.corner_colors if "HAS_VERTEX_COLORS" in raised else a.triangle_colors, 4, "f2"),
-        (layout.INSTANCES_TEXTURE, a.instances, 4, "u4"),
+        (bindings.UVS_TEXTURES[0], a.triangle_uvs, 2, "f4"),
+        (bindings.UVS_TEXTURES[1], a.triangle_uvs_1, 2, "f4"),
+        (bindings.COLORS_TEXTURE, a.corner_colors if "HAS_VERTEX_COLORS" in raised else a.triangle_colors, 4, "f2"),
+        (bindings.INSTANCES_TEXTURE, a.instances, 4, "u4"),
     ]
     if a.textures is not None:
-        rows += [(layout.BYTES_TEXTURE, a.textures.texels, 4, "f1")]
-        rows += [(layout.FLOATS_TEXTURE, a.textures.floats, 4, "f4")]
+        rows += [(bindings.BYTES_TEXTURE, a.textures.texels, 4, "f1")]
+        rows += [(bindings.FLOATS_TEXTURE, a.textures.floats, 4, "f4")]
     if "HAS_LIGHT_TREE" in raised:
-        rows += [(layout.LIGHT_TREE_TEXTURE, a.light_words, 4, "u4")]
+        rows += [(bindings.LIGHT_TREE_TEXTURE, a.light_words, 4, "u4")]
     for unit, values, channels, dtype in rows:
         if len(values):
-            height = -(-values.nbytes // (layout.TEXELS_A_ROW * channels * BYTES[dtype]))
-            out.append((unit, channels, dtype, _side(layout.TEXELS_A_ROW), _side(height)))
+            height = -(-values.nbytes // (bindings.TEXELS_A_ROW * channels * BYTES[dtype]))
+            out.append((unit, channels, dtype, _side(bindings.TEXELS_A_ROW), _side(height)))
     return tuple(out)
 
 
@@ -150,9 +150,9 @@ class Ahead:
             kernel = self._context.compute_shader(text)
         except Exception as error:  # moderngl.Error is not importable without its binary parts
             raise CompileError(str(error)) from error
-        for slot in range(len(layout.Slot)):
+        for slot in range(len(bindings.Slot)):
             self._zeros.bind_to_storage_buffer(slot)
-        for block in (layout.FRAME_BLOCK, layout.FILTER_BLOCK, *layout.COUNTED.values()):
+        for block in (bindings.FRAME_BLOCK, bindings.FILTER_BLOCK, *bindings.COUNTED.values()):
             self._zeros.bind_to_uniform_block(block)
         kernel.run(1, 1)
         self._context.finish()

@@ -9,6 +9,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import ShapeKind
+from gpu.record import Record
 from gpu.sky import SunDisk
 
 Vec3 = tuple[float, float, float]
@@ -58,17 +59,17 @@ class TextureArrays:
     """What the scene's textures are made of, and how its materials use them.
 
     `slots`: the members of `layout.Material` that any material has textured (and "normal", "coat_normal"), with the
-    slot that gives each its texel; those of `layout.OTHER_RANGES` have slots of their own, after all others.
+    slot that gives each its texel; those of `texturing.OTHER_RANGES` have slots of their own, after all others.
     """
 
     slots: dict[str, int]
-    words: np.ndarray  # (materials, n) uint32: its `layout.TextureSlot`s, then a `layout.TextureUse` for each member
+    words: np.ndarray  # (materials, n) uint32: its `TextureSlot`s, then a `TextureUse` for each member
     texels: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint8))  # of 8-bit images, in a row
     floats: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.float32))  # of all others
     key: str = ""  # equal where the texels are
 
 
-def _empty(record: type[layout.Record]) -> np.ndarray:
+def _empty(record: type[Record]) -> np.ndarray:
     return np.zeros(0, record.dtype)
 
 

@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 
 import numpy as np
 
-from gpu import glsl_textures, layout
+from gpu import glsl_textures, layout, texturing
 from gpu.arrays import SceneArrays
 from gpu.layout import LightKind, Model, ShapeKind
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
@@ -58,8 +58,8 @@ def _slot_flags(scene: SceneArrays) -> np.ndarray:
     if scene.textures is None:
         return np.zeros(0, np.uint32)
     count = max(scene.textures.slots.values(), default=-1) + 1
-    words = scene.textures.words[:, : count * layout.TextureSlot.words]
-    out: np.ndarray = np.ascontiguousarray(words).view(layout.TextureSlot.dtype)
+    words = scene.textures.words[:, : count * texturing.TextureSlot.words]
+    out: np.ndarray = np.ascontiguousarray(words).view(texturing.TextureSlot.dtype)
     return out["flags"][out["width"] > 0]
 
 
@@ -76,9 +76,9 @@ def _coat_apart(s: SceneArrays) -> bool:
     if s.textures is None or not _mapped(s, "normal", "coat_normal"):
         return False
     names = list(s.textures.slots)
-    first = (max(s.textures.slots.values()) + 1) * layout.TextureSlot.words
-    uses = np.ascontiguousarray(s.textures.words[:, first:]).view(layout.TextureUse.dtype)
-    mapped = [uses["channel"][:, names.index(n)] != layout.CHANNEL_NONE for n in layout.NORMALS if n in names]
+    first = (max(s.textures.slots.values()) + 1) * texturing.TextureSlot.words
+    uses = np.ascontiguousarray(s.textures.words[:, first:]).view(texturing.TextureUse.dtype)
+    mapped = [uses["channel"][:, names.index(n)] != texturing.CHANNEL_NONE for n in texturing.NORMALS if n in names]
     coated = (s.materials["model"] == Model.PRINCIPLED) & (s.materials["clearcoat"] > 0)
     return bool((np.any(mapped, axis=0) & coated).any())
 
@@ -115,10 +115,10 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in (*COUNTS.values(), "instances")),
     "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s),
     "HAS_TEXTURES": lambda s: s.textures is not None or len(s.triangle_colors) > 0,
-    "HAS_BYTE_TEXELS": _slot(0, layout.SLOT_FLOATS | layout.SLOT_CHECKER),
-    "HAS_FLOAT_TEXELS": _slot(layout.SLOT_FLOATS, layout.SLOT_CHECKER),
-    "HAS_SRGB_TEXELS": _slot(layout.SLOT_SRGB),
-    "HAS_CHECKERS": _slot(layout.SLOT_CHECKER),
+    "HAS_BYTE_TEXELS": _slot(0, texturing.SLOT_FLOATS | texturing.SLOT_CHECKER),
+    "HAS_FLOAT_TEXELS": _slot(texturing.SLOT_FLOATS, texturing.SLOT_CHECKER),
+    "HAS_SRGB_TEXELS": _slot(texturing.SLOT_SRGB),
+    "HAS_CHECKERS": _slot(texturing.SLOT_CHECKER),
     "HAS_UVS": lambda s: len(s.triangle_uvs) > 0,
     "HAS_UVS_1": lambda s: len(s.triangle_uvs_1) > 0,
     "HAS_VERTEX_COLORS": lambda s: len(s.triangle_colors) > 0,

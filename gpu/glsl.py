@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from gpu import energy, glsl_instances, glsl_textures, layout
-from gpu.layout import Frame, LightKind, Model, Record, ShapeKind, Slot
+from gpu import bindings, energy, glsl_instances, glsl_textures, layout
+from gpu.bindings import Slot
+from gpu.layout import Frame, LightKind, Model, ShapeKind
+from gpu.record import Record
 
 
 def _struct(record: type[Record]) -> str:
@@ -19,10 +21,10 @@ def _loader(name: str, record: type[Record], slot: Slot) -> str:
     A kind of which the first stand in a loop and the others in the tree has both, and `NAME_tree_load(i)` for any.
     """
     storage = _storage(name, record, slot, "words")
-    if name not in layout.COUNTED:
+    if name not in bindings.COUNTED:
         return "\n".join([storage, _load(name, record, "load", "words")])
     count, stride = f"{name.upper()}_COUNT", _stride(name, record)
-    block = f"layout(std140, binding = {layout.COUNTED[name]}) uniform {name}_block"
+    block = f"layout(std140, binding = {bindings.COUNTED[name]}) uniform {name}_block"
     lines = [
         f"#if {count} > 0",
         f"{block} {{ uvec4 {name}_words[{count} * {stride}]; }};",
@@ -96,7 +98,7 @@ def _constants() -> str:
     for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", Model)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
     out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
-    out += [f"#define FRAME_BLOCK {layout.FRAME_BLOCK}", f"#define FILTER_BLOCK {layout.FILTER_BLOCK}"]
+    out += [f"#define FRAME_BLOCK {bindings.FRAME_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
     for name in (
         "NONE",
         "SINGLE_SIDED",
@@ -116,9 +118,9 @@ def _constants() -> str:
         "METER_REPLICATES",
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
-    out.append(f"#define LIGHT_TREE_TEXTURE {layout.LIGHT_TREE_TEXTURE}")
-    out.append(f"const uint LIGHT_TREE_ROW = {layout.TEXELS_A_ROW}u;")
-    out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in layout.ENERGY_TEXTURES.items()]
+    out.append(f"#define LIGHT_TREE_TEXTURE {bindings.LIGHT_TREE_TEXTURE}")
+    out.append(f"const uint LIGHT_TREE_ROW = {bindings.TEXELS_A_ROW}u;")
+    out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in bindings.ENERGY_TEXTURES.items()]
     sizes = ("ETAS", "ASPECTS", "STEPS", "AZIMUTHS", "COSINES")
     out += [f"#define ENERGY_{name} {size}" for name, size in zip(sizes, energy.STRETCHED_SHAPE, strict=True)]
     for name in ("LEAST_ASPECT", "LARGEST_ETA", "AZIMUTH_POWER", "LEAST_SHEEN_ROUGHNESS"):
@@ -130,7 +132,7 @@ def text() -> str:
     """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `frame`."""
     structs = [_struct(r) for r in dict.fromkeys(r for r, _ in layout.BUFFERS.values())]
     loaders = [_loader(name, r, slot) for name, (r, slot) in layout.BUFFERS.items()]
-    loaders += [_picker(name, layout.BUFFERS[name][0]) for name in layout.COUNTED]
+    loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     parts = [_constants(), *structs, *loaders, nodes, _frame(), glsl_instances.text(), glsl_textures.text()]
     return "\n".join(parts) + "\n"
@@ -140,7 +142,7 @@ def _frame() -> str:
     members = {name: f"{kind.glsl} {name};" for name, kind in Frame.members.items()}
     last = " ".join(members.pop(name) for name in glsl_instances.FRAME)
     body = " ".join(members.values())
-    return f"""layout(std140, binding = {layout.FRAME_BLOCK}) uniform frame_block {{ {body}
+    return f"""layout(std140, binding = {bindings.FRAME_BLOCK}) uniform frame_block {{ {body}
 #if HAS_INSTANCES
 {last}
 #endif

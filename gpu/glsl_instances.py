@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from gpu import glsl_textures, layout
+from gpu import bindings, glsl_textures, layout
 from gpu.layout import Instance, ShapeKind
 
 FRAME = ("node_first", "instance_shift")  # the last members of `layout.Frame`, which only these kernels have
@@ -14,15 +14,15 @@ def text() -> str:
     members = " ".join(f"{kind.glsl} {name};" for name, kind in Instance.members.items())
     words = "\n".join(
         f"    uint a{k} = i * {GROUPS}u + {k}u;\n"
-        f"    uvec4 w{k} = texelFetch(instance_texels, ivec2(a{k} & {layout.TEXELS_A_ROW - 1}u,"
-        f" a{k} / {layout.TEXELS_A_ROW}u), 0);"
+        f"    uvec4 w{k} = texelFetch(instance_texels, ivec2(a{k} & {bindings.TEXELS_A_ROW - 1}u,"
+        f" a{k} / {bindings.TEXELS_A_ROW}u), 0);"
         for k in range(GROUPS)
     )
     return f"""#if HAS_INSTANCES
 const uint SHAPE_INSTANCE = {int(ShapeKind.INSTANCE)}u;
 const uint INSTANCED = {layout.INSTANCED}u;
 struct Instance {{ {members} }};
-layout(binding = {layout.INSTANCES_TEXTURE}) uniform usampler2D instance_texels;
+layout(binding = {bindings.INSTANCES_TEXTURE}) uniform usampler2D instance_texels;
 Instance instance_load(uint i) {{
 {words}
     return Instance({glsl_textures.unpacked(Instance, 4)});

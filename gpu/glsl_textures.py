@@ -9,12 +9,13 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpu import layout
-from gpu.layout import Record, TextureSlot, TextureUse
+from gpu import bindings, layout, texturing
+from gpu.record import Record
+from gpu.texturing import TextureSlot, TextureUse
 
 BASE = layout.Material.words // 4  # groups of four words of a material without textures
 SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
-ALL = (*layout.TEXTURABLE, *layout.NORMALS)
+ALL = (*texturing.TEXTURABLE, *texturing.NORMALS)
 
 
 def unpacked(record: type[Record], group: int) -> str:
@@ -33,7 +34,7 @@ def defines(slots: dict[str, int]) -> dict[str, object]:
     count = max(slots.values(), default=-1) + 1
     out: dict[str, object] = {f"TEXTURE_{name.upper()}": slots.get(name, -1) for name in ALL}
     out |= {f"TEXTURE_{name.upper()}_USE": f"{i}u" for i, name in enumerate(slots)}
-    surface = [slot for name, slot in slots.items() if name not in layout.OTHER_RANGES]
+    surface = [slot for name, slot in slots.items() if name not in texturing.OTHER_RANGES]
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
     out["MATERIAL_GROUPS"] = f"{BASE + groups(slots)}u"
@@ -79,31 +80,31 @@ def _use(name: str, low: float, high: float, texel: str, target: str) -> str:
 def text() -> str:
     """Structs and functions, all of it guarded by HAS_TEXTURES."""
     surface = "\n".join(
-        _use(name, *bounds, "texels[{}]", f"m.{name}") for name, bounds in layout.SURFACE_RANGES.items()
+        _use(name, *bounds, "texels[{}]", f"m.{name}") for name, bounds in texturing.SURFACE_RANGES.items()
     )
     others = "\n".join(
         f"void texture_use_{name}(uint i, vec4 texel, inout {layout.Material.members[name].glsl} x) {{\n"
         f"{_use(name, *bounds, 'texel', 'x')}\n}}"
-        for name, bounds in layout.OTHER_RANGES.items()
+        for name, bounds in texturing.OTHER_RANGES.items()
     )
     structs = "\n".join(
         f"struct {r.__name__} {{ {' '.join(f'{k.glsl} {n};' for n, k in r.members.items())} }};"
         for r in (TextureSlot, TextureUse)
     )
-    names = [n for n in vars(layout) if n.startswith(("SLOT_", "CHANNEL_"))]
-    constants = "\n".join(f"const uint TEXTURE_{n} = {getattr(layout, n)}u;" for n in names)
+    names = [n for n in vars(texturing) if n.startswith(("SLOT_", "CHANNEL_"))]
+    constants = "\n".join(f"const uint TEXTURE_{n} = {getattr(texturing, n)}u;" for n in names)
     units = {
-        "BYTES": layout.BYTES_TEXTURE,
-        "FLOATS": layout.FLOATS_TEXTURE,
-        "UVS": layout.UVS_TEXTURES[0],
-        "UVS_1": layout.UVS_TEXTURES[1],
-        "COLORS": layout.COLORS_TEXTURE,
+        "BYTES": bindings.BYTES_TEXTURE,
+        "FLOATS": bindings.FLOATS_TEXTURE,
+        "UVS": bindings.UVS_TEXTURES[0],
+        "UVS_1": bindings.UVS_TEXTURES[1],
+        "COLORS": bindings.COLORS_TEXTURE,
     }
     defined = "\n".join(f"#define TEXTURE_{name}_UNIT {unit}" for name, unit in units.items())
     return f"""#if HAS_TEXTURES
 {defined}
 {constants}
-const uint TEXTURE_ROW = {layout.TEXELS_A_ROW}u;
+const uint TEXTURE_ROW = {bindings.TEXELS_A_ROW}u;
 {structs}
 {_reader(TextureSlot, "texture_slot", f"{BASE}u", SLOT_GROUPS)}
 {_reader(TextureUse, "texture_use", f"{BASE}u + {SLOT_GROUPS}u * uint(TEXTURE_SLOTS)", USE_GROUPS)}

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
-from gpu.layout import Slot
+from gpu.bindings import Slot
 from gpu.tiles import Tile
 
 SAMPLES = 256  # they average at most so many

@@ -1,17 +1,17 @@
 """The bytes that the host and the shaders share, declared once.
 
-Each record yields a numpy dtype here and, in `glsl.py`, a struct, a buffer and a loader. Shaders get all of it
-through `#include "layout.glsl"`, which exists only in memory. Buffers are arrays of 32-bit words in groups of four
-(or two): llvmpipe fetches a uvec4 for the price of one float, so a record is read with as few fetches as it has
-groups.
+Each record yields a numpy dtype and, in `glsl.py`, a struct, a buffer and a loader; those of textures stand in
+`texturing.py`, the places where kernels find it all in `bindings.py`. Shaders get all of it through
+`#include "layout.glsl"`, which exists only in memory. Buffers are arrays of 32-bit words in groups of four (or two):
+llvmpipe fetches a uvec4 for the price of one float, so a record is read with as few fetches as it has groups.
 """
 
 from __future__ import annotations
 
 from enum import IntEnum
-from typing import ClassVar
 
-import numpy as np
+from gpu.bindings import Slot
+from gpu.record import Record, f32, u32, uvec2, vec2, vec3, vec4
 
 NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
 NOT_VAST = 3.4e38
@@ -25,45 +25,6 @@ HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
 # whole numbers of them.
 NORMALS_SMOOTH, NORMALS_LEFT = 1, 2
 TANGENT_SHIFT, TANGENT_BITS, TANGENT_STEPS = 2, 10, 1020
-
-
-class LayoutError(TypeError):
-    """A declaration that would leave a hole between members, or name an unknown type."""
-
-
-class Kind:
-    """A member's type: its GLSL name, its size in 32-bit words, and numpy's element."""
-
-    glsl: ClassVar[str]
-    words: ClassVar[int]
-    base: ClassVar[type[np.generic]] = np.float32
-
-
-class f32(Kind):
-    glsl, words = "float", 1
-
-
-class u32(Kind):
-    glsl, words, base = "uint", 1, np.uint32
-
-
-class vec2(Kind):
-    glsl, words = "vec2", 2
-
-
-class uvec2(Kind):
-    glsl, words, base = "uvec2", 2, np.uint32
-
-
-class vec3(Kind):
-    glsl, words = "vec3", 3
-
-
-class vec4(Kind):
-    glsl, words = "vec4", 4
-
-
-_KINDS: dict[str, type[Kind]] = {k.__name__: k for k in (f32, u32, vec2, uvec2, vec3, vec4)}
 
 
 class ShapeKind(IntEnum):
@@ -96,74 +57,6 @@ class Model(IntEnum):
     BLINN_PHONG = 4
 
 
-class Slot(IntEnum):
-    """Binding points of the storage buffers."""
-
-    MATERIALS = 0
-    SPHERES = 1
-    QUADS = 2
-    BOXES = 3
-    ELLIPSOIDS = 4
-    TRIANGLES = 5
-    TRIANGLE_NORMALS = 6
-    NODES = 7
-    LIGHTS = 8
-    ENVIRONMENT_CELLS = 9
-    SUM = 10
-    COMPENSATION = 11
-    MOMENTS = 12
-    ALBEDO = 13
-    NORMAL = 14
-    OUTPUT = 15
-
-
-FRAME_BLOCK = 0  # uniform blocks
-FILTER_BLOCK = 1
-# Buffers with a NAME_COUNT that kernels are compiled for: uniform blocks where it is above 0. Binding points
-COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}
-ENVIRONMENT_TEXTURE = 0  # texture units
-BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
-UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
-COLORS_TEXTURE = 12
-LIGHT_TREE_TEXTURE = 13
-INSTANCES_TEXTURE = 14  # records: all storage buffers are taken
-ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.energy
-
-
-class Record:
-    """Base of all records: members in order, a vec3 followed by a scalar, no hole between members."""
-
-    dtype: ClassVar[np.dtype[np.void]]
-    members: ClassVar[dict[str, type[Kind]]]
-    offsets: ClassVar[dict[str, int]]  # in words
-    words: ClassVar[int]
-    slot: ClassVar[Slot | None] = None
-
-    def __init_subclass__(cls) -> None:
-        cls.members = {}
-        for name, kind in cls.__annotations__.items():
-            if kind not in _KINDS:
-                raise LayoutError(f"{cls.__name__}.{name}: unknown type {kind!r}; have {sorted(_KINDS)}")
-            cls.members[name] = _KINDS[kind]
-        cls.offsets, end = {}, 0
-        for name, kind_ in cls.members.items():
-            align = {1: 1, 2: 2, 3: 4, 4: 4}[kind_.words]
-            if end % align:
-                raise LayoutError(f"{cls.__name__}.{name}: a hole of {align - end % align} words before it")
-            cls.offsets[name] = end
-            end += kind_.words
-        group = 4 if end > 2 else 2
-        cls.words = -(-end // group) * group
-        cls.dtype = np.dtype(
-            {
-                "names": list(cls.members),
-                "formats": [(k.base, (k.words,)) if k.words > 1 else k.base for k in cls.members.values()],
-                "offsets": [4 * o for o in cls.offsets.values()],
-                "itemsize": 4 * cls.words,
-            }
-        )
-
-
 class Material(Record):
     slot = Slot.MATERIALS
     base_color: vec3  # linear Rec.709 reflectance, each channel in [0, 1]; diffuse's albedo
@@ -194,27 +87,6 @@ class Material(Record):
     anisotropic_rotation: f32  # degrees
     ior: f32  # inside over outside; ABSENT: from `specular`
     cutoff: f32  # an opacity of at least this counts as 1, any other as 0; ABSENT: it is a chance
-
-
-class TextureSlot(Record):
-    """A texture as one material uses it. uv' = turn (u, v) + offset."""
-
-    first: u32  # its first texel among those of its kind
-    width: u32
-    height: u32
-    flags: u32  # SLOT_*
-    turn: vec4  # 2 x 2, row by row
-    color_a: vec3  # of a checker
-    offset_u: f32
-    color_b: vec3
-    offset_v: f32
-
-
-class TextureUse(Record):
-    """How a texel becomes a member of a material: that channel (or all three), times the factor."""
-
-    factor: vec3  # of a normal map x is its strength
-    channel: u32  # CHANNEL_*
 
 
 class Sphere(Record):
@@ -399,30 +271,6 @@ class Frame(Record):
 
 
 METER_REPLICATES = 8  # more than the noise meter takes of a pixel; which one it is, in so many parts of its place's x
-
-SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
-CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a
-
-# The numbers of a material that a texture may give, with their ranges: those a surface is made from, with which the
-# normals are asked for, and those that a path asks for elsewhere.
-UNIT, LARGE = (0.0, 1.0), (0.0, 1e20)
-SURFACE_RANGES: dict[str, tuple[float, float]] = {
-    name: UNIT
-    for name in (
-        "base_color", "roughness", "metallic", "subsurface", "specular", "specular_tint", "anisotropic", "sheen",
-        "sheen_tint", "clearcoat", "clearcoat_gloss", "sheen_roughness", "phong_specular", "transmission",
-        "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color",
-    )
-} | {
-    "shininess": LARGE,
-    "attenuation_distance": (1e-45, 1e9),
-    "anisotropic_rotation": (-1e9, 1e9),
-    "ior": (1.0, 4.0),
-}  # fmt: skip
-NORMALS = ("normal", "coat_normal")
-OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "cutoff": UNIT, "ambient": LARGE}
-TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
-TEXELS_A_ROW = 8192  # of the textures that hold texels and coordinates, one after the other
 
 # A leaf's link: bit 31 set, kind << 28, (count - 1) << 24, first: index into the array of that kind
 LEAF_BIT = 0x80000000

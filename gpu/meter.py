@@ -20,8 +20,9 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import features
+from gpu.bindings import Slot
 from gpu.kernels import Kernels
-from gpu.layout import METER_REPLICATES, Slot
+from gpu.layout import METER_REPLICATES
 
 FROM = 8  # samples of each pixel, from which on the meter runs; before, the samples' own variance must do
 LINE = 64  # metered pixels in a row of their buffers

@@ -11,13 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from gpu import bindings, display, features, filters, guides, layout, meter
 from gpu import context as contexts
-from gpu import display, features, filters, guides, layout, meter
 from gpu.adaptive import Adaptive
+from gpu.bindings import Slot
 from gpu.errors import NothingRendered
 from gpu.guides import Guides
 from gpu.kernels import Kernels
-from gpu.layout import Slot
 from gpu.meter import Meter
 from gpu.plan import DECISIONS
 from gpu.resolve import resolve
@@ -235,8 +235,8 @@ class Picture:
     def _bind(self) -> None:
         self.scene.bind()
         self._ended.bind_to_storage_buffer(int(Slot.ALBEDO))
-        self._frame_buffer.bind_to_uniform_block(layout.FRAME_BLOCK)
-        self._filter.bind_to_uniform_block(layout.FILTER_BLOCK)
+        self._frame_buffer.bind_to_uniform_block(bindings.FRAME_BLOCK)
+        self._filter.bind_to_uniform_block(bindings.FILTER_BLOCK)
 
     def _bind_part(self, buffers: dict[Slot, Any], tile: Tile, width: int) -> int:
         """Binds the part of each buffer that a tile touches, as a driver may bind no more than 128 MiB; its first

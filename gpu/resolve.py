@@ -8,8 +8,8 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import features
+from gpu.bindings import Slot
 from gpu.kernels import Kernels
-from gpu.layout import Slot
 
 _LINE = 1024  # pixels that resolve.comp takes for a row
 

@@ -10,17 +10,18 @@ from typing import Any
 
 import numpy as np
 
+from gpu import bindings, energy, features, layout, uploads
 from gpu import context as contexts
-from gpu import energy, features, layout, uploads
 from gpu.arrays import CameraArrays, SceneArrays
+from gpu.bindings import Slot
 from gpu.errors import OutOfMemory
-from gpu.layout import LightKind, Slot
+from gpu.layout import LightKind
 from gpu.settings import RenderSettings
 from gpu.texels import KINDS, Texels, bare, rows
 
 log = logging.getLogger(__name__)
 
-_BLOCKS = {layout.BUFFERS[name][1]: block for name, block in layout.COUNTED.items()}
+_BLOCKS = {layout.BUFFERS[name][1]: block for name, block in bindings.COUNTED.items()}
 _BLOCK_MAX = 16384  # bytes that every driver gives a uniform block; of longer buffers kernels see the first records
 
 
@@ -33,7 +34,7 @@ def upload_tables(context: Any) -> dict[int, Any]:
     The index of stretched lobes goes with the second: 2 048 layers are all that a driver need have.
     """
     out = {}
-    for name, unit in layout.ENERGY_TEXTURES.items():
+    for name, unit in bindings.ENERGY_TEXTURES.items():
         table = getattr(energy.tables(), name)
         if name == "stretched":
             etas, aspects, steps, azimuths, cosines, _ = table.shape
@@ -107,16 +108,16 @@ class Scene:
         a = self.arrays
         colors = a.corner_colors if "HAS_VERTEX_COLORS" in self._raised else a.triangle_colors
         asked = {
-            layout.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
-            layout.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
-            layout.COLORS_TEXTURE: (colors, 4, "f2"),
-            layout.INSTANCES_TEXTURE: (a.instances, 4, "u4"),
+            bindings.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
+            bindings.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
+            bindings.COLORS_TEXTURE: (colors, 4, "f2"),
+            bindings.INSTANCES_TEXTURE: (a.instances, 4, "u4"),
         }
         for unit, (values, channels, dtype) in asked.items():
             if len(values):
                 self._details[unit] = rows(self._context, values, channels, dtype)
         if "HAS_LIGHT_TREE" in self._raised:
-            self._details[layout.LIGHT_TREE_TEXTURE] = rows(self._context, a.light_words, 4, "u4")
+            self._details[bindings.LIGHT_TREE_TEXTURE] = rows(self._context, a.light_words, 4, "u4")
         if a.textures is not None:
             if a.textures.key:
                 self._images, self._key = self._shared.take(a.textures.key, self._upload_images), a.textures.key
@@ -129,7 +130,7 @@ class Scene:
     def _upload_images(self) -> dict[int, Any]:
         textures = self.arrays.textures
         assert textures is not None
-        asked = {layout.BYTES_TEXTURE: (textures.texels, "f1"), layout.FLOATS_TEXTURE: (textures.floats, "f4")}
+        asked = {bindings.BYTES_TEXTURE: (textures.texels, "f1"), bindings.FLOATS_TEXTURE: (textures.floats, "f4")}
         return {u: rows(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)}
 
     def _raise_flags(self) -> None:
@@ -215,7 +216,7 @@ class Scene:
             buffer.bind_to_storage_buffer(int(slot))
             if slot in _BLOCKS:
                 buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
-        self._texels.use(layout.ENVIRONMENT_TEXTURE)
+        self._texels.use(bindings.ENVIRONMENT_TEXTURE)
         for unit, texture in (*self._tables.items(), *self._details.items(), *self._images.items()):
             texture.use(unit)
 
@@ -274,9 +275,9 @@ class Everything(Scene):
         self._raise_flags()
         missing = KINDS.keys() - self._details.keys() - self._images.keys()
         self._own = {unit: bare(self._context, unit) for unit in missing}
-        if layout.COLORS_TEXTURE in missing and len(self.arrays.triangles):
-            self._own[layout.COLORS_TEXTURE].release()
-            self._own[layout.COLORS_TEXTURE] = rows(self._context, self.arrays.corner_colors, 4, "f2")
+        if bindings.COLORS_TEXTURE in missing and len(self.arrays.triangles):
+            self._own[bindings.COLORS_TEXTURE].release()
+            self._own[bindings.COLORS_TEXTURE] = rows(self._context, self.arrays.corner_colors, 4, "f2")
         self._details = self._details | self._own
         if not self._tables:
             self._tables = upload_tables(self._context)

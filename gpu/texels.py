@@ -8,27 +8,27 @@ from typing import Any
 
 import numpy as np
 
-from gpu import layout
+from gpu import bindings
 from gpu.errors import OutOfMemory
 
 BYTES = {"f1": 1, "f2": 2, "f4": 4, "u4": 4}
 KINDS = {  # channels and dtype, by texture unit
-    layout.UVS_TEXTURES[0]: (2, "f4"),
-    layout.UVS_TEXTURES[1]: (2, "f4"),
-    layout.COLORS_TEXTURE: (4, "f2"),
-    layout.BYTES_TEXTURE: (4, "f1"),
-    layout.FLOATS_TEXTURE: (4, "f4"),
-    layout.LIGHT_TREE_TEXTURE: (4, "u4"),
-    layout.INSTANCES_TEXTURE: (4, "u4"),
+    bindings.UVS_TEXTURES[0]: (2, "f4"),
+    bindings.UVS_TEXTURES[1]: (2, "f4"),
+    bindings.COLORS_TEXTURE: (4, "f2"),
+    bindings.BYTES_TEXTURE: (4, "f1"),
+    bindings.FLOATS_TEXTURE: (4, "f4"),
+    bindings.LIGHT_TREE_TEXTURE: (4, "u4"),
+    bindings.INSTANCES_TEXTURE: (4, "u4"),
 }
 
 
 def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
-    """A texture of `layout.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
+    """A texture of `bindings.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
     flat = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
-    pitch = layout.TEXELS_A_ROW * channels * BYTES[dtype]
+    pitch = bindings.TEXELS_A_ROW * channels * BYTES[dtype]
     height, rest = divmod(len(flat), pitch)
-    size = (layout.TEXELS_A_ROW, height + (rest > 0))
+    size = (bindings.TEXELS_A_ROW, height + (rest > 0))
     context.error  # noqa: B018  # an older one is not this texture's
     try:
         texture = context.texture(size, channels, dtype=dtype)
@@ -38,11 +38,11 @@ def rows(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
         texture.release()
         raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures")
     if height:
-        texture.write(flat[: height * pitch], viewport=(0, 0, layout.TEXELS_A_ROW, height))
+        texture.write(flat[: height * pitch], viewport=(0, 0, bindings.TEXELS_A_ROW, height))
     if rest:
         last = np.zeros(pitch, np.uint8)
         last[:rest] = flat[height * pitch :]
-        texture.write(last, viewport=(0, height, layout.TEXELS_A_ROW, 1))
+        texture.write(last, viewport=(0, height, bindings.TEXELS_A_ROW, 1))
     texture.filter = (context.NEAREST, context.NEAREST)
     return texture
 
@@ -53,8 +53,8 @@ def rewrite(texture: Any, values: np.ndarray, part: slice) -> int:
     texel = part.start * (values.itemsize // 16)
     sent = words.nbytes
     while len(words):
-        x, y = texel % layout.TEXELS_A_ROW, texel // layout.TEXELS_A_ROW
-        count = min(len(words), layout.TEXELS_A_ROW - x)
+        x, y = texel % bindings.TEXELS_A_ROW, texel // bindings.TEXELS_A_ROW
+        count = min(len(words), bindings.TEXELS_A_ROW - x)
         texture.write(np.ascontiguousarray(words[:count]), viewport=(x, y, count, 1))
         words, texel = words[count:], texel + count
     return sent

@@ -6,11 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from gpu import bindings
 from gpu import context as contexts
-from gpu import layout
 from gpu.arrays import SceneArrays
+from gpu.bindings import Slot
 from gpu.errors import OutOfMemory
-from gpu.layout import Slot
 from gpu.pinned import Pinned, pin
 from gpu.texels import rewrite, rows
 
@@ -72,14 +72,14 @@ def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, A
             array = getattr(new, BUFFERS[slot])
             _write(buffers[slot], array, new.instance_nodes.nbytes if slot == Slot.NODES else 0)
             sent += array.nbytes
-    if texture is not None and layout.LIGHT_TREE_TEXTURE in textures:
-        textures[layout.LIGHT_TREE_TEXTURE].release()
-        textures[layout.LIGHT_TREE_TEXTURE] = texture
+    if texture is not None and bindings.LIGHT_TREE_TEXTURE in textures:
+        textures[bindings.LIGHT_TREE_TEXTURE].release()
+        textures[bindings.LIGHT_TREE_TEXTURE] = texture
         sent += new.light_words.nbytes
     changed = np.flatnonzero(old.instances != new.instances)
     if len(changed):
         part = slice(int(changed[0]), int(changed[-1]) + 1)
-        sent += rewrite(textures[layout.INSTANCES_TEXTURE], new.instances, part)
+        sent += rewrite(textures[bindings.INSTANCES_TEXTURE], new.instances, part)
     return sent
 
 

@@ -7,9 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from gpu import Renderer, SceneArrays, layout
+from gpu import Renderer, SceneArrays, bindings, layout
+from gpu.bindings import Slot
 from gpu.features import FLAGS
-from gpu.layout import LightKind, LightNode, LightTreeHead, Slot
+from gpu.layout import LightKind, LightNode, LightTreeHead
 from gpu.texels import rows
 from tests.probing import Prober
 
@@ -77,7 +78,7 @@ class Picker:
         self._texture = rows(self._prober.context, arrays.light_tree, 4, "u4")
 
     def _run(self, sample: int, count: int, asks: np.ndarray, p: Any, n: Any, through: bool) -> np.ndarray:
-        self._texture.use(layout.LIGHT_TREE_TEXTURE)
+        self._texture.use(bindings.LIGHT_TREE_TEXTURE)
         frame = np.zeros((), layout.Frame.dtype)
         frame["light_count"] = len(self._lights)
         kinds = {f"HAS_{LightKind(int(kind)).name}_LIGHTS" for kind in set(self._lights["kind"])} & set(FLAGS)

@@ -8,9 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from gpu import Renderer, features, filters, layout
+from gpu import Renderer, bindings, features, filters, layout
+from gpu.bindings import Slot
 from gpu.kernels import Kernels
-from gpu.layout import Slot
 from gpu.program import SHADERS
 from gpu.scene import upload_tables
 
@@ -59,8 +59,8 @@ class Prober:
         table[:, 0] = filters.inverse(filter_name, features.FILTER_TABLE_SIZE)
         blocks = [self.context.buffer(table.tobytes())]
         blocks.append(self.context.buffer((np.zeros((), layout.Frame.dtype) if frame is None else frame).tobytes()))
-        blocks[0].bind_to_uniform_block(layout.FILTER_BLOCK)
-        blocks[1].bind_to_uniform_block(layout.FRAME_BLOCK)
+        blocks[0].bind_to_uniform_block(bindings.FILTER_BLOCK)
+        blocks[1].bind_to_uniform_block(bindings.FRAME_BLOCK)
         for name, value in {**uniforms, "count": count}.items():
             kernel[name].value = value
         tables = upload_tables(self.context) if "HAS_PRINCIPLED" in raised else {}

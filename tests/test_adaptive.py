@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from gpu import Picture, Renderer, RenderSettings, save
-from gpu.layout import Slot
+from gpu.bindings import Slot
 from gpu.meter import FROM
 from gpu.plan import CLASSES, DECISIONS, LEAST, MOST, Plan, pixels_of, weights_of
 from service.cli import main

@@ -10,8 +10,9 @@ import pytest
 from scipy.stats import qmc
 
 from gpu import ESTIMATORS, Renderer
+from gpu.bindings import Slot
 from gpu.features import EDITED
-from gpu.layout import ABSENT, Model, Slot
+from gpu.layout import ABSENT, Model
 from tests.extremes.scenes import LONG
 from tests.probing import Prober, materials
 from tests.rendering import document, picture, render

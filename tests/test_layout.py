@@ -5,9 +5,11 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import Renderer, glsl, layout
+from gpu import Renderer, bindings, glsl, layout
+from gpu.bindings import COUNTED
 from gpu.features import COUNTS, FEW, FLAGS, defines
-from gpu.layout import BUFFERS, COUNTED, LayoutError, Record, f32, vec3
+from gpu.layout import BUFFERS
+from gpu.record import LayoutError, Record, f32, vec3
 from gpu.texels import rows
 
 
@@ -42,7 +44,7 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
     data = rows(gpu._context, words, 4, "u4") if slot is None else gpu._context.buffer(words.tobytes())
     echo = gpu._context.buffer(reserve=4 * count * out_words)
     if slot is None:
-        data.use(layout.INSTANCES_TEXTURE)
+        data.use(bindings.INSTANCES_TEXTURE)
     elif block:
         data.bind_to_uniform_block(COUNTED[name])
     else:
@@ -73,7 +75,7 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
         "void main() {\n    if (gl_GlobalInvocationID.x > 0u) return;\n" + "\n".join(lines) + "\n}\n"
     )
     data, echo = gpu._context.buffer(words.tobytes()), gpu._context.buffer(reserve=4 * len(expected))
-    data.bind_to_uniform_block(layout.FRAME_BLOCK)
+    data.bind_to_uniform_block(bindings.FRAME_BLOCK)
     echo.bind_to_storage_buffer(15)
     kernel.run(1)
     assert np.frombuffer(echo.read(), np.uint32).tolist() == [int(x) for x in expected]

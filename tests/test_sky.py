@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from gpu import ESTIMATORS, Renderer, distribution, sky
-from gpu.layout import Frame, LightKind, Slot
+from gpu.bindings import Slot
+from gpu.layout import Frame, LightKind
 from service.pack import pack
 from service.pack.cache import PackCache
 from service.problems import InvalidDocument

@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, features, layout
+from gpu import Renderer, RenderSettings, features, layout, texturing
+from gpu.bindings import Slot
 from gpu.kernels import Kernels
-from gpu.layout import Slot
 from gpu.program import SHADERS, Source
 from service.pack import pack, pack_materials, repacked
 from service.problems import InvalidDocument
@@ -310,7 +310,7 @@ def test_members_share_a_look_where_they_can() -> None:
                      textures={"c": {"asset": "rgb"}, "t": {"asset": "rgba"}})  # fmt: skip
     slots = pack(parse_scene(scene), Images(**IMAGES)).arrays.textures.slots
     assert slots == {"base_color": 0, "roughness": 1, "metallic": 1}
-    assert set(layout.TEXTURABLE) <= set(layout.Material.members)
+    assert set(texturing.TEXTURABLE) <= set(layout.Material.members)
 
 
 def preprocessed(entry: str, defines: dict[str, object]) -> str:

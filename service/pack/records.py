@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu import layout
+from gpu.record import Record
 from service.pack.placed import Placed, Solids
 
 VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin, and over the smallest shape
@@ -79,7 +80,7 @@ def _solids(solids: Solids, origin: np.ndarray, cube: np.ndarray | None) -> tupl
     return records, (center - reach, center + reach)
 
 
-def _records(record: type[layout.Record], used: Sequence[tuple[int, int]]) -> np.ndarray:
+def _records(record: type[Record], used: Sequence[tuple[int, int]]) -> np.ndarray:
     records = np.zeros(len(used), record.dtype)
     if used:
         records["material"], records["shape"] = np.array(used, np.uint32).T

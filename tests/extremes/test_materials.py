@@ -8,8 +8,9 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from gpu.bindings import Slot
 from gpu.features import EDITED
-from gpu.layout import Model, Slot
+from gpu.layout import Model
 from tests import baseline, disney
 from tests.probing import Prober, materials
 
