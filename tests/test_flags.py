@@ -108,16 +108,20 @@ def test_the_scene_raises_it_and_the_plain_one_does_not(name: str) -> None:
     assert f"HAS_{name}" in flags(_packed(name).arrays) - plain
 
 
+def _render(gpu: Renderer, name: str, **how: Any) -> np.ndarray:
+    loaded = gpu.load(_packed(name).arrays, **how)
+    assert loaded.flags >= how.get("raised", frozenset())
+    made = gpu.picture(loaded, RenderSettings(48, 32, 3, roulette_depth=99))
+    made.trace(60.0, 8)
+    image = made.read()
+    made.release()
+    loaded.release()
+    return image
+
+
 @pytest.mark.parametrize("name", SCENES if LONG else ["CLEARCOAT"])
 def test_the_kernel_with_everything_shows_the_same(gpu: Renderer, name: str) -> None:
-    images = []
-    for everything in (False, True):
-        loaded = gpu.load(_packed(name).arrays, everything=everything)
-        made = gpu.picture(loaded, RenderSettings(48, 32, 3, roulette_depth=99))
-        made.trace(60.0, 8)
-        images.append(made.read())
-        made.release()
-        loaded.release()
+    images = [_render(gpu, name, everything=everything) for everything in (False, True)]
     # A rounding may turn a path at an edge: all but a few pixels agree to rounding, and their mean does.
     assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)
@@ -128,15 +132,8 @@ def test_the_kernel_with_everything_shows_the_same(gpu: Renderer, name: str) -> 
 )
 def test_a_flag_more_shows_the_same(gpu: Renderer, name: str, more: list[str]) -> None:
     """Glass elsewhere does not change how opaque surfaces are sampled; corners without colours are white."""
-    images = []
-    for raised in (frozenset[str](), frozenset(f"HAS_{flag}" for flag in more)):
-        loaded = gpu.load(_packed(name).arrays, editing=True, raised=raised)
-        assert loaded.flags >= raised
-        made = gpu.picture(loaded, RenderSettings(48, 32, 3, roulette_depth=99))
-        made.trace(60.0, 8)
-        images.append(made.read())
-        made.release()
-        loaded.release()
+    added = frozenset(f"HAS_{flag}" for flag in more)
+    images = [_render(gpu, name, editing=True, raised=raised) for raised in (frozenset[str](), added)]
     assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
 
 
