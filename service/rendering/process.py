@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from service.rendering import link, pulse
+from service.rendering.spell import Spell
 
 ROOT = Path(__file__).parents[2]
 TURNS = 10  # a piece of work may take so many times as long as the last one, and the patience on top
@@ -51,6 +52,7 @@ class Process:
         finally:
             theirs.close()
             os.close(self.pulse.descriptor)
+        self.pulse.begin(self._process.pid)
         self.link = link.Link(ours, received, lost)
 
     @property
@@ -81,6 +83,8 @@ class Process:
         self.pulse.close()
         if self._condemned is not None:
             return self._condemned
+        if code is None:  # its end of the link was closed, and it stayed
+            return "hung"
         if code not in KILLS:
             return "crashed"
         # The kernel kills too, where memory has run out; its counter is the machine's, and the best there is.
@@ -88,23 +92,30 @@ class Process:
 
 
 class _Watched(pulse.Pulse):
-    """A pulse with the time since it last beat, by the clock of whoever looks."""
+    """A pulse with the time since it last beat, as much of it as its process had."""
 
     def __init__(self) -> None:
         self.descriptor = pulse.memory()
         super().__init__(self.descriptor)
-        self._beats, self._since = -1, time.monotonic()
+        self._beats, self._pid = 0, 0
+        self._silence: Spell | None = None
+
+    def begin(self, pid: int) -> None:
+        self._pid = pid
+        self._silence = Spell(pid)
 
     def excuse(self) -> None:
-        self._beats = -1
+        self._silence = None
 
     def silent_s(self, sent: int) -> float:
         """Seconds without a beat while it owes something: work in hand, or messages not taken."""
         self.read()
-        now = time.monotonic()
         if self.beats != self._beats or (self.task == 0 and self.taken >= sent):
-            self._beats, self._since = self.beats, now
-        return now - self._since
+            self._beats, self._silence = self.beats, None
+            return 0.0
+        if self._silence is None:
+            self._silence = Spell(self._pid)
+        return self._silence.had_s
 
 
 def _spawn(end: socket.socket, pulse_descriptor: int, options: Options) -> subprocess.Popen[bytes]:
@@ -125,12 +136,14 @@ def _spawn(end: socket.socket, pulse_descriptor: int, options: Options) -> subpr
     )
 
 
-def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int:
+def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | None:
+    """Its exit code; None where it had to be killed."""
     try:
         return process.wait(patience_s)
     except subprocess.TimeoutExpired:
         process.kill()
-        return process.wait()
+        process.wait()
+        return None
 
 
 def _is_stopped(pid: int) -> bool:

@@ -1,0 +1,48 @@
+"""How much of the time that passed a process had: what it waited for a processor is not held against it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Mapping
+from contextlib import suppress
+from pathlib import Path
+
+# Of the time by the clock that counts in any case, or a renderer that spins on a busy machine would never be noticed.
+# Ten steps of niceness below a dozen busy programs, a process gets a fiftieth of a processor.
+LEAST = 0.05
+
+Ran = Mapping[int, tuple[int, int]]  # by thread: ns on a processor, ns ready for one and waiting
+
+
+class Spell:
+    """From now on."""
+
+    def __init__(self, pid: int) -> None:
+        self._pid = pid
+        self._began, self._ran = time.monotonic(), ran(pid)
+
+    @property
+    def had_s(self) -> float:
+        return had_s(time.monotonic() - self._began, self._ran, ran(self._pid))
+
+
+def had_s(passed_s: float, before: Ran, after: Ran) -> float:
+    """Of `passed_s` what was the process's own: all of it where it slept, was stopped or ran undisturbed."""
+    both = before.keys() & after.keys()
+    ran_s = sum(after[thread][0] - before[thread][0] for thread in both) / 1e9
+    waited_s = sum(after[thread][1] - before[thread][1] for thread in both) / 1e9
+    # Threads mostly wait for each other, so that the sum of their waiting is what the process lost; where they only
+    # are more than there are processors, the part of them that runs is the better figure.
+    share = ran_s / (ran_s + waited_s) if waited_s > 0 else 1.0
+    return max(passed_s - waited_s, passed_s * share, passed_s * LEAST)
+
+
+def ran(pid: int) -> Ran:
+    """Nothing where the system does not say; then all time that passes counts."""
+    found: dict[int, tuple[int, int]] = {}
+    with suppress(OSError, ValueError):
+        for thread in Path(f"/proc/{pid}/task").iterdir():
+            with suppress(OSError):  # it has just ended
+                on, waited, _ = (thread / "schedstat").read_text().split()
+                found[int(thread.name)] = int(on), int(waited)
+    return found
