@@ -138,6 +138,13 @@ class Appraise:
 
 
 @dataclass(frozen=True)
+class Settle:
+    """What was told of a task is to be made true before what follows, which may be too much and fall back to it."""
+
+    task: int
+
+
+@dataclass(frozen=True)
 class Restore:
     """The picture of a task whose scene was just sent again, as it was when Done or Checkpoint brought it."""
 
@@ -289,7 +296,7 @@ class Failed:
     fallback: int | None = None
 
 
-ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Restore | Appraise
+ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Settle | Restore | Appraise
 FromRenderer = (
     Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Checkpoint | Done | Appraised | Evicted | Failed
 )

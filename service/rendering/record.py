@@ -21,6 +21,7 @@ from service.rendering.messages import (
     Read,
     Restore,
     Resume,
+    Settle,
     Stop,
     StopRule,
     ToRenderer,
@@ -100,7 +101,9 @@ class Record:
     def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
         """What to tell a new renderer, in order; the encoded ones are whoever's sends them. `kept`: encoded."""
         out: list[Encoded | ToRenderer] = []
-        for state in self._states:
+        for number, state in enumerate(self._states):
+            if number:  # joined with the one before, that would be lost with it
+                out.append(Settle(self._task))
             out.append(link.another(state.scene))
             if state.since is not None:
                 out.append(state.since)

@@ -21,6 +21,7 @@ from service.rendering.messages import (
     Read,
     Restore,
     Resume,
+    Settle,
     Stop,
     ToRenderer,
     Update,
@@ -152,6 +153,8 @@ class Loop:
             task.look(message)
         elif isinstance(message, Read):
             self._work(task, lambda: task.read(message), message)
+        elif isinstance(message, Settle):
+            self._work(task, task.settle)
         elif isinstance(message, Restore):
             self._work(task, lambda: task.restore(message))
         elif isinstance(message, Appraise):

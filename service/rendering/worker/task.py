@@ -251,9 +251,13 @@ class Task:
         else:
             self._held.put_aside()
 
-    def restore(self, restore: Restore) -> None:
+    def settle(self) -> None:
+        """Applies what waits to be, for what comes next to fall back to."""
         if self._pending is not None:
             self._apply(self._pending)
+
+    def restore(self, restore: Restore) -> None:
+        self.settle()
         if self._held.holding is None:
             return
         course = self._course
