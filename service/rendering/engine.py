@@ -36,10 +36,10 @@ from service.rendering.record import Record
 from service.rendering.statistics import Kind, Statistics
 
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
-BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start
-SHOTS = 10  # killed before it could render, so many times as often, it is given up all the same
-LAST_WORDS_S = 1.0  # for a renderer whose end of the link is closed to be gone: then its exit code tells why
+BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start, ever
+LAST_WORDS_S = 5.0  # for a renderer whose end of the link is closed to be gone: then its exit code tells why
 BETWEEN_TRIES_S = 0.5
+SIEGE_S = 5.0  # ... at most, between renderers that others kill as soon as they begin
 HOPELESS_S = 15.0  # ... between those that come then, and find nobody waiting
 STRIKES = 3  # renderers that a task may bring down
 FORGIVEN_S = 5.0  # of life with that task, after which an earlier loss was not its fault
@@ -81,7 +81,7 @@ class Engine:
         self._ready: asyncio.Future[dict[str, Any]] | None = None
         self._process: Process | None = None
         self._lost_at: float | None = None
-        self._failures = 0.0
+        self._failures = self._shots = 0  # in a row, to start; through others
         self._detail = "The renderer has not been started."
         self._chores: set[asyncio.Task[None]] = set()
         self._closed = False
@@ -244,7 +244,7 @@ class Engine:
     def _is_ready(self, message: Ready) -> None:
         assert self._process is not None
         self._process.ready = True
-        self._failures = 0
+        self._failures = self._shots = 0
         seconds = time.monotonic() - self._process.began
         log.info("renderer ready renderer=%s seconds=%.2f", message.info.get("renderer"), seconds)
         if self._ready is not None and not self._ready.done():
@@ -293,10 +293,12 @@ class Engine:
 
     async def _replace(self, process: Process) -> None:
         cause = await process.end(LAST_WORDS_S)
-        by_others = cause in BY_OTHERS and not process.unable  # which, dying slowly, was given the last blow
-        self._failures = 0 if process.ready else self._failures + (1 / SHOTS if by_others else 1)
+        if not process.ready:
+            by_others = cause in BY_OTHERS and not process.unable  # which, dying slowly, was given the last blow
+            self._failures += not by_others
+            self._shots += by_others
         self.statistics.restarts[cause] += 1
-        log.error("renderer lost cause=%s lived_s=%.1f failures=%.1f", cause, process.lived_s, self._failures)
+        log.error("renderer lost cause=%s lived_s=%.1f failures=%d", cause, process.lived_s, self._failures)
         self._blame(process, cause)
         if self.hopeless:
             self._fail_all(self._detail)
@@ -306,8 +308,13 @@ class Engine:
             await asyncio.sleep(HOPELESS_S)
             self._ready = asyncio.get_running_loop().create_future()
         else:
-            await asyncio.sleep(BETWEEN_TRIES_S * self._failures)
+            await asyncio.sleep(self._pause_s(process.lived_s))
         self._begin()
+
+    def _pause_s(self, lived_s: float) -> float:
+        """Before the next try; what was killed after a while need not wait for that."""
+        siege_s = min(BETWEEN_TRIES_S * self._shots, SIEGE_S) - lived_s
+        return max(BETWEEN_TRIES_S * self._failures, siege_s, 0.0)
 
     def _blame(self, process: Process, cause: Cause) -> None:
         """Three strikes against the task that was worked on, where nobody from outside ended the renderer."""

@@ -1,0 +1,145 @@
+"""Renderers that are killed at the worst moments: whoever has work there gets it done all the same, only later."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from pathlib import Path
+
+import pytest
+
+from gpu import Renderer
+from service.rendering import engine as engines
+from service.rendering.engine import Engine
+from service.rendering.messages import Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
+from service.rendering.process import Options
+from tests.engines import with_engine
+from tests.test_compiling import arrays_of
+from tests.test_worker import LINEAR, Ears, settings
+
+
+async def replaced(engine: Engine, number: int = signal.SIGKILL) -> None:
+    """Returns when another renderer has been begun in the place of this one."""
+    while (pid := engine.process_id) is None:
+        await asyncio.sleep(0.001)
+    os.kill(pid, number)
+    while engine.process_id in (pid, None):
+        await asyncio.sleep(0.001)
+
+
+async def opened(engine: Engine, ears: Ears, samples: int = 1 << 24) -> int:
+    task = engine.open(ears)
+    size = settings(64)
+    await engine.send_scene(Update(task, 1, arrays_of("plain"), size, StopRule(samples), interactive=True))
+    return task
+
+
+def niceness(pid: int | None) -> set[int]:
+    threads = Path(f"/proc/{pid}/task").iterdir()
+    return {int((thread / "stat").read_text().rsplit(")", 1)[1].split()[16]) for thread in threads}
+
+
+def test_who_kills_it_before_it_can_start_never_wins(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four times the three that may fail by themselves, and more than were once allowed."""
+    monkeypatch.setattr(engines, "SIEGE_S", 0.0)
+
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = await opened(engine, ears)
+        await ears.next(Loaded)
+        for _ in range(35):
+            await replaced(engine)
+        assert not engine.hopeless and engine.statistics.restarts["killed"] == 35
+        engine.send(Want(task, 1, View()))
+        assert (await ears.next(Frame)).serial == 1
+
+    with_engine(test)
+
+
+def test_renderers_that_are_killed_at_once_are_not_begun_all_the_time(gpu: Renderer) -> None:
+    engine = Engine()
+    engine._shots = 3
+    assert engine._pause_s(0.1) == pytest.approx(1.4) and engine._pause_s(2.0) == 0.0
+    engine._shots = 1000
+    assert engine._pause_s(0.0) == engines.SIEGE_S and engine._pause_s(8.0) == 0.0
+
+
+def test_what_was_asked_while_there_was_none_is_answered(gpu: Renderer) -> None:
+    """A want, an edit and a reading fall into the gap, and the renderer after that is killed as it loads."""
+
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = await opened(engine, ears)
+        engine.send(Want(task, 1, View()))
+        first = await ears.next(Frame)
+        assert engine.process_id is not None
+        os.kill(engine.process_id, signal.SIGKILL)
+        engine.send(Want(task, 2, View()))  # nobody takes it any more
+        while engine.process_id is not None:
+            await asyncio.sleep(0)
+        engine.send(Update(task, 2, camera=arrays_of("plain").camera, base=1))
+        engine.send(Want(task, 3, View(), anyway=True))
+        engine.send(Read(task, 1, LINEAR))
+        await ears.next(str)
+        await replaced(engine)
+        answers = [await ears.next(Frame | Image) for _ in range(2)]  # whichever comes first
+        assert {type(each): each.serial for each in answers} == {Frame: 3, Image: 1}
+        assert first.generation == 1 and all(each.generation == 2 for each in answers if isinstance(each, Frame))
+
+    with_engine(test)
+
+
+def test_killed_between_a_frame_and_the_next_want(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = await opened(engine, ears)
+        for serial in range(1, 5):
+            engine.send(Want(task, serial, View()))
+            assert (await ears.next(Frame)).serial == serial
+            await replaced(engine)
+
+    with_engine(test)
+
+
+def test_too_large_an_edit_that_meets_a_kill_falls_back_all_the_same(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = await opened(engine, ears)
+        await ears.next(Loaded)
+        assert engine.process_id is not None
+        os.kill(engine.process_id, signal.SIGKILL)
+        engine.send(Update(task, 2, settings=settings(6000), base=1))
+        failed = await ears.next(Failed)
+        assert (failed.generation, failed.refused, failed.fallback) == (2, True, 1)
+        engine.send(Want(task, 1, View(), anyway=True))
+        assert (await ears.next(Frame)).generation == 1
+
+    with_engine(test, memory=64 << 20)
+
+
+def test_a_renderer_that_makes_a_mistake_is_not_one_that_was_killed(gpu: Renderer) -> None:
+    """However busy the machine: it ends at once, and with a code of its own."""
+
+    async def test(engine: Engine) -> None:
+        pid = engine.process_id
+        assert engine._process is not None
+        engine._process.link.send("no message")
+        while engine.process_id in (pid, None):
+            await asyncio.sleep(0.001)
+        assert dict(engine.statistics.restarts) == {"crashed": 1}
+
+    with_engine(test)
+
+
+def test_it_starts_as_fast_as_others_and_steps_back_then(gpu: Renderer) -> None:
+    async def test() -> None:
+        engine = Engine(Options())
+        engine.start()
+        own = os.getpriority(os.PRIO_PROCESS, 0)
+        assert niceness(engine.process_id) == {own}
+        await engine.ready(60)
+        assert min(niceness(engine.process_id)) >= min(own + 10, 19)
+        await engine.close()
+
+    asyncio.run(test())
