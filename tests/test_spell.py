@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from service.rendering import spell
+from service import spell
 from service.rendering.process import Options, Process
-from service.rendering.spell import LEAST, Spell, had_s, ran
+from service.spell import LEAST, Spell, had_s, ran
 
 SECOND = 10**9
 

@@ -16,7 +16,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from service.rendering import link, pulse
-from service.rendering.spell import Spell
+from service.spell import Spell
 
 ROOT = Path(__file__).parents[2]
 TURNS = 10  # a piece of work may take so many times as long as the last one, and the patience on top
