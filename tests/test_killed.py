@@ -10,9 +10,10 @@ from pathlib import Path
 import pytest
 
 from gpu import Renderer
+from service.problems import Unavailable
 from service.rendering import engine as engines
 from service.rendering.engine import Engine
-from service.rendering.messages import Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
+from service.rendering.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.rendering.process import Options
 from tests.engines import with_engine
 from tests.test_compiling import arrays_of
@@ -128,6 +129,24 @@ def test_a_renderer_that_makes_a_mistake_is_not_one_that_was_killed(gpu: Rendere
         while engine.process_id in (pid, None):
             await asyncio.sleep(0.001)
         assert dict(engine.statistics.restarts) == {"crashed": 1}
+
+    with_engine(test)
+
+
+def test_work_is_taken_while_it_is_replaced(gpu: Renderer) -> None:
+    async def test(engine: Engine) -> None:
+        assert engine.process_id is not None
+        os.kill(engine.process_id, signal.SIGKILL)
+        while engine.info is not None:
+            await asyncio.sleep(0)
+        with pytest.raises(Unavailable):
+            await engine.ready(0)
+        await engine.able(0)
+        ears = Ears()
+        await opened(engine, ears, samples=4)
+        assert (await ears.next(Done)).progress.samples == 4
+        with pytest.raises(Unavailable):
+            await Engine().able(0)
 
     with_engine(test)
 

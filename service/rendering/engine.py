@@ -82,6 +82,7 @@ class Engine:
         self._process: Process | None = None
         self._lost_at: float | None = None
         self._failures = self._shots = 0  # in a row, to start; through others
+        self._rendered = False  # there was one
         self._detail = "The renderer has not been started."
         self._chores: set[asyncio.Task[None]] = set()
         self._closed = False
@@ -124,6 +125,14 @@ class Engine:
             return await asyncio.wait_for(asyncio.shield(self._ready), timeout_s)
         except TimeoutError:
             raise Unavailable("The renderer is starting.") from None
+
+    async def able(self, timeout_s: float) -> None:
+        """Returns when something renders, or did and is being replaced: work can be taken, which then waits a little.
+
+        Raises Unavailable.
+        """
+        if not self._rendered or self._closed or self.hopeless:
+            await self.ready(timeout_s)
 
     def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
         """The number of a new task, whose messages `listener` hears until `drop`. Raises Unavailable.
@@ -243,7 +252,7 @@ class Engine:
 
     def _is_ready(self, message: Ready) -> None:
         assert self._process is not None
-        self._process.ready = True
+        self._process.ready = self._rendered = True
         self._failures = self._shots = 0
         seconds = time.monotonic() - self._process.began
         log.info("renderer ready renderer=%s seconds=%.2f", message.info.get("renderer"), seconds)

@@ -156,7 +156,7 @@ async def _job(request: Request) -> Job:
     own: House = house(request)
     body = await json_body(request)
     own.renders.admit(owner(request))
-    await own.engine.ready(STARTING_S)
+    await own.engine.able(STARTING_S)
     order = await packing(partial(own.reader.request, body))
     setup_s = time.monotonic() - began
     return Job(own.engine, order.packed, order.settings, setup_s, owner(request), order.document)
