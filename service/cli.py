@@ -97,7 +97,7 @@ def _bench(command: argparse.ArgumentParser) -> None:
         default="speed",
         help="speed (default): paths per second, compile times, latencies; "
         "compare: this checkout beside an earlier revision; "
-        "peers: error at equal time beside Mitsuba; "
+        "peers: error at equal time beside Mitsuba and Cycles; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
         "hand: from a slider to other pixels, in a browser; "
         "tradeoff: the price list, what every knob that buys speed costs in error",
@@ -110,7 +110,8 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")
     add("--revision", default="HEAD", metavar="REV", help="compare: with this one (default: HEAD)")
     add("--mesh", metavar="FILE", help="measure this mesh instead of the generated one")
-    add("--mitsuba", metavar="PYTHON", help="peers: an interpreter that can import mitsuba")
+    add("--mitsuba", metavar="PYTHON", help="peers: beside Mitsuba; an interpreter that can import mitsuba")
+    add("--cycles", metavar="PYTHON", help="peers: beside Cycles; an interpreter that can import bpy")
     add("--environment", metavar="FILE", help="light the scenes with this HDR image instead of the generated one")
 
 

@@ -1,11 +1,14 @@
-"""The comparison with another renderer compares like with like: same camera, same places, same light."""
+"""The comparison with other renderers compares like with like: same camera, same places, same light."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 import pytest
 
-from service.bench import peer_scenes, peers
+from service import cli
+from service.bench import peer_blender, peer_scenes, peers
 from service.pack import pack
 from service.scene import parse_scene
 
@@ -25,6 +28,70 @@ def test_a_parallelogram_stands_where_ours_does() -> None:
     corners = [matrix @ [x, y, 0, 1] for x, y in ((-1, -1), (1, -1), (-1, 1))]
     assert np.allclose([c[:3] for c in corners], [[1, 2, 3], [3, 2, 3], [1, 2, -1]])
     assert np.allclose(matrix[:3, 2], [0, 1, 0])  # the outward side is the one that shines
+
+
+@pytest.mark.parametrize("case", peer_scenes.cases(), ids=lambda case: case.name)
+def test_every_scene_is_described_in_triangles(case: peer_scenes.PeerCase) -> None:
+    scene, arrays = peer_blender.for_cycles(case, 64)
+    assert scene["shapes"] == [shape["material"] for shape in case.scene["shapes"]]
+    assert set(scene["shapes"]) <= set(scene["materials"])
+    assert scene["bounces"] == case.max_bounces - 1  # the first scattering is no bounce of theirs
+    assert ("environment" in case.scene) == ("environment" in arrays)
+    for i, shape in enumerate(case.scene["shapes"]):
+        assert (f"normals{i}" in arrays) == (shape["type"] in ("sphere", "mesh"))
+        assert arrays[f"faces{i}"].max() < len(arrays[f"vertices{i}"])
+
+
+def test_triangles_face_outward_and_fill_what_they_stand_for() -> None:
+    glass, box = (peer_blender.for_cycles(peer_scenes.cases()[i], 64)[1] for i in (4, 2))
+    assert len(glass["faces0"]) == 64_000
+    assert _volume(glass, 0) == pytest.approx(4 / 3 * np.pi, rel=5e-4)
+    outward = np.einsum("ij,ij->i", glass["normals0"], glass["vertices0"] - [0, 0, 1])
+    assert outward == pytest.approx(1, abs=1e-6)
+    assert _volume(box, 6) == pytest.approx(0.594 * 0.594 * 0.595, rel=1e-5)
+    lamp = box["vertices5"][box["faces5"]]
+    across = np.cross(lamp[:, 1] - lamp[:, 0], lamp[:, 2] - lamp[:, 0])
+    assert across.sum(axis=0) / 2 == pytest.approx([0, 0, -0.47 * 0.38], abs=1e-6)  # it shines downward
+    assert np.allclose(lamp[..., 2], 1.995)
+
+
+def _volume(arrays: dict[str, np.ndarray], i: int) -> float:
+    corners = arrays[f"vertices{i}"][arrays[f"faces{i}"]].astype(np.float64)
+    return float(np.linalg.det(corners).sum() / 6)
+
+
+def test_the_sky_stands_as_ours_in_their_axes() -> None:
+    ours = np.random.default_rng(5).normal(size=(50, 3))
+    x, y, z = peer_blender.BLENDER_FROM_OURS @ ours.T
+    theirs = 0.5 - np.arctan2(y, x) / (2 * np.pi)  # their equirectangular mapping, whose up is Z
+    assert theirs == pytest.approx(0.5 + np.arctan2(ours[:, 0], -ours[:, 2]) / (2 * np.pi))
+    assert z == pytest.approx(ours[:, 1])
+
+
+def test_their_camera_looks_from_where_ours_does() -> None:
+    document = {"position": [1, 2, 3], "target": [1, 2, 1], "vfov": 90}
+    camera = peer_blender._camera(document)
+    seen = [[1, 2, 1], [2, 2, 1], [1, 3, 1]]  # ahead, to the right, above
+    world = np.c_[np.array(seen) @ peer_blender.BLENDER_FROM_OURS.T, np.ones(3)]
+    local = world @ np.linalg.inv(camera["matrix"]).T
+    assert np.allclose(local[:, :3], [[0, 0, -2], [1, 0, -2], [0, 1, -2]])
+    assert camera["vfov"] == pytest.approx(np.pi / 2)
+
+
+def test_the_table_has_a_line_for_each_renderer_that_ran() -> None:
+    def side(speed: float, error: float) -> dict[str, Any]:
+        return {"mpaths_per_s": speed, "samples": [4, 40], "rel_mse": [error, error / 10], "brightness": 0.5}
+
+    row: dict[str, Any] = {"name": "box", "sunbox": side(6, 1e-3), "cycles": side(2, 4e-3)}
+    row["ratios"] = {"cycles": peers._ratios(row["sunbox"], row["cycles"])}
+    _, ours, theirs = peers.table([row]).splitlines()
+    assert ours.split() == ["box", "Sunbox", "6.00", "4", "40", "1.0e-03", "1.0e-04"]
+    assert theirs.split() == ["Cycles", "2.00", "3.00", "4", "40", "4.0e-03", "0.25", "4.0e-04", "0.25", "1.0000"]
+
+
+def test_a_renderer_to_stand_beside_has_to_be_named(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench", "peers"]) == 2
+    assert "--cycles PYTHON" in capsys.readouterr().err
 
 
 def test_error_is_relative_where_it_is_bright_and_absolute_where_it_is_dark() -> None:

@@ -1,8 +1,8 @@
-"""Sunbox beside Mitsuba 3 on the same machine: error after the same seconds, and paths per second.
+"""Sunbox beside Mitsuba 3 and Cycles on the same machine: error after the same seconds, and paths per second.
 
 Each renders scenes of the same geometry, materials and light in a process of its own, in turns. Errors are against
-each renderer's own reference (made by its independent sampler over many more samples), so that no difference of
-models counts as noise: relMSE = mean((x - r)^2 / (r^2 + .01)). Compiling and loading are not counted.
+each renderer's own reference (another seed over many more samples), so that no difference of models counts as noise:
+relMSE = mean((x - r)^2 / (r^2 + .01)). Compiling, loading and the building of trees are not counted.
 """
 
 from __future__ import annotations
@@ -20,17 +20,20 @@ from typing import Any
 
 import numpy as np
 
-from service.bench import machine, peer_scenes
+from service.bench import machine, peer_blender, peer_scenes
 from service.bench.peer_scenes import PeerCase
 
 MOMENTS_S = (1.0, 10.0)
-SCRIPT = Path(__file__).parent / "peer_mitsuba.py"
+HERE = Path(__file__).parent
 VARIANT = "llvm_ad_rgb"
+TRIES = 3  # Cycles is told samples, not seconds: as often may it try to meet a moment
+NAMES = {"sunbox": "Sunbox", "mitsuba": "Mitsuba", "cycles": "Cycles"}
 
 
 @dataclass(frozen=True)
 class Options:
-    python: Path  # an interpreter that has mitsuba
+    mitsuba: Path | None = None  # an interpreter that has mitsuba
+    cycles: Path | None = None  # one that has bpy
     rounds: int = 3
     reference_s: float = 120.0
     size: int = 512
@@ -55,7 +58,11 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
 
 
 def _row(case: PeerCase, options: Options, folder: Path, told: Callable[[str], None]) -> dict[str, Any]:
-    sides = {"sunbox": _sunbox, "mitsuba": _mitsuba}
+    sides = {"sunbox": _sunbox}
+    if options.mitsuba:
+        sides["mitsuba"] = _mitsuba
+    if options.cycles:
+        sides["cycles"] = _cycles
     row: dict[str, Any] = {"name": case.name, "max_bounces": case.max_bounces}
     references: dict[str, np.ndarray] = {}
     courses: dict[str, list[Course]] = {}
@@ -69,12 +76,18 @@ def _row(case: PeerCase, options: Options, folder: Path, told: Callable[[str], N
             courses[name].append(side(case, options, folder, MOMENTS_S, 2 + turn))
     for name in sides:
         row[name] = _summary(courses[name], references[name], options.size)
-    means = [float(reference.mean()) for reference in references.values()]
-    row["brightness_ratio"] = means[0] / means[1]  # both show the same scene when this is near 1
-    row["paths_ratio"] = row["sunbox"]["mpaths_per_s"] / row["mitsuba"]["mpaths_per_s"]
-    ours, theirs = row["sunbox"]["rel_mse"], row["mitsuba"]["rel_mse"]
-    row["error_ratio"] = [a / b for a, b in zip(ours, theirs, strict=True)]
+    peers = [name for name in sides if name != "sunbox"]
+    row["ratios"] = {name: _ratios(row["sunbox"], row[name]) for name in peers}
     return row
+
+
+def _ratios(ours: dict[str, Any], theirs: dict[str, Any]) -> dict[str, Any]:
+    """Ours over theirs. Both show the same scene where that of the brightness is near 1."""
+    return {
+        "paths": ours["mpaths_per_s"] / theirs["mpaths_per_s"],
+        "error": [a / b for a, b in zip(ours["rel_mse"], theirs["rel_mse"], strict=True)],
+        "brightness": ours["brightness"] / theirs["brightness"],
+    }
 
 
 def _summary(courses: list[Course], reference: np.ndarray, size: int) -> dict[str, Any]:
@@ -82,7 +95,9 @@ def _summary(courses: list[Course], reference: np.ndarray, size: int) -> dict[st
     rates = [float(c.samples[-1] / c.seconds[-1]) * size * size / 1e6 for c in courses]
     return {
         "mpaths_per_s": statistics.median(rates),
+        "samples": [float(statistics.median(column)) for column in zip(*(c.samples for c in courses), strict=True)],
         "rel_mse": [statistics.median(column) for column in zip(*errors, strict=True)],
+        "brightness": float(reference.mean(dtype=np.float64)),
     }
 
 
@@ -105,29 +120,41 @@ def _mitsuba(case: PeerCase, options: Options, folder: Path, moments: tuple[floa
     description, arrays = peer_scenes.for_mitsuba(case, options.size)
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # numpy's stub takes no dict of arrays
     job = {"variant": VARIANT, "scene": description, "arrays": str(folder / "arrays.npz"), "moments": moments}
-    return _run([str(options.python), str(SCRIPT)], job, folder)
+    return _run([str(options.mitsuba), str(HERE / "peer_mitsuba.py")], job, folder)
+
+
+def _cycles(case: PeerCase, options: Options, folder: Path, moments: tuple[float, ...], seed: int) -> Course:
+    description, arrays = peer_blender.for_cycles(case, options.size)
+    np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # as above
+    job = {"scene": description, "arrays": str(folder / "arrays.npz"), "moments": moments, "seed": seed}
+    job |= {"threads": len(os.sched_getaffinity(0)), "tries": TRIES if moments == MOMENTS_S else 1}
+    return _run([str(options.cycles), str(HERE / "peer_cycles.py")], job, folder)
 
 
 def _run(command: list[str], job: dict[str, Any], folder: Path) -> Course:
     (folder / "job.json").write_text(json.dumps(job))
-    subprocess.run([*command, folder / "job.json", folder / "out.npz"], check=True, env=os.environ)
+    # Blender tells its progress on the standard output, where only the table belongs.
+    command = [*command, str(folder / "job.json"), str(folder / "out.npz")]
+    subprocess.run(command, check=True, stdout=subprocess.DEVNULL)
     with np.load(folder / "out.npz") as out:
         return Course(out["seconds"], out["samples"], out["pictures"])
 
 
 def table(rows: list[dict[str, Any]]) -> str:
+    """A line for each renderer of each scene; each ratio is Sunbox's figure over that line's."""
     name = max(len(row["name"]) for row in rows)
-    lines = [
-        f"{'':{name}}  Mpaths/s: Sunbox Mitsuba  ratio   relMSE 1 s: Sunbox Mitsuba  ratio"
-        "   10 s: Sunbox  Mitsuba  ratio  light"
-    ]
+    lines = [f"{'':{name}}           Mpaths/s  ratio   spp: 1 s   10 s   relMSE: 1 s  ratio     10 s  ratio   light"]
     for row in rows:
-        ours, theirs = row["sunbox"], row["mitsuba"]
-        lines.append(
-            f"{row['name']:{name}}  {ours['mpaths_per_s']:16.2f} {theirs['mpaths_per_s']:7.2f}"
-            f" {row['paths_ratio']:6.2f}"
-            f"   {ours['rel_mse'][0]:18.2e} {theirs['rel_mse'][0]:7.1e} {row['error_ratio'][0]:6.2f}"
-            f"   {ours['rel_mse'][1]:12.2e} {theirs['rel_mse'][1]:8.1e} {row['error_ratio'][1]:6.2f}"
-            f"  {row['brightness_ratio']:5.3f}"
-        )
-    return "\n".join(lines)
+        for side in ("sunbox", *row["ratios"]):
+            figures, ratios = row[side], row["ratios"].get(side)
+            paths = early = late = light = ""
+            if ratios:
+                paths, light = f"{ratios['paths']:.2f}", f"{ratios['brightness']:.4f}"
+                early, late = (f"{ratio:.2f}" for ratio in ratios["error"])
+            lines.append(
+                f"{row['name'] if side == 'sunbox' else '':{name}}  {NAMES[side]:7}"
+                f"  {figures['mpaths_per_s']:8.2f} {paths:>6}"
+                f"   {figures['samples'][0]:8.0f} {figures['samples'][1]:6.0f}"
+                f"   {figures['rel_mse'][0]:11.1e} {early:>6} {figures['rel_mse'][1]:8.1e} {late:>6}  {light:>6}"
+            )
+    return "\n".join(line.rstrip() for line in lines)

@@ -97,13 +97,15 @@ def _compare(arguments: argparse.Namespace) -> int:
 
 
 def _peers(arguments: argparse.Namespace) -> int:
-    if not arguments.mitsuba:
-        raise BadInput("--mitsuba PYTHON: name an interpreter that can import mitsuba")
+    mitsuba, cycles = (Path(name) if name else None for name in (arguments.mitsuba, arguments.cycles))
+    if not mitsuba and not cycles:
+        text = "name an interpreter that can import mitsuba, or one that can import bpy, or both"
+        raise BadInput(f"--mitsuba PYTHON, --cycles PYTHON: {text}")
     output = _output(arguments.output)
     from service.bench import peers
 
     try:
-        options = peers.Options(Path(arguments.mitsuba), arguments.runs)
+        options = peers.Options(mitsuba, cycles, arguments.runs)
         document = peers.measure(options, lambda what: print(what, file=sys.stderr))
     except (OSError, subprocess.CalledProcessError) as error:
         raise Failed(f"a renderer could not be run: {error}") from None
