@@ -7,6 +7,7 @@ import os
 import signal
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,11 +15,11 @@ import numpy as np
 import pytest
 
 from gpu import Recipe, Renderer, RenderSettings, features
-from gpu.ahead import common
+from gpu.ahead import common, recipe
 from service.pack import pack
 from service.rendering.engine import Engine
 from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
-from service.rendering.worker.compiler import Compiled, Compiler
+from service.rendering.worker.compiler import Compiled, Compiler, records
 from service.rendering.worker.holding import Holding, kernel_of
 from service.scene import parse_scene
 from tests.documents import Shelf
@@ -245,6 +246,8 @@ def test_without_a_cache_nobody_is_asked(
 class Instant:
     """In the place of the helper's process."""
 
+    process_id = None
+
     def __init__(self) -> None:
         self.asked: list[Recipe] = []
         self.answers = 0
@@ -289,3 +292,56 @@ def test_the_renderer_finds_all_of_it(gpu: Renderer, cold: Path, name: str) -> N
     before = files()
     run(RENDERER)
     assert files() == before > 0
+
+
+def test_a_kernel_outlives_the_renderer_that_wanted_it(gpu: Renderer, arrays: Any, cold: Path) -> None:
+    """Else a machine so slow that renderers are killed before a kernel is there would never have it."""
+    wanted = recipe(arrays, RenderSettings(**COLD), features.flags(arrays))
+    record = records() / wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
+
+    async def test(engine: Engine) -> None:
+        late, helper = await compiled_for(engine, arrays)
+        pid = engine.process_id
+        assert pid is not None
+        engine.drop(late)
+        os.kill(pid, signal.SIGKILL)
+        while engine.process_id in (pid, None):
+            await asyncio.sleep(0.01)
+        assert not record.exists()  # it has hardly begun
+        while is_there(helper):  # until it is done
+            await asyncio.sleep(0.02)
+        assert record.exists()
+
+    with_engine(test)
+
+
+def test_a_kernel_under_way_ends_with_the_server(gpu: Renderer, arrays: Any, cold: Path) -> None:
+    left: list[int] = []
+
+    async def test(engine: Engine) -> None:
+        left.append((await compiled_for(engine, arrays))[1])
+
+    with_engine(test)
+    until = time.monotonic() + 30
+    while is_there(left[0]):
+        assert time.monotonic() < until
+        time.sleep(0.02)
+
+
+async def compiled_for(engine: Engine, arrays: Any) -> tuple[int, int]:
+    """A task whose kernel is being compiled while another's picture is traced, and the process that does that."""
+    other = Ears()
+    busy, late = engine.open(other), engine.open(Ears())
+    await engine.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
+    await other.next(busy, Loaded)
+    await engine.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
+    while not (begun := helpers(engine.process_id)):
+        await asyncio.sleep(0.01)
+    return late, begun[0]
+
+
+def is_there(pid: int) -> bool:
+    try:
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+    except OSError:
+        return False

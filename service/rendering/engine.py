@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import itertools
 import logging
+import os
 import time
 from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
@@ -86,10 +87,12 @@ class Engine:
         self._detail = "The renderer has not been started."
         self._chores: set[asyncio.Task[None]] = set()
         self._closed = False
+        self._lifeline: tuple[int, int] | None = None  # a pipe: what outlives a renderer ends with its other end
 
     def start(self) -> None:
         """Starts the renderer's process; it is ready some tenths of a second later."""
         self._ready = asyncio.get_running_loop().create_future()
+        self._lifeline = os.pipe()
         self._begin()
         self._do(self._watch())
 
@@ -102,6 +105,9 @@ class Engine:
         process, self._process = self._process, None
         if process is not None:
             await process.end(FAREWELL_S)
+        for end in self._lifeline or ():
+            os.close(end)
+        self._lifeline = None
 
     @property
     def process_id(self) -> int | None:
@@ -186,7 +192,8 @@ class Engine:
             link.discard(encoded)
 
     def _begin(self) -> None:
-        self._process = process = Process(self._options, self._received, lambda: self._lose(process))
+        lifeline = None if self._lifeline is None else self._lifeline[0]
+        self._process = process = Process(self._options, self._received, lambda: self._lose(process), lifeline)
         for task, held in self._tasks.items():
             self._not_appraised(held, "The renderer was lost meanwhile: ask again.")
             held.resident = held.record.kept is None

@@ -39,7 +39,10 @@ class Options:
 class Process:
     """`received` hears its messages; `lost`, once, that its end of the link is closed."""
 
-    def __init__(self, options: Options, received: Callable[[Any], None], lost: Callable[[], None]) -> None:
+    def __init__(
+        self, options: Options, received: Callable[[Any], None], lost: Callable[[], None], lifeline: int | None = None
+    ) -> None:
+        """`lifeline`: the end of a pipe, whose other end the server holds as long as it lives."""
         self.began = time.monotonic()
         self.ready = False
         self.unable = False  # to render, as it says itself
@@ -48,7 +51,7 @@ class Process:
         self._oom_kills = _oom_kills()
         ours, theirs = link.pair()
         try:
-            self._process = _spawn(theirs, self.pulse.descriptor, options)
+            self._process = _spawn(theirs, self.pulse.descriptor, options, lifeline)
         finally:
             theirs.close()
             os.close(self.pulse.descriptor)
@@ -118,17 +121,20 @@ class _Watched(pulse.Pulse):
         return self._silence.had_s
 
 
-def _spawn(end: socket.socket, pulse_descriptor: int, options: Options) -> subprocess.Popen[bytes]:
+def _spawn(
+    end: socket.socket, pulse_descriptor: int, options: Options, lifeline: int | None
+) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(pulse_descriptor)]
     command += ["--server", str(os.getpid()), "--log-level", str(logging.getLogger().getEffectiveLevel())]
     command += ["--checkpoint", str(options.checkpoint_s)]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]
+    command += [] if lifeline is None else ["--lifeline", str(lifeline)]
     # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.
     # stdout is the command line's, who may be read by a script that waits for its end.
     return subprocess.Popen(
         command,
-        pass_fds=[end.fileno(), pulse_descriptor],
+        pass_fds=[end.fileno(), pulse_descriptor, *([] if lifeline is None else [lifeline])],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

@@ -29,6 +29,7 @@ def main() -> int:
     parser.add_argument("--memory", type=int, help="bytes that may be held on the device")
     parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
     parser.add_argument("--device", type=int)
+    parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
     parser.add_argument("--log-level", type=int, default=logging.WARNING)
     parser.add_argument("--server", type=int, required=True, help="its process id")
     arguments = parser.parse_args()
@@ -64,7 +65,8 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
     limit = arguments.memory or default_limit(bool(renderer.info["software"]))
-    Loop(end, renderer, Pulse(arguments.pulse), limit, arguments.device, arguments.checkpoint).run()
+    pulse, lifeline = Pulse(arguments.pulse), arguments.lifeline
+    Loop(end, renderer, pulse, limit, arguments.device, arguments.checkpoint, lifeline).run()
     return 0
 
 

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.rendering import link
 from service.rendering.worker.helper import Helper
+from service.spell import Spell
 
 if TYPE_CHECKING:
     from gpu import Recipe
@@ -49,21 +50,29 @@ class Compiler:
     """Its process starts with the first order and ends when idle for a while."""
 
     def __init__(
-        self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool], spare: bool = False
+        self,
+        info: dict[str, Any],
+        device: int | None,
+        crowded: Callable[[], bool],
+        spare: bool = False,
+        lifeline: int | None = None,
     ) -> None:
         """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop; `spare`: in time
-        that nobody else wants, however long that takes."""
+        that nobody else wants, however long that takes; `lifeline`: its process ends with the server, and when the
+        renderer is killed goes on with what it compiles, for the next one."""
         self._driver = f"{info['renderer']} {info['version']}"
         self._crowded = crowded
-        given = [] if device is None else ["--device", str(device)]
-        self._helper = Helper("service.rendering.worker.compiling", *given, *(["--spare"] if spare else []))
+        given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
+        given += ["--spare"] if spare else []
+        self._helper = Helper("service.rendering.worker.compiling", *given, lifeline=lifeline)
         self._limit_s = SPARE_LIMIT_S if spare else LIMIT_S
         self._able = _has_cache()
-        self._records = _records()
+        self._records = records()
         self._known: set[Recipe] = set()  # what needs no helper any more, or was not helped
         self._met: set[Recipe] = set()
         self._orders: list[_Order] = []  # the first is under way
         self._until = 0.0
+        self._spell: Spell | None = None  # of the order under way
         self._failures = 0
 
     @property
@@ -141,7 +150,7 @@ class Compiler:
         try:
             answer: Compiled = self._helper.hear()
         except BlockingIOError:
-            if not self._orders or time.monotonic() < self._until:
+            if not self._orders or time.monotonic() < self._until or self._is_starved():
                 return
             self._ended(f"it took more than {self._limit_s:.0f} s")
         except link.Closed:
@@ -156,6 +165,12 @@ class Compiler:
             self._tell(answer.milliseconds)
         if self._orders:
             self._begin()
+
+    def _is_starved(self) -> bool:
+        """Whether it had no processor for some of its time; that much it gets on top."""
+        left_s = 0.0 if self._spell is None else self._limit_s - self._spell.had_s
+        self._until = time.monotonic() + left_s
+        return left_s > 0
 
     def close(self) -> None:
         self._helper.close()
@@ -179,6 +194,7 @@ class Compiler:
             if self._failures < TRIES:
                 self._helper.ask(self._orders[0].recipe)
                 self._until = time.monotonic() + self._limit_s
+                self._spell = None if self._helper.process_id is None else Spell(self._helper.process_id)
                 return
         except (link.Closed, OSError) as error:  # it can't be started
             log.info("no compiler: %s", error or "it had ended")
@@ -209,7 +225,7 @@ def _prune(records: Path) -> None:
             path.unlink(missing_ok=True)
 
 
-def _records() -> Path:
+def records() -> Path:
     """Where an empty file says of a kernel that it is in the driver's cache: beside that."""
     base = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "sunbox" / "kernels"

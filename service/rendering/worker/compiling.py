@@ -1,21 +1,29 @@
 """The helper process that compiles: `python -m service.rendering.worker.compiling DESCRIPTOR --parent PID`.
 
-A process of its own with its own context: what it compiles the renderer loads from the driver's disk cache.
+A process of its own with its own context: what it compiles the renderer loads from the driver's disk cache. Where the
+renderer is lost, the kernel under way is finished, for the next one: killed every few seconds on a starved machine,
+they would never have it.
 """
 
 from __future__ import annotations
 
 import argparse
+import fcntl
 import os
 import select
 import signal
 import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
 
 from service.rendering import link
-from service.rendering.worker.compiler import Compiled
-from service.rendering.worker.lifeline import end_with
+from service.rendering.worker.compiler import Compiled, records
+from service.rendering.worker.lifeline import end_with, end_with_pipe, hung_up
 
 IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
+LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
 SPARE_IDLE_S = 5.0  # ... where kernels come seldom
 
 
@@ -23,13 +31,15 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m service.rendering.worker.compiling")
     parser.add_argument("descriptor", type=int)
     parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--driver", required=True, help="its name and version, which records go by")
+    parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
     parser.add_argument("--device", type=int)
     parser.add_argument("--spare", action="store_true", help="only while nobody else wants the processor")
     arguments = parser.parse_args()
     if arguments.spare:
         os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    if not end_with(arguments.parent):
+    if not (end_with(arguments.parent) if arguments.lifeline is None else end_with_pipe(arguments.lifeline)):
         return 0
     from gpu.ahead import Ahead
     from gpu.errors import GpuError
@@ -39,13 +49,48 @@ def main() -> int:
             ahead = Ahead(arguments.device)
             while select.select([end], [], [], SPARE_IDLE_S if arguments.spare else IDLE_S)[0]:
                 recipe = link.receive(end, wait=True)
+                record = records() / recipe.digest(arguments.driver)
                 try:
-                    link.send(end, Compiled(*ahead.compile(recipe)))
+                    with _alone(record, end):
+                        compiled = Compiled(0.0, True) if record.exists() else Compiled(*ahead.compile(recipe))
+                        if compiled.cached:
+                            _record(record)
                 except GpuError as error:  # the renderer meets it too, and says it to whom it concerns
-                    link.send(end, Compiled(0.0, True, str(error)))
+                    compiled = Compiled(0.0, True, str(error))
+                link.send(end, compiled)
         except (link.Closed, GpuError):
             pass
     return 0
+
+
+@contextmanager
+def _alone(record: Path, end: socket.socket) -> Iterator[None]:
+    """While nobody else compiles this: one whose renderer was lost may. Raises link.Closed when ours is meanwhile."""
+    path = record.with_suffix(".lock")
+    try:
+        record.parent.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    except OSError:  # nobody can write there: then each compiles for itself
+        yield
+        return
+    try:
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if hung_up(end.fileno()):
+                    raise link.Closed from None
+                time.sleep(LOOK_S)
+        yield
+        path.unlink(missing_ok=True)
+    finally:
+        os.close(lock)
+
+
+def _record(record: Path) -> None:
+    with suppress(OSError):
+        record.touch()
 
 
 if __name__ == "__main__":

@@ -17,8 +17,13 @@ ROOT = Path(__file__).parents[3]
 class Helper:
     """Runs `python -m MODULE DESCRIPTOR --parent PID ARGUMENTS`, which may end by itself when idle."""
 
-    def __init__(self, module: str, *arguments: str) -> None:
+    def __init__(self, module: str, *arguments: str, lifeline: int | None = None) -> None:
+        """With `lifeline`, a pipe of the server's, it may end something that its parent does not see the end of."""
         self._module, self._arguments = module, arguments
+        self._passed: list[int] = []
+        if lifeline is not None:
+            self._passed = [lifeline]
+            self._arguments = *arguments, "--lifeline", str(lifeline)
         self._process: subprocess.Popen[bytes] | None = None
         self._end: socket.socket | None = None
 
@@ -62,7 +67,7 @@ class Helper:
             try:
                 self._process = subprocess.Popen(
                     [*command, *self._arguments],
-                    pass_fds=[theirs.fileno()],
+                    pass_fds=[theirs.fileno(), *self._passed],
                     cwd=ROOT,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,

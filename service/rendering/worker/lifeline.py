@@ -1,9 +1,11 @@
-"""A child that ends when its parent does."""
+"""A child that ends when its parent does, or when the server does."""
 
 from __future__ import annotations
 
 import ctypes
+import fcntl
 import os
+import select
 import signal
 
 PR_SET_PDEATHSIG = 1
@@ -13,3 +15,20 @@ def end_with(parent: int) -> bool:
     """Has the kernel kill this process when the parent dies, however it dies; False when it is dead already."""
     ctypes.CDLL(None).prctl(PR_SET_PDEATHSIG, signal.SIGKILL)
     return os.getppid() == parent
+
+
+def end_with_pipe(descriptor: int) -> bool:
+    """Has the kernel end this process with whoever holds the pipe's other end; False when nobody does."""
+    # Opened anew: one description, which children share, has one owner to signal. SIGIO ends who does not handle it,
+    # in the middle of a driver's compiler too.
+    own = os.open(f"/proc/self/fd/{descriptor}", os.O_RDONLY | os.O_NONBLOCK)
+    fcntl.fcntl(own, fcntl.F_SETOWN, os.getpid())
+    fcntl.fcntl(own, fcntl.F_SETFL, fcntl.fcntl(own, fcntl.F_GETFL) | os.O_ASYNC)
+    return not hung_up(own)
+
+
+def hung_up(end: int) -> bool:
+    """Whether nobody holds the other end any more."""
+    poll = select.poll()
+    poll.register(end, 0)
+    return bool(poll.poll(0))

@@ -50,6 +50,7 @@ class Loop:
         memory_limit: int,
         device: int | None,
         checkpoint_s: float,
+        lifeline: int | None = None,
     ) -> None:
         self._end = end
         self._renderer = renderer
@@ -59,7 +60,7 @@ class Loop:
         self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
         self._denoiser = Denoiser()
-        self._compiler = Compiler(renderer.info, device, self._crowded)
+        self._compiler = Compiler(renderer.info, device, self._crowded, lifeline=lifeline)
         self._spare = Compiler(renderer.info, device, lambda: True, spare=True)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
