@@ -12,7 +12,7 @@ from gpu.bindings import Slot
 from gpu.features import FLAGS
 from gpu.layout import LightKind, LightNode, LightTreeHead
 from gpu.texels import rows
-from tests.probing import Prober
+from tests.probing import prober_of
 
 
 @dataclass
@@ -73,7 +73,7 @@ class Picker:
     """Asks the shaders how the lights of a scene are picked."""
 
     def __init__(self, gpu: Renderer, arrays: SceneArrays) -> None:
-        self._prober, self._lights = Prober(gpu), arrays.lights.copy()
+        self._prober, self._lights = prober_of(gpu), arrays.lights.copy()
         self._lights["index"] = np.arange(len(self._lights))
         self._texture = rows(self._prober.context, arrays.light_tree, 4, "u4")
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Any
 
@@ -31,11 +32,15 @@ def materials(**members: Any) -> np.ndarray:
 
 
 class Prober:
-    """Kernels, buffers and uniforms for probes on the context of a Renderer."""
+    """Kernels, buffers and uniforms for probes on the context of a Renderer; see `prober_of`."""
 
     def __init__(self, renderer: Renderer) -> None:
         self.context = renderer._context
         self._kernels = Kernels(self.context, (PROBES, SHADERS))
+
+    @cached_property
+    def _tables(self) -> dict[int, Any]:
+        return upload_tables(self.context)
 
     def run(
         self,
@@ -63,11 +68,17 @@ class Prober:
         blocks[1].bind_to_uniform_block(bindings.FRAME_BLOCK)
         for name, value in {**uniforms, "count": count}.items():
             kernel[name].value = value
-        tables = upload_tables(self.context) if "HAS_PRINCIPLED" in raised else {}
-        for unit, texture in tables.items():
-            texture.use(unit)
+        if "HAS_PRINCIPLED" in raised:
+            for unit, texture in self._tables.items():
+                texture.use(unit)
         kernel.run(-(-count // 64))
         results = [np.frombuffer(made[slot].read(), np.float32).reshape(count, 4) for slot in outputs]
-        for buffer in (*made.values(), *blocks, *tables.values()):
+        for buffer in (*made.values(), *blocks):
             buffer.release()
         return results
+
+
+@cache
+def prober_of(renderer: Renderer) -> Prober:
+    """The one of that renderer: kernels that are not released stay, and take 7 MB each."""
+    return Prober(renderer)

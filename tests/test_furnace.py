@@ -14,7 +14,7 @@ from gpu.bindings import Slot
 from gpu.features import EDITED
 from gpu.layout import ABSENT, Model
 from tests.extremes.scenes import LONG
-from tests.probing import Prober, materials
+from tests.probing import Prober, materials, prober_of
 from tests.rendering import document, picture, render
 
 FLAGS = frozenset({"HAS_PRINCIPLED", "HAS_TRANSMISSION", "HAS_ATTENUATION", *EDITED["HAS_DISNEY"]})
@@ -32,7 +32,7 @@ NAMES = (*FRACTIONS, *OTHERS)
 
 @pytest.fixture(scope="module")
 def prober(gpu: Renderer) -> Prober:
-    return Prober(gpu)
+    return prober_of(gpu)
 
 
 def _materials(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

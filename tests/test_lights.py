@@ -13,7 +13,7 @@ from gpu.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests import stats
-from tests.probing import Prober
+from tests.probing import prober_of
 from tests.rendering import Images, document, picture, render
 
 FLOOR = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
@@ -244,7 +244,7 @@ def test_flat_lamps_are_sampled_with_their_density(gpu: Renderer, view: str, kin
         corners = [origin.tolist(), (origin + u).tolist(), (origin + v).tolist()]
         shape = {"type": "mesh", "vertices": corners, "faces": [[0, 1, 2]], "smooth": False}
     packed = pack(parse_scene(document([{**shape, "material": "lamp"}], {"lamp": BOTH})), Images()).arrays
-    prober, n, cells, fine = Prober(gpu), 200_000, 16, 16
+    prober, n, cells, fine = prober_of(gpu), 200_000, 16, 16
     flags = frozenset({"HAS_EMISSION", "HAS_EMISSION_BOTH", "HAS_QUAD_LIGHTS", "HAS_TRIANGLE_LIGHTS"})
     records = {Slot.TRIANGLES: packed.triangles} if triangle else {Slot.QUADS: packed.quads}
 

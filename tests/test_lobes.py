@@ -12,7 +12,7 @@ from gpu.bindings import Slot
 from gpu.features import EDITED
 from gpu.layout import Model
 from tests import baseline, disney, stats
-from tests.probing import Prober, materials
+from tests.probing import Prober, materials, prober_of
 
 D, METAL_ROUGH, BLINN_PHONG = Model.DISNEY, Model.METAL_ROUGH, Model.BLINN_PHONG
 ROWS = {
@@ -72,7 +72,7 @@ CASES = [(name, angle) for name in ROWS for angle in ANGLES]
 
 @pytest.fixture(scope="module")
 def prober(gpu: Renderer) -> Prober:
-    return Prober(gpu)
+    return prober_of(gpu)
 
 
 def _wo(angle: float) -> np.ndarray:
@@ -83,17 +83,18 @@ def _wo(angle: float) -> np.ndarray:
 def _ask(
     prober: Prober, row: str, wo: np.ndarray, ask: np.ndarray, sample: int, inside: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    asks = np.zeros((len(ask), 4), np.float32)
-    asks[:, :3] = ask
+    asks = np.zeros((len(ask) + wo.size // 3, 4), np.float32)
+    asks[:, :3] = np.concatenate([ask, wo.reshape(-1, 3)])
     inputs = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row] if row in ROWS else PRINCIPLED[row]}
     flags = FLAGS if row in ROWS else PRINCIPLED_FLAGS
     defines = {"SAMPLE": sample, "INSIDE": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
-    f, wi = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, wo=tuple(wo))
+    f, wi = prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=wo.size // 3 - 1)
     return f.astype(float), wi.astype(float)
 
 
 def _eval(prober: Prober, row: str, wo: np.ndarray, wi: np.ndarray, inside: int = 0) -> np.ndarray:
+    """(n, 4), f and its pdf, of wi (n, 3) and one wo (3,) or as many."""
     return _ask(prober, row, wo, wi, 0, inside)[0]
 
 
@@ -170,7 +171,7 @@ def test_reciprocal(prober: Prober, row: str) -> None:
     for wo in _hemisphere(rng, 6):
         wi = _hemisphere(rng, 64)
         there = _eval(prober, row, wo, wi)[:, :3] / wi[:, 2:]
-        back = np.concatenate([_eval(prober, row, w, wo[None])[:, :3] / wo[2] for w in wi])
+        back = _eval(prober, row, wi, np.broadcast_to(wo, wi.shape))[:, :3] / wo[2]
         np.testing.assert_allclose(there, back, rtol=2e-3, atol=1e-6)
 
 
@@ -227,15 +228,15 @@ def test_principled_is_reciprocal(prober: Prober, row: str, inside: int) -> None
     for wo in _hemisphere(rng, 5):
         wi = _hemisphere(rng, 48)
         there = _eval(prober, row, wo, wi, inside)[:, :3] / wi[:, 2:]
-        back = np.concatenate([_eval(prober, row, w, wo[None], inside)[:, :3] / wo[2] for w in wi])
+        back = _eval(prober, row, wi, np.broadcast_to(wo, wi.shape), inside)[:, :3] / wo[2]
         np.testing.assert_allclose(there, back, rtol=3e-3, atol=1e-6)
         if _clear(row):
             under = wi * [1, 1, -1]
             there = _eval(prober, row, wo, under, inside)[:, :3] / wi[:, 2:] / (1 if inside else eta2)
             # From the other side, whose frame is turned about x: y and z change sign.
             turned, source = under * [1, 1, -1], wo * [1, 1, -1]
-            back = [_eval(prober, row, w, source[None], 1 - inside)[:, :3] / wo[2] for w in turned]
-            back = np.concatenate(back) / (eta2 if inside else 1)
+            back = _eval(prober, row, turned, np.broadcast_to(source, wi.shape), 1 - inside)[:, :3] / wo[2]
+            back = back / (eta2 if inside else 1)
             assert there.max() > 0
             np.testing.assert_allclose(there, back, rtol=3e-3, atol=1e-6)
 

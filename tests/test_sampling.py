@@ -9,14 +9,14 @@ from scipy.stats import qmc
 
 from gpu import FILTERS, Renderer, filters, layout
 from tests import stats
-from tests.probing import Prober
+from tests.probing import Prober, prober_of
 
 N = 1 << 16
 
 
 @pytest.fixture(scope="module")
 def prober(gpu: Renderer) -> Prober:
-    return Prober(gpu)
+    return prober_of(gpu)
 
 
 def _draw(

@@ -11,7 +11,7 @@ from gpu import Renderer, RenderSettings, Scene, layout
 from gpu.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
-from tests.probing import Prober
+from tests.probing import prober_of
 from tests.rendering import Images, document
 
 TURNED = {"translate": [0.3, -0.2, 0.1], "rotate": [20, -35, 50], "scale": [0.5, 1.3, -0.8]}
@@ -82,7 +82,7 @@ def _trace(gpu: Renderer, scene: Scene, o: np.ndarray, d: np.ndarray, away: np.n
     inputs = {Slot.SUM: wide(o), Slot.COMPENSATION: wide(d), Slot.MOMENTS: wide(away)}
     outputs = (Slot.OUTPUT, Slot.ALBEDO, Slot.NORMAL)
     known = scene.defines(RenderSettings(8, 8)) | {"HAS_ANISOTROPIC": 1}
-    return Prober(gpu).run("rays.comp", len(o), inputs, outputs, known, frame=frame)
+    return prober_of(gpu).run("rays.comp", len(o), inputs, outputs, known, frame=frame)
 
 
 def _rays(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:

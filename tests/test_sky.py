@@ -16,7 +16,7 @@ from service.pack.cache import PackCache
 from service.problems import InvalidDocument
 from service.scene import parse_scene
 from tests import stats
-from tests.probing import Prober
+from tests.probing import Prober, prober_of
 from tests.rendering import Images, document, render
 
 FACES = ("px", "nx", "py", "ny", "pz", "nz")
@@ -44,7 +44,7 @@ def packed(environment: dict[str, Any], images: dict[str, np.ndarray] | None = N
 
 @pytest.fixture(scope="module")
 def prober(gpu: Renderer) -> Prober:
-    return Prober(gpu)
+    return prober_of(gpu)
 
 
 class Probe:

@@ -12,7 +12,7 @@ from gpu.bindings import Slot
 from gpu.features import EDITED
 from gpu.layout import Model
 from tests import baseline, disney
-from tests.probing import Prober, materials
+from tests.probing import Prober, materials, prober_of
 
 D, P, G, B = Model.DISNEY, Model.PRINCIPLED, Model.METAL_ROUGH, Model.BLINN_PHONG
 GLASS = {"model": P, "transmission": 1, "base_color": 1}
@@ -56,7 +56,7 @@ CASES = [(row, inside) for row in ROWS for inside in SIDES[row]]
 
 @pytest.fixture(scope="module")
 def prober(gpu: Renderer) -> Prober:
-    return Prober(gpu)
+    return prober_of(gpu)
 
 
 def _at(elevation: float, azimuth: float | np.ndarray) -> np.ndarray:
@@ -66,13 +66,13 @@ def _at(elevation: float, azimuth: float | np.ndarray) -> np.ndarray:
 
 
 def _ask(prober: Prober, row: str, wo: np.ndarray, ask: np.ndarray, sample: int, inside: int) -> list[np.ndarray]:
-    asks = np.zeros((len(ask), 4), np.float32)
-    asks[:, :3] = ask
+    asks = np.zeros((len(ask) + 1, 4), np.float32)
+    asks[:-1, :3], asks[-1, :3] = ask, wo
     principled = ROWS[row]["model"][0] == P
     inputs, defines = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}, {"SAMPLE": sample, "INSIDE": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
     flags = NEW if principled else OLD
-    return prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, wo=tuple(wo.tolist()))
+    return prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=0)
 
 
 @pytest.mark.parametrize(("row", "inside"), CASES)
