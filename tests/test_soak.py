@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import threading
+import time
+
 from service.bench.soak_tally import Tally
 
 
@@ -40,3 +43,10 @@ def test_a_page_that_grows_is_not_good_enough() -> None:
     assert tally.good(growth=1.5, fair=0.95, page_growth=1.3)
     assert not tally.good(growth=1.5, fair=0.95, page_growth=1.2)
     assert "4.0 / 5.0" in tally.table()
+
+
+def test_who_gets_further_is_not_stuck() -> None:
+    tally, began = Tally(), time.monotonic() - 100.0
+    assert tally.still_s(threading.get_ident(), began) >= 100.0
+    tally.advance()
+    assert tally.still_s(threading.get_ident(), began) < 100.0 <= tally.still_s(None, began)

@@ -24,6 +24,7 @@ from service.bench.soak_tally import Tally
 STREAMS, RENDERS = 4, 2
 KILL_EVERY_S = (3.0, 12.0)  # a renderer lives so long
 WATCH_S = 2.0
+STUCK_S = 60.0  # for a client to come to its end after the last kill, or for a render to get any further
 SETTLED_S = 20.0  # after which memory is compared with what it is at the end
 GROWTH = 1.5  # ... times that, and no more
 PAGE_GROWTH = 1.25  # of the page's heap; its undo fills up to its depth in the first minutes
@@ -75,8 +76,10 @@ def _run(server: Server, tally: Tally, seconds: float, chance: random.Random) ->
         time.sleep(min(left, 30.0))
         sys.stderr.write(f"soak: {left / 60:.1f} min left, {tally.kills} kills, {tally.frames} frames\n")
     over.set()
+    ended = time.monotonic()
     for thread in threads:
-        thread.join(60)
+        while thread.is_alive() and tally.still_s(thread.ident, ended) < STUCK_S:
+            thread.join(1.0)
         tally.stuck += thread.is_alive()
 
 

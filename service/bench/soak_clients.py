@@ -115,9 +115,13 @@ def render(server: Server, tally: Tally, over: threading.Event, chance: random.R
             continue
         id = json.loads(body)["id"]
         told: dict[str, Any] = {"state": "queued"}
+        samples = 0
         while told["state"] in ("queued", "running") and status:
             status, body = server.ask("GET", f"/v1/renders/{id}?wait=20")
             told = json.loads(body) if status == 200 else {"state": f"status {status}"}
+            if told.get("samples", 0) > samples:
+                samples = told["samples"]
+                tally.advance()
         if told["state"] != "done" or told["samples"] != wanted:
             tally.lose(f"render {told['state']}")
         elif (status := server.ask("GET", f"/v1/renders/{id}/image?format=exr")[0]) != 200:
@@ -178,7 +182,7 @@ def vanish(server: Server, tally: Tally, over: threading.Event, chance: random.R
 def share_alike(server: Server, tally: Tally) -> float | None:
     """Jain's index of the samples that equal streams get, with nobody else there and nobody killed."""
     document = scene(server, SCENES[0])
-    streams = [Stream(server) for _ in range(EQUALS)]
+    streams: list[Stream] = []
     counts: list[int] = [0] * EQUALS
 
     def look(number: int, stream: Stream, until: float) -> None:
@@ -187,6 +191,8 @@ def share_alike(server: Server, tally: Tally) -> float | None:
                 counts[number] = max(counts[number], stream.hear(0.5).get("samples", 0))
 
     try:
+        for _ in range(EQUALS):
+            streams.append(Stream(server))
         for stream in streams:
             settings = {"width": SIDE, "height": SIDE, "max_samples": 1 << 20}
             stream.move("start", scene=document, settings=settings)
@@ -196,7 +202,7 @@ def share_alike(server: Server, tally: Tally) -> float | None:
             thread.start()
         for thread in threads:
             thread.join()
-    except ConnectionClosed:
+    except (ConnectionClosed, TimeoutError):
         tally.lose("stream closed while sharing")
         return None
     finally:

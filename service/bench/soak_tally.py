@@ -26,6 +26,7 @@ class Tally:
         self.exit_code, self.orphans = 0, 0
         self._killed_at: dict[str, float] = {}
         self._watchers: set[str] = set()
+        self._advanced_at: dict[int | None, float] = {}  # by thread
         self._memory: list[tuple[int, int, int]] = []  # server's, renderer's bytes, descriptors
         self._ended: tuple[int, int, int] = (0, 0, 0)
         self._page: list[tuple[int, int]] = []  # bytes of heap, nodes
@@ -55,6 +56,14 @@ class Tally:
             self._watchers.add(watcher)
             if began_again and watcher in self._killed_at:
                 self.recoveries_s.append(time.monotonic() - self._killed_at.pop(watcher))
+
+    def advance(self) -> None:
+        """What the calling thread waits for has got further."""
+        self._advanced_at[threading.get_ident()] = time.monotonic()
+
+    def still_s(self, thread: int | None, since: float) -> float:
+        """Seconds since what that thread waits for got further, from `since` at the earliest."""
+        return time.monotonic() - max(since, self._advanced_at.get(thread, since))
 
     def moved(self, watcher: str, first_frame_s: float) -> None:
         with self._lock:
