@@ -94,6 +94,12 @@ def test_a_renderer_to_stand_beside_has_to_be_named(capsys: pytest.CaptureFixtur
     assert "--cycles PYTHON" in capsys.readouterr().err
 
 
+def test_an_interpreter_without_the_renderer_is_told_at_once(capsys: pytest.CaptureFixture[str]) -> None:
+    assert cli.main(["bench", "peers", "--cycles", "false"]) == 1
+    said = capsys.readouterr().err
+    assert "import bpy" in said and "reference" not in said
+
+
 def test_error_is_relative_where_it_is_bright_and_absolute_where_it_is_dark() -> None:
     reference = np.array([[[0.0, 10.0, 0.1]]])
     assert peers.rel_mse(reference * 1.1, reference) == pytest.approx((1 / 100.01 + 1e-4 / 0.02) / 3)

@@ -49,7 +49,10 @@ class Course:
 
 
 def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
-    """Machine, and a row for each scene. Raises CalledProcessError where a side fails."""
+    """Machine, and a row for each scene. Raises OSError or CalledProcessError where a side cannot be run."""
+    for python, module in ((options.mitsuba, "mitsuba"), (options.cycles, "bpy")):
+        if python:  # asked before our own reference takes its minutes
+            subprocess.run([python, "-c", f"import {module}"], check=True, stdout=subprocess.DEVNULL)
     rows = []
     with tempfile.TemporaryDirectory(prefix="sunbox-peers-") as folder:
         for case in peer_scenes.cases():
