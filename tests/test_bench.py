@@ -53,6 +53,11 @@ def test_latencies_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.M
     figures = latency.measure()
     assert figures["server_start_warm_ms"] > figures["slider_p50_ms"] > 0
     assert figures["slider_p50_ms"] <= figures["slider_p95_ms"] <= figures["slider_worst_ms"]
+    monkeypatch.setattr(latency, "MOVES", 2)
+    monkeypatch.setattr(latency.presets, "names", lambda kind: [{"name": "cornell-empty"}])
+    room = latency.rooms(lambda line: None)["cornell-empty"]
+    for hand in ("slider", "camera"):
+        assert room[f"{hand}_p95_ms"] >= room[f"{hand}_p50_ms"] > 0
 
 
 def test_command_prints_a_table_and_keeps_the_figures(
@@ -64,11 +69,13 @@ def test_command_prints_a_table_and_keeps_the_figures(
         "size": [512, 512],
         "scenes": [{**row, "compile_cold_ms": 90.0, "compile_warm_ms": 4.0}],
         "latency": {"slider_p95_ms": 64.2},
+        "rooms": {"a box": {"slider_p50_ms": 31, "slider_p95_ms": 41, "camera_p50_ms": 51, "camera_p95_ms": 61}},
     }
     monkeypatch.setattr(speed, "measure", lambda options, told: document)
     output = tmp_path / "new" / "bench.json"
     assert main(["bench", "speed", "-o", str(output)]) == 0
     said = capsys.readouterr().out
+    assert ["a", "box", "31", "41", "51", "61"] in [line.split() for line in said.splitlines()]
     assert "12.35" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
     assert json.loads(output.read_text()) == document
     assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2

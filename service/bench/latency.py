@@ -1,7 +1,10 @@
-"""What a person at the editor waits for, measured at the socket of a real server: start-up and slider moves."""
+"""What a person at the editor waits for, measured at the socket of a real server: start-up, and moves of a slider or
+the camera.
+"""
 
 from __future__ import annotations
 
+import cmath
 import json
 import os
 import socket
@@ -9,7 +12,7 @@ import subprocess
 import sys
 import tempfile
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from pathlib import Path
 from typing import Any
@@ -18,8 +21,11 @@ from urllib.request import urlopen
 from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
+from service import presets
+
 SCENE = "sphere-on-floor"  # the editor's default
 SIZE = 512
+SUBJECT = "subject"  # the material of every built-in scene that is there to be changed
 MOVES = 60
 PAUSE_S = 0.15  # between slider moves: the pace of a hand; the picture goes on refining meanwhile
 PATIENCE_S = 60.0
@@ -41,6 +47,23 @@ def measure() -> dict[str, float]:
         "slider_p95_ms": moves[int(0.95 * len(moves))],
         "slider_worst_ms": moves[-1],
     }
+
+
+def rooms(told: Callable[[str], None]) -> dict[str, dict[str, float]]:
+    """The same, by built-in scene: `slider_p50_ms`, `slider_p95_ms`, and those of the `camera`."""
+    out: dict[str, dict[str, float]] = {}
+    with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, server(folder) as (port, _):
+        for entry in presets.names("scenes"):
+            told(f"first frames of {entry['name']}")
+            with _stream(port) as stream:
+                editor = Editor(port, stream, entry["name"])
+                editor.start(0.0)
+                out[entry["name"]] = {}
+                for hand, move in (("slider", editor.move), ("camera", editor.turn)):
+                    moves = sorted(move() for _ in range(MOVES))
+                    out[entry["name"]][f"{hand}_p50_ms"] = moves[len(moves) // 2]
+                    out[entry["name"]][f"{hand}_p95_ms"] = moves[int(0.95 * len(moves))]
+    return out
 
 
 @contextmanager
@@ -73,11 +96,12 @@ def server(folder: str) -> Iterator[tuple[int, float]]:
 class Editor:
     """As the editor behaves: acknowledges every frame, moves a slider now and then."""
 
-    def __init__(self, port: int, stream: ClientConnection) -> None:
+    def __init__(self, port: int, stream: ClientConnection, scene: str = SCENE) -> None:
         self._stream = stream
-        with urlopen(f"http://127.0.0.1:{port}/v1/presets/scenes/{SCENE}", timeout=PATIENCE_S) as answer:
+        with urlopen(f"http://127.0.0.1:{port}/v1/presets/scenes/{scene}", timeout=PATIENCE_S) as answer:
             self._scene = json.load(answer)
-        self._material = self._scene["shapes"][0]["material"]
+        kind = self._scene["materials"][SUBJECT]["type"]
+        self._slider = "albedo" if kind == "diffuse" else "roughness"
         self._generation = 0
 
     def start(self, began: float) -> float:
@@ -88,13 +112,24 @@ class Editor:
 
     def move(self) -> float:
         """Milliseconds from sending a slider's new value to having the first frame that shows it."""
+        value = 0.1 + 0.8 * (self._generation * 0.618 % 1)  # the golden ratio: no value comes twice
+        return self._change({"materials": {SUBJECT: {self._slider: value}}})
+
+    def turn(self) -> float:
+        """The same of a camera that goes half a degree around what it looks at."""
+        camera = self._scene["camera"]
+        (x, y, z), (tx, _, tz) = camera["position"], camera["target"]
+        turned = complex(x - tx, z - tz) * cmath.exp(0.0087j)
+        camera["position"] = [tx + turned.real, y, tz + turned.imag]
+        return self._change({"camera": {"position": camera["position"]}})
+
+    def _change(self, scene: dict[str, Any]) -> float:
         until = time.perf_counter() + PAUSE_S
         while (left := until - time.perf_counter()) > 0:
             with suppress(TimeoutError):
                 self._receive(left)
-        value = 0.1 + 0.8 * (self._generation * 0.618 % 1)  # the golden ratio: no value comes twice
         sent = time.perf_counter()
-        self._send("update", scene={"materials": {self._material: {"roughness": value}}})
+        self._send("update", scene=scene)
         return 1e3 * (self._first_frame() - sent)
 
     def _send(self, kind: str, **message: Any) -> None:

@@ -45,6 +45,7 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
         "size": [SIZE, SIZE],
         "scenes": [{key: value for key, value in row.items() if key != "renderer"} for row in rows],
         "latency": latency.measure(),
+        "rooms": latency.rooms(told),
     }
 
 
@@ -111,6 +112,11 @@ def table(document: dict[str, Any]) -> str:
     lines.append("")
     for key, value in document["latency"].items():
         lines.append(f"{key.removesuffix('_ms').replace('_', ' '):24}{value:8.1f} ms")
+    rooms = document["rooms"]
+    lines.append(f"\n{'update to first frame, ms':24}  slider p50    p95  camera p50    p95")
+    for room, at in rooms.items():
+        slider, camera = ((at[f"{hand}_p50_ms"], at[f"{hand}_p95_ms"]) for hand in ("slider", "camera"))
+        lines.append(f"{room:24}  {slider[0]:10.0f}  {slider[1]:5.0f}  {camera[0]:10.0f}  {camera[1]:5.0f}")
     lines.append("")
     lines += [f"{key:10} {value}" for key, value in document["machine"].items()]
     return "\n".join(lines)
