@@ -17,7 +17,7 @@ from tests.serving import ENDLESS, SCENE, SMALL, Picture, Server
 from tests.serving import client as opened
 
 RAW = {"format": "rgba32f"}
-KILLS = int(os.environ.get("SURVIVAL_KILLS", 12))  # in a row; 100 for the record
+KILLS = int(os.environ.get("SURVIVAL_KILLS", 8))  # in a row; 100 for the record
 
 
 @pytest.fixture(scope="module")

@@ -185,7 +185,7 @@ class Ears:
 
     async def next(self, kind: Any) -> Any:
         while True:
-            message = await asyncio.wait_for(self.messages.get(), 20)
+            message = await asyncio.wait_for(self.messages.get(), 60)  # busy machines start one in ten seconds
             if isinstance(message, kind):
                 return message
 
