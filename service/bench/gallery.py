@@ -105,7 +105,12 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
     ),
     "editor-scene": ((1280, 800), "light", [("click", "#tab-scene", ""), ("key", "h", ""), ("key", "4", "")]),
     "editor-phone": ((390, 844), "dark", [("click", "#material-presets [data-name=copper]", "")]),
+    "editor-lost": (  # the last: it ends the server
+        (1280, 800), "dark",
+        [("fill", "#panel [data-field=roughness] input[type=number]", "7"), ("lose", "", "")],
+    ),
 }  # fmt: skip
+LOST = "text=The connection to the server was lost"
 
 
 def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: float = 25) -> None:
@@ -126,6 +131,14 @@ def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: 
                     page.keyboard.press(what)
                 elif act == "click":
                     page.click(what)
+                elif act == "fill":
+                    page.fill(what, value)
+                    page.press(what, "Enter")
+                elif act == "lose":
+                    page.wait_for_timeout(1000 * wait_s)
+                    server.terminate()
+                    page.wait_for_selector(LOST)
+                    wait_s = 0.5  # before it is tried again
                 else:
                     page.select_option(what, value)
             page.wait_for_timeout(1000 * wait_s)
@@ -142,7 +155,7 @@ def main() -> int:
     wanted = parser.parse_args()
     OUT.mkdir(exist_ok=True)
     sunbox = Path(sys.executable).with_name("sunbox")
-    states = [name for name in wanted.names if name in STATES]
+    states = [name for name in STATES if name in wanted.names]
     if states:
         photograph_editor(sunbox, states)
     for name in wanted.names:
