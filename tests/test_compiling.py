@@ -345,3 +345,22 @@ def is_there(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except OSError:
         return False
+
+
+def test_the_other_end_of_a_pipe_is_a_lifeline() -> None:
+    """Of two that share it, in the middle of a loop that never looks."""
+    read, write = os.pipe()
+    program = "import sys\nfrom service.rendering.worker.lifeline import end_with_pipe\n"
+    program += "print(end_with_pipe(int(sys.argv[1])), flush=True)\nwhile True: pass"
+    command = [sys.executable, "-c", program, str(read)]
+    both = [subprocess.Popen(command, pass_fds=[read], stdout=subprocess.PIPE, text=True) for _ in range(2)]
+    for each in both:
+        assert each.stdout is not None and each.stdout.readline() == "True\n"
+    os.close(write)
+    assert [each.wait(30) for each in both] == [-signal.SIGIO] * 2
+    late = subprocess.Popen(command, pass_fds=[read], stdout=subprocess.PIPE, text=True)
+    assert late.stdout is not None and late.stdout.readline() == "False\n"
+    late.kill()
+    for each in (*both, late):
+        each.communicate()
+    os.close(read)
