@@ -8,7 +8,15 @@ from collections.abc import Iterator
 import pytest
 
 from gpu import ContextError, Renderer
+from tests.rendering import release_pictures
 from tests.serving import Server
+
+
+@pytest.fixture(scope="module", autouse=True)
+def pictures() -> Iterator[None]:
+    """Pictures last as long as the tests of their file."""
+    yield
+    release_pictures()
 
 
 @pytest.fixture(scope="session")

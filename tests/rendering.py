@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+import moderngl
 import numpy as np
 
 from gpu import Picture, Renderer, RenderSettings
@@ -45,7 +46,19 @@ def picture(
     defaults = {"width": 32, "height": 32, "max_bounces": 1, "filter": "box"}
     out = gpu.picture(loaded, RenderSettings(**{**defaults, **settings}))
     out.trace(600.0, samples)
+    _made.append(out)
     return out
+
+
+_made: list[Picture] = []
+
+
+def release_pictures() -> None:
+    """What tests have left of `picture(...)`: each holds a kernel, 7 MB."""
+    while _made:
+        left = _made.pop()
+        if left._kernel is not None and not isinstance(left.context.mglo, moderngl.InvalidObject):  # not released yet
+            left.release()
 
 
 def render(gpu: Renderer, scene: dict[str, Any], samples: int = 64, aov: str = "color", **more: Any) -> np.ndarray:
