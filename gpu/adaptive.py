@@ -10,7 +10,7 @@ from gpu import context as contexts
 from gpu import features
 from gpu.bindings import Slot
 from gpu.kernels import Kernels
-from gpu.plan import AREA, CLASSES, WORDS, Plan, pixels_of, weights_of
+from gpu.plan import AREA, CLASSES, DECISIONS, WORDS, Plan, pixels_of, weights_of
 from gpu.tiles import GUESS_S, PASS_S, SLICE_S, USUAL_BOUNCES, Tile
 
 _MOST_AREAS = 1 << 14  # of a dispatch
@@ -83,7 +83,9 @@ class Adaptive:
         plan = self._kept()
         wanted = plan.at(after)
         self._counts.write(wanted.tobytes())
-        left = (wanted - plan.at(before)).astype(np.int64).max(axis=2).ravel()
+        # Just decided anew, the plan would have some pixels at a sample that they do not have.
+        had = plan.counts if before in DECISIONS else plan.at(before)
+        left = (wanted - had).astype(np.int64).max(axis=2).ravel()
         fits = SLICE_S / (self._rates.max() * AREA * AREA) if self.cost_s else 1
         self.chunk = max(1, min(most, int(fits)))
         self.rounds = max(1, -(-int(left.max()) // self.chunk))

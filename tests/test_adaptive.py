@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Picture, Renderer, RenderSettings, save
+from gpu import Picture, Renderer, RenderSettings, adaptive, save
 from gpu.bindings import Slot
 from gpu.meter import FROM
-from gpu.plan import CLASSES, DECISIONS, LEAST, MOST, Plan, pixels_of, weights_of
+from gpu.plan import AREA, CLASSES, DECISIONS, LEAST, MOST, Plan, pixels_of, weights_of
 from service.cli import main
 from tests.rendering import Images, document, picture
 from tests.serving import SCENE, SMALL, Client, Server
@@ -91,6 +91,19 @@ def test_the_cut_of_the_work_does_not_show(gpu: Renderer) -> None:
     assert taken.mean() == pytest.approx(70, rel=0.01) and taken.max() > 4 * taken.min() > 0
     for made in (whole, cut):
         made.release()
+
+
+@pytest.mark.parametrize("decision", DECISIONS[1:])
+def test_pixels_get_all_that_a_decision_wants(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, decision: int) -> None:
+    """In slices of one sample too, where what an area is short of is not rounded up to a slice."""
+    made = picture(gpu, SCENES["cornell"], decision, adaptive=True, **SIZE)
+    monkeypatch.setattr(adaptive, "SLICE_S", 1e-12)
+    for samples in (decision + 1, decision + 22):
+        made.trace(600, samples)
+        wanted = made._adaptive._kept().at(samples)
+        y, x = np.mgrid[: SIZE["height"], : SIZE["width"]]
+        assert np.array_equal(counts(made), wanted[y // AREA, x // AREA, y % CLASSES])
+    made.release()
 
 
 @pytest.mark.parametrize("samples", [FROM - 1, DECISIONS[1], 50])
