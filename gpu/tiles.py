@@ -74,8 +74,8 @@ class Tiles:
 def samples_at_once(max_bounces: int, shapes: int, nodes: int) -> int:
     """How many samples an invocation may take on llvmpipe without coming near the end of its loops.
 
-    Two rays a bounce, each past all shapes outside of the tree (`shapes`) and, in the tree, past 16 nodes for each
+    Three rays a bounce, each past all shapes outside of the tree (`shapes`) and, in the tree, past 16 nodes for each
     doubling of `nodes`: several times the mean over a mesh of 80 000 triangles.
     """
-    turns = 2 * (max_bounces + 1) * (4 + shapes + 16 * max(nodes, 1).bit_length())
+    turns = 3 * (max_bounces + 1) * (4 + shapes + 16 * max(nodes, 1).bit_length())
     return max(1, min(MAX_SAMPLES_A_PASS, LOOP_TURNS // turns))

@@ -75,4 +75,12 @@ uvec2 sobol_bits(Sampler s, uint pair) {
     return uvec2(x, y);
 }
 
+// Where twice is 1, the k-th of the two samples of a sequence of twice as many that stand for this one: as well spread
+// as those. Else this one itself.
+Sampler sobol_part(Sampler s, uint k, uint twice) {
+    s.index = (s.index << twice) | k;
+    s.index_reversed = bitfieldReverse(s.index);
+    return s;
+}
+
 vec2 sobol_pair(Sampler s, uint pair) { return sobol_units(sobol_bits(s, pair)); }

@@ -148,3 +148,13 @@ Surface surface_make(Material m, vec2 tangent) {
 #endif
     return s;
 }
+
+// Whether its noise comes from where the light is rather than from where it sends its paths: not of mirrors, more or
+// less, nor of glass, whose paths find the light themselves.
+bool surface_is_broad(Surface s) {
+    bool narrow = s.metallic > 0.5 && s.roughness < 0.25;
+#if HAS_TRANSMISSION
+    narrow = narrow || (s.model == MODEL_PRINCIPLED && s.transmission > 0.5);
+#endif
+    return !narrow;
+}

@@ -52,6 +52,9 @@ vec4 environment_radiance(vec3 w) {
 #endif
 }
 
+// Whether it is not the same from everywhere.
+bool environment_varies() { return textureSize(environment_texels, 0).x > 1; }
+
 LightSample environment_light_sample(uvec2 bits) {
     vec2 u = sobol_units(bits);
 #if HAS_SUN

@@ -8,11 +8,12 @@ layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answ
 uniform uvec2 pixel;
 uniform uint pair;
 uniform uint count;
+uniform uint twice; // 1: the halves of half as many samples
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    vec2 u = sobol_pair(sobol_begin(pixel, i, frame.replicate), pair);
+    vec2 u = sobol_pair(sobol_part(sobol_begin(pixel, i >> twice, frame.replicate), i & twice, twice), pair);
     vec4 a = vec4(u, 0.0, 0.0);
 #if WHAT == 1
     a.xy = sampling_disk(u);
