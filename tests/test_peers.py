@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -111,3 +112,18 @@ def test_runs_are_scaled_to_the_moment() -> None:
     summary = peers._summary([course], np.ones((2, 2, 3)), 2)
     assert summary["rel_mse"] == pytest.approx([1.25 * 0.01 / 1.01, 1.05 * 0.01 / 1.01])
     assert summary["mpaths_per_s"] == pytest.approx(40 / 10.5 * 4 / 1e6)
+
+
+def test_no_run_shares_its_samples_with_the_reference(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    """It would be compared with itself, in part."""
+    seeds: dict[str, list[int]] = {}
+
+    def run(command: list[str], job: dict[str, Any], folder: Path) -> peers.Course:
+        seeds.setdefault(command[-1], []).append(job["seed"])
+        n = len(job["moments"])
+        return peers.Course(np.ones(n), np.ones(n), np.full((n, 2, 2, 3), job["seed"], np.float32))
+
+    monkeypatch.setattr(peers, "_run", run)
+    options = peers.Options(mitsuba=Path("m"), cycles=Path("c"), rounds=2)
+    peers._row(peer_scenes.cases()[0], options, tmp_path, lambda _: None)
+    assert {side: len(set(given)) for side, given in seeds.items()} == dict.fromkeys(seeds, 3) and len(seeds) == 3

@@ -122,7 +122,8 @@ def _sunbox(case: PeerCase, options: Options, folder: Path, moments: tuple[float
 def _mitsuba(case: PeerCase, options: Options, folder: Path, moments: tuple[float, ...], seed: int) -> Course:
     description, arrays = peer_scenes.for_mitsuba(case, options.size)
     np.savez(folder / "arrays.npz", **arrays)  # type: ignore[arg-type]  # numpy's stub takes no dict of arrays
-    job = {"variant": VARIANT, "scene": description, "arrays": str(folder / "arrays.npz"), "moments": moments}
+    job = {"scene": description, "arrays": str(folder / "arrays.npz"), "moments": moments, "seed": seed}
+    job |= {"variant": VARIANT}
     return _run([str(options.mitsuba), str(HERE / "peer_mitsuba.py")], job, folder)
 
 
