@@ -142,7 +142,7 @@ class Ahead:
         """Compiles to machine code by running over no pixel; the processor time that it took (s)."""
         text = wanted.text
         textures = [self._texture(*kind) for kind in wanted.textures]
-        if dict(wanted.defines).get("HAS_PRINCIPLED"):
+        if dict(wanted.defines).get("HAS_PRINCIPLED_LOBES"):
             for unit, table in self._energy().items():
                 table.use(unit)
         start = time.process_time()

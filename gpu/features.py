@@ -15,6 +15,7 @@ from gpu.layout import LightKind, Model, ShapeKind
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
+LEAST_ROUGHNESS = 0.01  # as in surface.glsl
 
 
 def _looped(scene: SceneArrays, kind: ShapeKind, records: str) -> int:
@@ -51,6 +52,24 @@ def _transmits(materials: np.ndarray) -> np.ndarray:
     m = materials
     out: np.ndarray = (m["model"] == Model.PRINCIPLED) & (m["transmission"] > 0) & (m["metallic"] < 1)
     return out
+
+
+def _mirrors(materials: np.ndarray) -> np.ndarray:
+    """Those that only mirror or refract, by their own numbers: textures may make more of others, or less."""
+    m = materials
+    whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
+    bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
+    out: np.ndarray = (m["model"] == Model.PRINCIPLED) & (m["roughness"] < LEAST_ROUGHNESS) & whole & bare
+    return out
+
+
+def _spreads(s: SceneArrays) -> bool:
+    """Whether some `principled` does more than mirror and refract, or no glass is there for which that is spared."""
+    m = s.materials
+    given = m["model"] == Model.PRINCIPLED
+    sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
+    spared = (sure & _transmits(m)).any() and not _mapped(s, "normal", "coat_normal")
+    return bool(given.any() and (not spared or (given & ~sure).any()))
 
 
 def _slot_flags(scene: SceneArrays) -> np.ndarray:
@@ -156,7 +175,9 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_BLINN_PHONG": _model(Model.BLINN_PHONG),
     "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
     "HAS_PRINCIPLED": _model(Model.PRINCIPLED),
+    "HAS_PRINCIPLED_LOBES": _spreads,
     "HAS_TRANSMISSION": lambda s: bool(_transmits(s.materials).any()),
+    "HAS_MIRRORS": lambda s: bool((_transmits(s.materials) & _mirrors(s.materials)).any()),
     "HAS_ATTENUATION": lambda s: bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any()),
 }
 
@@ -166,7 +187,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
 _OPAQUE = ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")
 EDITED = {
     "HAS_DISNEY": _OPAQUE,
-    "HAS_PRINCIPLED": ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_CLEARCOAT"),
+    "HAS_PRINCIPLED": ("HAS_PRINCIPLED_LOBES", "HAS_SUBSURFACE", "HAS_SHEEN", "HAS_CLEARCOAT"),
     "HAS_BLINN_PHONG": ("HAS_AMBIENT",),
 }
 
@@ -182,6 +203,15 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
     if editing:
         raised |= {more for name in raised & set(EDITED) for more in EDITED[name]}
     return frozenset(raised)
+
+
+# What spares work and changes no picture: an edit that could do with it is not worth waiting for a compiler.
+_SPARING = frozenset({"HAS_MIRRORS"})
+
+
+def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:
+    """The flags of a scene under edit, after one: those that it had, and what it needs now."""
+    return raised | (flags(scene, True) - _SPARING)
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no

@@ -83,7 +83,7 @@ class Scene:
             for thing in (*self._buffers.values(), *self._details.values()):
                 thing.release()
             raise
-        self._tables = upload_tables(context) if "HAS_PRINCIPLED" in self._raised else {}
+        self._tables = upload_tables(context) if "HAS_PRINCIPLED_LOBES" in self._raised else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
         log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
 
@@ -134,8 +134,12 @@ class Scene:
         return {u: rows(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)}
 
     def _raise_flags(self) -> None:
-        raised = features.everything() if self._everything else features.flags(self.arrays, self._editing)
-        self._raised = self._raised | raised if self._editing else raised
+        if self._everything:
+            self._raised = features.everything()
+        elif self._editing and self._raised:
+            self._raised = features.grown(self._raised, self.arrays)
+        else:
+            self._raised = features.flags(self.arrays, self._editing)
 
     def _upload_environment(self) -> tuple[Any, np.ndarray]:
         e = self.arrays.environment
@@ -207,7 +211,7 @@ class Scene:
         if len(self.arrays.materials) and changes.keys() & {"materials", "textures"}:
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._raise_flags()
-        if "HAS_PRINCIPLED" in self._raised and not self._tables:
+        if "HAS_PRINCIPLED_LOBES" in self._raised and not self._tables:
             self._tables = upload_tables(self._context)
 
     def bind(self) -> None:

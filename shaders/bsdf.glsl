@@ -95,7 +95,7 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
         r = Scatter(blinn_phong_eval(s, wi, wm), blinn_phong_pdf(s, wi, wm, dot(wi, wm)));
     }
 #endif
-#if HAS_PRINCIPLED
+#if HAS_PRINCIPLED_LOBES
     if (s.model == MODEL_PRINCIPLED) r = principled_eval(s, wo, wi);
 #endif
 #if HAS_TRANSMISSION
@@ -106,7 +106,7 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
     return r;
 }
 
-#if HAS_PRINCIPLED
+#if HAS_PRINCIPLED_LOBES
 struct Sampled {
     vec3 wi;
     bool specular; // from a perfectly specular lobe: `there` is its f and its chance, in place of bsdf_eval's
@@ -147,7 +147,7 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     return wi;
 }
 
-#if HAS_PRINCIPLED
+#if HAS_PRINCIPLED_LOBES
 Sampled bsdf_pick(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if HAS_COAT_NORMALS
     Sampled r = Sampled(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0), false);

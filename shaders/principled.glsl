@@ -44,13 +44,18 @@ vec4 principled_kept(Surface s, vec3 w) {
     return energy_albedo(bsdf_turn(s, w), s.mirror ? 0.0 : s.roughness, s.aspect, s.eta_outside);
 }
 
-// The surface as seen from wo; `behind`: from the inner side of its geometry.
-void principled_face(vec3 wo, bool behind, inout Surface s) {
-    if (s.model != MODEL_PRINCIPLED) return;
+// `behind`: the surface is seen from the inner side of its geometry.
+void principled_side(bool behind, inout Surface s) {
 #if HAS_TRANSMISSION
     s.inside = behind && s.transmission > 0.0 && s.metallic < 1.0;
     s.eta = s.inside ? 1.0 / s.eta_outside : s.eta_outside;
 #endif
+}
+
+// The surface as seen from wo.
+void principled_face(vec3 wo, bool behind, inout Surface s) {
+    if (s.model != MODEL_PRINCIPLED) return;
+    principled_side(behind, s);
     s.kept = principled_kept(s, wo);
     s.kept_mean = energy_mean(s.mirror ? 0.0 : s.roughness, s.aspect, s.eta_outside);
     // The layers lie on the outer side.

@@ -16,6 +16,9 @@ from gpu.program import SHADERS
 from gpu.scene import upload_tables
 
 PROBES = Path(__file__).parent / "probes"
+# All flags of the production model.
+PRINCIPLED_FLAGS = frozenset({"HAS_PRINCIPLED", *features.EDITED["HAS_PRINCIPLED"], "HAS_ANISOTROPIC",
+                              "HAS_TRANSMISSION", "HAS_ATTENUATION"})  # fmt: skip
 
 
 def materials(**members: Any) -> np.ndarray:

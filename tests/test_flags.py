@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
-from gpu.features import FLAGS, flags
+from gpu.arrays import SceneArrays
+from gpu.features import FLAGS, flags, grown
 from gpu.price import kernel_price
 from service.pack import Packed, pack
 from service.scene import parse_scene
@@ -88,7 +89,8 @@ SCENES: dict[str, Doc] = {
     "TANGENTS": made_of({"type": "disney", "anisotropic": 1}, icosphere("m", 1)),
     "CLEARCOAT": made_of({"type": "disney", "clearcoat": 1}), "METAL_ROUGH": made_of(GLTF),
     "BLINN_PHONG": made_of(PHONG), "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
-    "PRINCIPLED": made_of({"type": "principled"}), "TRANSMISSION": made_of(GLASS),
+    "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
+    "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
 }  # fmt: skip
 ELSEWHERE = {"UVS_1", "TEXTURED_LIGHTS", "INSTANCES"}  # raised in the tests of glTF files, textured lights, instances
@@ -109,9 +111,13 @@ def test_the_scene_raises_it_and_the_plain_one_does_not(name: str) -> None:
 
 
 def _render(gpu: Renderer, name: str, **how: Any) -> np.ndarray:
-    loaded = gpu.load(_packed(name).arrays, **how)
+    return _seen(gpu, RenderSettings(48, 32, 3, roulette_depth=99), _packed(name).arrays, **how)
+
+
+def _seen(gpu: Renderer, settings: RenderSettings, arrays: SceneArrays, **how: Any) -> np.ndarray:
+    loaded = gpu.load(arrays, **how)
     assert loaded.flags >= how.get("raised", frozenset())
-    made = gpu.picture(loaded, RenderSettings(48, 32, 3, roulette_depth=99))
+    made = gpu.picture(loaded, settings)
     made.trace(60.0, 8)
     image = made.read()
     made.release()
@@ -119,7 +125,7 @@ def _render(gpu: Renderer, name: str, **how: Any) -> np.ndarray:
     return image
 
 
-@pytest.mark.parametrize("name", SCENES if LONG else ["CLEARCOAT"])
+@pytest.mark.parametrize("name", SCENES if LONG else ["CLEARCOAT", "MIRRORS"])
 def test_the_kernel_with_everything_shows_the_same(gpu: Renderer, name: str) -> None:
     images = [_render(gpu, name, everything=everything) for everything in (False, True)]
     # A rounding may turn a path at an edge: all but a few pixels agree to rounding, and their mean does.
@@ -135,6 +141,39 @@ def test_a_flag_more_shows_the_same(gpu: Renderer, name: str, more: list[str]) -
     added = frozenset(f"HAS_{flag}" for flag in more)
     images = [_render(gpu, name, editing=True, raised=raised) for raised in (frozenset[str](), added)]
     assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
+
+
+CLEAR = {"type": "principled", "transmission": 1, "roughness": 0}
+CHECKS = {"type": "checker", "a": 0.1, "b": 0.9}
+
+
+@pytest.mark.parametrize("estimator", ["mis", "light"])
+@pytest.mark.parametrize(
+    "more", [{}, {"attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}, {"alpha": 0.5}, {"base_color": T}]
+)
+def test_paths_go_through_mirrors_as_they_are_scattered(
+    gpu: Renderer, monkeypatch: pytest.MonkeyPatch, more: Doc, estimator: Any
+) -> None:
+    """The loop of their own changes no picture: glass, a metal that mirrors, a lamp inside of the glass."""
+    materials = {"glass": {**CLEAR, **more}, "metal": {"type": "principled", "metallic": 1, "roughness": 0},
+                 "m": {"type": "diffuse", "albedo": 0.6}, "lamp": LAMP}  # fmt: skip
+    shapes = [ball("glass"), FLOOR, ball("metal", (1.5, 0, -1), 0.7), ball("lamp", (0.2, 0.1, 0), 0.2)]
+    scene = pack(parse_scene(lit(*shapes, materials=materials, textures={"t": CHECKS})), IMAGES).arrays
+    assert "HAS_MIRRORS" in flags(scene) and "HAS_PRINCIPLED_LOBES" not in flags(scene)
+    settings = RenderSettings(48, 32, 8, estimator=estimator, roulette_depth=2)
+    images = [_seen(gpu, settings, scene)]
+    monkeypatch.setitem(FLAGS, "HAS_MIRRORS", lambda _: False)
+    monkeypatch.setitem(FLAGS, "HAS_PRINCIPLED_LOBES", lambda _: True)
+    images.append(_seen(gpu, settings, scene))
+    assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
+    assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)
+
+
+def test_an_edit_waits_for_no_loop_that_it_can_do_without() -> None:
+    rough, smooth = (flags(_packed(name).arrays, True) for name in ("TRANSMISSION", "MIRRORS"))
+    assert smooth - rough == {"HAS_MIRRORS"}
+    assert grown(rough, _packed("MIRRORS").arrays) == rough
+    assert grown(smooth, _packed("TRANSMISSION").arrays) == smooth
 
 
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:

@@ -11,13 +11,11 @@ from scipy.stats import qmc
 
 from gpu import ESTIMATORS, Renderer
 from gpu.bindings import Slot
-from gpu.features import EDITED
 from gpu.layout import ABSENT, Model
 from tests.extremes.scenes import LONG
-from tests.probing import Prober, materials, prober_of
+from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 from tests.rendering import document, picture, render
 
-FLAGS = frozenset({"HAS_PRINCIPLED", "HAS_TRANSMISSION", "HAS_ATTENUATION", *EDITED["HAS_DISNEY"]})
 WHITE = {"type": "constant", "radiance": 1}
 SPHERE = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
@@ -55,7 +53,8 @@ def _materials(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _albedo(prober: Prober, m: np.ndarray, asks: np.ndarray, samples: int) -> tuple[np.ndarray, np.ndarray]:
     """Directional albedo of the brightest channel and its standard error, none of it NaN or negative."""
     inputs = {Slot.SUM: asks, Slot.MATERIALS: m}
-    out = prober.run("albedo.comp", len(m), inputs, (Slot.OUTPUT,), {}, FLAGS, samples=samples)[0].astype(float)
+    told = prober.run("albedo.comp", len(m), inputs, (Slot.OUTPUT,), {}, PRINCIPLED_FLAGS, samples=samples)
+    out = told[0].astype(float)
     assert (out[:, 2] == 1).all()
     return out[:, 0], np.sqrt(np.maximum(out[:, 1] - out[:, 0] ** 2, 0) / samples)
 

@@ -12,7 +12,7 @@ from gpu.bindings import Slot
 from gpu.features import EDITED
 from gpu.layout import Model
 from tests import baseline, disney, stats
-from tests.probing import Prober, materials, prober_of
+from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 
 D, METAL_ROUGH, BLINN_PHONG = Model.DISNEY, Model.METAL_ROUGH, Model.BLINN_PHONG
 ROWS = {
@@ -65,7 +65,6 @@ PRINCIPLED = {
 }  # fmt: skip
 ANGLES = (0.0, 35.0, 70.0, 87.0)
 FLAGS = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG"})
-PRINCIPLED_FLAGS = frozenset({"HAS_PRINCIPLED", "HAS_TRANSMISSION", "HAS_ATTENUATION", *EDITED["HAS_DISNEY"]})
 TANGENT = np.array([0.8, 0.6])
 CASES = [(name, angle) for name in ROWS for angle in ANGLES]
 

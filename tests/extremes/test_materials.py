@@ -12,7 +12,7 @@ from gpu.bindings import Slot
 from gpu.features import EDITED
 from gpu.layout import Model
 from tests import baseline, disney
-from tests.probing import Prober, materials, prober_of
+from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 
 D, P, G, B = Model.DISNEY, Model.PRINCIPLED, Model.METAL_ROUGH, Model.BLINN_PHONG
 GLASS = {"model": P, "transmission": 1, "base_color": 1}
@@ -49,7 +49,6 @@ ROWS = {
 }  # fmt: skip
 ELEVATIONS = (90.0, 45.0, 1.0, 0.1, 0.01)  # degrees above the surface
 OLD = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG"})
-NEW = frozenset({"HAS_PRINCIPLED", "HAS_TRANSMISSION", "HAS_ATTENUATION", *EDITED["HAS_DISNEY"]})
 SIDES = {row: (0, 1) if m["transmission"][0] > 0 and m["metallic"][0] < 1 else (0,) for row, m in ROWS.items()}
 CASES = [(row, inside) for row in ROWS for inside in SIDES[row]]
 
@@ -71,7 +70,7 @@ def _ask(prober: Prober, row: str, wo: np.ndarray, ask: np.ndarray, sample: int,
     principled = ROWS[row]["model"][0] == P
     inputs, defines = {Slot.SUM: asks, Slot.MATERIALS: ROWS[row]}, {"SAMPLE": sample, "INSIDE": inside}
     outputs = (Slot.MOMENTS, Slot.OUTPUT)
-    flags = NEW if principled else OLD
+    flags = PRINCIPLED_FLAGS if principled else OLD
     return prober.run("bsdf.comp", len(ask), inputs, outputs, defines, flags, last_wo=0)
 
 

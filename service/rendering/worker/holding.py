@@ -122,6 +122,5 @@ def kernel_of(
         return None
     if edits or update.scene is None:
         arrays = ahead.edited(arrays, edits)
-        more = features.flags(arrays, editing)
-        raised = raised | more if editing else more
+        raised = features.grown(raised, arrays) if editing else features.flags(arrays)
     return ahead.recipe(arrays, settings, raised)
