@@ -75,10 +75,10 @@ uvec2 sobol_bits(Sampler s, uint pair) {
     return uvec2(x, y);
 }
 
-// Where twice is 1, the k-th of the two samples of a sequence of twice as many that stand for this one: as well spread
-// as those. Else this one itself.
-Sampler sobol_part(Sampler s, uint k, uint twice) {
-    s.index = (s.index << twice) | k;
+// The k-th of the samples, a power of two, of a sequence of as many times more, that stand for this one: as well spread
+// as those. Without doublings this one itself.
+Sampler sobol_part(Sampler s, uint k, uint doublings) {
+    s.index = (s.index << doublings) | k;
     s.index_reversed = bitfieldReverse(s.index);
     return s;
 }

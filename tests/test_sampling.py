@@ -21,13 +21,13 @@ def prober(gpu: Renderer) -> Prober:
 
 def _draw(
     prober: Prober, what: int, count: int = N, sampler: int = 0, pair: int = 2, seed: int = 0, replicate: int = 0,
-    pixel: tuple[int, int] = (3, 7), filter_name: str = "box", twice: int = 0,
+    pixel: tuple[int, int] = (3, 7), filter_name: str = "box", doublings: int = 0,
 ) -> np.ndarray:  # fmt: skip
     frame = np.zeros((), layout.Frame.dtype)
     frame["seed"], frame["replicate"] = seed, replicate
     defines = {"WHAT": what, "SAMPLER": sampler}
     out = prober.run("numbers.comp", count, {}, defines=defines, frame=frame, filter_name=filter_name,
-                     pixel=pixel, pair=pair, twice=twice)  # fmt: skip
+                     pixel=pixel, pair=pair, doublings=doublings)  # fmt: skip
     return out[0].astype(float)
 
 

@@ -8,12 +8,13 @@ layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answ
 uniform uvec2 pixel;
 uniform uint pair;
 uniform uint count;
-uniform uint twice; // 1: the halves of half as many samples
+uniform uint doublings; // 2: the quarters of a quarter of the samples
 
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    vec2 u = sobol_pair(sobol_part(sobol_begin(pixel, i >> twice, frame.replicate), i & twice, twice), pair);
+    Sampler whole = sobol_begin(pixel, i >> doublings, frame.replicate);
+    vec2 u = sobol_pair(sobol_part(whole, i & ((1u << doublings) - 1u), doublings), pair);
     vec4 a = vec4(u, 0.0, 0.0);
 #if WHAT == 1
     a.xy = sampling_disk(u);
