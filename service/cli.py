@@ -95,7 +95,7 @@ def _bench(command: argparse.ArgumentParser) -> None:
         nargs="?",
         choices=["speed", "compare", "peers", "hemisphere", "hand", "tradeoff"],
         default="speed",
-        help="speed (default): paths per second, compile times, latencies; "
+        help="speed (default): paths per second, compile times, growth with triangles, latencies; "
         "compare: this checkout beside an earlier revision; "
         "peers: error at equal time beside Mitsuba and Cycles; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "

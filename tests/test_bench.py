@@ -9,8 +9,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+import trimesh
 
-from service.bench import compare, latency, machine, scenes, speed
+from service.bench import compare, growth, latency, machine, scenes, speed, timing
 from service.cli import main
 from service.pack import pack
 from service.scene import parse_scene
@@ -41,11 +42,22 @@ def test_given_mesh_takes_the_place_of_the_generated_one(tmp_path: Path) -> None
 
 def test_case_is_measured(gpu: Any, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     monkeypatch.setattr(speed, "SIZE", 32)
-    monkeypatch.setattr(speed, "RUN_S", 0.05)
+    monkeypatch.setattr(timing, "RUN_S", 0.05)
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", "")  # put back afterwards: measuring sets it
     row = speed._measure_case(scenes.cases()[0], speed.Options(runs=2), 2, str(tmp_path))
     assert row["mpaths_per_s"] == pytest.approx(32 * 32 / row["ms_per_sample"] / 1e3)
     assert row["mpaths_per_s"] > 0 and row["compile_ms"] > 0 and row["spread"] >= 0
+
+
+def test_growth_is_that_of_one_form(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    coarse, fine = (trimesh.Trimesh(m.vertices, m.faces).volume for m in map(growth.ball, (4, 5)))
+    assert coarse == pytest.approx(fine, rel=0.01)
+    monkeypatch.setattr(timing, "SIZE", 16)
+    monkeypatch.setattr(timing, "RUN_S", 0.05)
+    rows = growth.measure(lambda line: None, range(1, 3))
+    assert [row["triangles"] for row in rows] == [80, 320]
+    assert all(row["ms_per_sample"] > 0 and row["build_mtri_per_s"] > 0 for row in rows)
+    assert len(growth.table(rows).splitlines()) == 3
 
 
 def test_latencies_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -64,10 +76,12 @@ def test_command_prints_a_table_and_keeps_the_figures(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     row = {"name": "a sphere", "max_bounces": 8, "mpaths_per_s": 12.3456, "ms_per_sample": 21.2, "spread": 0.02}
+    grown = {"build_s": 0.1, "build_mtri_per_s": 1.5}
     document = {
         "machine": machine.describe({"renderer": "a driver", "version": "4.5"}),
         "size": [512, 512],
         "scenes": [{**row, "compile_cold_ms": 90.0, "compile_warm_ms": 4.0}],
+        "growth": [{**grown, "triangles": n, "ms_per_sample": n / 8} for n in (80, 320)],
         "latency": {"slider_p95_ms": 64.2},
         "rooms": {"a box": {"slider_p50_ms": 31, "slider_p95_ms": 41, "camera_p50_ms": 51, "camera_p95_ms": 61}},
     }
@@ -76,7 +90,7 @@ def test_command_prints_a_table_and_keeps_the_figures(
     assert main(["bench", "speed", "-o", str(output)]) == 0
     said = capsys.readouterr().out
     assert ["a", "box", "31", "41", "51", "61"] in [line.split() for line in said.splitlines()]
-    assert "12.35" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
+    assert "12.35" in said and "+30.0" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
     assert json.loads(output.read_text()) == document
     assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2
 

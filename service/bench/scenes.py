@@ -34,8 +34,8 @@ def cases() -> list[Case]:
         Case("Cornell box, two spheres", presets.get("scenes", "cornell-spheres"), 4),
         Case("1 000 spheres, HDR image", presets.get("scenes", "sphere-field"), 8),
         Case("hall, 240 lamps", _hall(), 4),
-        Case("mesh on a plane, HDR image", _mesh(), 2),
-        Case("mesh on a plane, HDR image", _mesh(), 8),
+        Case("mesh on a plane, HDR image", mesh_on_plane(), 2),
+        Case("mesh on a plane, HDR image", mesh_on_plane(), 8),
     ]
 
 
@@ -122,7 +122,7 @@ def _hall(lamps: int = 240) -> Document:
     }
 
 
-def _mesh() -> Document:
+def mesh_on_plane() -> Document:
     return {
         "version": 1,
         "camera": {"position": [0, 1.6, 4.2], "target": [0, 0.9, 0], "vfov": 40},

@@ -11,19 +11,15 @@ from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass
 from multiprocessing import get_context
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from gpu import Renderer, RenderSettings
-from service.bench import latency, machine
+from service.bench import growth, latency, machine, timing
 from service.bench.scenes import BenchAssets, Case, cases
 from service.pack import pack
 from service.scene import parse_scene
 
-if TYPE_CHECKING:
-    from gpu import Picture
-
-SIZE = 512
-RUN_S = 1.5  # long enough that beginning and ending a run do not count
+SIZE = timing.SIZE
 
 
 @dataclass(frozen=True)
@@ -39,11 +35,13 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
     for case in cases():
         told(f"{case.name}, {case.max_bounces} bounces")
         rows.append(_in_fresh_processes(case, options))
+    grown = growth.measure(told)
     told("server start and slider moves")
     return {
         "machine": machine.describe(rows[0]["renderer"]),
         "size": [SIZE, SIZE],
         "scenes": [{key: value for key, value in row.items() if key != "renderer"} for row in rows],
+        "growth": grown,
         "latency": latency.measure(),
         "rooms": latency.rooms(told),
     }
@@ -77,27 +75,12 @@ def _measure_case(case: Case, options: Options, runs: int, cache: str) -> dict[s
         "renderer": renderer.info,
     }
     if runs:
-        seconds = _seconds_per_sample(picture, runs)
+        seconds = timing.seconds_per_sample(picture, runs)
         row["ms_per_sample"] = 1e3 * statistics.median(seconds)
         row["spread"] = (max(seconds) - min(seconds)) / statistics.median(seconds)
         row["mpaths_per_s"] = SIZE * SIZE / statistics.median(seconds) / 1e6
     renderer.close()
     return row
-
-
-def _seconds_per_sample(picture: Picture, runs: int) -> list[float]:
-    """Wall seconds for a sample of every pixel, a value for each run of about RUN_S."""
-    once = _trace(picture, 2)  # the tiles find their size
-    samples = max(2, round(RUN_S * 2 / once))
-    return [_trace(picture, samples) / samples for _ in range(runs)]
-
-
-def _trace(picture: Picture, samples: int) -> float:
-    picture.reset()
-    began = time.perf_counter()
-    while picture.samples < samples:
-        picture.trace(1.0, samples)
-    return time.perf_counter() - began
 
 
 def table(document: dict[str, Any]) -> str:
@@ -109,7 +92,7 @@ def table(document: dict[str, Any]) -> str:
             f"{row['name']:{name}}  {row['max_bounces']:7}  {row['mpaths_per_s']:8.2f}  {row['ms_per_sample']:9.1f}"
             f"  {100 * row['spread']:4.0f} %  {row['compile_cold_ms']:12.0f}  {row['compile_warm_ms']:7.0f}"
         )
-    lines.append("")
+    lines += ["", growth.table(document["growth"]), ""]
     for key, value in document["latency"].items():
         lines.append(f"{key.removesuffix('_ms').replace('_', ' '):24}{value:8.1f} ms")
     rooms = document["rooms"]
