@@ -68,6 +68,19 @@ def moved_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe | None
     return recipe(apart, settings, features.flags(apart, True))
 
 
+def touched_recipes(arrays: SceneArrays, settings: RenderSettings) -> list[Recipe]:
+    """What a stream will need when it first touches a slider of `principled` that is not compiled in with the others.
+    A guess for meshes, of which only those of the material that is stretched get tangents.
+    """
+    has = features.flags(arrays, True)
+    if "HAS_PRINCIPLED" not in has:
+        return []
+    along = {"HAS_TANGENTS"} if "HAS_SMOOTH_NORMALS" in has else set()
+    clear, stretched = {"HAS_TRANSMISSION"}, {"HAS_ANISOTROPIC", *along}
+    asked = {has | clear, has | stretched, has | clear | stretched} - {has}
+    return [recipe(arrays, settings, raised) for raised in sorted(asked, key=len)]
+
+
 def full_recipe(arrays: SceneArrays, settings: RenderSettings) -> Recipe:
     """The same with every flag raised, for a `scene.Everything`, which has something bound to every texture unit."""
     own = recipe(arrays, settings, features.everything())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
+from gpu.ahead import recipe, touched_recipes
 from gpu.arrays import SceneArrays
 from gpu.features import FLAGS, flags, grown
 from gpu.price import kernel_price
@@ -174,6 +175,18 @@ def test_an_edit_waits_for_no_loop_that_it_can_do_without() -> None:
     assert smooth - rough == {"HAS_MIRRORS"}
     assert grown(rough, _packed("MIRRORS").arrays) == rough
     assert grown(smooth, _packed("TRANSMISSION").arrays) == smooth
+
+
+@pytest.mark.parametrize("more", [{"transmission": 0.5}, {"anisotropic": 0.5}])
+@pytest.mark.parametrize("shape", [ball("m"), icosphere("m", 1)], ids=["ball", "mesh"])
+def test_the_first_touch_of_a_slider_is_foreseen(shape: Doc, more: Doc) -> None:
+    """And whoever touched it already gets nothing compiled for that."""
+    plastic, settings = {"type": "principled", "roughness": 0.3}, RenderSettings(48, 32)
+    before, after = (pack(parse_scene(made_of({**plastic, **m}, shape)), IMAGES).arrays for m in ({}, more))
+    wanted = recipe(after, settings, grown(flags(before, True), after))
+    assert wanted in touched_recipes(before, settings)
+    assert wanted not in touched_recipes(after, settings)
+    assert touched_recipes(_packed("DISNEY").arrays, settings) == []
 
 
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:

@@ -237,11 +237,11 @@ class Task:
             self._foresee(settings)
 
     def _foresee(self, settings: RenderSettings) -> None:
-        """Has compiled, in spare time, what a large mesh would need that a person moves."""
+        """Has compiled, in spare time, what moving a large mesh would need, and the first touch of some sliders."""
         if self._spare is not None and self._course.interactive:
-            wanted = ahead.moved_recipe(self._held.full.scene.arrays, settings)
-            if wanted is not None:
-                self._spare.prepare([wanted])
+            arrays = self._held.full.scene.arrays
+            moved = ahead.moved_recipe(arrays, settings)
+            self._spare.prepare([*([moved] if moved else []), *ahead.touched_recipes(arrays, settings)])
 
     def evict(self) -> None:
         """Leaves the device: to the machine's memory, or where the server has it already, altogether."""
