@@ -37,7 +37,7 @@ vec3 path_clamp(vec3 c, bool indirect) {
 }
 
 // On towards d, which was sampled with `next`, to the nearest surface. `found_pdf`: what light found there is weighed
-// with; `lights`: whether it counts at all; `side`: of d, in the shading frame.
+// with; `counts`: whether it does at all; `side`: of d, in the shading frame.
 void step_on(vec3 d, Scatter next, float found_pdf, bool counts, float side, Surface s, Sampler rng, inout Path path) {
     path.d = d;
     path.throughput *= next.f / (path.alive ? next.pdf : 1.0);

@@ -10,8 +10,9 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.ahead import recipe, touched_recipes
 from gpu.arrays import SceneArrays
-from gpu.features import FLAGS, flags, grown
+from gpu.features import FLAGS, LEAST_ROUGHNESS, flags, grown
 from gpu.price import kernel_price
+from gpu.program import SHADERS
 from service.pack import Packed, pack
 from service.scene import parse_scene
 from tests.extremes.scenes import LONG, ball, icosphere, quad
@@ -168,6 +169,11 @@ def test_paths_go_through_mirrors_as_they_are_scattered(
     images.append(_seen(gpu, settings, scene))
     assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)
+
+
+def test_both_sides_agree_on_what_a_mirror_is() -> None:
+    """Else glass between the two would meet a kernel without its lobes."""
+    assert f"SURFACE_LEAST_ROUGHNESS = {LEAST_ROUGHNESS};" in (SHADERS / "surface.glsl").read_text()
 
 
 def test_an_edit_waits_for_no_loop_that_it_can_do_without() -> None:
