@@ -48,6 +48,7 @@ def overlay(editor: Editor, id: str) -> np.ndarray:
 
 def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     editor.settled()
+    samples = editor.samples()
     click(editor, 0.1, 0.9)
     editor.wait("the floor", lambda: editor.page.input_value("#material") == "floor")
     editor.wait("its outline", lambda: overlay(editor, "outline")[..., 3].any())
@@ -59,7 +60,7 @@ def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:
     assert editor.page.get_attribute("#outline-list [data-thing='/shapes/0']", "aria-selected") == "true"
     click(editor, 0.5, 0.02)
     editor.wait("the sky", lambda: editor.text("#thing-title") == "Environment")
-    assert editor.samples() > 4, "picking costs no sample"
+    assert editor.samples() >= samples, "picking costs no sample"
 
 
 def test_frame_focus_and_fly(editor: Editor) -> None:
