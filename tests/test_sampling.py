@@ -21,11 +21,11 @@ def prober(gpu: Renderer) -> Prober:
 
 def _draw(
     prober: Prober, what: int, count: int = N, sampler: int = 0, pair: int = 2, seed: int = 0, replicate: int = 0,
-    pixel: tuple[int, int] = (3, 7), filter_name: str = "box", doublings: int = 0,
+    pixel: tuple[int, int] = (3, 7), filter_name: str = "box", doublings: int = 0, adaptive: int = 0,
 ) -> np.ndarray:  # fmt: skip
     frame = np.zeros((), layout.Frame.dtype)
     frame["seed"], frame["replicate"] = seed, replicate
-    defines = {"WHAT": what, "SAMPLER": sampler}
+    defines = {"WHAT": what, "SAMPLER": sampler, "ADAPTIVE": adaptive}
     out = prober.run("numbers.comp", count, {}, defines=defines, frame=frame, filter_name=filter_name,
                      pixel=pixel, pair=pair, doublings=doublings)  # fmt: skip
     return out[0].astype(float)
@@ -51,6 +51,34 @@ def test_sobol_beats_independent_and_matches_scipys_scramble(prober: Prober) -> 
     owen = errors(qmc.Sobol(2, scramble=True, rng=s).random(256) for s in range(64))
     assert ours < 0.35 * plain
     assert ours < 1.5 * owen
+
+
+@pytest.mark.parametrize("pair", [0, 3])
+@pytest.mark.parametrize("corner", [(0, 0), (6, 4), (2, 130)])
+def test_four_neighbours_fill_each_others_gaps(prober: Prober, corner: tuple[int, int], pair: int) -> None:
+    pixels = [(corner[0] + i % 2, corner[1] + i // 2) for i in range(4)]
+    drawn = np.stack([_draw(prober, 0, 64, pixel=pixel, pair=pair)[:, :2] for pixel in pixels])
+    for k in range(7):
+        together = drawn[:, : 1 << k].reshape(-1, 2)
+        for axis in (0, 1):
+            assert len(np.unique(np.floor(together[:, axis] * len(together)))) == len(together), (k, axis)
+
+
+def _edge_errors(prober: Prober, samples: int, **more: int) -> np.ndarray:
+    """(blocks, 16): of pixels in blocks of 4 x 4, in the share of x + y / 2 < 0.7."""
+    corners = [(4 * i, 4 * (i % 5)) for i in range(30)]
+    pixels = [[(x + i % 4, y + i // 4) for i in range(16)] for x, y in corners]
+    draw = lambda pixel: _draw(prober, 0, samples, pixel=pixel, **more)[:, :2]  # noqa: E731
+    return np.array([[(draw(p) @ [1, 0.5] < 0.7).mean() - 0.45 for p in block] for block in pixels])
+
+
+@pytest.mark.parametrize("samples", [1, 4, 16, 64])
+def test_neighbours_errors_cancel(prober: Prober, samples: int) -> None:
+    errors = _edge_errors(prober, samples)
+    alone = _edge_errors(prober, samples, adaptive=1)
+    assert (errors**2).mean() == pytest.approx((alone**2).mean(), rel=0.3), "to each pixel it is all the same"
+    assert (errors.mean(axis=1) ** 2).mean() < 0.5 * (errors**2).mean() / 16
+    assert (alone.mean(axis=1) ** 2).mean() > 0.5 * (alone**2).mean() / 16, "adaptive counts want them independent"
 
 
 @pytest.mark.parametrize("sampler", [0, 1])
