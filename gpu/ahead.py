@@ -123,8 +123,11 @@ def _side(length: int) -> int:
 
 
 def edited(arrays: SceneArrays, edits: dict[str, Any]) -> SceneArrays:
-    """The arrays as far as flags look at them after `Scene.edit` of these."""
+    """The arrays after `Scene.edit` of these."""
     changes: dict[str, Any] = {name: edits[name] for name in ("camera", "materials") if name in edits}
+    if "environment" in edits and arrays.environment is not None:
+        rotation, scale = edits["environment"]
+        changes["environment"] = replace(arrays.environment, rotation=rotation, scale=scale)
     if "texture_words" in edits and arrays.textures is not None:
         changes["textures"] = replace(arrays.textures, words=edits["texture_words"])
     return replace(arrays, **changes, **edits.get("moved", {}))

@@ -229,11 +229,28 @@ _BLOCK_BYTES = 16384  # what every driver gives a uniform block
 PICK_MAX = 2
 
 
+def _loop(name: str) -> str:
+    """The define of how often a loop over shapes runs, beside that of how many of them stand in it."""
+    return name.replace("_COUNT", "_LOOP")
+
+
+def looped(scene: SceneArrays) -> dict[str, int]:
+    """How many shapes of each kind stand in the kernel's loops, by the members of `layout.Frame` that tell so."""
+    kinds = zip(COUNTS.values(), ShapeKind, strict=False)
+    return {f"looped_{records}": _looped(scene, kind, records) for records, kind in kinds}
+
+
+def told_loops() -> dict[str, object]:
+    """For a kernel that learns those numbers from the frame."""
+    return {_loop(name): f"frame.looped_{records}" for name, records in COUNTS.items()}
+
+
 def counts(scene: SceneArrays) -> dict[str, object]:
     """How many shapes of each kind stand in the kernel's loops, how many materials and lights, where few; and where
     textures belong."""
     kinds = zip(COUNTS.items(), ShapeKind, strict=False)  # instances are never looped over
     out: dict[str, object] = {name: _looped(scene, kind, records) for (name, records), kind in kinds}
+    out |= {_loop(name): n for name, n in out.items()}
     few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
     slots = {} if scene.textures is None else scene.textures.slots
     room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * glsl_textures.groups(slots))
@@ -253,7 +270,8 @@ def defines(
 ) -> dict[str, object]:
     """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
-    out |= {name: 0 for name in (*COUNTS, *FEW)} | {"QUAD_LAMP": -1} | glsl_textures.defines({}) | dict(shapes or {})
+    out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
+    out |= {"QUAD_LAMP": -1} | glsl_textures.defines({}) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}

@@ -253,7 +253,7 @@ class Frame(Record):
     node_count: u32  # of one octant's order of the top
     light_count: u32
     replicate: u32  # 0: the picture's own scramble of the sampler; 1: the noise meter's, from the first one on
-    clamp_radiance: f32  # of indirect light; 0: off
+    clamp_radiance: f32  # of indirect light; infinite: off
     environment_probability: f32  # of picking the environment among the lights
     moment_scale: f32  # second moments are of radiance times this
     environment_background: u32
@@ -266,6 +266,11 @@ class Frame(Record):
     slot_first: u32  # the pixel at the beginning of the bound part of the accumulators
     sun_first: u32  # among the lights: directional ones with a disk stand side by side
     sun_count: u32
+    looped_spheres: u32  # how many stand in the kernel's loop, for one that was not compiled for their number
+    looped_quads: u32
+    looped_boxes: u32
+    looped_ellipsoids: u32
+    looped_triangles: u32
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's
 

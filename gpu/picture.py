@@ -228,7 +228,7 @@ class Picture:
         frame["tile_origin"], frame["tile_size"] = tile, size
         frame["sample_first"], frame["sample_count"] = first, count
         frame["max_bounces"], frame["roulette_depth"], frame["seed"] = s.max_bounces, s.roulette_depth, s.seed
-        frame["clamp_radiance"] = s.clamp or 0.0
+        frame["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
         frame["slot_width"] = s.width
         return frame
 

@@ -13,6 +13,7 @@ from gpu.kernels import Kernels
 from gpu.picture import Picture
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
+from gpu.stopgap import Provisional
 from gpu.texels import Texels
 
 
@@ -45,11 +46,18 @@ class Renderer:
         Raises SceneTooLarge, OutOfMemory.
         """
         self._own()
-        for name in ("spheres", "quads", "boxes", "ellipsoids", "triangles"):
-            count = len(getattr(arrays, name))
-            if count > layout.LEAF_FIRST_MASK:
-                raise SceneTooLarge(f"{count} {name}: at most {layout.LEAF_FIRST_MASK} of a kind")
+        _check(arrays)
         return Scene(self._context, arrays, editing, self._texels, everything, raised)
+
+    def provisional(self, arrays: SceneArrays) -> Scene:
+        """Upload a scene to be shown with the kernel of `stopgap`, where that has a recipe for it. What other scenes
+        share with it is uploaded once.
+
+        Raises SceneTooLarge, OutOfMemory.
+        """
+        self._own()
+        _check(arrays)
+        return Provisional(self._context, arrays, self._texels)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.
@@ -87,3 +95,10 @@ class Renderer:
 
     def __exit__(self, *_: object) -> None:
         self.close()
+
+
+def _check(arrays: SceneArrays) -> None:
+    for name in ("spheres", "quads", "boxes", "ellipsoids", "triangles"):
+        count = len(getattr(arrays, name))
+        if count > layout.LEAF_FIRST_MASK:
+            raise SceneTooLarge(f"{count} {name}: at most {layout.LEAF_FIRST_MASK} of a kind")

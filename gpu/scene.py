@@ -116,7 +116,7 @@ class Scene:
         for unit, (values, channels, dtype) in asked.items():
             if len(values):
                 self._details[unit] = rows(self._context, values, channels, dtype)
-        if "HAS_LIGHT_TREE" in self._raised:
+        if "HAS_LIGHT_TREE" in self._raised and len(a.light_words):
             self._details[bindings.LIGHT_TREE_TEXTURE] = rows(self._context, a.light_words, 4, "u4")
         if a.textures is not None:
             if a.textures.key:
@@ -134,6 +134,7 @@ class Scene:
         return {u: rows(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)}
 
     def _raise_flags(self) -> None:
+        self._looped = features.looped(self.arrays)
         if self._everything:
             self._raised = features.everything()
         elif self._editing and self._raised:
@@ -239,6 +240,8 @@ class Scene:
         frame["node_count"] = a.node_count
         frame["node_first"], frame["instance_shift"] = len(a.instance_nodes), a.instance_shift
         frame["light_count"] = len(a.lights)
+        for member, count in self._looped.items():
+            frame[member] = count
         suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
         frame["sun_first"], frame["sun_count"] = suns.min(initial=len(a.lights)), len(suns)
         frame["moment_scale"] = 1.0 / a.radiance_scale

@@ -37,27 +37,27 @@ void shapes_take(uint kind, uint index, float t, vec2 uv, uvec2 skip, inout Near
 void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Nearest n) {
     Shear shear = triangle_shear(o, d);
 #if HAS_SPHERES
-    for (uint i = 0u; i < uint(SPHERE_COUNT); i++) {
+    for (uint i = 0u; i < uint(SPHERE_LOOP); i++) {
         shapes_take(SHAPE_SPHERE, i, sphere_hit(sphere_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_QUADS
-    for (uint i = 0u; i < uint(QUAD_COUNT); i++) {
+    for (uint i = 0u; i < uint(QUAD_LOOP); i++) {
         shapes_take(SHAPE_QUAD, i, quad_hit(quad_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_BOXES
-    for (uint i = 0u; i < uint(BOX_COUNT); i++) {
+    for (uint i = 0u; i < uint(BOX_LOOP); i++) {
         shapes_take(SHAPE_BOX, i, box_hit(box_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_ELLIPSOIDS
-    for (uint i = 0u; i < uint(ELLIPSOID_COUNT); i++) {
+    for (uint i = 0u; i < uint(ELLIPSOID_LOOP); i++) {
         shapes_take(SHAPE_ELLIPSOID, i, ellipsoid_hit(ellipsoid_load(i), o, d, n.t), n.uv, skip, n);
     }
 #endif
 #if HAS_TRIANGLES
-    for (uint i = 0u; i < uint(TRIANGLE_COUNT); i++) {
+    for (uint i = 0u; i < uint(TRIANGLE_LOOP); i++) {
         vec2 uv = n.uv;
         float t = triangle_hit(triangle_load(i), shear, d, n.t, uv);
         shapes_take(SHAPE_TRIANGLE, i, t, uv, skip, n);

@@ -1,0 +1,76 @@
+"""The kernel that shows what waits for its own: the same picture of every scene that it knows, and no wait."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings, features, stopgap
+from gpu.price import full_kernel
+from service.pack import pack
+from service.scene import parse_scene
+from tests.documents import Shelf
+from tests.serving import SCENE
+from tests.test_flags import IMAGES, SCENES
+
+SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
+
+
+def arrays_of(scene: dict[str, Any], images: Any = None) -> Any:
+    return pack(parse_scene(scene), images or Shelf()).arrays
+
+
+KNOWN = {name: arrays for name in SCENES if stopgap.recipe(arrays := arrays_of(SCENES[name], IMAGES), SMALL)}
+
+
+def test_one_kernel_for_all_that_it_knows() -> None:
+    raised = frozenset[str]().union(*(features.flags(arrays) for arrays in KNOWN.values()))
+    assert raised == stopgap.flags(), "each flag is in some scene here"
+    found = {stopgap.recipe(arrays, SMALL) for arrays in KNOWN.values()}
+    sides = {dict((unit, side) for unit, _, _, *side in recipe.textures)[0][0] for recipe in found if recipe}
+    assert len(found) == len(sides) <= 2, "one for environments of each kind"
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
+    pictures = []
+    for scene in (gpu.load(KNOWN[name]), gpu.provisional(KNOWN[name])):
+        picture = gpu.picture(scene, SMALL)
+        picture.trace(60.0, 8)
+        pictures.append(picture.read())
+        picture.release()
+        scene.release()
+    apart = np.abs(pictures[0] - pictures[1]) > 1e-3 * (pictures[0] + 0.01)
+    assert np.isfinite(pictures[1]).all() and apart.mean() < 0.01, "but for paths on which rounding decides"
+
+
+def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:
+    scene = gpu.provisional(KNOWN["PRINCIPLED"])
+    means = []
+    for clamp in (None, 1e6, 1e-3):
+        picture = gpu.picture(scene, RenderSettings(24, 16, max_bounces=3, clamp=clamp))
+        picture.trace(60.0, 8)
+        means.append(picture.read()[..., :3].mean())
+        picture.release()
+    scene.release()
+    assert means[0] == means[1] > means[2] > 0
+
+
+def test_what_it_does_not_know() -> None:
+    assert stopgap.recipe(arrays_of(SCENES["CHECKERS"], IMAGES), SMALL) is None
+    known = KNOWN["SPHERES"]
+    for other in ({"estimator": "light"}, {"sampler": "independent"}):
+        assert stopgap.recipe(known, RenderSettings(24, 16, **other)) is None
+    adaptive = RenderSettings(24, 16, adaptive=True)
+    assert stopgap.recipe(known, adaptive) is not None and not stopgap.settings_for(adaptive).adaptive  # type: ignore[union-attr]
+    assert full_kernel(known, SMALL) != stopgap.recipe(known, SMALL)
+
+
+def test_what_an_edit_tells_it() -> None:
+    scene = {**SCENE, "environment": {"type": "constant", "radiance": 0.5}}
+    arrays = arrays_of(scene)
+    assert stopgap.edits(arrays, arrays) is not None
+    assert stopgap.edits(arrays, arrays_of(scene)) is None, "other arrays, perhaps other shapes"
+    assert stopgap.edits(arrays, arrays_of(SCENE)) is None
