@@ -20,7 +20,7 @@ from service.pack import pack
 from service.rendering.engine import Engine
 from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.rendering.worker.compiler import Compiled, Compiler, records
-from service.rendering.worker.holding import Holding, kernel_of
+from service.rendering.worker.holding import Holding, wanted_of
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.engines import with_engine
@@ -215,11 +215,11 @@ def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
     assert flags > features.flags(arrays, editing=True)
     aside = holding.aside()
     edit = Update(1, 2, materials=rough, base=1)
-    recipe = kernel_of(edit, aside.settings, None, aside)
+    wanted = wanted_of(edit, aside.settings, None, aside)
     back = Holding.back(gpu, aside)
     assert back.scene.flags == flags and back.ladder.full.samples == 3
     assert back.ladder.full.compile_ms == 0  # it is still there
-    assert recipe is not None and dict(recipe.defines) == back.scene.defines(aside.settings)
+    assert wanted is not None and dict(wanted.recipe.defines) == back.scene.defines(aside.settings)
     back.release()
 
 

@@ -2,6 +2,10 @@
 
 from __future__ import annotations
 
+import asyncio
+import time
+from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -10,12 +14,19 @@ import pytest
 from gpu import Renderer, RenderSettings, features, stopgap
 from gpu.price import full_kernel
 from service.pack import pack
+from service.rendering.engine import Engine
+from service.rendering.messages import Frame, Loaded, Pause, StopRule, Update, View, Want
+from service.rendering.worker.compiler import records
 from service.scene import parse_scene
 from tests.documents import Shelf
+from tests.engines import with_engine
 from tests.serving import SCENE
+from tests.test_compiling import Ears
 from tests.test_flags import IMAGES, SCENES
 
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
+SIZE = {"width": 256, "height": 256}
+BUILT_S = 300.0  # most of it is spent on others, where there are any
 
 
 def arrays_of(scene: dict[str, Any], images: Any = None) -> Any:
@@ -74,3 +85,61 @@ def test_what_an_edit_tells_it() -> None:
     assert stopgap.edits(arrays, arrays) is not None
     assert stopgap.edits(arrays, arrays_of(scene)) is None, "other arrays, perhaps other shapes"
     assert stopgap.edits(arrays, arrays_of(SCENE)) is None
+
+
+async def shown(engine: Engine, ears: Ears, task: int, generation: int) -> list[Frame | Loaded]:
+    """What is told of a generation until its picture is there in full."""
+    told: list[Frame | Loaded] = []
+    serial = 100 * generation
+    engine.send(Want(task, serial, View(encoding="linear")))
+    while True:
+        message = await ears.next(task, Frame, Loaded)
+        if message.generation != generation:
+            continue
+        told.append(message)
+        if isinstance(message, Frame):
+            if message.scale == 1.0:
+                return told
+            serial += 1
+            engine.send(Want(task, serial, View(encoding="linear")))
+
+
+def test_a_stream_sees_at_once_what_is_compiled_for(
+    gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
+    arrays = arrays_of(SCENE)
+    wanted = stopgap.recipe(arrays, RenderSettings(**SIZE))
+    assert wanted is not None
+    record = records() / wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
+
+    async def test(engine: Engine) -> None:
+        ears = Ears()
+        task = engine.open(ears)
+        await engine.send_scene(Update(task, 1, arrays, SIZE, StopRule(64), interactive=True))
+        await ears.next(task, Loaded)
+        until = time.monotonic() + BUILT_S
+        while not record.exists():
+            assert time.monotonic() < until
+            await asyncio.sleep(0.1)
+
+        engine.send(Update(task, 2, settings={**SIZE, "clamp": 5.0}, base=1))
+        told = await shown(engine, ears, task, 2)
+        loaded = next(i for i, message in enumerate(told) if isinstance(message, Loaded))
+        before, after = told[:loaded], told[loaded + 1 :]
+        frames = [message for message in told if isinstance(message, Frame)]
+        assert before and all(isinstance(frame, Frame) and frame.provisional for frame in before)
+        assert after and not any(frame.provisional for frame in after if isinstance(frame, Frame))
+        order = [(frame.scale, frame.progress.samples) for frame in frames]
+        assert order == sorted(order) and len(set(order)) == len(order)
+        first, last = frames[0].pixels, frames[-1].pixels
+        assert first.mean((0, 1)) == pytest.approx(last.mean((0, 1)), rel=0.25)
+
+        engine.send(Pause(task))
+        open_lens = replace(arrays.camera, aperture_radius=0.1)
+        engine.send(Update(task, 3, camera=open_lens, base=2))
+        (only,) = await shown(engine, ears, task, 3)
+        assert isinstance(only, Frame) and not only.provisional, "at rest one first look is all it wants"
+        assert not engine.statistics.restarts
+
+    with_engine(test)

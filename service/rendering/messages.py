@@ -198,6 +198,7 @@ class Frame:
     scale: float
     last: bool
     denoised: bool = False
+    provisional: bool = False  # the generation may still fail
 
 
 @dataclass(frozen=True)

@@ -159,7 +159,8 @@ class Stream:
 
     def heard(self, message: FromRenderer) -> None:
         if isinstance(message, Frame):
-            self._live.works = max(self._live.works, message.generation)  # else every edit's documents are kept
+            if not message.provisional:  # else every edit's documents are kept
+                self._live.works = max(self._live.works, message.generation)
             if self._flow.welcome(message):
                 self._post(message)
         elif isinstance(message, Done):

@@ -85,17 +85,22 @@ class Compiler:
         """How long it makes sense to wait for that."""
         return max(0.0, self._until - time.monotonic()) if self._orders else None
 
-    def waits(self, recipe: Recipe, told: Told) -> bool:
+    def knows(self, recipe: Recipe) -> bool:
+        """Whether nobody need wait for it any more."""
+        return recipe in self._known
+
+    def waits(self, recipe: Recipe, told: Told, alone: bool = False) -> bool:
         """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
-        it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop.
+        it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop, as
+        where nobody else is there, unless there is something to do meanwhile (`alone`).
         """
         if told is not _nobody:
             self.forget(told)
-        if recipe in self._known:
+        if self.knows(recipe):
             return False
         order = next((order for order in self._orders if order.recipe == recipe), None)
         if order is None:
-            if not self._able or not self._crowded() or self._is_recorded(recipe):
+            if not self._able or not (alone or self._crowded()) or self._is_recorded(recipe):
                 return False
             order = _Order(recipe)
             self._orders.append(order)

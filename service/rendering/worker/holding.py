@@ -100,10 +100,19 @@ def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:
     return (0 if arrays is None else scene_bytes(arrays)) + picture_bytes(settings)
 
 
-def kernel_of(
+@dataclass(frozen=True)
+class Wanted:
+    """What an update comes to, and the kernel that it takes."""
+
+    arrays: SceneArrays
+    settings: RenderSettings
+    recipe: Recipe
+
+
+def wanted_of(
     update: Update, old: RenderSettings | None, holding: Holding | None, aside: Aside | None
-) -> Recipe | None:
-    """The kernel of the picture that the update makes; None: the one there is, or nothing can come of it."""
+) -> Wanted | None:
+    """The picture that the update makes; None: its kernel is the one there is, or nothing can come of it."""
     settings = old if update.settings is None else RenderSettings(**update.settings)
     edits, raised = update.edits, frozenset[str]()
     if settings is None:
@@ -123,4 +132,4 @@ def kernel_of(
     if edits or update.scene is None:
         arrays = ahead.edited(arrays, edits)
         raised = features.grown(raised, arrays) if editing else features.flags(arrays)
-    return ahead.recipe(arrays, settings, raised)
+    return Wanted(arrays, settings, ahead.recipe(arrays, settings, raised))

@@ -23,11 +23,12 @@ UNMEASURED_S = 2e-6  # a sample of a pixel, before there was one; a large mesh t
 class Ladder:
     """The pictures of one scene with the same settings. Rungs below 1 are made when first climbed."""
 
-    def __init__(self, renderer: Renderer, scene: Scene, settings: RenderSettings) -> None:
+    def __init__(self, renderer: Renderer, scene: Scene, settings: RenderSettings, full: bool = True) -> None:
+        """Without `full` the picture at full size, too, is made when first climbed."""
         self._renderer = renderer
         self._scene = scene
         self._settings = settings
-        self._pictures = {1.0: renderer.picture(scene, settings)}
+        self._pictures = {1.0: renderer.picture(scene, settings)} if full else {}
 
     @property
     def full(self) -> Picture:

@@ -110,7 +110,7 @@ class Showing:
         content = (course.generation, shown, progress.samples, course.reason, smooth is not None and smooth.fine)
         if content == self._served and not want.anyway:
             return False
-        pixels = _pixels_of(picture, want.view, smooth)
+        pixels = pixels_of(picture, want.view, smooth)
         last = course.reason is not None and whole
         self._served, self.want = content, None
         denoised = smooth is not None
@@ -146,7 +146,7 @@ class Showing:
         self._give(read, full, smooth)
 
     def _give(self, read: Read, full: Picture | None, smooth: Smooth | None) -> None:
-        pixels = _pixels_of(full, read.view, smooth) if full else None
+        pixels = pixels_of(full, read.view, smooth) if full else None
         progress = smooth.progress if smooth else self._course.progress(self._held)
         self._held.rests()
         self._send(Image(self._number, read.serial, pixels, progress, smooth is not None))
@@ -231,7 +231,8 @@ class Showing:
         return True
 
 
-def _pixels_of(picture: Picture, view: View, smooth: Smooth | None) -> np.ndarray:
+def pixels_of(picture: Picture, view: View, smooth: Smooth | None) -> np.ndarray:
+    """What is shown of it: (height, width, 4) as the view wants it."""
     color = smooth.pixels if smooth else None
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color

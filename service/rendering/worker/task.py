@@ -27,12 +27,13 @@ from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.course import Course
 from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.held import Held
-from service.rendering.worker.holding import kernel_of
+from service.rendering.worker.holding import Wanted, wanted_of
 from service.rendering.worker.keeping import Keeping
 from service.rendering.worker.ladder import FULL_S
 from service.rendering.worker.memory import UNLIMITED, Memory
 from service.rendering.worker.showing import SLICE_S, Showing
 from service.rendering.worker.smoothing import Smoothing
+from service.rendering.worker.stopgap import Stopgap
 
 if TYPE_CHECKING:
     from gpu import Renderer, Saved
@@ -72,6 +73,7 @@ class Task:
         self._showing = Showing(number, send, self._held, self._course, smoothing, self._finish, compiler)
         self.appraising = Appraising(number, send, renderer, spare)
         self._spare = spare
+        self._stopgap = Stopgap(number, send, renderer, spare)
         self._scale = 1.0  # of what is traced
         self._pending: Update | None = None  # not applied yet
         self._stopping = False  # when that was applied
@@ -97,7 +99,7 @@ class Task:
         if self._away:
             return False
         if self._pending is not None:
-            return not self._compiling
+            return not self._compiling or (self._stopgap.due and not self._paused)
         if not self._held.there:
             return False
         if self._keeping.under_way or self._showing.due:
@@ -107,6 +109,8 @@ class Task:
     @property
     def unseen(self) -> bool:
         pending, interactive = self._pending, self._course.interactive
+        if self._compiling and self._stopgap.due:
+            return self._stopgap.scale is None
         if pending is not None and (pending.restarts or self._held.holding is None):
             return pending.interactive or interactive
         return self._showing.scale is None and interactive
@@ -130,7 +134,7 @@ class Task:
 
     @property
     def bytes(self) -> int:
-        return self._held.bytes
+        return self._held.bytes + self._stopgap.bytes
 
     @property
     def rested_since(self) -> float:
@@ -147,6 +151,9 @@ class Task:
     def turn(self) -> None:
         """Applies what has changed, traces a slice, and ends the render when that was the last."""
         if self._pending is not None:
+            if self._compiling:
+                self.traced += self._stopgap.step()
+                return
             self._compile_and_apply(self._pending)
             if self._compiling:
                 return
@@ -187,15 +194,28 @@ class Task:
     def _compile_and_apply(self, update: Update) -> None:
         """Applies the update, or has its kernel compiled first: then this turn was for nothing more."""
         self.attempted = update.generation
-        kernel = None
+        wanted = None
         if self._compiler is not None:
-            kernel = kernel_of(update, self._settings, self._held.holding, self._held.aside)
-            self._compiling = kernel is not None and self._compiler.waits(kernel, self._hear_compiled)
+            wanted = wanted_of(update, self._settings, self._held.holding, self._held.aside)
+            self._compiling = wanted is not None and self._waits(wanted, update, self._compiler)
             if self._compiling:
                 return
         self._apply(update)
-        if kernel is not None and self._compiler is not None and self.generation == update.generation:
-            self._compiler.met(kernel)
+        self._stopgap.release()
+        if wanted is not None and self._compiler is not None and self.generation == update.generation:
+            self._compiler.met(wanted.recipe)
+
+    def _waits(self, wanted: Wanted, update: Update, compiler: Compiler) -> bool:
+        """Whether its kernel is being compiled; who looks on sees it with another one meanwhile."""
+        looks_on = (update.interactive or self._course.interactive) and not self._paused
+        shows = looks_on and not compiler.knows(wanted.recipe) and self._stopgap.can(wanted)
+        if not compiler.waits(wanted.recipe, self._hear_compiled, shows):
+            return False
+        if shows:
+            self._stopgap.begin(wanted, update.generation)
+        else:
+            self._stopgap.release()
+        return True
 
     def _hear_compiled(self, milliseconds: float) -> None:
         self._compiling, self._compiled_ms = False, milliseconds
@@ -242,6 +262,7 @@ class Task:
             arrays = self._held.full.scene.arrays
             moved = ahead.moved_recipe(arrays, settings)
             self._spare.prepare([*([moved] if moved else []), *ahead.touched_recipes(arrays, settings)])
+            self._stopgap.prepare(arrays, settings)
 
     def evict(self) -> None:
         """Leaves the device: to the machine's memory, or where the server has it already, altogether."""
@@ -255,6 +276,7 @@ class Task:
         """Applies what waits to be, for what comes next to fall back to."""
         if self._pending is not None:
             self._apply(self._pending)
+            self._stopgap.release()
 
     def restore(self, restore: Restore) -> None:
         self.settle()
@@ -274,7 +296,12 @@ class Task:
 
     def answer(self) -> bool:
         """Sends the frame that is wanted if there is something new to see in it."""
-        return self._pending is None and self._showing.answer()
+        if self._pending is None:
+            return self._showing.answer()
+        seen = self._compiling and self._stopgap.answer(self._showing.want)
+        if seen:
+            self._showing.want = None
+        return seen
 
     def read(self, read: Read) -> None:
         self._showing.read(read)
@@ -328,6 +355,7 @@ class Task:
         self._keeping.restart()
         if self._compiler is not None:
             self._compiler.forget(self._hear_compiled)
+        self._stopgap.release()
         self._held.release()
         self._showing.forget()
 
@@ -350,6 +378,9 @@ class Task:
         self._course.restart()
         first = self._held.holding is not None and self._course.interactive
         self._scale = self._held.ladder.first(self._course.pixel_s) if first else 1.0
+        seen = self._stopgap.shown(self.generation)
+        if self._scale <= seen:
+            self._scale = self._held.ladder.next(seen, self._course.pixel_s)
 
     def _end_if_reached(self) -> bool:
         reason = self._course.enough(self._held)

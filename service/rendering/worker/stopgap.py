@@ -1,0 +1,145 @@
+"""First looks at what waits for its kernel, by one that is slower and there already (gpu/stopgap.py).
+
+They are small, so that the picture by its own kernel, which begins anew, is larger whenever it comes.
+"""
+
+from __future__ import annotations
+
+import logging
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from gpu import GpuError, OutOfMemory, scene_bytes, stopgap
+from service.rendering.messages import Frame, FromRenderer, Progress, Want
+from service.rendering.worker.compiler import Compiler
+from service.rendering.worker.holding import Wanted
+from service.rendering.worker.ladder import FIRST_S, SCALES, SMALLEST_SIDE, Ladder
+from service.rendering.worker.showing import GUIDES, SLICE_S, pixels_of
+
+if TYPE_CHECKING:
+    from gpu import Renderer, RenderSettings, Scene, SceneArrays
+
+MOST_BYTES = 1 << 28  # of a scene: it is on the device twice, and of this size it loads in .1 s
+ENOUGH_S = 0.1  # of tracing: on llvmpipe it takes from the compiler what it is there to bridge
+LARGEST = 1 / 2  # of the scales
+BEGIN_S = 4e-6  # a sample of a pixel, before there was one (llvmpipe with 2 cores)
+
+log = logging.getLogger(__name__)
+
+
+class Stopgap:
+    """Between `begin` and `release` there is a picture of that update."""
+
+    def __init__(
+        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, spare: Compiler | None
+    ) -> None:
+        """`spare` compiles in time that nobody wants; without it there is never anything to see."""
+        self.generation = 0
+        self.scale: float | None = None  # of what there is to see
+        self._number, self._send, self._renderer, self._spare = number, send, renderer, spare
+        self._scene: Scene | None = None
+        self._ladder: Ladder | None = None
+        self._next = 1.0  # the scale that is traced
+        self._pixel_s = BEGIN_S
+        self._spent_s = 0.0
+        self._served: tuple[object, ...] = ()
+        self._shown = (0, 0.0)
+        self._began = 0.0
+
+    @property
+    def bytes(self) -> int:
+        if self._scene is None or self._ladder is None:
+            return 0
+        return scene_bytes(self._scene.arrays) + self._ladder.bytes
+
+    @property
+    def due(self) -> bool:
+        """There is more to trace."""
+        return self._ladder is not None and (self.scale != self._next or self._spent_s < ENOUGH_S)
+
+    def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> None:
+        """Has the kernel compiled, some time, that edits of these will need."""
+        recipe = stopgap.recipe(arrays, settings)
+        if recipe is not None and self._spare is not None:
+            self._spare.prepare([recipe])
+
+    def can(self, wanted: Wanted) -> bool:
+        """Whether there would be anything to see at once."""
+        if self._spare is None or min(wanted.settings.width, wanted.settings.height) * LARGEST < SMALLEST_SIDE:
+            return False
+        recipe = stopgap.recipe(wanted.arrays, wanted.settings)
+        return recipe is not None and self._spare.has(recipe) and scene_bytes(wanted.arrays) <= MOST_BYTES
+
+    def begin(self, wanted: Wanted, generation: int) -> None:
+        """Begins with what `can` be shown; where it can't after all, there is nothing to see."""
+        settings = stopgap.settings_for(wanted.settings)
+        recipe = stopgap.recipe(wanted.arrays, wanted.settings)
+        assert settings is not None and recipe is not None and self._spare is not None
+        self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
+        try:
+            edits = None if self._scene is None else stopgap.edits(self._scene.arrays, wanted.arrays)
+            if self._scene is not None and edits is not None:
+                self._scene.edit(**edits)
+            else:
+                self.release()
+                self._scene = self._renderer.provisional(wanted.arrays)
+            if self._ladder is not None:
+                self._ladder.release()
+            self._ladder = Ladder(self._renderer, self._scene, settings, full=False)
+            self._next = self._fitting(self._ladder, FIRST_S)
+            self._ladder.picture(self._next)
+            self._spare.met(recipe)
+        except GpuError as error:
+            log.info("no stopgap: %s", error)
+            self.release()
+
+    def step(self) -> int:
+        """Traces for a slice; how many samples of pixels."""
+        try:
+            return 0 if self._ladder is None else self._trace(self._ladder)
+        except OutOfMemory as error:
+            log.info("no stopgap: %s", error)
+            self.release()
+            return 0
+
+    def _trace(self, ladder: Ladder) -> int:
+        picture = ladder.picture(self._next)
+        before = picture.samples
+        self._spent_s += picture.trace(SLICE_S, before + 1)
+        self._pixel_s = picture.cost_s or self._pixel_s
+        if picture.samples:
+            self.scale = self._next
+            if self._spent_s < ENOUGH_S:
+                self._next = max(self._next, self._fitting(ladder, ENOUGH_S - self._spent_s))
+        return (picture.samples - before) * picture.settings.width * picture.settings.height
+
+    def _fitting(self, ladder: Ladder, seconds: float) -> float:
+        """The largest scale at which a sample takes no longer, or the smallest one there is."""
+        scales = [scale for scale in SCALES if scale <= LARGEST]
+        return next((s for s in scales if ladder.pixels(s) * self._pixel_s <= seconds), scales[-1])
+
+    def answer(self, want: Want | None) -> bool:
+        """Sends the frame that is wanted if there is something new to see in it."""
+        if want is None or self.scale is None or self._ladder is None or want.view.aov in GUIDES:
+            return False
+        picture = self._ladder.picture(self.scale)
+        content = (self.generation, self.scale, picture.samples)
+        if content == self._served and not want.anyway:
+            return False
+        self._served, self._shown = content, (self.generation, self.scale)
+        progress = Progress(picture.samples, None, time.monotonic() - self._began)
+        what = want.serial, self.generation, pixels_of(picture, want.view, None), progress, self.scale
+        self._send(Frame(self._number, *what, last=False, provisional=True))
+        return True
+
+    def shown(self, generation: int) -> float:
+        """The scale at which that one was seen; 0: not at all."""
+        return self._shown[1] if self._shown[0] == generation else 0.0
+
+    def release(self) -> None:
+        for thing in (self._ladder, self._scene):
+            if thing is not None:
+                thing.release()
+        self._ladder = self._scene = None
+        self.scale = None
