@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from gpu import Renderer, RenderSettings, Scene, SceneArrays
 
 MOST_BYTES = 1 << 28  # of a scene: it is on the device twice, and of this size it loads in .1 s
-ENOUGH_S = 0.1  # of tracing: on llvmpipe it takes from the compiler what it is there to bridge
+ENOUGH_S = 0.25  # of tracing: on llvmpipe it takes from the compiler what it is there to bridge
 LARGEST = 1 / 2  # of the scales
 BEGIN_S = 4e-6  # a sample of a pixel, before there was one (llvmpipe with 2 cores)
 
