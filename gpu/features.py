@@ -13,9 +13,11 @@ from gpu import glsl_textures, layout, texturing
 from gpu.arrays import SceneArrays
 from gpu.layout import LightKind, Model, ShapeKind
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
+from gpu.view import open_share
 
 FILTER_TABLE_SIZE = 512
 LEAST_ROUGHNESS = 0.01  # as in surface.glsl
+OPEN = 0.4  # of the picture shows nothing: then a loop of its own for that spares more than it takes
 
 
 def _looped(scene: SceneArrays, kind: ShapeKind, records: str) -> int:
@@ -165,6 +167,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     ),
     "HAS_ENVIRONMENT_CUBE": lambda s: s.environment is not None and s.environment.cube,
     "HAS_SUN": lambda s: s.environment is not None and s.environment.sun is not None,
+    "HAS_OPEN_VIEW": lambda s: open_share(s) >= OPEN,
     "HAS_APERTURE": lambda s: s.camera.aperture_radius > 0,
     "HAS_DISNEY": _model(Model.DISNEY),
     "HAS_SUBSURFACE": _disney("subsurface"),
@@ -206,7 +209,7 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
 
 
 # What spares work and changes no picture: an edit that could do with it is not worth waiting for a compiler.
-_SPARING = frozenset({"HAS_MIRRORS"})
+_SPARING = frozenset({"HAS_MIRRORS", "HAS_OPEN_VIEW"})
 
 
 def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:

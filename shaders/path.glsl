@@ -10,23 +10,35 @@
 #include "meet.glsl"
 #include "mirror.glsl"
 
-struct Radiance {
-    vec3 color;
-    float alpha; // 1: met a surface, or a background that is shown
-};
+bool path_was_cut; // the last path: by the driver
 
-bool path_was_cut; // of the last path: by the driver
-
+// What a camera ray sees that meets nothing; a: whether that is shown.
 #if HAS_ATTENUATION
-Radiance path_trace(vec3 o, vec3 d, Sampler rng, Medium medium) {
+vec4 path_sky(vec3 d, Medium medium) {
+    vec3 share = medium_share(medium, INFINITY_T);
 #else
-Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
+vec4 path_sky(vec3 d) {
+    vec3 share = vec3(1.0);
 #endif
-    Path path;
-    float alpha = 0.0; // of the picture
+    vec4 sky = vec4(0.0);
+#if HAS_ENVIRONMENT
+    if (frame.environment_background != 0u)
+        sky = vec4(path_clamp(share * arriving_outside(d, PATH_CERTAIN, false), false), 1.0);
+#endif
+    return sky;
+}
+
+// A path from the camera at what it meets first, `n`; its alpha: 1: a surface, or a background that is shown.
+#if HAS_ATTENUATION
+float path_begin(vec3 o, vec3 d, Nearest n, Point at, Medium medium, out Path path) {
+#else
+float path_begin(vec3 o, vec3 d, Nearest n, Point at, out Path path) {
+#endif
+    float alpha = 0.0;
     path.d = d;
-    path.n = passing_nearest(o, d, NONE, 0u, rng, path.at);
-    path.alive = path.n.id != NONE;
+    path.n = n;
+    path.at = at;
+    path.alive = n.id != NONE;
     path.color = vec3(0.0);
     path.throughput = vec3(1.0);
     path.bounce = 0u;
@@ -53,6 +65,11 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
 #if HAS_TRANSMISSION
     path.dense = 1.0;
 #endif
+    return alpha;
+}
+
+// The light that a path finds, to its end.
+vec3 path_go(Sampler rng, Path path) {
     vec3 before = path.color; // light of all bounces but the last
     if (path.alive) {
         do {
@@ -261,5 +278,5 @@ Radiance path_trace(vec3 o, vec3 d, Sampler rng) {
     // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word.
     path_was_cut = path.alive && path.bounce < frame.max_bounces;
     if (path_was_cut) path.color = before; // what the last bounce has met may not be there
-    return Radiance(path.color, alpha);
+    return path.color;
 }

@@ -13,6 +13,7 @@ from gpu.arrays import SceneArrays
 from gpu.features import FLAGS, LEAST_ROUGHNESS, flags, grown
 from gpu.price import kernel_price
 from gpu.program import SHADERS
+from gpu.view import open_share
 from service.pack import Packed, pack
 from service.scene import parse_scene
 from tests.extremes.scenes import LONG, ball, icosphere, quad
@@ -85,6 +86,7 @@ SCENES: dict[str, Doc] = {
     "ENVIRONMENT_IMAGE": document([FLOOR], environment={"type": "image", "asset": "floats"}),
     "ENVIRONMENT_CUBE": document([FLOOR], environment={"type": "cubemap", "assets": {
         f"{sign}{axis}": "face" for axis in "xyz" for sign in "pn"}}),
+    "OPEN_VIEW": lit(ball("m", (0.3, 0.2, 0), 0.5)),
     "APERTURE": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "aperture_radius": 0.1}),
     "DISNEY": made_of({"type": "disney"}), "SUBSURFACE": made_of({"type": "disney", "subsurface": 1}),
     "SHEEN": made_of({"type": "disney", "sheen": 1}), "ANISOTROPIC": made_of({"type": "disney", "anisotropic": 1}),
@@ -125,6 +127,17 @@ def _seen(gpu: Renderer, settings: RenderSettings, arrays: SceneArrays, **how: A
     made.release()
     loaded.release()
     return image
+
+
+@pytest.mark.parametrize("radius", [5.0, 1.5, 1.0, 0.4])
+def test_how_much_of_the_view_is_open(gpu: Renderer, radius: float) -> None:
+    camera = {"position": [1, 2, 4], "target": [0.2, 0, 0], "vfov": 40}
+    arrays = pack(parse_scene(document([ball("m", radius=radius)], camera=camera)), IMAGES).arrays
+    seen = _seen(gpu, RenderSettings(64, 64, 1, filter="box"), arrays)
+    share = open_share(arrays)
+    assert share == pytest.approx(1 - seen[..., 3].mean(), abs=0.02)
+    assert ("HAS_OPEN_VIEW" in flags(arrays)) == (share >= 0.4)
+    assert open_share(pack(parse_scene(lit(ball("m", radius=radius), FLOOR)), IMAGES).arrays) == 0
 
 
 @pytest.mark.parametrize("name", SCENES if LONG else ["CLEARCOAT", "MIRRORS"])
