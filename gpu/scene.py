@@ -116,7 +116,7 @@ class Scene:
         for unit, (values, channels, dtype) in asked.items():
             if len(values):
                 self._details[unit] = rows(self._context, values, channels, dtype)
-        if "HAS_LIGHT_TREE" in self._raised and len(a.light_words):
+        if "HAS_LIGHT_TREE" in self._raised:
             self._details[bindings.LIGHT_TREE_TEXTURE] = rows(self._context, a.light_words, 4, "u4")
         if a.textures is not None:
             if a.textures.key:

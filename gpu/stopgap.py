@@ -9,11 +9,11 @@ from __future__ import annotations
 from dataclasses import fields, replace
 from typing import Any
 
-from gpu import ahead, bindings, features
+from gpu import ahead, features
 from gpu.arrays import SceneArrays
 from gpu.scene import Scene
 from gpu.settings import RenderSettings
-from gpu.texels import KINDS, Texels, bare
+from gpu.texels import Texels
 
 # Textures are laid out anew for each scene; instances are rare, and would cost all others time.
 UNKNOWN = frozenset({
@@ -42,11 +42,7 @@ def recipe(arrays: SceneArrays, settings: RenderSettings) -> ahead.Recipe | None
     """To have it compiled; None where it cannot show such a scene."""
     if settings_for(settings) is None or features.flags(arrays) & UNKNOWN:
         return None
-    bound = ahead.recipe(arrays, settings, flags()).textures
-    tree = bindings.LIGHT_TREE_TEXTURE
-    if tree not in (unit for unit, *_ in bound):
-        bound = (*bound, (tree, *KINDS[tree], 1, 1))
-    return ahead.Recipe(tuple(defines().items()), bound)
+    return ahead.Recipe(tuple(defines().items()), ahead.recipe(arrays, settings, flags()).textures)
 
 
 def edits(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
@@ -66,11 +62,6 @@ class Provisional(Scene):
 
     def __init__(self, context: Any, arrays: SceneArrays, texels: Texels) -> None:
         super().__init__(context, arrays, False, texels)
-
-    def _upload_details(self) -> None:
-        super()._upload_details()
-        if bindings.LIGHT_TREE_TEXTURE not in self._details:
-            self._details[bindings.LIGHT_TREE_TEXTURE] = bare(self._context, bindings.LIGHT_TREE_TEXTURE)
 
     def _raise_flags(self) -> None:
         self._looped = features.looped(self.arrays)
