@@ -3,13 +3,22 @@
 from __future__ import annotations
 
 import os
+import tempfile
 from collections.abc import Iterator
+from pathlib import Path
 
 import pytest
 
 from gpu import ContextError, Renderer
+from tests.privileges import shed
 from tests.rendering import release_pictures
 from tests.serving import Server
+
+
+def pytest_configure(config: pytest.Config) -> None:
+    folder = tempfile.TemporaryDirectory(prefix="sunbox-tests-")
+    config.add_cleanup(folder.cleanup)
+    shed(Path(folder.name))
 
 
 @pytest.fixture(scope="module", autouse=True)

@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import os
-import threading
 from collections.abc import Callable
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
-NICENESS = 5  # of what packs scenes, beside the event loop and the encoders; the renderer is at 10
+from service.rendering.priority import raise_thread_niceness
+
+NICENESS = 5  # steps above the event loop and the encoders, of what packs scenes; the renderer is 10 above
 
 T = TypeVar("T")
 
 
 def _yield_to_others() -> None:
-    os.setpriority(os.PRIO_PROCESS, threading.get_native_id(), NICENESS)  # Linux: of this thread alone
+    raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, os.getpid()) + NICENESS)
 
 
 _PACKING = ThreadPoolExecutor(2, "packing", _yield_to_others)  # parsing and packing scenes: seconds for the largest

@@ -13,11 +13,12 @@ from pathlib import Path
 from service import logs
 from service.rendering import link
 from service.rendering.messages import Ready, Unable
+from service.rendering.priority import raise_process_niceness
 from service.rendering.pulse import Pulse
 from service.rendering.worker.lifeline import end_with
 
 OOM_SCORE = 500  # of 1000
-NICENESS = 10  # the server's event loop and the encoders come first; llvmpipe's threads too
+NICENESS = 10  # steps above the server's: its event loop and encoders come first, before llvmpipe's threads too
 
 log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
 
@@ -61,21 +62,14 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     except GpuError as error:
         link.send(end, Unable(str(error)))
         return 1
-    _be_polite()
+    # Only now: beside a dozen busy programs, starting at this priority took half a minute instead of three seconds.
+    raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS)
     link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
     limit = arguments.memory or default_limit(bool(renderer.info["software"]))
     pulse, lifeline = Pulse(arguments.pulse), arguments.lifeline
     Loop(end, renderer, pulse, limit, arguments.device, arguments.checkpoint, lifeline).run()
     return 0
-
-
-def _be_polite() -> None:
-    """Only now: beside a dozen busy programs, starting at this priority took half a minute instead of three seconds,
-    and clients wait for it."""
-    nice = os.getpriority(os.PRIO_PROCESS, 0) + NICENESS
-    for thread in Path("/proc/self/task").iterdir():
-        os.setpriority(os.PRIO_PROCESS, int(thread.name), nice)
 
 
 def _offer_itself() -> None:
