@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import contextlib
 import ctypes
+import ipaddress
 import logging
 import os
 import resource
@@ -49,6 +50,10 @@ TICKS = 50  # of uvicorn, ten a second: how often closed connections are looked 
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
 DESCRIPTORS = 65_536
+OPEN_TO_ALL = (
+    "serving without a key: whoever reaches this address can render, and can read, replace and delete what is saved; "
+    "set SUNBOX_API_KEY, or listen on 127.0.0.1 (in a container: publish the port on 127.0.0.1) host=%s"
+)
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
@@ -99,6 +104,8 @@ def run(config: Config) -> int:
         log.error("can't listen on %s port %d: %s", config.host, config.port, error.strerror or error)
         return 1
     host, port = listener.getsockname()[:2]
+    if not config.api_key and not ipaddress.ip_address(host).is_loopback:
+        log.warning(OPEN_TO_ALL, host)
     app = create_app(config)
     settings = uvicorn.Config(
         app,

@@ -3,16 +3,19 @@
 from __future__ import annotations
 
 import os
+import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator
+from pydantic import Field, ValidationError, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 1 GiB
 MIB, GIB = 2**20, 2**30
 
 LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota")  # how the names of limits begin
+
+HOST = re.compile(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")  # a name, an IPv4 or an IPv6 address
 
 Words = Annotated[list[str], NoDecode]
 
@@ -30,7 +33,7 @@ def _default_data_dir() -> Path:
 class Config(BaseSettings):
     """Each field is read from SUNBOX_ and its name in capitals; the descriptions are the README's table."""
 
-    model_config = SettingsConfigDict(env_prefix="SUNBOX_", frozen=True, extra="ignore", env_ignore_empty=True)
+    model_config = SettingsConfigDict(env_prefix="SUNBOX_", frozen=True, extra="ignore")
 
     host: str = Field("127.0.0.1", description="Address to listen on.")
     port: int = Field(8000, ge=0, le=65535, description="Port to listen on; 0 takes a free one.")
@@ -38,6 +41,11 @@ class Config(BaseSettings):
         default_factory=list,
         repr=False,
         description="Keys, separated by commas, one of which `/v1/*` then asks for; renders belong to their key.",
+    )
+    allowed_hosts: Words = Field(
+        default_factory=list,
+        description="Names besides 127.0.0.1 and localhost, separated by commas, by which this server may be asked "
+        "(default: none on a loopback address, any on another).",
     )
     allowed_origins: Words = Field(
         default_factory=list, description="Origins besides the server's own that may call, separated by commas."
@@ -94,21 +102,40 @@ class Config(BaseSettings):
         """What a caller may run into, by name; None: no such limit."""
         return {name: getattr(self, name) for name in type(self).model_fields if name.startswith(LIMITS)}
 
-    @field_validator("allowed_origins", "api_key", mode="before")
+    @model_validator(mode="before")
+    @classmethod
+    def _given(cls, values: dict[str, Any]) -> dict[str, Any]:
+        """Leaves out what is set to nothing, as `SUNBOX_DEVICE: ${SUNBOX_DEVICE:-}` in a compose file does.
+
+        Not the keys: a secret that is empty by mistake would open the service to everybody.
+        """
+        return {name: value for name, value in values.items() if value != "" or name == "api_key"}
+
+    @field_validator("allowed_hosts", "allowed_origins", "api_key", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
 
-    @field_validator("allowed_origins")
+    @field_validator("allowed_hosts", "allowed_origins")
     @classmethod
-    def _named(cls, origins: list[str]) -> list[str]:
-        return [origin for origin in origins if origin]
+    def _named(cls, names: list[str]) -> list[str]:
+        return [name for name in names if name]
+
+    @field_validator("allowed_hosts")
+    @classmethod
+    def _plain(cls, hosts: list[str]) -> list[str]:
+        for host in hosts:
+            if not HOST.fullmatch(host):
+                raise ValueError(f"{host!r} is no host name; write it without scheme, port and path")
+        return [host.strip("[]").lower() for host in hosts]
 
     @field_validator("api_key")
     @classmethod
     def _usable(cls, keys: list[str]) -> list[str]:
+        if keys == [""]:
+            raise ValueError("is set, but empty; give it one or more keys, or remove it to serve without keys")
         if "" in keys:
-            raise ValueError("there is an empty key among these, or none at all")
+            raise ValueError("one of the keys is empty")
         for key in keys:
             if not all("!" <= letter <= "~" for letter in key):
                 raise ValueError("a key is of printable ASCII characters without blanks, or no header could hold it")
@@ -120,8 +147,14 @@ def load_config(**given: Any) -> Config:
     try:
         return Config(**{name: value for name, value in given.items() if value is not None})
     except ValidationError as error:
-        lines = [f"SUNBOX_{str(e['loc'][0]).upper()}: {e['msg'].lower()}" for e in error.errors()]
+        lines = [f"SUNBOX_{str(e['loc'][0]).upper()}: {_said(e['msg'])}" for e in error.errors()]
         raise ConfigError("; ".join(lines)) from None
+
+
+def _said(message: str) -> str:
+    """pydantic's message as the second half of a sentence."""
+    plain = message.removeprefix("Value error, ")
+    return plain[:1].lower() + plain[1:]
 
 
 def table() -> str:

@@ -61,7 +61,7 @@ class Guard:
         self._config = config
         self._keys = Keys(config.api_key)
         self._origins = {_origin(origin) for origin in config.allowed_origins}
-        self._hosts = LOOPBACK_NAMES | {host for _, host, _ in self._origins}
+        self._hosts = LOOPBACK_NAMES | set(config.allowed_hosts) | {host for _, host, _ in self._origins}
         self._refuse = refuse
         self._held = 0  # bytes of bodies that are being dealt with
 
@@ -115,12 +115,13 @@ class Guard:
         return self._keys.owner(headers.get("authorization"), offered)
 
     def _check_host(self, scope: Scope, headers: Headers) -> None:
-        """On a loopback address only its own names: a foreign one that resolves here is an attack (DNS rebinding)."""
+        """A foreign name that resolves to this server is an attack on whoever browses beside it (DNS rebinding).
+
+        On an address that is not loopback every name is accepted unless SUNBOX_ALLOWED_HOSTS lists the right ones.
+        """
         host = _host(headers.get("host", ""))
-        if _is_loopback(scope) and host not in self._hosts:
-            raise Forbidden(
-                f"Host {host!r} is not 127.0.0.1 or localhost, and SUNBOX_ALLOWED_ORIGINS does not name it"
-            )
+        if (_is_loopback(scope) or self._config.allowed_hosts) and host not in self._hosts:
+            raise Forbidden(f"Host {host!r} is not 127.0.0.1 or localhost, and SUNBOX_ALLOWED_HOSTS does not name it")
 
     def _check_origin(self, headers: Headers) -> None:
         """No Origin: not a browser. Behind a proxy the scheme is unknown, so the host and port decide."""

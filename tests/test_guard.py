@@ -20,6 +20,7 @@ from service.config import Config, ConfigError, load_config
 from service.guard import Guard
 from service.keys import Keys
 from service.problems import Unauthorized
+from service.routes.errors import respond
 from tests.serving import ENDLESS, SCENE, SMALL, Server
 from tests.test_rest import OBJ, is_problem
 
@@ -212,6 +213,38 @@ def test_useless_keys_are_refused(value: str, monkeypatch: pytest.MonkeyPatch) -
 
 def test_no_key_is_in_the_configurations_text() -> None:
     assert "secret" not in repr(Config(api_key=["secret"]))
+
+
+@pytest.mark.parametrize(
+    ("server", "hosts", "host", "status"),
+    [
+        ("127.0.0.1", [], "evil.example", 403),
+        ("127.0.0.1", ["render.example"], "render.example:8000", 200),
+        ("127.0.0.1", ["render.example"], "evil.example", 403),
+        ("127.0.0.1", ["render.example"], "127.0.0.1:8000", 200),  # the container's own HEALTHCHECK
+        ("172.17.0.2", [], "evil.example", 200),  # which names lead here is not known
+        ("172.17.0.2", ["render.example"], "RENDER.example", 200),
+        ("172.17.0.2", ["render.example"], "localhost:8000", 200),  # published on the host's loopback
+        ("172.17.0.2", ["render.example"], "evil.example", 403),
+        ("172.17.0.2", ["render.example"], "172.17.0.2", 403),
+    ],
+)
+def test_hosts_that_may_be_asked(server: str, hosts: list[str], host: str, status: int) -> None:
+    """DNS rebinding leads a browser that knows a foreign name to this server; in a container its address is no
+    loopback one, so the operator says which names are its own."""
+    statuses: list[int] = []
+
+    async def send(message: Any) -> None:
+        if message["type"] == "http.response.start":
+            statuses.append(message["status"])
+
+    async def receive() -> Any:
+        return {"type": "http.request", "body": b"", "more_body": False}
+
+    guard = Guard(PlainTextResponse("here"), config=Config(allowed_hosts=hosts), refuse=respond)
+    scope: Any = {"type": "http", "method": "GET", "path": "/", "headers": [(b"host", host.encode())]}
+    asyncio.run(guard({**scope, "server": (server, 8000)}, receive, send))
+    assert statuses == [status]
 
 
 def test_who_sends_a_refused_body_hears_why() -> None:

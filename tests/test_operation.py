@@ -14,8 +14,10 @@ from typing import Any
 
 import httpx
 import pytest
+import uvicorn
 
-from service import config, logs
+from service import app, config, logs
+from service.config import Config
 from service.logs import _fields
 from tests.serving import ENDLESS, SCENE, SMALL, Server, client
 
@@ -143,6 +145,16 @@ def test_a_device_that_is_not_there(server: Server, tmp_path: Path) -> None:
         assert lost.http.get("/v1/info").json()["renderer"] is None
     finally:
         assert lost.stop() == 0
+
+
+def test_serving_everybody_without_a_key_is_warned_of(
+    caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: sockets[0].close())
+    for host, key, warned in (("0.0.0.0", [], True), ("127.0.0.1", [], False), ("0.0.0.0", ["secret"], False)):
+        caplog.clear()
+        app.run(Config(host=host, port=0, api_key=key, data_dir=tmp_path))
+        assert ("SUNBOX_API_KEY" in caplog.text) is warned
 
 
 def test_the_readme_has_the_configuration() -> None:

@@ -148,3 +148,22 @@ def test_a_bad_variable_is_named(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SUNBOX_PORT", "http")
     with pytest.raises(ConfigError, match=r"SUNBOX_PORT.*SUNBOX_MAX_TRIANGLES"):
         load_config()
+
+
+@pytest.mark.parametrize("value", ["", "  "])
+def test_an_empty_key_does_not_open_the_service(value: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """It is what a compose file passes on for `${SUNBOX_API_KEY:-}` when its author forgot to set one."""
+    monkeypatch.setenv("SUNBOX_API_KEY", value)
+    with pytest.raises(ConfigError, match=r"^SUNBOX_API_KEY: is set, but empty; .* remove it"):
+        load_config()
+    monkeypatch.delenv("SUNBOX_API_KEY")
+    assert load_config().api_key == []
+
+
+def test_hosts_are_names(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_ALLOWED_HOSTS", "Render.example, 10.0.0.7,[fd00::1],")
+    assert load_config().allowed_hosts == ["render.example", "10.0.0.7", "fd00::1"]
+    for wrong in ("https://render.example", "render.example:8000", "a b", "render.example/sunbox"):
+        monkeypatch.setenv("SUNBOX_ALLOWED_HOSTS", wrong)
+        with pytest.raises(ConfigError, match=r"^SUNBOX_ALLOWED_HOSTS: '.*' is no host name"):
+            load_config()
