@@ -4,6 +4,7 @@
 
 import { HEX, hex, linear } from "./color.js";
 import { element, isBeingEdited } from "./dom.js";
+import { slideByTouch } from "./sliding.js";
 import { compact, inWords, unitText } from "./words.js";
 
 const UNSET = "–"; // neither document nor schema has a value
@@ -47,6 +48,7 @@ function track(field, id, { input, commit }) {
     oninput: () => input(inside(range.valueAsNumber)),
     onchange: commit,
   });
+  slideByTouch(range, { input: (value) => input(inside(value)), commit });
   const show = (value) => {
     range.value = String(value ?? min);
     range.style.setProperty("--fill", String((range.valueAsNumber - min) / (max - min)));

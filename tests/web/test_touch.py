@@ -1,0 +1,63 @@
+"""Fingers on the panel of a phone."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+
+import pytest
+from playwright.sync_api import Browser
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+
+Swipe = Callable[[str, float, float], None]
+
+
+@pytest.fixture
+def phone(browser: Browser, server: Server) -> Iterator[tuple[Editor, Swipe]]:
+    """The editor on a phone, and swipe(selector, right, down): a finger that begins near the right end of a thing."""
+    context = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    editor = Editor(context.new_page())
+    editor.open(server.url)
+    session = context.new_cdp_session(editor.page)
+
+    def swipe(selector: str, right: float, down: float) -> None:
+        box = editor.page.locator(selector).bounding_box()
+        assert box is not None
+        x, y = box["x"] + 0.8 * box["width"], box["y"] + box["height"] / 2
+        for step in range(11):
+            at = {"x": x + right * step / 10, "y": y + down * step / 10, "id": 0}
+            kind = "touchMove" if step else "touchStart"
+            session.send("Input.dispatchTouchEvent", {"type": kind, "touchPoints": [at]})
+            editor.page.wait_for_timeout(16)
+        session.send("Input.dispatchTouchEvent", {"type": "touchEnd", "touchPoints": []})
+        editor.page.wait_for_timeout(200)
+
+    yield editor, swipe
+    context.close()
+
+
+def test_a_finger_that_scrolls_the_panel_moves_no_slider(phone: tuple[Editor, Swipe]) -> None:
+    editor, swipe = phone
+    page, slider = editor.page, editor.field("roughness")
+    page.locator(slider).scroll_into_view_if_needed()
+    before, at = page.input_value(slider), page.evaluate("document.querySelector('#page-material').scrollTop")
+    swipe(slider, 3, -100)
+    assert page.evaluate("document.querySelector('#page-material').scrollTop") > at + 50, "the panel scrolled"
+    swipe(slider, 0, 60)
+    assert page.input_value(slider) == before
+    assert page.is_disabled("#undo"), "nothing was changed"
+
+    page.locator(slider).scroll_into_view_if_needed()
+    page.wait_for_timeout(200)  # until the panel rests
+    swipe(slider, -40, 2)
+    moved = float(page.input_value(slider))
+    assert float(before) - 0.4 < moved < float(before), "by as much as the finger went, not to where it is"
+    box = page.locator(slider).bounding_box()
+    assert box is not None
+    page.touchscreen.tap(box["x"] + 0.7 * box["width"], box["y"] + box["height"] / 2)
+    editor.wait("a tap", lambda: abs(float(page.input_value(slider)) - 0.7) < 0.02)
+    page.tap("#undo")
+    assert float(page.input_value(slider)) == moved, "a slide is one step of undo"
+    page.tap("#undo")
+    assert page.input_value(slider) == before
