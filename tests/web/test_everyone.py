@@ -68,6 +68,42 @@ def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, i
     editor.page.close()
 
 
+SMALL = """() => {
+    const rem = parseFloat(getComputedStyle(document.documentElement).fontSize);
+    const said = [...document.querySelectorAll("body *")]
+        .filter((each) => each.checkVisibility() && !each.closest(".unseen, svg"));
+    const isCoarse = matchMedia("(pointer: coarse)").matches;
+    const small = (each) => {
+        const letters = parseFloat(getComputedStyle(each).fontSize);
+        const isPointed = each.matches("[type=range], [type=checkbox], [type=color], [type=file]");
+        const writes = each.matches("select, textarea, input") && !isPointed;
+        const { width, height } = each.getBoundingClientRect();
+        const isHit = each.matches("button, select, summary, [role=option], input:not(.divider, [type=file])");
+        const hasText = [...each.childNodes].some((node) => node.nodeType === 3 && node.data.trim());
+        if (hasText && letters < 11) return "letters";
+        if (isCoarse && writes && letters < 16) return "iOS zooms into it";
+        if (isCoarse && isHit && Math.min(width, height) < 39.5) return `${width} x ${height}`;
+        return each.matches(".page, .top") && each.scrollWidth > each.clientWidth + 1 ? "scrolls sideways" : null;
+    };
+    const found = said.map((each) => [small(each), each.outerHTML.slice(0, 90)]).filter(([what]) => what);
+    return rem === 16 ? found : [["a rem", rem], ...found];
+}"""
+
+
+@pytest.mark.parametrize("size", [(390, 844, True), (844, 390, True), (1024, 768, False), (720, 450, False)])
+def test_letters_can_be_read_and_fingers_hit(browser: Browser, server: Server, size: tuple[int, int, bool]) -> None:
+    """A phone both ways, a tablet's size, and a laptop at 200 %."""
+    width, height, touch = size
+    page = browser.new_page(viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch)
+    page.goto(server.url + "/")
+    page.wait_for_selector("#material-form [data-field]")
+    page.click("#compare")
+    for tab in ("scene", "render", "keep", "material"):
+        page.click(f"#tab-{tab}")
+        assert page.evaluate(SMALL) == [], tab
+    page.close()
+
+
 def test_the_keyboard_reaches_everything(editor: Editor) -> None:
     before = editor.settled()
     editor.page.keyboard.press("?")
