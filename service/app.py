@@ -28,6 +28,7 @@ from starlette.staticfiles import StaticFiles
 from service import presets
 from service.assets import AssetStore
 from service.config import Config
+from service.connections import Connection, listen
 from service.documents import Documents
 from service.guard import Guard
 from service.logs import Requests
@@ -99,9 +100,9 @@ def run(config: Config) -> int:
     _give_memory_back()
     _take_descriptors()
     try:
-        listener = socket.create_server((config.host, config.port), family=_family(config.host), backlog=2048)
+        listener = listen(config.host, config.port)
     except OSError as error:
-        log.error("can't listen on %s port %d: %s", config.host, config.port, error.strerror or error)
+        log.error("could not listen host=%s port=%d error=%s", config.host, config.port, error.strerror or error)
         return 1
     host, port = listener.getsockname()[:2]
     if not config.api_key and not ipaddress.ip_address(host).is_loopback:
@@ -109,6 +110,7 @@ def run(config: Config) -> int:
     app = create_app(config)
     settings = uvicorn.Config(
         app,
+        http=Connection,
         log_config=None,
         access_log=False,
         server_header=False,
@@ -174,7 +176,7 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         if (reason := await self._house.gpu_missing()) is not None:
-            log.error("not started: %s", reason)
+            log.error("did not start reason=%s", reason)
             await self._house.engine.close()
             self.refused = self.should_exit = True
             return
@@ -239,7 +241,3 @@ def _give_memory_back() -> None:
         libc = ctypes.CDLL(None)
         libc.mallopt(M_MMAP_THRESHOLD, 1 << 20)
         libc.mallopt(M_TRIM_THRESHOLD, 4 << 20)
-
-
-def _family(host: str) -> socket.AddressFamily:
-    return socket.AF_INET6 if ":" in host else socket.AF_INET
