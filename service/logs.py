@@ -4,75 +4,126 @@ from __future__ import annotations
 
 import logging
 import re
-import secrets
+import sys
+import threading
 import time
-from collections.abc import Callable, MutableMapping
+from collections.abc import Callable, Iterable, MutableMapping
+from datetime import UTC, datetime
+from secrets import token_urlsafe
+from types import TracebackType
 from typing import Any
 
 import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.log_output import Output, Queued, Redacting, Written
 from service.problems import Internal, ServiceError
 
 log = logging.getLogger(__name__)
 
-FIELD = re.compile(r"\s*\b(\w+)=%[-+# 0-9.]*[a-z]")  # of a message as style.md has it: fields last, name=%s
+CONVERSION = re.compile(r"(?P<field>\s*\b(?P<name>\w+)=)?%(?P<how>%|[-+# 0-9]*(?:\.(?P<digits>\d+))?[a-z])")
 GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # of a proxy before us; another text is not taken into the logs
 ID_BYTES = 9
+ROOMS = ("service", "gpu")  # whose loggers are our own
 ASKED_ALL_THE_TIME = ("/healthz", "/readyz", "/metrics")
 
 Heard = Callable[[str, str, int, float], None]  # method, route, status, seconds
 
 
-def configure(form: str, level: str) -> None:
-    """Has everything that is logged through the standard library written to stderr."""
-    import sys
+def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str] = ()) -> None:
+    """Has everything that is logged through the standard library written to stderr, as `form`: "console" or "json".
 
+    `level` is the least that is written of our own; libraries have theirs from warnings on. With `queued` a thread of
+    its own writes it, so that whoever logs never waits. `secrets` are left out of every line.
+    """
     before: list[Any] = [
-        structlog.contextvars.merge_contextvars,
         structlog.stdlib.add_log_level,
         structlog.stdlib.add_logger_name,
-        structlog.processors.TimeStamper(fmt="iso", utc=True),
+        _time,
         _fields,
+        _context,
     ]
     last: list[Any]
     if form == "json":
         last = [structlog.processors.format_exc_info, structlog.processors.JSONRenderer()]
     else:
-        last = [structlog.dev.ConsoleRenderer(colors=sys.stderr.isatty())]
-    handler = logging.StreamHandler()
-    handler.setFormatter(
-        structlog.stdlib.ProcessorFormatter(
+        # No locals in tracebacks: they may hold keys, and rendering them took seconds.
+        plain = structlog.dev.plain_traceback
+        colors = sys.stderr.isatty()
+        last = [structlog.dev.ConsoleRenderer(colors=colors, exception_formatter=plain, sort_keys=False)]
+    output = Output()
+    output.setFormatter(
+        Redacting(
+            secrets,
             foreign_pre_chain=before,
             pass_foreign_args=True,
             processors=[structlog.stdlib.ProcessorFormatter.remove_processors_meta, *last],
         )
     )
-    logging.basicConfig(level=level.upper(), handlers=[handler], force=True)
+    handler: logging.Handler = output
+    if queued:
+        handler = Queued()
+        Written(handler, output)
+    least = logging.getLevelNamesMapping()[level.upper()]
+    logging.basicConfig(level=max(least, logging.WARNING), handlers=[handler], force=True)
+    for room in ROOMS:
+        logging.getLogger(room).setLevel(least)
+    logging.captureWarnings(True)
+    sys.excepthook = _uncaught
+    threading.excepthook = lambda told: _uncaught(told.exc_type, told.exc_value, told.exc_traceback)
+
+
+def level() -> int:
+    """The least that is logged of our own."""
+    return logging.getLogger(ROOMS[0]).getEffectiveLevel()
+
+
+def _uncaught(kind: type[BaseException], error: BaseException | None, trace: TracebackType | None) -> None:
+    if error is not None and not isinstance(error, KeyboardInterrupt | SystemExit):
+        log.critical("ended by an error", exc_info=(kind, error, trace))
 
 
 def _fields(logger: Any, method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """Takes `name=%s` out of a message's text: its values become fields."""
+    """Takes `name=%s` out of a message's text: its values become fields, and what is left is one line."""
     arguments = event.pop("positional_args", None)
     message = event["_record"].msg
-    if not isinstance(message, str) or not isinstance(arguments, tuple):
-        return event
-    found = list(FIELD.finditer(message))
-    if not found or message.count("%") != len(arguments):
-        return event
-    # Fields stand last, so the arguments before theirs belong to the text.
-    texts = len(arguments) - len(found)
-    plain = FIELD.sub("", message)
-    event["event"] = plain % arguments[:texts] if texts else plain
-    event.update({match[1]: _plain(value) for match, value in zip(found, arguments[texts:], strict=True)})
+    found = list(CONVERSION.finditer(message)) if isinstance(message, str) else []
+    taken = [each for each in found if each["how"] != "%"]
+    if isinstance(arguments, tuple) and len(taken) == len(arguments) and any(each["field"] for each in taken):
+        values = dict(zip((each.start() for each in taken), arguments, strict=True))
+        text = CONVERSION.sub(lambda match: _text(match, values.get(match.start())), message)
+        event["event"] = text.strip()
+        event.update({each["name"]: _plain(values[each.start()], each["digits"]) for each in taken if each["field"]})
+    event["event"] = "; ".join(line.strip() for line in str(event["event"]).splitlines() if line.strip())
     return event
 
 
-def _plain(value: Any) -> Any:
+def _text(match: re.Match[str], value: Any) -> str:
+    """What stands in the text instead of a conversion."""
+    if match["how"] == "%":
+        return f"{match['field'] or ''}%"
+    return "" if match["field"] else f"%{match['how']}" % (value,)
+
+
+def _plain(value: Any, digits: str | None) -> Any:
     if isinstance(value, float):
-        return round(value, 4)
+        return round(value, 4 if digits is None else int(digits)) if digits != "0" else round(value)
     return value if isinstance(value, bool | int | str) else str(value)
+
+
+def _time(logger: Any, method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """When it was logged, not when it is written."""
+    when = datetime.fromtimestamp(event["_record"].created, UTC)
+    event["timestamp"] = when.isoformat(timespec="microseconds").replace("+00:00", "Z")
+    return event
+
+
+def _context(logger: Any, method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
+    """Adds what the record belongs to: the request's id."""
+    record = event["_record"]
+    event.update(getattr(record, "context", None) or structlog.contextvars.get_contextvars())
+    return event
 
 
 class Requests:
@@ -87,7 +138,7 @@ class Requests:
         if scope["type"] == "lifespan":
             return await self._app(scope, receive, send)
         given = Headers(scope=scope).get("x-request-id", "")
-        id = given if GIVEN_ID.fullmatch(given) else secrets.token_urlsafe(ID_BYTES)
+        id = given if GIVEN_ID.fullmatch(given) else token_urlsafe(ID_BYTES)
         began, status = time.perf_counter(), 0
 
         async def sending(message: Message) -> None:

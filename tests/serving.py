@@ -43,22 +43,22 @@ class Server:
     """`sunbox serve` on a free port, with its data in `folder`."""
 
     def __init__(self, folder: Path, **variables: str) -> None:
-        self._log = folder / "server.log"
+        self.log = folder / "server.log"
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
         environment |= {"SUNBOX_DATA_DIR": str(folder / "data"), **variables}
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
-        with self._log.open("wb") as log:
+        with self.log.open("wb") as log:
             self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
         assert self.process.stdout is not None
         said = self.process.stdout.readline()
-        assert "http://" in said, self._log.read_text()
+        assert "http://" in said, self.log.read_text()
         self.url = said[said.index("http://") :].strip().rstrip("/")
         self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S)
 
     def wait(self) -> None:
         until = time.monotonic() + PATIENCE_S
         while self.http.get("/readyz").status_code != 200:
-            assert time.monotonic() < until, self._log.read_text()
+            assert time.monotonic() < until, self.log.read_text()
             time.sleep(0.05)
 
     def children(self) -> list[int]:
@@ -73,7 +73,7 @@ class Server:
                 with suppress(OSError):  # it may be gone by now
                     if b"rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
                         return pid
-            assert time.monotonic() < until, self._log.read_text()
+            assert time.monotonic() < until, self.log.read_text()
             time.sleep(0.02)
 
     def stop(self, number: int = signal.SIGTERM) -> int:

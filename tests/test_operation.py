@@ -111,9 +111,10 @@ def test_logs_for_machines(server: Server, tmp_path: Path) -> None:
         (
             "told %s of it who=%s times=%d s=%.2f",
             ("all", "a b", 3, 0.12345),
-            {"event": "told all of it", "who": "a b", "times": 3, "s": 0.1235},
+            {"event": "told all of it", "who": "a b", "times": 3, "s": 0.12},
         ),
-        ("100 %% of=%s", ("it",), {"event": "100 % of=it"}),
+        ("100 %% of=%s", ("it",), {"event": "100 %", "of": "it"}),
+        ("told ms=%.0f %s", (96.0135, "all"), {"event": "told all", "ms": 96}),
         ("nothing", (), {"event": "nothing"}),
     ],
 )

@@ -186,7 +186,7 @@ class _Child:
             code = self.process.wait(CLOSING_SECONDS)
         except subprocess.TimeoutExpired:
             return "reading it crashed the parser"
-        log.warning("parsing child died code=%d", code)
+        log.warning("the parser died exit_code=%d", code)
         for number, text in CRASHES.items():
             if code == -number:
                 return text.format(seconds=limits.seconds)

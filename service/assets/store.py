@@ -186,7 +186,7 @@ class AssetStore:
             self._folder.mkdir(parents=True, exist_ok=True)
             yield
         except OSError as error:
-            log.error("asset not stored id=%s error=%s", id, error)
+            log.error("could not store an asset id=%s error=%s", id, error)
             raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
 
     def _load(self, ref: str) -> Parsed:

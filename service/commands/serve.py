@@ -11,6 +11,6 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration(host=arguments.host, port=arguments.port)
     from service import app, logs
 
-    logs.configure(config.log_format, config.log_level)
+    logs.configure(config.log_format, config.log_level, queued=True, secrets=config.api_key)
 
     return app.run(config)

@@ -226,7 +226,7 @@ class Engine:
             self._detail = message.detail
             if self._process is not None:
                 self._process.unable = True
-            log.error("no renderer: %s", message.detail)
+            log.error("could not start a renderer error=%s", message.detail)
         elif isinstance(message, Usage):
             self._account(message)
         elif (held := self._tasks.get(message.task)) is not None:
@@ -340,7 +340,7 @@ class Engine:
             return
         held.strikes += 1
         held.struck_at = time.monotonic()
-        log.warning("task %d was worked on when the renderer was lost strikes=%d", task, held.strikes)
+        log.warning("blamed a task for the loss of the renderer task=%d strikes=%d", task, held.strikes)
         if held.strikes >= STRIKES:
             del self._tasks[task]
             self.statistics.gpu_s_of.pop(task, None)

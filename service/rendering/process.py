@@ -15,6 +15,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, Literal
 
+from service import logs
 from service.rendering import link, pulse
 from service.spell import Spell
 
@@ -125,7 +126,7 @@ def _spawn(
     end: socket.socket, pulse_descriptor: int, options: Options, lifeline: int | None
 ) -> subprocess.Popen[bytes]:
     command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(pulse_descriptor)]
-    command += ["--server", str(os.getpid()), "--log-level", str(logging.getLogger().getEffectiveLevel())]
+    command += ["--server", str(os.getpid()), "--log-level", str(logs.level())]
     command += ["--checkpoint", str(options.checkpoint_s)]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]

@@ -37,7 +37,7 @@ class Warming:
             settings = await packing(partial(self._reader.settings, SETTINGS))
             task = self._engine.open(self, "server")
         except ServiceError as error:
-            log.warning("not warmed up: %s", error)
+            log.warning("did not warm up error=%s", error)
             return
         try:
             stop = StopRule(max_samples=1)

@@ -5,12 +5,14 @@ from __future__ import annotations
 from fastapi import FastAPI, Request
 from fastapi.exceptions import RequestValidationError
 from starlette.exceptions import HTTPException
+from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Match, Mount
 
 from service.problems import FieldError, InvalidDocument, ServiceError, Unauthorized, answer, problem
 
 MEDIA_TYPE = "application/problem+json"
+GONE = 499  # nginx's status, for logs and metrics, of a request whose sender went away; nobody receives it
 
 
 def respond(error: Exception) -> Response:
@@ -26,11 +28,17 @@ def tell_errors(app: FastAPI) -> None:
     app.add_exception_handler(ServiceError, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _unrouted)
+    app.add_exception_handler(ClientDisconnect, _gone)
     app.add_exception_handler(Exception, _refused)
 
 
 async def _refused(request: Request, error: Exception) -> Response:
     return respond(error)
+
+
+async def _gone(request: Request, error: Exception) -> Response:
+    """The sender went away in the middle of its body, which is no error of anybody's."""
+    return Response(status_code=GONE)
 
 
 async def _invalid(request: Request, error: Exception) -> Response:

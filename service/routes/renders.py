@@ -22,6 +22,7 @@ from service.rendering.reading import unfolded
 from service.rendering.threads import encoding, packing
 from service.routes import answers
 from service.routes.bodies import json_body
+from service.routes.errors import GONE
 from service.routes.house import STARTING_S, House, house, owner
 
 router = APIRouter(prefix="/v1", tags=["renders"])
@@ -78,7 +79,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
     try:
         await _finished_or_gone(request, job)
         if not job.finished.is_set():
-            return Response(status_code=499)  # nobody reads it
+            return Response(status_code=GONE)
         if job.state == "cancelled":
             raise Unavailable("The server is shutting down.")
         return await _image(job, query, view)

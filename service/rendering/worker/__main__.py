@@ -44,7 +44,7 @@ def main() -> int:
     except link.Closed:
         code = 0
     except BaseException:
-        log.exception("the renderer ends")
+        log.exception("the renderer failed")
         code = 1
     # At once, its end of the link with it: on a busy machine an interpreter takes seconds to tidy up, and whoever is
     # killed meanwhile does not tell any more that it ended by itself.

@@ -68,7 +68,7 @@ class Appraising:
             full_ms, self._compile_ms = price.full_compile_ms + self._compile_ms, 0.0
             self._tell(Appraised(self._number, "", full_ms, price.sample_s, price.full_sample_s))
         except GpuError as error:
-            log.warning("kernels not compared: %s", error)
+            log.warning("could not compare kernels error=%s", error)
             self._tell(Appraised(self._number, f"Not measured: {error}"))
 
     def _waits(self, picture: Picture) -> bool:

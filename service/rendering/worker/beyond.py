@@ -45,6 +45,6 @@ class Beyond:
         except StopIteration as end:
             self.shares, self._steps = end.value, None
         except GpuError as error:
-            log.warning("light beyond the bounces not measured: %s", error)
+            log.warning("could not measure light beyond the bounces error=%s", error)
             self._given_up, self._steps = True, None
         return True

@@ -142,7 +142,7 @@ class Compiler:
                 self._records.mkdir(parents=True, exist_ok=True)
                 (self._records / recipe.digest(self._driver)).touch()
             except OSError as error:
-                log.info("not recorded: %s", error)
+                log.info("could not record a compiled kernel error=%s", error)
 
     def forget(self, told: Told) -> None:
         """Nobody waits there any more; what nobody waits for is not begun."""
@@ -164,7 +164,10 @@ class Compiler:
             self._failures = 0 if answer.cached else self._failures + 1
             if not answer.cached:
                 log.warning("compiled ahead in vain: the driver has no disk cache to write to")
-            log.info("compiled ahead ms=%.0f %s", answer.milliseconds, answer.detail)
+            if answer.detail:
+                log.info("could not compile ahead error=%s ms=%.0f", answer.detail, answer.milliseconds)
+            else:
+                log.info("compiled ahead ms=%.0f", answer.milliseconds)
             if answer.cached and not answer.detail:
                 self._record(self._orders[0].recipe)
             self._tell(answer.milliseconds)
@@ -184,7 +187,7 @@ class Compiler:
         self.close()
         if self._orders:
             self._failures += 1
-            log.warning("compiling in the loop: %s", detail)
+            log.warning("left a kernel to be compiled in the loop reason=%s", detail)
             self._tell(0.0)
 
     def _tell(self, milliseconds: float) -> None:
@@ -202,10 +205,10 @@ class Compiler:
                 self._spell = None if self._helper.process_id is None else Spell(self._helper.process_id)
                 return
         except (link.Closed, OSError) as error:  # it can't be started
-            log.info("no compiler: %s", error or "it had ended")
+            log.info("could not start the compiler error=%s", error or "it had ended")
             self.close()
         self._able = False
-        log.warning("compiling in the loop from now on")
+        log.warning("gave up compiling ahead: kernels are compiled in the loop")
         while self._orders:
             self._tell(0.0)
 

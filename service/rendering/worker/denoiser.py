@@ -98,7 +98,7 @@ class Denoiser:
             self._deaths = 0
             self._took_s = time.monotonic() - self._asked_at
         if delivery.detail:
-            log.warning("not denoised: %s", delivery.detail)
+            log.warning("could not denoise error=%s", delivery.detail)
         if delivery.missing:
             self.missing = delivery.detail
         told, self._told = self._told, None

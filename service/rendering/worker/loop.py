@@ -191,10 +191,10 @@ class Loop:
         except link.Closed:
             raise
         except GpuError as error:
-            log.warning("failed task=%d %s: %s", task.number, type(error).__name__, error)
+            log.warning("task failed task=%d kind=%s error=%s", task.number, type(error).__name__, error)
             detail, refused = str(error), isinstance(error, SceneTooLarge | OutOfMemory)
         except Exception:
-            log.exception("failed task=%d", task.number)
+            log.exception("task failed task=%d", task.number)
             detail, refused = "The renderer made a mistake; its log says which.", False
         if read is None:
             task.fail()

@@ -91,7 +91,7 @@ class Stopgap:
             self._ladder.picture(self._next)
             self._spare.met(recipe)
         except GpuError as error:
-            log.info("no stopgap: %s", error)
+            log.info("could not use a stopgap error=%s", error)
             self.release()
 
     def step(self) -> int:
@@ -99,7 +99,7 @@ class Stopgap:
         try:
             return 0 if self._ladder is None else self._trace(self._ladder)
         except OutOfMemory as error:
-            log.info("no stopgap: %s", error)
+            log.info("could not use a stopgap error=%s", error)
             self.release()
             return 0
 

@@ -1,0 +1,185 @@
+"""Logs: one line an event, its fields named; no secret; tracebacks that are plain, rare, and nobody waits for."""
+
+from __future__ import annotations
+
+import ast
+import json
+import logging
+import socket
+import sys
+import threading
+import time
+from collections.abc import Iterator
+from pathlib import Path
+from urllib.parse import urlsplit
+
+import pytest
+
+from service import log_output, logs
+from tests.serving import Client, Server
+from tests.test_operation import metrics, wait_until
+
+log = logging.getLogger("service.test")
+
+
+@pytest.fixture
+def untouched() -> Iterator[None]:
+    """Logging as it was before the test."""
+    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in logs.ROOMS]
+    before, levels, hooks = (
+        root.handlers[:],
+        [each.level for each in (root, *rooms)],
+        (sys.excepthook, threading.excepthook),
+    )
+    yield
+    root.handlers[:] = before
+    for each, level in zip((root, *rooms), levels, strict=True):
+        each.setLevel(level)
+    sys.excepthook, threading.excepthook = hooks
+    logging.captureWarnings(False)
+
+
+def fail(secret: str) -> None:
+    raise ValueError("what went wrong")
+
+
+def failing(secret: str = "a-local-secret") -> None:
+    try:
+        fail(secret)
+    except ValueError:
+        log.exception("failed task=%d", 7)
+
+
+@pytest.mark.parametrize("form", ["console", "json"])
+def test_tracebacks_are_plain_and_rare(form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
+    logs.configure(form, "info")
+    for _ in range(5):
+        failing()
+    (output,) = logging.getLogger().handlers
+    assert isinstance(output, log_output.Output)
+    told = capfd.readouterr().err
+    assert told.count("ValueError: what went wrong") == 1 and "a-local-secret" not in told
+    assert "│" not in told, "Rich draws boxes, which takes seconds"
+    output.tell_repeated(time.monotonic() + log_output.REPEAT_S)
+    (line,) = capfd.readouterr().err.splitlines()
+    assert "and 4 more like it" in line and "ValueError" in line and "test_logs.py:" in line
+    failing()
+    assert "Traceback" in capfd.readouterr().err
+
+
+def test_who_logs_does_not_wait(untouched: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Rendered in another thread, in order, with what the request was; all of it before the end."""
+    written: list[tuple[str, str]] = []
+    let_go = threading.Event()
+
+    def write(self: log_output.Output, record: logging.LogRecord) -> None:
+        let_go.wait(10)
+        written.append((threading.current_thread().name, self.format(record)))
+
+    monkeypatch.setattr(logging.StreamHandler, "emit", write)
+    monkeypatch.setattr(log_output.atexit, "register", lambda stop: None)
+    logs.configure("json", "info", queued=True)
+    with logs.structlog.contextvars.bound_contextvars(request="mine"):
+        log.info("first count=%d", 1)
+        failing()
+    (queued,) = logging.getLogger().handlers
+    assert isinstance(queued, log_output.Queued) and not written
+    let_go.set()
+    queued.records.put(None)
+    until = time.monotonic() + 10
+    while len(written) < 2:
+        assert time.monotonic() < until
+        time.sleep(0.01)
+    assert threading.current_thread().name not in {thread for thread, _ in written}
+    first, second = (json.loads(line) for _, line in written)
+    assert (first["event"], first["count"], first["request"]) == ("first", 1, "mine")
+    assert second["request"] == "mine" and "what went wrong" in second["exception"]
+
+
+def test_nobody_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(log_output, "MOST_QUEUED", 2)
+    queued = log_output.Queued()
+    for _ in range(5):
+        queued.handle(logging.makeLogRecord({"msg": "x"}))
+    assert queued.records.qsize() == 2 and queued.dropped == 3
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        '127.0.0.1:1 - "WebSocket /v1/stream?session=a-SECRET_1&x=2" [accepted]',
+        "GET /v1/stream?beside=a-SECRET_1 HTTP/1.1",
+        "< Authorization: Bearer a-SECRET_1",
+        "< Sec-WebSocket-Protocol: sunbox.v1, sunbox.key.a-SECRET_1, other",
+        "KeyError: 'a-SECRET_1-of-the-configuration'",
+    ],
+)
+@pytest.mark.parametrize("form", ["console", "json"])
+def test_no_secret_is_logged(text: str, form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
+    logs.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
+    log.info("heard text=%s", text)
+    log.info(text)
+    told = capfd.readouterr().err
+    assert "SECRET" not in told and told.count("***") == 2
+
+
+def test_libraries_speak_of_what_matters(untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
+    """uvicorn tells each WebSocket's address at INFO, query included; numba's DEBUG is thousands of lines."""
+    logs.configure("json", "debug")
+    for name in ("uvicorn.error", "numba.core.ssa", "PIL.PngImagePlugin", "asyncio", "websockets"):
+        logging.getLogger(name).info("something happened")
+    assert not capfd.readouterr().err
+    logging.getLogger("asyncio").error("Task exception was never retrieved\nfuture: <Task>\n")
+    log.debug("detail")
+    lines = [json.loads(line)["event"] for line in capfd.readouterr().err.splitlines()]
+    assert lines == ["Task exception was never retrieved; future: <Task>", "detail"]
+
+
+def test_a_sender_that_goes_away_is_no_error(server: Server) -> None:
+    """Twenty of them once stopped the service for a minute: each cost seconds for a traceback with all locals."""
+    written = server.log.read_text()
+    address = urlsplit(server.url)
+    refused = 'sunbox_requests_total{method="POST",route="%s",status="%d"}'
+    before = metrics(server)
+    routes = ("/v1/renders", "/v1/render", "/v1/assets")
+    for i in range(21):
+        with socket.create_connection((address.hostname, address.port), 10) as connection:
+            head = f"POST {routes[i % 3]} HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Length: 100000\r\n\r\n"
+            connection.sendall(head.encode() + b"{" * 1000)
+    began = time.monotonic()
+    assert server.http.get("/healthz").status_code == 200
+    assert time.monotonic() - began < 0.5
+    for route in routes:
+        wait_until(lambda name=refused % (route, 499): metrics(server)[name] == before.get(name, 0) + 7)
+        assert metrics(server).get(refused % (route, 500)) == before.get(refused % (route, 500))
+    told = server.log.read_text()[len(written) :]
+    assert "Traceback" not in told and "[error" not in told and "ClientDisconnect" not in told
+
+
+def test_session_ids_are_in_no_log(server: Server) -> None:
+    already = server.log.read_text().count("path=/v1/stream")
+    session = None
+    for _ in range(2):
+        opened = Client(server.url, session=session)
+        with opened.socket:
+            session = opened.until("hello")[0]["session"]
+    wait_until(lambda: server.log.read_text().count("path=/v1/stream") == already + 2)
+    assert session not in server.log.read_text()
+
+
+def test_every_message_has_its_fields_last() -> None:
+    """`what happened name=%s`: values that stand in the text can't be looked for."""
+    for path in sorted((*Path("service").rglob("*.py"), *Path("gpu").rglob("*.py"))):
+        for node in ast.walk(ast.parse(path.read_text())):
+            if not (isinstance(node, ast.Call) and isinstance(node.func, ast.Attribute)):
+                continue
+            if not (isinstance(node.func.value, ast.Name) and node.func.value.id == "log"):
+                continue
+            texts = [
+                each.value for each in node.args if isinstance(each, ast.Constant) and isinstance(each.value, str)
+            ]
+            message = texts[0]
+            fields = [bool(match["field"]) for match in logs.CONVERSION.finditer(message)]
+            where = f"{path}:{node.lineno}: {message}"
+            assert fields == sorted(fields) and fields.count(False) <= 1, where
+            assert not message.endswith(": %s"), where
