@@ -79,10 +79,11 @@ export class Editor extends Store {
 
   resetView() { this.change({ scene: { ...this.state.scene, camera: this.state.home.camera } }); }
 
-  // A value at a place such as /scene/camera/vfov; undefined gives it back to its default.
-  edit(place, value) {
+  // A value at a place such as /scene/camera/vfov; undefined gives it back to its default. Edits of one gesture are
+  // undone together.
+  edit(place, value, gesture = place) {
     this.forgive();
-    this.change(put(this.state, place, value), place);
+    this.change(put(this.state, place, value), gesture);
   }
 
   rest() { this.seal(); }

@@ -4,6 +4,7 @@ import { element } from "./dom.js";
 import { at, equal, pointer } from "./patch.js";
 import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
+import * as transforms from "./transforms.js";
 import { inWords } from "./words.js";
 
 const ICONS = {
@@ -111,25 +112,22 @@ export class Outliner {
       this.#find("thing-material").replaceChildren(...names.map((name) => element("option", { value: name }, inWords(name))));
       this.#find("thing-material").value = document.material;
     }
-    const marks = [document?.transform?.matrix && "matrix", this.acts.removable(this.thing) && "removable"].filter(Boolean);
+    const marks = [transforms.isSkewed(document?.transform) && "skewed", this.acts.removable(this.thing) && "removable"].filter(Boolean);
     const kind = [this.thing, document?.type, ...marks].join(" ");
     if (kind !== this.#made) this.#make(kind, document, isShape);
-    for (const { place, form } of this.#forms) form.show(at(scene, place) ?? {});
+    for (const { place, form, read } of this.#forms) form.show(read(at(scene, place)));
   }
 
   #make(kind, document, isShape) {
     this.#made = kind;
     const own = this.#model(document);
-    const parts = own ? [{ place: this.thing, fields: fields(this.schema, own) }] : [];
-    if (isShape && !document.transform?.matrix) {
-      parts.push({ title: "Transform", place: `${this.thing}/transform`, fields: fields(this.schema, transformModel(this.schema)) });
-    }
-    this.#forms = parts.map(({ title, place, fields: chosen }) => ({
-      place, title,
-      form: schemaForm(chosen, {
-        change: (name, value) => this.acts.edit(`/scene${place}/${name}`, value),
-        commit: () => this.acts.rest(), forgive: () => this.acts.forgive(),
-      }),
+    const parts = own ? [{
+      place: this.thing, fields: fields(this.schema, own), read: (values) => values ?? {},
+      change: (name, value) => this.acts.edit(`/scene${this.thing}/${name}`, value),
+    }] : [];
+    if (isShape) parts.push(this.#transform(document));
+    this.#forms = parts.map(({ fields: chosen, change, ...part }) => ({
+      ...part, form: schemaForm(chosen, { change, commit: () => this.acts.rest(), forgive: () => this.acts.forgive() }),
     }));
     const removable = this.acts.removable(this.thing);
     const button = (label, does) => element("button", { type: "button", class: "button small", onclick: does }, label);
@@ -139,8 +137,23 @@ export class Outliner {
       /^\/(shapes|lights)\//.test(thing) ? button("Duplicate", () => this.acts.duplicate(thing)) : null,
       removable ? button("Delete", () => this.acts.remove(thing)) : null,
     ].filter(Boolean));
-    this.#find("thing-form").replaceChildren(...this.#forms.flatMap(({ title, form }) =>
-      [...(title ? [element("h3", {}, title)] : []), form.element]));
+    this.#find("thing-form").replaceChildren(...this.#forms.flatMap(({ title, note, form }) =>
+      [title && element("h3", {}, title), note && element("p", { class: "note" }, note), form.element].filter(Boolean)));
+  }
+
+  // Imported parts stand by a matrix: the form shows it as a move, a turn and a scale, which an edit makes of it.
+  #transform({ transform }) {
+    const place = `${this.thing}/transform`;
+    const isSkewed = transforms.isSkewed(transform);
+    return {
+      title: "Transform", place, read: transforms.shown,
+      note: isSkewed ? "This part is skewed in its file: it can be moved, but not turned or scaled." : "",
+      fields: fields(this.schema, transformModel(this.schema)).filter(({ name }) => !isSkewed || name === "translate"),
+      change: (name, value) => {
+        const now = at(this.acts.state.scene, place);
+        this.acts.edit(`/scene${place}`, transforms.changed(now, name, value), `/scene${place}/${name}`);
+      },
+    };
   }
 
   // As Panel.mark: the control's place, or null.

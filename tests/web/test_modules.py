@@ -7,9 +7,11 @@ import random
 from collections.abc import Iterator
 from typing import Any
 
+import numpy as np
 import pytest
 from playwright.sync_api import Browser, Page
 
+from service.scene.transform import Transform
 from tests.serving import Server
 
 
@@ -154,3 +156,45 @@ def test_a_preset_says_what_it_costs_this_scene_and_before_that_the_list(page: P
         "≈ 40 s to 4 % noise here",
         "256 samples, 8 bounces; beyond them 1.2 % of this scene's light is missing",
     ]
+
+
+def test_a_matrix_is_told_as_move_turn_and_scale(page: Page) -> None:
+    chance = random.Random(5)
+    cases = [Transform(), Transform(rotate=(0, 90, 0)), Transform(rotate=(30, -90, 0)), Transform(scale=(1, 1, -2))]
+    for _ in range(40):
+        turn = tuple(chance.choice([chance.uniform(-180, 180), 0, 90, -90, 180]) for _ in range(3))
+        size = tuple(chance.choice([-1, 1]) * 10 ** chance.uniform(-3, 2) for _ in range(3))
+        cases.append(Transform(translate=tuple(chance.uniform(-9, 9) for _ in range(3)), rotate=turn, scale=size))
+    for case in cases:
+        matrix = case.matrix4()
+        told = call(page, "transforms.js", "parts", matrix.astype(np.float32).reshape(-1).tolist())
+        again = Transform(**{name: tuple(values) for name, values in told.items()}).matrix4()
+        assert np.abs(again - matrix).max() < 2e-6 * np.abs(matrix).max(), case
+    assert call(page, "transforms.js", "parts", cases[3].matrix4().reshape(-1).tolist()) == {
+        "translate": [0, 0, 0], "rotate": [0, 0, 0], "scale": [1, 1, -2],
+    }  # fmt: skip
+
+
+def test_a_skewing_matrix_can_only_be_moved(page: Page) -> None:
+    skewed = [1, 0.5, 0, 3, 0, 1, 0, 4, 0, 0, 1, 5, 0, 0, 0, 1]
+    assert call(page, "transforms.js", "parts", skewed) is None
+    assert call(page, "transforms.js", "shown", {"matrix": skewed}) == {"translate": [3, 4, 5]}
+    moved = call(page, "transforms.js", "changed", {"matrix": skewed}, "translate", [7, 8, 9])["matrix"]
+    assert moved == [1, 0.5, 0, 7, 0, 1, 0, 8, 0, 0, 1, 9, 0, 0, 0, 1]
+
+
+@pytest.mark.parametrize(
+    ("shape", "expected"),
+    [
+        ({"type": "sphere", "center": [1, 2, 3], "radius": 1}, {"center": [2, 2, 1]}),
+        ({"type": "box", "min": [0, 0, 0], "max": [1, 1, 1]}, {"min": [1, 0, -2], "max": [2, 1, -1]}),
+        ({"type": "quad", "origin": [0, 0, 0], "u": [1, 0, 0], "v": [0, 0, 1]}, {"origin": [1, 0, -2]}),
+        ({"type": "mesh", "asset": "a"}, {"transform": {"translate": [1, 0, -2]}}),
+        (
+            {"type": "sphere", "center": [1, 2, 3], "radius": 1, "transform": {"translate": [4, 0, 0], "scale": 2}},
+            {"transform": {"translate": [5, 0, -2], "scale": 2}},
+        ),
+    ],
+)
+def test_shapes_are_moved(page: Page, shape: dict[str, Any], expected: dict[str, Any]) -> None:
+    assert call(page, "transforms.js", "moved", shape, [1, 0, -2]) == shape | expected
