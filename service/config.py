@@ -83,6 +83,10 @@ class Config(BaseSettings):
         le=2**24,
         description="Most triangles that a scene holds, shared ones once; at most 2^24 (float32 counts no further).",
     )
+    max_shapes: int = Field(200_000, ge=1, description="Most shapes of a scene; a mesh is one.")
+    max_lights: int = Field(10_000, ge=1, description="Most lights of a scene that are no shapes.")
+    max_materials: int = Field(10_000, ge=1, description="Most materials of a scene.")
+    max_textures: int = Field(10_000, ge=1, description="Most textures of a scene.")
     max_texels: int = Field(
         2**26, ge=1, le=2**27, description="Most texels of an image, and of a scene's textures: four of 4096 x 4096."
     )

@@ -13,6 +13,7 @@ from service.rendering.change import change, risky
 from service.rendering.messages import Update
 from service.rendering.reading import Reader, stop_rule
 from service.scene import Scene, merge_patch
+from service.scene.document import Parsed
 
 
 @dataclass(frozen=True)
@@ -97,7 +98,8 @@ class Live:
         new = replace(old, generation=message.generation)
         if "scene" in message.model_fields_set:
             document = merge_patch(old.scene_document, message.scene)
-            new = replace(new, scene_document=document, scene=self._reader.scene(document))
+            scene = self._reader.scene(document, Parsed(old.scene_document, old.scene))
+            new = replace(new, scene_document=document, scene=scene)
         if "settings" in message.model_fields_set:
             document = merge_patch(old.settings_document, message.settings)
             new = replace(new, settings_document=document, settings=self._reader.settings(document))

@@ -14,6 +14,7 @@ from service.rendering.messages import Encoding, Frame
 from service.rendering.messages import View as PictureView
 from service.scene.base import Model, hint
 from service.scene.mistakes import validated
+from service.scene.text import load_json
 
 GENERATIONS = 2**53  # what every JSON reader keeps exact
 QUALITY, LAST_QUALITY = 80, 90  # JPEG: 4:2:0 while it converges, 4:4:4 for the frame that stays
@@ -82,9 +83,9 @@ Message = Start | Update | ViewMessage | Ack | Bare
 _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
 
 
-def parse(document: object) -> Message:
-    """Raises InvalidDocument with pointers from the message's root."""
-    return validated(_MESSAGE, document, "")
+def parse(text: str) -> Message:
+    """Raises MalformedJson, or InvalidDocument with pointers from the message's root."""
+    return validated(_MESSAGE, load_json(text), "")
 
 
 def frame_bytes(frame: Frame, view: View, seq: int) -> bytes:

@@ -19,6 +19,7 @@ from service.quality import ResolvedSettings, resolve
 from service.rendering.messages import StopRule
 from service.scene import Scene, load_json, parse_scene, parse_settings
 from service.scene.base import Model
+from service.scene.document import Parsed
 from service.scene.mistakes import validated
 
 
@@ -65,8 +66,9 @@ class Reader:
             raise InvalidDocument(errors)
         return understood[0], understood[1]
 
-    def scene(self, document: Any) -> Scene:
-        return parse_scene(document, "/scene")
+    def scene(self, document: Any, before: Parsed | None = None) -> Scene:
+        """With the one `before` an edit costs only what it changes."""
+        return parse_scene(document, "/scene", self._config, before)
 
     def settings(self, document: Any) -> ResolvedSettings:
         settings = parse_settings(document, "/settings", self._config)

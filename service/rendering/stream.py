@@ -20,7 +20,6 @@ from service.rendering.live import Live
 from service.rendering.messages import Done, Failed, Frame, FromRenderer, Loaded, Pause, Resume, Stop, Update
 from service.rendering.reading import Reader
 from service.rendering.threads import Lane, encoding
-from service.scene import load_json
 
 TAKEN_UP, LOST = 4409, 4500  # close codes
 WAITING = 64  # messages to take, or to send; more of them wait in the network
@@ -308,8 +307,7 @@ class Stream:
     async def _parsed(self, text: str | None) -> protocol.Message:
         if text is None:
             raise MalformedJson("A message is JSON text, not bytes.")
-        document = load_json(text) if len(text) < SMALL else await self._lane.run(partial(load_json, text))
-        return protocol.parse(document)
+        return protocol.parse(text) if len(text) < SMALL else await self._lane.run(partial(protocol.parse, text))
 
 
 async def _stopped(task: asyncio.Task[None]) -> None:

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+from itertools import islice
 from types import NoneType
 from typing import Any, get_args
 
-from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetPydanticSchema
+from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetPydanticSchema, model_validator
 from pydantic_core import CoreSchema, PydanticCustomError
 
 REFUSAL = "refusal"  # the type of our own errors among pydantic's
+MOST_MISTAKES = 100  # that are looked for in one document: a list of ten thousand wrong spheres only repeats itself
 
 
 class Model(BaseModel):
@@ -16,6 +18,17 @@ class Model(BaseModel):
     model_config = ConfigDict(
         strict=True, extra="forbid", allow_inf_nan=False, frozen=True, arbitrary_types_allowed=True
     )
+
+    @model_validator(mode="before")
+    @classmethod
+    def _without_most_unknown_names(cls, value: Any) -> Any:
+        """Leaves enough unknown names to refuse the object: pydantic makes an error of each, of a hundred thousand
+        too, and lets no other thread run meanwhile."""
+        fields = cls.model_fields
+        if not isinstance(value, dict) or len(value) <= len(fields) + MOST_MISTAKES:
+            return value
+        unknown = islice((name for name in value if name not in fields), MOST_MISTAKES)
+        return {name: value[name] for name in fields if name in value} | {name: value[name] for name in unknown}
 
 
 def refusal(detail: str, at: str = "") -> PydanticCustomError:

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from itertools import islice
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Protocol
 
-from pydantic import BeforeValidator, Field, ValidationError
+from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
 from service.problems import FieldError, InvalidDocument
-from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.base import MOST_MISTAKES, OMITTABLE, Model, hint, refusal
 from service.scene.camera import Camera
 from service.scene.environment import Environment
 from service.scene.light import Light
 from service.scene.material import Material
-from service.scene.mistakes import MOST, among, escaped, mistakes
+from service.scene.mistakes import among, escaped, mistakes, validated_entries
 from service.scene.numbers import described
 from service.scene.shape import Shape
 from service.scene.texture import Texture
@@ -42,17 +43,95 @@ class Scene(Model):
     shapes: Annotated[list[Shape], hint("Shapes", "Each made of one of the materials.")]
 
 
-def parse_scene(document: Any, pointer: str = "") -> Scene:
-    """The scene that a document describes. Raises InvalidDocument with every mistake, seen from `pointer` up."""
-    errors: list[FieldError] = []
+_KINDS: dict[str, type] = {"lights": list, "textures": dict, "materials": dict, "shapes": list}
+_ENTRIES: dict[str, TypeAdapter[Any]] = {
+    "lights": TypeAdapter(Light),
+    "textures": TypeAdapter(Texture),
+    "materials": TypeAdapter(Material),
+    "shapes": TypeAdapter(Shape),
+}
+
+
+class Limits(Protocol):
+    """What of the service's configuration bounds a scene."""
+
+    @property
+    def max_shapes(self) -> int: ...
+
+    @property
+    def max_lights(self) -> int: ...
+
+    @property
+    def max_materials(self) -> int: ...
+
+    @property
+    def max_textures(self) -> int: ...
+
+
+@dataclass(frozen=True)
+class Parsed:
+    """A document, and the scene that it describes."""
+
+    document: Any
+    scene: Scene
+
+
+def parse_scene(
+    document: Any, pointer: str = "", limits: Limits | None = None, before: Parsed | None = None
+) -> Scene:
+    """The scene that a document describes. Raises InvalidDocument with its mistakes, seen from `pointer` up.
+
+    Entries that `document` shares with the one `before` (`merge_patch` copies only what it changes) are the same in
+    both scenes, and are not validated again.
+    """
+    fields = document if isinstance(document, dict) else {}
+    held = {name: fields[name] for name, kind in _KINDS.items() if isinstance(fields.get(name), kind)}
+    errors = _too_many(held, limits)
+    if errors:  # nothing in there is looked at
+        raise InvalidDocument(errors).under(pointer)
+    # What the scene holds is validated one entry after the other, and the rest of it without.
+    head = {**document, **{name: type(entries)() for name, entries in held.items()}} if held else document
     try:
-        scene = Scene.model_validate(document)
+        scene = Scene.model_validate(head)
     except ValidationError as error:
         errors = mistakes(error, Scene)
-    errors += islice(_dangling(document), MOST)
+    parts = {name: _part(name, entries, before, errors) for name, entries in held.items()}
+    errors.sort(key=_place)
+    errors += islice(_dangling(document), MOST_MISTAKES)
     if errors:
-        raise InvalidDocument(errors).under(pointer)
-    return scene
+        raise InvalidDocument(errors[:MOST_MISTAKES]).under(pointer)
+    return scene.model_copy(update=parts)
+
+
+def _too_many(held: dict[str, Any], limits: Limits | None) -> list[FieldError]:
+    most = {name: getattr(limits, f"max_{name}") for name in held} if limits is not None else {}
+    return [
+        FieldError(f"/{name}", f"has {len(held[name])} entries: at most {most[name]} (SUNBOX_MAX_{name.upper()})")
+        for name in most
+        if len(held[name]) > most[name]
+    ]
+
+
+def _part(name: str, entries: Any, before: Parsed | None, errors: list[FieldError]) -> Any:
+    """The entries as they are understood; adds the mistakes in them to `errors`."""
+    old: Any = None if before is None else before.document.get(name)
+    made: Any = None if before is None else getattr(before.scene, name)
+    if entries is old:
+        return made
+
+    def known(key: int | str, value: Any) -> Any:
+        return made[key] if isinstance(old, dict) and key in old and old[key] is value else None
+
+    pairs = entries.items() if isinstance(entries, dict) else enumerate(entries)
+    fresh, found = validated_entries(_ENTRIES[name], pairs, known)
+    errors += (FieldError(f"/{name}{error.pointer}", error.detail) for error in found)
+    return fresh if isinstance(entries, dict) else list(fresh.values())
+
+
+def _place(error: FieldError) -> int:
+    """Where its field stands in the scene; unknown ones come last."""
+    first = error.pointer.split("/", 2)[1:2]
+    return next((i for i, name in enumerate(Scene.model_fields) if [name] == first), len(Scene.model_fields))
 
 
 def _dangling(document: Any) -> Iterator[FieldError]:

@@ -10,13 +10,13 @@ from typing import Any, TypeVar
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from service.problems import FieldError, InvalidDocument
-from service.scene.base import REFUSAL, field_names
+from service.scene.base import MOST_MISTAKES, REFUSAL, field_names
 from service.scene.numbers import described
 from service.scene.places import Place, locate
 
 T = TypeVar("T")
 
-MOST = 100  # mistakes told at once: a list of ten thousand wrong spheres would only repeat itself
+LONGEST_STEP = 200  # characters of a name in a pointer: a hundred pointers through a name of 20 MB would be 2 GB
 
 _WRONG_KIND = ("union_tag_invalid", "union_tag_not_found", "literal_error", "missing")
 
@@ -30,9 +30,34 @@ def validated(adapter: TypeAdapter[T], document: Any, pointer: str) -> T:
         raise InvalidDocument(mistakes(error, adapter._type)).under(pointer) from None
 
 
+def validated_entries(
+    adapter: TypeAdapter[T], entries: Iterable[tuple[int | str, Any]], known: Callable[[int | str, Any], T | None]
+) -> tuple[dict[int | str, T], list[FieldError]]:
+    """What `adapter` makes of each entry of an array or object, and the mistakes, seen from that.
+
+    The search ends once there are MOST_MISTAKES. `known` gives what was made of an entry before, which saves doing it
+    again. One at a time, because pydantic keeps the errors of them all (1 KiB each) and lets no thread run meanwhile.
+    """
+    made: dict[int | str, T] = {}
+    found: list[FieldError] = []
+    for key, value in entries:
+        same = known(key, value)
+        if same is not None:
+            made[key] = same
+            continue
+        try:
+            made[key] = adapter.validate_python(value)
+        except ValidationError as error:
+            step = "/" + escaped(key)
+            found += (FieldError(step + each.pointer, each.detail) for each in mistakes(error, adapter._type))
+            if len(found) >= MOST_MISTAKES:
+                break
+    return made, found[:MOST_MISTAKES]
+
+
 def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
     """Where and what, in the order of the document; `kind` is the type that was validated."""
-    found: dict[str, str] = {}
+    found: dict[str, tuple[Any, Place]] = {}
     kinds: set[str] = set()
     for entry in error.errors(include_url=False):
         place = locate(kind, entry["loc"])
@@ -41,11 +66,11 @@ def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
             pointer += "/type"
         if pointer.endswith("/type") and entry["type"] in _WRONG_KIND:
             kinds.add(pointer)
-        found.setdefault(pointer + entry.get("ctx", {}).get("at", ""), _detail(entry, place))
+        found.setdefault(pointer + entry.get("ctx", {}).get("at", ""), (entry, place))
     # What kind of thing it is comes first: under a wrong type every other field may look wrong.
-    hidden = tuple(pointer.removesuffix("type") for pointer in kinds)
-    kept = [pointer for pointer in found if pointer in kinds or not pointer.startswith(hidden)]
-    return [FieldError(pointer, found[pointer]) for pointer in kept[:MOST]]
+    holders = {pointer.removesuffix("type") for pointer in kinds}
+    kept = (pointer for pointer in found if pointer in kinds or not _is_below(pointer, holders))
+    return [FieldError(pointer, _detail(*found[pointer])) for pointer in islice(kept, MOST_MISTAKES)]
 
 
 def among(names: Iterable[str]) -> str:
@@ -55,8 +80,18 @@ def among(names: Iterable[str]) -> str:
 
 
 def escaped(step: object) -> str:
-    """One step of a JSON pointer (RFC 6901)."""
-    return str(step).replace("~", "~0").replace("/", "~1")
+    """One step of a JSON pointer (RFC 6901); a name that nobody would read to its end is cut off."""
+    return str(step)[:LONGEST_STEP].replace("~", "~0").replace("/", "~1")
+
+
+def _is_below(pointer: str, holders: set[str]) -> bool:
+    """Whether one of the holders, which end with a slash, leads to it."""
+    at = pointer.find("/")
+    while at >= 0:
+        if pointer[: at + 1] in holders:
+            return True
+        at = pointer.find("/", at + 1)
+    return False
 
 
 def _detail(entry: Any, place: Place) -> str:
