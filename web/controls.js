@@ -5,33 +5,62 @@
 import { HEX, hex, linear } from "./color.js";
 import { element, isBeingEdited } from "./dom.js";
 import { slideByTouch } from "./sliding.js";
+import { neededIn, parseNumber, parseTriple } from "./number.js";
 import { compact, inWords, unitText } from "./words.js";
 
 const UNSET = "–"; // neither document nor schema has a value
 
+// A text field: one of type=number swallows what it does not understand, such as the comma of 0,35. Only where
+// a value is never negative may a phone show its keys for decimals: those have no minus.
 function numberEntry(field, id, { input, commit, refuse, restore }) {
+  const unit = unitText(field.unit);
+  let latest = null;
+  const clean = () => { delete box.dataset.dirty; };
+  const take = () => {
+    clean();
+    if (box.value.trim() === "") {
+      if (field.required) return restore();
+      input(undefined);
+      return commit();
+    }
+    const value = parseNumber(box.value, unit);
+    if (value === null) return refuse(neededIn(unit));
+    input(value);
+    commit();
+  };
+  const step = (steps) => {
+    const from = parseNumber(box.value, unit) ?? latest ?? field.initial ?? field.soft.min ?? 0;
+    const to = Number((from + steps * field.step).toPrecision(12));
+    const { min, max, open } = field;
+    if (to < min || to > max || to <= open.min || to >= open.max) return;
+    clean();
+    input(to);
+    box.value = compact(to);
+    box.select();
+  };
   const box = element("input", {
-    type: "number", id, class: "entry", step: String(field.step),
-    min: field.min === undefined ? undefined : String(field.min),
-    placeholder: UNSET,
+    type: "text", id, class: "entry number", autocomplete: "off", spellcheck: "false",
+    inputmode: field.min >= 0 ? "decimal" : undefined, placeholder: UNSET,
     oninput: () => { box.dataset.dirty = "yes"; },
-    onblur: () => { delete box.dataset.dirty; },
-    onwheel: () => box.blur(), // the wheel scrolls the panel; it must not turn the number on the way
+    onblur: clean,
     onkeydown: (event) => {
-      if (event.key !== "Escape") return;
-      delete box.dataset.dirty;
-      restore();
+      if (event.key === "Escape") {
+        clean();
+        restore();
+      }
+      const up = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+      if (!up || event.altKey || event.ctrlKey || event.metaKey) return;
+      event.preventDefault();
+      step(up * (event.shiftKey ? 10 : 1));
     },
-    onchange: () => {
-      delete box.dataset.dirty;
-      if (box.validity.badInput) return refuse("A number is needed here.");
-      if (box.value === "" && field.required) return restore();
-      input(box.value === "" ? undefined : Number(box.value));
-      commit();
-    },
+    onkeyup: ({ key }) => { if (key === "ArrowUp" || key === "ArrowDown") commit(); },
+    onchange: take,
   });
   const show = (value) => {
-    if (!isBeingEdited(box)) box.value = value === undefined || value === null ? "" : compact(value);
+    latest = value ?? null;
+    if (isBeingEdited(box)) return;
+    box.value = latest === null ? "" : compact(latest);
+    box.title = latest === null || box.value === String(latest) ? "" : String(latest);
   };
   return { element: box, show };
 }
@@ -107,8 +136,6 @@ function vector(field, id, { input, commit, refuse, restore }) {
   };
 }
 
-const NUMBERS = /^\s*[\d.eE+-]+(?:[\s,]+[\d.eE+-]+){2}\s*$/;
-
 // Swatch and text; a colour that may pass 1 is split into a tint and a strength.
 function color(field, id, { input, commit, refuse, restore }) {
   const bright = !(field.max <= 1);
@@ -139,8 +166,9 @@ function color(field, id, { input, commit, refuse, restore }) {
       delete text.dataset.dirty;
       if (text.value === "" && !isSet) return restore();
       const match = HEX.exec(text.value.trim());
+      const triple = parseTriple(text.value);
       if (match) input(linear(match[0]).map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
-      else if (NUMBERS.test(text.value)) input(text.value.trim().split(/[\s,]+/).map(Number));
+      else if (triple) input(triple);
       else return refuse("Write #rrggbb, or three linear numbers such as 0.2 0.4 0.6.");
       commit();
     },

@@ -4,7 +4,7 @@
 import { element } from "./dom.js";
 
 const PATIENCE_MS = 350;
-const WRITTEN = ["number", "text", "button"]; // :focus-visible by a mere click; a hint would be in the way
+const WRITTEN = ["text", "button"]; // :focus-visible by a mere click; a hint would be in the way
 const bubble = element("div", { class: "tooltip", "aria-hidden": "true", hidden: true });
 let timer = 0;
 

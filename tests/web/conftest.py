@@ -183,7 +183,9 @@ class Editor:
         return waiting.value.path().read_bytes()
 
     def field(self, name: str, kind: str = "range", form: str = "#panel") -> str:
-        return f"{form} [data-field={name}] input[type={kind}]"
+        """The control of a field: its `range`, the `number` beside it, or a colour's `text`."""
+        inputs = {"number": "input.number", "text": "input.entry:not(.number)"}
+        return f"{form} [data-field={name}] {inputs.get(kind, f'input[type={kind}]')}"
 
 
 @pytest.fixture

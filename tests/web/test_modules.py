@@ -198,3 +198,29 @@ def test_a_skewing_matrix_can_only_be_moved(page: Page) -> None:
 )
 def test_shapes_are_moved(page: Page, shape: dict[str, Any], expected: dict[str, Any]) -> None:
     assert call(page, "transforms.js", "moved", shape, [1, 0, -2]) == shape | expected
+
+
+NUMBERS = {
+    "0.35": 0.35, "0,35": 0.35, ",5": 0.5, "1e-3": 0.001, "\u22122": -2, "1/3": 0.333333333333, "50%": 0.5,
+    "12,5 %": 0.125, "2*(1+.5)-1": 2, "16 777 216": 16777216, "1,000": 1, "-0,25": -0.25,
+    "abc": None, "": None, "1,234.5": None, "1,2,3": None, "1/0": None, "2 3": None, "5 m": None,
+    "(1": None, "1e": None,
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("text", NUMBERS)
+def test_numbers_are_read_as_people_write_them(page: Page, text: str) -> None:
+    assert call(page, "number.js", "parseNumber", text) == NUMBERS[text]
+
+
+def test_a_number_may_say_its_own_unit_and_no_share_of_it(page: Page) -> None:
+    assert call(page, "number.js", "parseNumber", "30\u00b0", "\u00b0") == 30
+    assert call(page, "number.js", "parseNumber", "50%", "\u00b0") is None
+
+
+TRIPLES = ["0.2 0.4 0.6", "0,2 0,4 0,6", "0.2, 0.4, 0.6", "0.2,0.4,0.6", "0,2; 0,4; 0,6", "20% 2/5 .6"]
+
+
+@pytest.mark.parametrize("text", TRIPLES)
+def test_colours_are_three_numbers_however_parted(page: Page, text: str) -> None:
+    assert call(page, "number.js", "parseTriple", text) == [0.2, 0.4, 0.6]

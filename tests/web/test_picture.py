@@ -28,7 +28,7 @@ def camera(editor: Editor) -> dict[str, Any]:
     editor.tab("scene")
     editor.page.click("#outline-list [data-thing='/camera']")
     script = """() => Object.fromEntries([...document.querySelectorAll("#thing-form [data-field]")].map((row) =>
-        [row.dataset.field, [...row.querySelectorAll("input[type=number]")].map((each) => Number(each.value))]))"""
+        [row.dataset.field, [...row.querySelectorAll("input.number")].map((each) => Number(each.value))]))"""
     found: dict[str, Any] = editor.page.evaluate(script)
     return found
 

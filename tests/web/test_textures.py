@@ -49,13 +49,13 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
 
     page.select_option(f"{BENEATH} [data-field=wrap] select", "mirror")
     page.select_option(f"{BENEATH} [data-field=color_space] select", "linear")
-    turn = page.locator(f"{BENEATH} [data-field=rotation] input[type=number]")
+    turn = page.locator(f"{BENEATH} [data-field=rotation] input.number")
     turn.fill("30")
     turn.press("Enter")
     across = page.locator(f"{BENEATH} [data-field=scale] input").first
     across.fill("3")
     across.press("Enter")
-    power = page.locator(f"{BENEATH} [data-field=factor] input[type=text]")
+    power = page.locator(f"{BENEATH} [data-field=factor] input.entry:not(.number)")
     power.fill("0.5 0.5 0.5")
     power.press("Enter")
     editor.wait_for_change(before)
@@ -83,11 +83,11 @@ def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> Non
     page.click(f"{BENEATH} > summary")
     shared = f"{BENEATH} > p"
     assert editor.text(shared) == "How it lies holds for all 2 parameters that show halves."
-    turn = page.locator(f"{BENEATH} [data-field=rotation] input[type=number]")
+    turn = page.locator(f"{BENEATH} [data-field=rotation] input.number")
     turn.fill("30")
     turn.press("Enter")
     page.select_option(f"{BENEATH} [data-field=channel] select", "r")
-    power = page.locator(f"{BENEATH} [data-field=factor] input[type=text]")
+    power = page.locator(f"{BENEATH} [data-field=factor] input.entry:not(.number)")
     power.fill("0.5 0.5 0.5")
     power.press("Enter")
     before = editor.settled()
