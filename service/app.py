@@ -13,12 +13,10 @@ import signal
 import socket
 import sys
 import threading
-import time
-from collections.abc import AsyncIterator, Iterable, Iterator
+from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from importlib import metadata
 from pathlib import Path
-from typing import Any
 
 import uvicorn
 from fastapi import FastAPI
@@ -28,10 +26,12 @@ from starlette.staticfiles import StaticFiles
 from service import presets
 from service.assets import AssetStore
 from service.config import Config
-from service.connections import Connection, listen
+from service.connection_limits import Watch
+from service.connections import connection_class, listen
 from service.documents import Documents
-from service.guard import Guard
+from service.guard import Guard, turning_away
 from service.logs import Requests
+from service.problems import Unavailable
 from service.quota import Quota
 from service.rendering.engine import Engine
 from service.rendering.process import Options
@@ -46,8 +46,8 @@ from service.routes.house import MESSAGE_BYTES, House
 
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # proxies cut connections that are idle for a minute
-STUCK_S = 10.0  # for the last bytes of a closed connection, and for the first request of an open one
-TICKS = 50  # of uvicorn, ten a second: how often closed connections are looked at
+KEEP_ALIVE_S = 150  # longer than proxies keep idle connections (Caddy two minutes), or they meet a closed one
+TICKS = 10  # of uvicorn, ten a second: how often connections are looked at
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
 DESCRIPTORS = 65_536
@@ -55,6 +55,8 @@ OPEN_TO_ALL = (
     "serving without a key: whoever reaches this address can render, and can read, replace and delete what is saved; "
     "set SUNBOX_API_KEY, or listen on 127.0.0.1 (in a container: publish the port on 127.0.0.1) host=%s"
 )
+
+FULL = Unavailable("There is no room for another connection just now (SUNBOX_MAX_CONNECTIONS).", 5)
 
 M_TRIM_THRESHOLD, M_MMAP_THRESHOLD = -1, -3  # of malloc.h
 
@@ -98,7 +100,7 @@ def create_app(config: Config) -> FastAPI:
 def run(config: Config) -> int:
     """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 when the address can't be had."""
     _give_memory_back()
-    _take_descriptors()
+    most = min(config.max_connections, _take_descriptors() // 2)  # files, scenes and images take others
     try:
         listener = listen(config.host, config.port)
     except OSError as error:
@@ -108,55 +110,36 @@ def run(config: Config) -> int:
     if not config.api_key and not ipaddress.ip_address(host).is_loopback:
         log.warning(OPEN_TO_ALL, host)
     app = create_app(config)
+    own: House = app.state.house
+    full = Requests(turning_away(FULL, respond), refuse=respond, heard=own.traffic.heard)
     settings = uvicorn.Config(
         app,
-        http=Connection,
+        http=connection_class(most, full),
         log_config=None,
         access_log=False,
         server_header=False,
         ws_per_message_deflate=False,
         ws_max_size=MESSAGE_BYTES,
         ws_ping_interval=PING_S,
+        timeout_keep_alive=KEEP_ALIVE_S,
         timeout_graceful_shutdown=GRACE_S,
     )
     address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
-    server = _Server(settings, app.state.house, address)
+    server = _Server(settings, own, address)
     server.run([listener])
     return 1 if server.refused else 0
 
 
-def _take_descriptors() -> None:
-    """As many as the system lets this process have: clients, scenes and assets in memory hold some each, and what a
-    shell gives its programs by default (1 024) is meant for such as wait with select().
+def _take_descriptors() -> int:
+    """As many as the system lets this process have; how many that is. Clients, scenes and assets in memory hold some
+    each, and what a shell gives its programs by default (1 024) is meant for such as wait with select().
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
     if soft != resource.RLIM_INFINITY and soft < most:
         resource.setrlimit(resource.RLIMIT_NOFILE, (most, hard))
-
-
-class Stuck:
-    """Ends connections that were closed but never close, and those on which no whole request came.
-
-    A vanished client takes not even the last bytes; a hostile one sends a header a minute, on a thousand connections.
-    """
-
-    def __init__(self) -> None:
-        self._since: dict[Any, float] = {}
-
-    def abort(self, connections: Iterable[Any]) -> None:
-        """To be called now and then with what is connected."""
-        now = time.monotonic()
-        stuck = [connection for connection in connections if _is_stuck(connection)]
-        self._since = {connection: self._since.get(connection, now) for connection in stuck}
-        for connection, since in self._since.items():
-            if now - since >= STUCK_S and since < now:
-                connection.transport.abort()
-
-
-def _is_stuck(connection: Any) -> bool:
-    """Of uvicorn's: `cycle` is the request under way, None before the first; a WebSocket has none."""
-    return connection.transport.is_closing() or getattr(connection, "cycle", True) is None
+        return most
+    return DESCRIPTORS if soft == resource.RLIM_INFINITY else soft
 
 
 class _Server(uvicorn.Server):
@@ -166,12 +149,12 @@ class _Server(uvicorn.Server):
         super().__init__(config)
         self._house = house
         self._address = address
-        self._stuck = Stuck()
+        self._watch = Watch()
         self.refused = False
 
     async def on_tick(self, counter: int) -> bool:
         if counter % TICKS == 0:
-            self._stuck.abort(self.server_state.connections)
+            self._watch.look(self.server_state.connections)
         return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:

@@ -64,6 +64,9 @@ class Config(BaseSettings):
     max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body, as decompressed.")
     max_bodies: int = Field(GIB, ge=1, description="Most bytes of all bodies that are being dealt with.")
     body_timeout: float = Field(30.0, gt=0, description="Longest pause (s) within a body that is being sent.")
+    max_connections: int = Field(
+        1024, ge=2, description="Most connections at a time, streams included; one address has at most half of them."
+    )
     max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
     gpu_memory: int | None = Field(
         None, ge=1, description="Most bytes of scenes and pictures on the device (default: half of a CPU's memory)."

@@ -1,17 +1,24 @@
-"""Connections below HTTP: how they are listened for and how bytes are written to them."""
+"""Connections below HTTP: how they are listened for, how many there are, how bytes are written to them."""
 
 from __future__ import annotations
 
 import asyncio
 import socket
+import struct
+import time
+from contextlib import suppress
 from typing import Any
 
+from starlette.types import ASGIApp
 from uvicorn.protocols.http.h11_impl import H11Protocol
+
+from service.connection_limits import Room
 
 BACKLOG = 2048
 JOINED = 16 * 1024  # bytes; longer pieces are written as they are, as joining them would copy them
 # TCP's probes of a silent peer: one that vanished without a word is noticed after two minutes.
 PROBE_AFTER_S, PROBE_EVERY_S, PROBES = 60, 15, 4
+RESET = struct.pack("ii", 1, 0)  # SO_LINGER: closed at once, with a reset
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -36,11 +43,13 @@ class JoinedWrites(asyncio.Transport):
         self._transport = transport
         self._pending: list[bytes] = []
         self._size = 0  # of these
+        self.written = 0  # bytes in all
         self._loop = asyncio.get_running_loop()
 
     def write(self, data: Any) -> None:
         if not data:
             return
+        self.written += len(data)
         if self._size + len(data) > JOINED:
             self._flush()
             return self._transport.write(data)
@@ -61,7 +70,11 @@ class JoinedWrites(asyncio.Transport):
         self._transport.close()
 
     def abort(self) -> None:
+        """Drops what was not read yet, in the kernel too, which would go on offering it for minutes."""
         self._pending.clear()
+        self._size = 0
+        with suppress(OSError):
+            self.get_extra_info("socket").setsockopt(socket.SOL_SOCKET, socket.SO_LINGER, RESET)
         self._transport.abort()
 
     def get_write_buffer_size(self) -> int:
@@ -90,7 +103,25 @@ class JoinedWrites(asyncio.Transport):
 
 
 class Connection(H11Protocol):
-    """uvicorn's connection, which writes an answer's head and body apart; here they leave in one packet."""
+    """uvicorn's connection, with room for as many as there may be; head and body of an answer leave in one packet."""
+
+    room: Room  # of all
+    refuse: ASGIApp  # answers those for which there is none
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
+        self.began = time.monotonic()
+        self._refused = False
         super().connection_made(JoinedWrites(transport))
+        entered = self.room.enter(self, self.connections)
+        if entered == "ignored":
+            self.transport.abort()
+        elif entered == "refused":
+            self._refused, self.app = True, type(self).refuse
+
+    def _should_upgrade(self) -> bool:
+        return not self._refused and super()._should_upgrade()
+
+
+def connection_class(most: int, refuse: ASGIApp) -> type[Connection]:
+    """A protocol for uvicorn that takes `most` connections; `refuse` answers requests on others."""
+    return type("Connection", (Connection,), {"room": Room(most), "refuse": staticmethod(refuse)})

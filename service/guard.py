@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import asyncio
 import ipaddress
+import time
 from collections.abc import Awaitable, Callable
 from contextlib import suppress
 from urllib.parse import urlsplit
 
-from starlette._utils import get_route_path
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
@@ -33,6 +33,7 @@ CLOSE_CODES: dict[type[ServiceError], int] = {Unauthorized: 4401, Forbidden: 440
 REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
 RETRY_S = 5  # when to come again with a body that there is no room for
+LEAST_RATE, FREE_S = 1024, 30.0  # bytes a second that a body must come with, once it has taken so long
 LINGER_S, SILENT_S = 30.0, 2.0  # for a refused body: in all, and without a byte
 # Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are made.
 CONTENT_POLICY = (
@@ -108,7 +109,7 @@ class Guard:
 
     def _owner(self, scope: Scope, headers: Headers) -> str:
         """Whose key it is; "" where none is asked for. Raises Unauthorized."""
-        path = get_route_path(scope)
+        path = _route_path(scope)
         if not self._keys.asked_for or not (path == "/v1" or path.startswith("/v1/")):
             return ""
         offered = scope.get("subprotocols", []) if scope["type"] == "websocket" else []
@@ -155,17 +156,23 @@ class _Body:
         self.received = 0
         self._guard = guard
         self._receive = receive
+        self._waited_s = 0.0
         self._ended = False
 
     async def receive(self) -> Message:
         """Raises TooLarge, TimedOut, Unavailable."""
         if self._ended:
             return await self._receive()  # for the connection's end, which may take long
+        left_s = FREE_S + self.received / LEAST_RATE - self._waited_s
+        began = time.monotonic()
         try:
-            message = await asyncio.wait_for(self._receive(), self._guard.body_timeout)
+            message = await asyncio.wait_for(self._receive(), min(self._guard.body_timeout, left_s))
         except TimeoutError:
             self._ended = True
+            if left_s < self._guard.body_timeout:
+                raise TimedOut(f"The body came too slowly: {LEAST_RATE} bytes a second are the least.") from None
             raise TimedOut("The body did not go on (SUNBOX_BODY_TIMEOUT).") from None
+        self._waited_s += time.monotonic() - began
         more = len(message.get("body", b""))
         self._guard.take(self.received, more)
         self.received += more
@@ -211,6 +218,15 @@ def _lingering(send: Send, receive: Receive) -> Callable[[Message], Awaitable[No
     return sending
 
 
+def turning_away(error: ServiceError, refuse: Refuse) -> ASGIApp:
+    """An application that answers every request with this error, and closes its connection."""
+
+    async def turn_away(scope: Scope, receive: Receive, send: Send) -> None:
+        await refuse(error)(scope, receive, _secured(_lingering(send, receive), None, close=True))
+
+    return turn_away
+
+
 async def _answer_preflight(send: Send, origin: str) -> None:
     headers = {"access-control-allow-origin": origin, "vary": "Origin", **PREFLIGHT}
     raw = [(name.encode(), value.encode()) for name, value in headers.items()]
@@ -225,6 +241,13 @@ async def _close(scope: Scope, receive: Receive, send: Send, code: int, reason: 
     offered = [offer for offer in scope.get("subprotocols", []) if not offer.startswith(PROTOCOL)]
     await send({"type": "websocket.accept", "subprotocol": offered[0] if offered else None})
     await send({"type": "websocket.close", "code": code, "reason": reason[:REASON_CHARACTERS]})
+
+
+def _route_path(scope: Scope) -> str:
+    """The path as the routes see it: below the one that the application is mounted at."""
+    path: str = scope["path"]
+    below = path.removeprefix(scope.get("root_path", ""))
+    return below if below.startswith("/") or not below else path
 
 
 def _is_loopback(scope: Scope) -> bool:

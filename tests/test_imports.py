@@ -27,7 +27,7 @@ LAYERS = [
     {"service.rendering"},
     {"service.readiness"},
     {"service.keys"},
-    {"service.connections", "service.guard", "service.metrics", "service.routes"},
+    {"service.connection_limits", "service.connections", "service.guard", "service.metrics", "service.routes"},
     {"service.app"},
     {"service.bench"},
     {"service.commands"},

@@ -1,0 +1,144 @@
+"""How many connections there are, and how long one may wait for the other side.
+
+Slow clients are welcome, ones that stand still are not: a request's head, an answer's bytes and what is left of a
+body each have their time. `guard.py` does the same for bodies that are being received.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import ipaddress
+import logging
+import struct
+import termios
+import time
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import lru_cache
+from typing import Any, Literal
+
+import h11
+
+HEAD_S = 10.0  # for a request's head, from its first byte, or from the connection
+REST_S = 30.0  # for the rest of a body whose answer was sent already
+UNREAD_S = 30.0  # in which an answer must go on by LEAST_RATE: a client that vanished or stalled takes nothing
+LEAST_RATE = 1024  # bytes a second
+SETTLED_S = 1.0  # a head that takes longer makes room for another connection where there is none
+REFUSALS = 64  # connections beyond the most that are still told why they are refused
+NETWORK_BITS = 64  # of an IPv6 address: what one customer of a provider has
+
+Owed = Literal["head", "rest", "reading"]
+
+log = logging.getLogger(__name__)
+
+
+@dataclass
+class _Wait:
+    owed: Owed
+    since: float
+    delivered: int  # bytes, at that time
+
+
+class Watch:
+    """Ends connections on which nothing goes on. `look` is to be called about once a second."""
+
+    def __init__(self) -> None:
+        self._waits: dict[Any, _Wait] = {}
+
+    def look(self, connections: Collection[Any]) -> None:
+        now = time.monotonic()
+        waits = {each: wait for each in connections if (wait := self._wait(each, now)) is not None}
+        for connection, wait in waits.items():
+            if now - wait.since >= _limit_s(wait.owed):
+                log.info("connection ended owed=%s waited_s=%.0f", wait.owed, now - wait.since)
+                connection.transport.abort()
+        self._waits = waits
+
+    def _wait(self, connection: Any, now: float) -> _Wait | None:
+        """What it has been waiting for without enough of it, and since when."""
+        owed = _owed(connection)
+        if owed is None:
+            return None
+        delivered = _delivered(connection.transport) if owed == "reading" else 0
+        before = self._waits.get(connection)
+        if before is None or before.owed != owed or delivered - before.delivered >= LEAST_RATE * UNREAD_S:
+            return _Wait(owed, now, delivered)
+        return before
+
+
+class Room:
+    """Room for `most` connections, of which one address has at most half: it can't keep everybody else out."""
+
+    def __init__(self, most: int) -> None:
+        self._most = most
+        self._share = max(1, most // 2)
+
+    def enter(self, connection: Any, connections: Collection[Any]) -> Literal["welcome", "refused", "ignored"]:
+        """Whether a new one may stay; `connections` has it already. One that rests makes room where there is none."""
+        if len(connections) <= self._share:
+            return "welcome"
+        network = _network(connection)
+        ours = [each for each in connections if _network(each) == network]
+        if len(ours) <= self._share and len(connections) <= self._most:
+            return "welcome"
+        crowd = ours if len(ours) > self._share else connections
+        open_ones = (each for each in crowd if each is not connection and not each.transport.is_closing())
+        resting = min(open_ones, key=_rest_order, default=None)
+        if resting is not None and _rest_order(resting) < BUSY:
+            resting.shutdown()
+            return "welcome"
+        return "refused" if len(connections) <= self._most + REFUSALS else "ignored"
+
+
+BUSY = (2, 0.0)
+
+
+def _rest_order(connection: Any) -> tuple[int, float]:
+    """Who goes first: the longest idle between two requests, then the longest without a whole first one."""
+    idle = getattr(connection, "timeout_keep_alive_task", None)
+    if idle is not None:
+        return 0, idle.when()
+    if getattr(connection, "cycle", True) is None and time.monotonic() - connection.began >= SETTLED_S:
+        return 1, connection.began
+    return BUSY
+
+
+def _owed(connection: Any) -> Owed | None:
+    """What a connection of uvicorn's waits for from its client; None: for nothing, or for a next request."""
+    if connection.transport.get_write_buffer_size():
+        return "reading"
+    if not hasattr(connection, "cycle"):  # a WebSocket's, which has pings
+        return None
+    cycle, theirs = connection.cycle, connection.conn.their_state
+    if cycle is None or (cycle.response_complete and theirs is h11.IDLE and connection.conn.trailing_data[0]):
+        return "head"
+    return "rest" if cycle.response_complete and theirs is h11.SEND_BODY else None
+
+
+def _limit_s(owed: Owed) -> float:
+    return {"head": HEAD_S, "rest": REST_S, "reading": UNREAD_S}[owed]
+
+
+def _delivered(transport: Any) -> int:
+    """Bytes that the other side has acknowledged: the kernel takes megabytes that nobody has read."""
+    sent = transport.written - transport.get_write_buffer_size()
+    try:
+        queued = fcntl.ioctl(transport.get_extra_info("socket").fileno(), termios.TIOCOUTQ, b"\0" * 4)
+    except OSError:  # it was closed just now
+        return int(sent)
+    return int(sent) - int(struct.unpack("i", queued)[0])
+
+
+def _network(connection: Any) -> str:
+    """Whose it is, as far as an address tells: all that one customer of a provider can come from."""
+    return _network_of(connection.client[0] if connection.client else "")
+
+
+@lru_cache(4096)
+def _network_of(address: str) -> str:
+    if ":" not in address:
+        return address
+    parsed = ipaddress.IPv6Address(address.partition("%")[0])
+    if parsed.ipv4_mapped is not None:
+        return str(parsed.ipv4_mapped)
+    return str(ipaddress.IPv6Network((parsed, NETWORK_BITS), strict=False))

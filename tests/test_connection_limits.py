@@ -1,0 +1,237 @@
+"""Connections that stand still are ended, slow ones are not; who keeps many can't keep others out."""
+
+from __future__ import annotations
+
+import asyncio
+import socket
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from typing import Any
+
+import pytest
+import uvicorn
+from starlette.types import Message, Receive, Scope, Send
+
+from service import connection_limits, guard
+from service.config import Config
+from service.connection_limits import Room, Watch
+from service.connections import connection_class, listen
+from service.guard import Guard, turning_away
+from service.problems import Unavailable
+from service.routes.errors import respond
+
+LARGE = 4 << 20
+RATE = 2 << 20  # bytes a second, of the slow reader
+
+
+async def app(scope: Scope, receive: Receive, send: Send) -> None:
+    """Answers without reading the body; /large with LARGE bytes, /wait after a second."""
+    if scope["type"] == "lifespan":
+        return
+    if scope["path"] == "/wait":
+        await asyncio.sleep(1)
+    if scope["path"] == "/body":
+        while (await receive()).get("more_body"):
+            pass
+    body = b"x" * (LARGE if scope["path"] == "/large" else 2)
+    await send({"type": "http.response.start", "status": 200, "headers": [(b"content-length", b"%d" % len(body))]})
+    await send({"type": "http.response.body", "body": body})
+
+
+class _Server(uvicorn.Server):
+    watch = Watch()
+
+    async def on_tick(self, counter: int) -> bool:
+        self.watch.look(self.server_state.connections)
+        return await super().on_tick(counter)
+
+
+@contextmanager
+def serving(most: int = 100, asgi: Any = app) -> Iterator[tuple[str, int]]:
+    listener = listen("127.0.0.1", 0)
+    listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
+    refuse = turning_away(Unavailable("There is no room.", 5), respond)
+    http = connection_class(most, refuse)
+    config = uvicorn.Config(asgi, http=http, lifespan="off", log_config=None, access_log=False, timeout_keep_alive=60)
+    server = _Server(config)
+    thread = threading.Thread(target=server.run, args=([listener],))
+    thread.start()
+    try:
+        yield listener.getsockname()[:2]
+    finally:
+        server.should_exit = server.force_exit = True
+        thread.join(10)
+
+
+@pytest.fixture(autouse=True)
+def short(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("HEAD_S", "REST_S", "UNREAD_S"):
+        monkeypatch.setattr(connection_limits, name, 0.5)
+
+
+def connected(address: tuple[str, int], said: bytes = b"") -> socket.socket:
+    connection = socket.socket()
+    connection.setsockopt(socket.SOL_SOCKET, socket.SO_RCVBUF, 1 << 14)
+    connection.settimeout(10)
+    connection.connect(address)
+    connection.sendall(said)
+    return connection
+
+
+def get(path: str = "/", extra: bytes = b"") -> bytes:
+    return b"GET " + path.encode() + b" HTTP/1.1\r\nHost: 127.0.0.1\r\n" + extra + b"\r\n"
+
+
+def is_ended(connection: socket.socket) -> bool:
+    try:
+        return connection.recv(65536) == b""
+    except ConnectionError:
+        return True
+
+
+def answer(connection: socket.socket, request: bytes) -> bytes:
+    connection.sendall(request)
+    return connection.recv(65536)
+
+
+def drip(connection: socket.socket, pieces: int = 100) -> float:
+    """Seconds until it is ended, a byte at a time being sent."""
+    began = time.monotonic()
+    connection.setblocking(False)
+    try:
+        for _ in range(pieces):
+            connection.send(b"x")
+            time.sleep(0.05)
+    except ConnectionError:
+        pass
+    return time.monotonic() - began
+
+
+def test_heads_that_never_end() -> None:
+    with serving() as address:
+        silent, half = connected(address), connected(address, b"GET / HT")
+        again = connected(address)
+        assert answer(again, get()).startswith(b"HTTP/1.1 200")
+        resting, busy = connected(address), connected(address, get("/wait"))
+        assert answer(resting, get()).startswith(b"HTTP/1.1 200")
+        assert drip(again) < 3, "a second head, a byte at a time"
+        assert is_ended(silent) and is_ended(half)
+        assert busy.recv(65536).startswith(b"HTTP/1.1 200")
+        assert answer(resting, get()).startswith(b"HTTP/1.1 200"), "it rested between two requests"
+
+
+def test_what_is_left_of_a_body() -> None:
+    with serving() as address:
+        post = connected(address, b"POST / HTTP/1.1\r\nHost: x\r\nContent-Length: 100000\r\n\r\n")
+        assert post.recv(65536).startswith(b"HTTP/1.1 200")
+        assert drip(post) < 3
+
+
+def test_a_slow_download_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Four times as long as an unread answer may take."""
+    with serving() as address:
+        connection = connected(address, get("/large"))
+        received, began = 0, time.monotonic()
+        while received < LARGE:
+            piece = connection.recv(1 << 14)
+            assert piece, f"cut off after {received} bytes"
+            received += len(piece)
+            time.sleep(max(0.0, received / RATE - (time.monotonic() - began)))
+        assert time.monotonic() - began > 3 * connection_limits.UNREAD_S
+
+
+@pytest.mark.parametrize("piece", [0, 1])
+def test_a_download_that_nobody_reads(piece: int) -> None:
+    """Or at a byte in a tenth of a second."""
+    with serving() as address:
+        connection, began = connected(address, get("/large")), time.monotonic()
+        left = LARGE
+        while time.monotonic() - began < 1.5:
+            time.sleep(0.1)
+            if piece:
+                left -= len(connection.recv(piece))
+        with pytest.raises(ConnectionError):  # a reset: what waited in the kernel is gone, too
+            while left > 0:
+                left -= len(connection.recv(1 << 20)) or LARGE
+
+
+def test_a_full_server_says_so() -> None:
+    with serving(most=4) as address:
+        busy = [connected(address, get("/wait")) for _ in range(2)]
+        full = connected(address)
+        head, _, body = answer(full, get()).partition(b"\r\n\r\n")
+        assert b" 503 " in head and b"retry-after: 5" in head and b"connection: close" in head and b"no room" in body
+        assert all(each.recv(65536).startswith(b"HTTP/1.1 200") for each in busy)
+        # Both rest now: the one that has done so longer makes room.
+        assert answer(connected(address), get()).startswith(b"HTTP/1.1 200")
+        assert is_ended(busy[0]) and answer(busy[1], get()).startswith(b"HTTP/1.1 200")
+
+
+class Peer:
+    """A connection as uvicorn has it."""
+
+    def __init__(self, address: str, idle_since: float | None = None, began: float = 0.0, cycle: Any = None) -> None:
+        self.client, self.began, self.cycle, self.transport = (address, 1), began, cycle, self
+        self.timeout_keep_alive_task = None if idle_since is None else self
+        self.when = lambda: idle_since
+        self.ended = False
+
+    def is_closing(self) -> bool:
+        return self.ended
+
+    def shutdown(self) -> None:
+        self.ended = True
+
+
+def test_one_address_has_half_of_the_room() -> None:
+    now = time.monotonic()
+    room, crowd = Room(8), [Peer("10.0.0.1", cycle=1) for _ in range(4)]
+    for address, entered in (("10.0.0.1", "refused"), ("::ffff:10.0.0.1", "refused"), ("10.0.0.2", "welcome")):
+        newcomer = Peer(address, began=now)
+        assert room.enter(newcomer, [*crowd, newcomer]) == entered
+    v6 = [Peer(f"2001:db8::{i}", cycle=1) for i in range(4)]
+    for address, entered in (("2001:db8::99", "refused"), ("2001:db8:0:1::1", "welcome")):
+        newcomer = Peer(address, began=now)
+        assert room.enter(newcomer, [*v6, newcomer]) == entered
+    full = [Peer(f"10.0.1.{i}", cycle=1) for i in range(8)]
+    newcomer = Peer("10.0.0.3", began=now)
+    assert room.enter(newcomer, [*full, newcomer]) == "refused"
+    flood = [Peer("10.0.0.1", cycle=1) for _ in range(8 + connection_limits.REFUSALS)]
+    assert room.enter(newcomer, [*flood, *full, newcomer]) == "ignored"
+
+
+def test_who_rests_makes_room() -> None:
+    now = time.monotonic()
+    resting, longest = Peer("a", idle_since=now, cycle=1), Peer("a", idle_since=now - 9, cycle=1)
+    slow, fresh, newcomer = Peer("a", began=now - 5), Peer("a", began=now), Peer("a", began=now)
+    everybody = [Peer("a", cycle=1), resting, fresh, slow, longest, newcomer]
+    room = Room(4)
+    for first in (longest, resting, slow):
+        assert room.enter(newcomer, everybody) == "welcome" and first.ended
+    assert room.enter(newcomer, everybody) == "refused" and not fresh.ended
+
+
+def test_a_body_that_drips(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A byte now and then is no pause, and would hold a place for ever."""
+    monkeypatch.setattr(guard, "FREE_S", 0.3)
+    answers: list[Message] = []
+
+    async def receive() -> Message:
+        await asyncio.sleep(0.02)
+        return {"type": "http.request", "body": b"x", "more_body": True}
+
+    async def send(message: Message) -> None:
+        answers.append(message)
+
+    async def reading(scope: Scope, receive: Receive, send: Send) -> None:
+        with pytest.raises(guard.TimedOut, match="too slowly"):
+            while True:
+                await receive()
+
+    headers = [(b"host", b"127.0.0.1")]
+    scope = {"type": "http", "method": "POST", "path": "/", "headers": headers, "server": ("127.0.0.1", 80)}
+    began = time.monotonic()
+    asyncio.run(Guard(reading, config=Config(), refuse=respond)(scope, receive, send))
+    assert time.monotonic() - began < 5
