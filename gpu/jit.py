@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import logging
 import os
 from collections.abc import Callable
@@ -49,5 +50,11 @@ def _compiled(function: F, **options: Any) -> F:
     try:
         return cast(F, numba.njit(cache=True, nogil=True, **options)(function))
     except RuntimeError:
-        log.warning("compiled without a cache function=%s", function.__name__)
+        _log_no_cache()
         return cast(F, numba.njit(nogil=True, **options)(function))
+
+
+@functools.cache
+def _log_no_cache() -> None:
+    folder = os.environ["NUMBA_CACHE_DIR"]
+    log.warning("machine code is compiled anew in each process, as its cache cannot be written folder=%s", folder)

@@ -8,7 +8,7 @@ import signal
 import subprocess
 import sys
 import time
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,13 +40,13 @@ ENDLESS = {"width": 32, "height": 24, "max_samples": 1 << 24}
 
 
 class Server:
-    """`sunbox serve` on a free port, with its data in `folder`."""
+    """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one."""
 
-    def __init__(self, folder: Path, **variables: str) -> None:
+    def __init__(self, folder: Path, *, python: Sequence[str] = (), **variables: str) -> None:
         self.log = folder / "server.log"
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
         environment |= {"SUNBOX_DATA_DIR": str(folder / "data"), **variables}
-        command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
+        command = [*(python or [sys.executable]), "-m", "service.cli", "serve", "--port", "0"]
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
         assert self.process.stdout is not None

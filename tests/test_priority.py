@@ -12,8 +12,6 @@ import pytest
 
 from service.rendering import priority
 from service.rendering.priority import raise_thread_niceness
-from tests.privileges import capabilities
-from tests.serving import Server
 
 GIVES_WAY = """
 import os, threading
@@ -81,8 +79,3 @@ def test_a_refusal_is_logged_once_and_ends_nothing(
         raise_thread_niceness(19)
         raise_thread_niceness(19)
     assert len(caplog.records) == 1 and "Operation not permitted" in caplog.text
-
-
-def test_the_tests_servers_and_renderers_have_no_privileges(server: Server) -> None:
-    for process in (server.process.pid, server.renderer()):
-        assert capabilities(process) == 0

@@ -41,7 +41,7 @@ class SourceAssets:
                 try:
                     self._quota.make_room(len(self._found.read(ref)))
                     self._found.keep(ref)
-                except ServiceError as error:
+                except (ServiceError, OSError) as error:  # somebody else's folder may not even be listed
                     log.warning("asset not kept ref=%s error=%s", ref, error)
 
     def by_id(self, scene: Any) -> tuple[Any, dict[str, str]]:

@@ -3,8 +3,18 @@
 from __future__ import annotations
 
 import argparse
+import logging
+import os
+from pathlib import Path
 
 from service.commands.configuration import configuration
+
+CLOSED = (
+    "SUNBOX_DATA_DIR cannot be used by user %d: user %d owns %s and keeps others from reading or writing it. Uploads "
+    "and saved documents will be refused."
+)
+
+log = logging.getLogger(__name__)
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -12,5 +22,18 @@ def run(arguments: argparse.Namespace) -> int:
     from service import app, logs
 
     logs.configure(config.log_format, config.log_level, queued=True, secrets=config.api_key)
+    if (closed := _closed(config.data_dir)) is not None:
+        log.warning(CLOSED, os.geteuid(), closed.stat().st_uid, closed)
 
     return app.run(config)
+
+
+def _closed(folder: Path) -> Path | None:
+    """The first thing in the way of storing data: what another user, root above all, left or did not permit."""
+    for wanted in (folder, folder / "assets", folder / "documents.sqlite3"):
+        path = wanted.absolute()
+        while not os.path.exists(path):  # it will be made, in the folder above
+            path = path.parent
+        if not os.access(path, os.R_OK | os.W_OK | (os.X_OK if path.is_dir() else 0)):
+            return path
+    return None

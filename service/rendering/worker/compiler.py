@@ -133,7 +133,7 @@ class Compiler:
         return recipe in self._met or self._is_recorded(recipe)
 
     def _is_recorded(self, recipe: Recipe) -> bool:
-        return self._able and (self._records / recipe.digest(self._driver)).exists()
+        return self._able and os.path.exists(self._records / recipe.digest(self._driver))
 
     def _record(self, recipe: Recipe) -> None:
         """It is in the driver's disk cache."""

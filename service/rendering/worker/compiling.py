@@ -53,7 +53,7 @@ def main() -> int:
                 try:
                     # In spare time nobody may be made to wait: that can take as long as it likes.
                     with nullcontext() if arguments.spare else _alone(record, end):
-                        compiled = Compiled(0.0, True) if record.exists() else Compiled(*ahead.compile(recipe))
+                        compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(recipe))
                         if compiled.cached:
                             _record(record)
                 except GpuError as error:  # the renderer meets it too, and says it to whom it concerns
