@@ -13,6 +13,7 @@ from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlencode
 
 import httpx
 import numpy as np
@@ -105,12 +106,21 @@ class Picture:
 class Client:
     """The other end of the stream. Acknowledges what it receives unless told otherwise."""
 
-    def __init__(self, url: str, origin: str | None = None, session: str | None = None) -> None:
+    def __init__(
+        self,
+        url: str,
+        origin: str | None = None,
+        session: str | None = None,
+        beside: str | None = None,
+        key: str | None = None,
+    ) -> None:
         self.url = url
-        address = url.replace("http://", "ws://") + "/v1/stream"
-        address += "" if session is None else f"?session={session}"
+        given = {"session": session, "beside": beside}
+        query = urlencode({name: value for name, value in given.items() if value is not None})
+        address = url.replace("http://", "ws://") + "/v1/stream" + (query and f"?{query}")
         offered = None if origin is None else Origin(origin)
-        self.socket = connect(address, subprotocols=[Subprotocol("sunbox.v1")], max_size=None, origin=offered)
+        protocols = [Subprotocol("sunbox.v1"), *([] if key is None else [Subprotocol(f"sunbox.key.{key}")])]
+        self.socket = connect(address, subprotocols=protocols, max_size=None, origin=offered)
         self.acknowledges = True
 
     def say(self, kind: str, **message: Any) -> None:

@@ -80,6 +80,12 @@ class Written:
     def get_write_buffer_size(self) -> int:
         return 0
 
+    def get_extra_info(self, name: str, default: Any) -> Any:
+        return self
+
+    def setsockopt(self, *options: Any) -> None:
+        self.options = options
+
 
 def test_writes_of_one_turn_are_joined() -> None:
     async def run() -> None:
@@ -108,6 +114,7 @@ def test_what_is_aborted_writes_nothing() -> None:
         joined.abort()
         await asyncio.sleep(0)
         assert written.writes == [] and written.ended == "aborted"
+        assert written.options[1] == socket.SO_LINGER
 
     asyncio.run(run())
 

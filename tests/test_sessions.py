@@ -9,7 +9,6 @@ from typing import Any
 import pytest
 from websockets.exceptions import ConnectionClosed
 
-from service import app
 from service.problems import NotFound, TooManyRequests
 from service.rendering import sessions
 from service.rendering.engine import Engine
@@ -132,20 +131,6 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
     asyncio.run(test())
 
 
-class Stuck:
-    """A connection whose client has vanished: what it was sent last never leaves, so it never closes."""
-
-    def __init__(self, closing: bool) -> None:
-        self.transport = self
-        self.closing, self.aborted = closing, False
-
-    def is_closing(self) -> bool:
-        return self.closing
-
-    def abort(self) -> None:
-        self.aborted = True
-
-
 def test_two_variants_count_as_one_client() -> None:
     async def test() -> None:
         engine: Any = Engine()
@@ -166,14 +151,24 @@ def test_two_variants_count_as_one_client() -> None:
     asyncio.run(test())
 
 
-def test_vanished_clients_are_let_go(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(app, "STUCK_S", 0.0)
-    gone, there = Stuck(closing=True), Stuck(closing=False)
-    stuck = app.Stuck()
-    stuck.abort([gone, there])
-    assert not gone.aborted, "it may have just begun to close"
-    stuck.abort([gone, there])
-    assert gone.aborted and not there.aborted
+def test_a_session_belongs_to_its_key(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> None:
+    """Whoever has read its id somewhere else neither takes it up, nor has a second one beside it."""
+    server = Server(tmp_path_factory.mktemp("keyed"), SUNBOX_API_KEY="anna-key,bert-key", SUNBOX_MAX_CLIENTS="1")
+    try:
+        server.wait()
+        first = Client(server.url, key="anna-key")
+        session = first.until("hello")[0]["session"]
+        assert closed_with(Client(server.url, session=session, key="bert-key")) == 4404
+        assert closed_with(Client(server.url, beside=session, key="bert-key")) == 4429
+        with Client(server.url, beside=session, key="anna-key").socket:
+            pass
+        again = Client(server.url, session=session, key="anna-key")
+        with again.socket:
+            assert again.until("hello")[0]["session"] == session
+        assert closed_with(first) == 4409
+    finally:
+        assert server.stop() == 0
+    assert session not in server.log.read_text() and "-key" not in server.log.read_text()
 
 
 def test_too_many_clients_and_going_away(gpu: object, tmp_path_factory: pytest.TempPathFactory) -> None:

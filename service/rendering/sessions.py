@@ -19,8 +19,9 @@ log = logging.getLogger(__name__)
 
 
 class Session:
-    def __init__(self, stream: Stream) -> None:
+    def __init__(self, stream: Stream, owner: str) -> None:
         self.id = secrets.token_urlsafe(ID_BYTES)
+        self.owner = owner  # whose key opened it
         self.stream = stream
         self.connections = 0  # being served; while one takes another's place there are two
         self.beside: Session | None = None  # whose second variant this is: a client's two count as one
@@ -44,23 +45,24 @@ class Sessions:
         """Sessions whose clients may come back."""
         return len(self._kept) - self.attended
 
-    def enter(self, id: str | None, beside: str | None = None) -> Session:
+    def enter(self, id: str | None, beside: str | None = None, owner: str = "") -> Session:
         """A new session, or the one of that id; `leave` ends what this begins.
 
+        `owner`: whose key it is. One that another key opened is as gone as one that never was.
         `beside`: the session of the same client whose picture this one is compared with. Each has its turn, and the
         two count as one client.
 
         Raises NotFound when it is gone, TooManyRequests when there is no room, Unavailable without a renderer.
         """
-        session = self._kept.get(id) if id is not None else None
+        session = self._of(id, owner)
         if id is not None and session is None:
             raise NotFound("This session is gone: start anew.")
-        first = self._first(beside) if session is None else session.beside
+        first = self._first(beside, owner) if session is None else session.beside
         is_second = first is not None and first.connections > 0
         if (session is None or not session.connections) and not is_second and self.attended >= self._most:
             raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
         if session is None:
-            session = Session(Stream(self._engine, self._reader))
+            session = Session(Stream(self._engine, self._reader), owner)
             session.beside = first
             self._kept[session.id] = session
         if session.timer is not None:
@@ -69,9 +71,14 @@ class Sessions:
         session.connections += 1
         return session
 
-    def _first(self, id: str | None) -> Session | None:
+    def _of(self, id: str | None, owner: str) -> Session | None:
+        """The session of that id, if that key opened it."""
+        session = self._kept.get(id) if id is not None else None
+        return session if session is not None and session.owner == owner else None
+
+    def _first(self, id: str | None, owner: str) -> Session | None:
         """The session of that id, if it may have another one beside it: not a second one, and one at a time."""
-        first = self._kept.get(id) if id is not None else None
+        first = self._of(id, owner)
         taken = any(each.beside is first and each.connections for each in self._kept.values())
         return None if first is None or first.beside is not None or taken else first
 

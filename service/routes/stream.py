@@ -10,7 +10,7 @@ from starlette.websockets import WebSocketState
 
 from service.problems import NotFound, ServiceError, TooManyRequests
 from service.rendering.stream import LOST, Attendance, Stream
-from service.routes.house import house
+from service.routes.house import house, owner
 
 router = APIRouter()
 
@@ -26,7 +26,8 @@ async def stream(socket: WebSocket) -> None:
     try:
         info = await own.info()
         try:
-            session = own.sessions.enter(socket.query_params.get("session"), socket.query_params.get("beside"))
+            query = socket.query_params
+            session = own.sessions.enter(query.get("session"), query.get("beside"), owner(socket))
         except ServiceError as error:
             code = CLOSE_CODES.get(type(error), LOST)
             return await socket.close(code, error.detail[:REASON_CHARACTERS])
