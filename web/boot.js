@@ -1,23 +1,23 @@
 // What the page needs before it can begin: the schema, the library, and what to show first.
 
 import { Problem, fetchApi, fetchPreset, fetchSchema } from "./api.js";
-import { lastWork } from "./desk.js";
 import { askForKey } from "./key.js";
 import { openLibrary } from "./library.js";
 import { readLink, revived } from "./share.js";
+import { lastWork } from "./work.js";
 
 const FIRST_SCENE = "sphere-on-floor";
 const BOOT_RETRY_MS = 1500;
 
 // What the address or the last visit left: {state, from} or null. A bad link is told and passed over.
 async function left(complain) {
+  const work = await lastWork();
   try {
     const linked = await readLink();
     if (linked) return { state: revived(linked), from: "link" };
   } catch (error) {
     complain(new Error(`This link could not be opened. ${error.message}`));
   }
-  const work = lastWork();
   return work?.scene ? { state: revived(work), from: "work" } : null;
 }
 

@@ -30,24 +30,3 @@ export class Desk {
     for (const listener of this.#listeners) listener(this.state);
   }
 }
-
-// The work itself, kept from one visit to the next.
-const WORK = "sunbox.work";
-
-export function keepWork(essence) {
-  try {
-    localStorage.setItem(WORK, JSON.stringify(essence));
-  } catch {
-    localStorage.removeItem(WORK); // an older state would come back as if it were the last
-  }
-}
-
-export function lastWork() {
-  try {
-    return JSON.parse(localStorage.getItem(WORK));
-  } catch {
-    return null;
-  }
-}
-
-export function forgetWork() { localStorage.removeItem(WORK); }

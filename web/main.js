@@ -2,7 +2,7 @@
 
 import { boot } from "./boot.js";
 import { Comparison } from "./compare.js";
-import { Desk, forgetWork, keepWork } from "./desk.js";
+import { Desk } from "./desk.js";
 import { element } from "./dom.js";
 import { Editor } from "./editor.js";
 import * as exporting from "./export.js";
@@ -22,6 +22,7 @@ import { watchTabs } from "./tabs.js";
 import { Thumbnails } from "./thumbnails.js";
 import { Viewport, pictureSize } from "./viewport.js";
 import { inWords } from "./words.js";
+import { forgetWork, keepWork } from "./work.js";
 
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
 const KEEP_REST_MS = 600;
