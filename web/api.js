@@ -36,10 +36,14 @@ export const fetchApi = async () => (await fetch(new URL("openapi.json", documen
 export const listPresets = (kind) => get(`presets/${kind}`);
 export const fetchPreset = (kind, name) => get(`presets/${kind}/${encodeURIComponent(name)}`);
 
-const saved = (kind, name) => `documents/${kind}/${encodeURIComponent(name)}`;
+// Any words can be a document's title. Its name is a part of the address, and the few words that cannot be one
+// (a slash, or nothing but one or two dots) are replaced by their look-alikes.
+const nameOf = (title) => title.replaceAll("/", "\u2215").replace(/^\.{1,2}$/, (dots) => dots.replaceAll(".", "\u2024"));
+const saved = (kind, name) => `documents/${kind}/${encodeURIComponent(nameOf(name))}`;
 export const listSaved = (kind) => get(`documents/${kind}`);
 export const fetchSaved = (kind, name) => get(saved(kind, name));
-export const save = (kind, name, document) => ask("PUT", saved(kind, name), json(document));
+export const save = (kind, title, document) =>
+  ask("PUT", `${saved(kind, title)}?${new URLSearchParams({ title })}`, json(document));
 export const forget = (kind, name) => ask("DELETE", saved(kind, name));
 
 export const fetchAssetScene = (id) => get(`assets/${id}/scene`);

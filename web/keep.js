@@ -1,6 +1,7 @@
 // The page that keeps and shares: names on the server, snapshots in this browser, files, a link, a command.
 
 import * as api from "./api.js";
+import { ask } from "./ask.js";
 import { element, freshId } from "./dom.js";
 import { jsonBlob, saveAs } from "./files.js";
 import { dismiss, recallAll, remember } from "./memory.js";
@@ -8,6 +9,7 @@ import { inWords } from "./words.js";
 
 const KINDS = ["scenes", "materials"];
 const SNAPSHOT = "snapshot ";
+const WHOSE = "Everybody who uses this server has it, and this cannot be undone.";
 
 const button = (label, does, more = {}) => element("button", { type: "button", class: "button small", onclick: does, ...more }, label);
 
@@ -42,10 +44,12 @@ export class Keep {
 
   #saved(kind) {
     const id = freshId("name");
-    const name = element("input", { class: "entry", id, placeholder: "Name", maxlength: "64", autocomplete: "off", spellcheck: "false" });
+    const name = element("input", { class: "entry", id, placeholder: "Name", maxlength: "100", autocomplete: "off", spellcheck: "false" });
     const keep = () => this.#try(async () => {
       const wanted = name.value.trim();
       if (!wanted) return name.focus();
+      const taken = (await api.listSaved(kind)).some((each) => (each.title ?? each.name) === wanted);
+      if (taken && !(await ask({ title: `Replace “${wanted}”?`, detail: WHOSE, yes: "Replace" }))) return null;
       await api.save(kind, wanted, this.acts.document(kind));
       name.value = "";
       this.acts.announce(`Saved ${wanted}.`);
@@ -63,11 +67,17 @@ export class Keep {
   async refresh(kind) {
     const all = await this.#try(() => api.listSaved(kind));
     if (!all) return;
-    this.lists[kind].replaceChildren(...all.map(({ name, title }) => element("li", {},
-      element("button", { type: "button", class: "open", onclick: () => this.#try(async () => this.acts.open(kind, await api.fetchSaved(kind, name), name)) }, title ?? name),
+    this.lists[kind].replaceChildren(...all.map(({ name, title = name }) => element("li", {},
       element("button", {
-        type: "button", class: "forget", "aria-label": `Delete ${name}`,
-        onclick: () => this.#try(async () => { await api.forget(kind, name); await this.refresh(kind); }),
+        type: "button", class: "open", title, onclick: () => this.#try(async () => this.acts.open(kind, await api.fetchSaved(kind, name), title)),
+      }, title),
+      element("button", {
+        type: "button", class: "forget", "aria-label": `Delete ${title}`,
+        onclick: () => this.#try(async () => {
+          if (!(await ask({ title: `Delete “${title}”?`, detail: WHOSE, yes: "Delete" }))) return;
+          await api.forget(kind, name);
+          await this.refresh(kind);
+        }),
       }, "×"))));
     if (!all.length) this.lists[kind].replaceChildren(element("li", { class: "note" }, "Nothing saved yet"));
   }
@@ -102,7 +112,11 @@ export class Keep {
         element("p", {}, `${when} · ${value.note}`),
         element("button", {
           type: "button", class: "forget", "aria-label": `Delete the snapshot of ${when}`,
-          onclick: async () => { await dismiss(name); await this.refreshSnapshots(); },
+          onclick: async () => {
+            if (!(await ask({ title: "Delete this snapshot?", detail: "This cannot be undone.", yes: "Delete" }))) return;
+            await dismiss(name);
+            await this.refreshSnapshots();
+          },
         }, "×"));
     }));
   }

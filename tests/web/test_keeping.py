@@ -107,11 +107,83 @@ def test_snapshots_and_names(editor: Editor, server: Server) -> None:
     editor.page.click("#page-keep .kept .open >> text=my red")
     editor.wait("red again", lambda: not editor.differs(before, 8))
     editor.page.click("[aria-label='Delete my red']")
+    assert editor.page.is_visible("text=Delete “my red”?"), "it is everybody's, and gone for good"
+    editor.page.keyboard.press("Escape")
+    assert "my red" in editor.text("#page-keep")
+    editor.page.click("[aria-label='Delete my red']")
+    editor.page.click("dialog[open] button:text-is('Delete')")
     editor.wait("its end", lambda: "my red" not in editor.text("#page-keep"))
     editor.page.keyboard.press("Control+z")
     editor.wait_for_change(before)
     editor.page.click(".snapshot .open")
     editor.wait("the snapshot's view", lambda: not editor.differs(before, 8))
+
+
+def test_any_name_can_be_saved_and_is_not_lost_by_accident(editor: Editor, server: Server) -> None:
+    page = editor.page
+    editor.tab("keep")
+    names = ["My first scene / \u00e4", "..", "50% grey?#1", "m" * 64]
+    for name in names:
+        page.fill("#page-keep .entry >> nth=1", name)
+        page.keyboard.press("Enter")
+        opener = page.locator("#page-keep .kept .open", has_text=name)
+        editor.wait("the name", lambda opener=opener: opener.count() == 1)
+        assert editor.text("#messages") == ""
+        assert opener.inner_text() == name
+    assert {each["title"] for each in server.http.get("/v1/documents/materials").json()} == set(names)
+    for name in names[:2]:
+        page.locator("#page-keep .kept .open", has_text=name).click()
+        editor.wait("the material", lambda: editor.text("#messages") == "")
+    assert page.evaluate("(p => p.scrollWidth - p.clientWidth)(document.getElementById('page-keep'))") == 0
+    cross = page.locator(f"[aria-label='Delete {names[3]}']").bounding_box()
+    assert cross is not None and cross["x"] + cross["width"] <= 800, "a long name leaves room for its cross"
+
+    before = server.http.get("/v1/documents/materials/50%25%20grey%3F%231").json()
+    editor.tab("material")
+    page.select_option("#model", "diffuse")
+    editor.tab("keep")
+    for answer in ("Cancel", "Replace"):
+        page.fill("#page-keep .entry >> nth=1", names[2])
+        page.keyboard.press("Enter")
+        page.click(f"dialog[open] button:text-is('{answer}')")
+        editor.wait("the answer", lambda: page.locator("dialog[open]").count() == 0)
+        if answer == "Cancel":
+            assert server.http.get("/v1/documents/materials/50%25%20grey%3F%231").json() == before
+    editor.wait(
+        "the other",
+        lambda: server.http.get("/v1/documents/materials/50%25%20grey%3F%231").json()["type"] == "diffuse",
+    )
+
+
+def test_two_tabs_keep_two_works(editor: Editor, context: BrowserContext, server: Server) -> None:
+    def kept(tab: Editor) -> object:
+        return tab.page.evaluate(
+            "JSON.parse(localStorage['sunbox.work ' + sessionStorage['sunbox.tab']] ?? 'null')"
+            "?.scene.materials.subject.type"
+        )
+
+    def work(tab: Editor, model: str) -> None:
+        tab.page.select_option("#model", model)
+        tab.wait("its work to be kept", lambda: kept(tab) == model)
+
+    work(editor, "diffuse")
+    second = Editor(context.new_page())
+    second.open(server.url)
+    assert second.page.input_value("#model") == "diffuse", "a new tab begins with the last work"
+    work(second, "disney")
+    editor.page.reload()
+    editor.wait("the first work", lambda: "last work" in editor.text("#messages"))
+    assert editor.page.input_value("#model") == "diffuse"
+    second.page.reload()
+    second.wait("the second work", lambda: "last work" in second.text("#messages"))
+    assert second.page.input_value("#model") == "disney"
+    # A duplicated tab comes with the name of the first.
+    third = Editor(context.new_page())
+    name = editor.page.evaluate("sessionStorage['sunbox.tab']")
+    third.page.add_init_script(f"sessionStorage['sunbox.tab'] ??= '{name}'")
+    third.open(server.url)
+    assert third.page.evaluate("sessionStorage['sunbox.tab']") != name
+    assert third.page.input_value("#model") == "diffuse"
 
 
 def test_json_leaves_and_comes_back(editor: Editor) -> None:
