@@ -159,7 +159,7 @@ class AssetStore:
             raise refused(f"the {format.upper()} file", error) from None
         imported = take_apart(file, self._keep)
         with self._storing(id):
-            self._write(self._path(id, SCENE), json.dumps(asdict(imported)).encode())
+            self._write(self._path(id, SCENE), json.dumps(vars(imported)).encode())
         warnings = imported.warnings or None
         return AssetInfo(id, "scene", format, length(data), triangles=file.triangles, warnings=warnings)
 

@@ -13,6 +13,7 @@ from service.scene.numbers import LARGEST, Point, ScaleFactors, check_number, de
 
 # The volume that the axes span once each has length one. Below it the inverse has no digit right in float32.
 LEAST_VOLUME = 1e-7
+VANISHING = 2.0**-150  # rounds to 0 in float32
 
 Matrix = tuple[float, ...]
 
@@ -52,12 +53,19 @@ def _matrix(value: Any) -> Matrix:
         raise refusal(f"must be 16 numbers, row by row, not {described(value)}")
     if len(value) != 16:
         raise refusal(f"must be 16 numbers, row by row, not {len(value)}")
-    numbers = tuple(check_number(x, -LARGEST, LARGEST, f"number {i}") for i, x in enumerate(value))
+    # The quick way first, and numpy nowhere: a model may have 60 000 of them.
+    if {*map(type, value)} <= {float, int} and abs(max(value, key=abs)) <= LARGEST:
+        numbers = tuple(map(float, value))
+    else:
+        numbers = tuple(check_number(x, -LARGEST, LARGEST, f"number {i}") for i, x in enumerate(value))
     if numbers[12:] != (0, 0, 0, 1):
         raise refusal("must be affine: its last row is 0 0 0 1 (translation stands in numbers 3, 7 and 11)")
-    axes = np.reshape(numbers, (4, 4))[:3, :3]
-    lengths = [math.hypot(*axis) for axis in axes.T]
-    if np.float32(min(lengths)) == 0 or abs(np.linalg.det(axes / lengths)) < LEAST_VOLUME:
+    x, y, z = (numbers[k:11:4] for k in range(3))  # the axes are the columns
+    lengths = [math.hypot(*axis) for axis in (x, y, z)]
+    volume = (
+        x[0] * (y[1] * z[2] - y[2] * z[1]) + x[1] * (y[2] * z[0] - y[0] * z[2]) + x[2] * (y[0] * z[1] - y[1] * z[0])
+    )
+    if min(lengths) <= VANISHING or abs(volume) < LEAST_VOLUME * math.prod(lengths):
         raise refusal("must be invertible: this matrix makes every shape flat")
     return numbers
 

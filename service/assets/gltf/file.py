@@ -13,18 +13,10 @@ import numpy.typing as npt
 
 from service.assets.data import AssetLimits
 from service.assets.errors import ParseError
+from service.assets.gltf.extensions import check_required
 from service.assets.gltf.place import Place, shown, whole
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-# What this reader does something about. KNOWN ones may be required; an OPTIONAL one changes nothing that is seen.
-KNOWN = {
-    "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
-    "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_pbrSpecularGlossiness",
-    "KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_materials_variants", "KHR_materials_volume", "KHR_mesh_quantization", "KHR_node_visibility",
-    "KHR_texture_transform", "EXT_mesh_gpu_instancing", "EXT_texture_webp",
-}  # fmt: skip
-OPTIONAL = {"KHR_xmp", "KHR_xmp_json_ld"}
 MOST_ITEMS = 1 << 20  # of one kind; the time to look at them all is bounded, and a stranger's file may list anything
 
 Array = npt.NDArray[Any]
@@ -47,10 +39,7 @@ class GltfFile:
             raise ParseError(f"glTF 2.0 is read, this is version {shown(version)}", "/asset/version")
         if least != "2.0":
             raise ParseError(f"glTF 2.0 is read, this asks for {shown(least)}", "/asset/minVersion")
-        for k, name in enumerate(self.root.array("extensionsRequired")):
-            if name not in KNOWN | OPTIONAL:
-                detail = f"the file requires {shown(name)}, which is not supported"
-                raise ParseError(detail, f"/extensionsRequired/{k}")
+        check_required(self.root)
 
     def count(self, kind: str) -> int:
         return len(self.root.array(kind))

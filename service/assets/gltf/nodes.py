@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -16,6 +15,7 @@ from service.assets.gltf.file import GltfFile
 from service.assets.gltf.place import Place, shown
 
 MOST_INSTANCES = 100_000  # shapes in a document; beyond, the document itself is the burden
+IDENTITY = tuple(np.eye(4).reshape(-1).tolist())
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,21 @@ class Nodes:
     @cached_property
     def shown(self) -> list[Node]:
         """Those of the default scene, or of the first; all, where the file has no scenes. Parents first."""
-        found, seen = [], set()
-        stack = [(np.eye(4), index, pointer) for index, pointer in reversed(self._roots())]
+        places, indices, parents = self._walk()
+        worlds = np.empty((len(places), 4, 4))
+        for k, (local, parent) in enumerate(zip(local_matrices(places), parents, strict=True)):
+            worlds[k] = local if parent < 0 else worlds[parent] @ local
+        return list(map(Node, places, indices, worlds))
+
+    def _walk(self) -> tuple[list[Place], list[int], list[int]]:
+        """The nodes that are shown, their numbers in the file, and where in the list their parents are (-1: none)."""
+        places: list[Place] = []
+        indices: list[int] = []
+        parents: list[int] = []
+        seen: set[int] = set()
+        stack = [(index, pointer, -1) for index, pointer in reversed(self._roots())]
         while stack:
-            parent, index, pointer = stack.pop()
+            index, pointer, parent = stack.pop()
             place = self._file.item("nodes", index, pointer)
             if index in seen:  # also every cycle
                 raise ParseError(f"reaches /nodes/{index} a second time; nodes must form a tree", pointer)
@@ -45,11 +56,14 @@ class Nodes:
             hidden = place.extension("KHR_node_visibility")
             if hidden is not None and not hidden.flag("visible", True):
                 continue  # with all below it
-            world = parent @ local_matrix(place)
-            found.append(Node(place, index, world))
             children = place.array("children")
-            stack += [(world, children[k], f"{place.at('children')}/{k}") for k in reversed(range(len(children)))]
-        return found
+            stack += [
+                (children[k], f"{place.pointer}/children/{k}", len(places)) for k in reversed(range(len(children)))
+            ]
+            places.append(place)
+            indices.append(index)
+            parents.append(parent)
+        return places, indices, parents
 
     @cached_property
     def worlds(self) -> dict[int, Doubles]:
@@ -59,9 +73,10 @@ class Nodes:
         """Also of a node outside the scene: a skeleton may stand there."""
         if index in self.worlds:
             return self.worlds[index]
-        matrix, at, steps = np.eye(4), index, 0
+        matrix: Doubles = np.eye(4)
+        at, steps = index, 0
         while True:
-            matrix = local_matrix(self._file.item("nodes", at, pointer)) @ matrix
+            matrix = local_matrices([self._file.item("nodes", at, pointer)])[0] @ matrix
             parent = self.parents.get(at)
             steps += 1
             if parent is None:
@@ -86,20 +101,19 @@ class Nodes:
         return [(one, f"{scene.at('nodes')}/{k}") for k, one in enumerate(scene.array("nodes"))]
 
 
-def local_matrix(place: Place) -> Doubles:
-    """(4, 4): the matrix, given by columns, or T R S."""
-    if "matrix" in place:
-        columns: Doubles = np.array(place.numbers("matrix", tuple(np.eye(4).reshape(-1)), 1e38))
-        matrix: Doubles = np.ascontiguousarray(columns.reshape(4, 4).T)
-        if tuple(matrix[3]) != (0, 0, 0, 1):
-            raise place.error("matrix", f"must be affine: its last row is {shown(matrix[3].tolist())}")
-        return matrix
-    made: Doubles = trs(
-        np.array([place.numbers("translation", (0.0, 0.0, 0.0))]),
-        np.array([place.numbers("rotation", (0.0, 0.0, 0.0, 1.0))]),
-        np.array([place.numbers("scale", (1.0, 1.0, 1.0))]),
-    )[0]
-    return made
+def local_matrices(places: list[Place]) -> Doubles:
+    """(n, 4, 4): each node's matrix, given by columns, or T R S. In one go: numpy takes 100 us for a node alone."""
+    translations = np.array([place.numbers("translation", (0.0, 0.0, 0.0)) for place in places]).reshape(-1, 3)
+    rotations = np.array([place.numbers("rotation", (0.0, 0.0, 0.0, 1.0)) for place in places]).reshape(-1, 4)
+    scales = np.array([place.numbers("scale", (1.0, 1.0, 1.0)) for place in places]).reshape(-1, 3)
+    matrices: Doubles = trs(translations, rotations, scales)
+    for k, place in enumerate(places):
+        if "matrix" in place:
+            columns = np.array(place.numbers("matrix", IDENTITY, 1e38))
+            matrices[k] = columns.reshape(4, 4).T
+            if tuple(matrices[k, 3]) != (0, 0, 0, 1):
+                raise place.error("matrix", f"must be affine: its last row is {shown(matrices[k, 3].tolist())}")
+    return matrices
 
 
 def trs(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
@@ -118,12 +132,11 @@ def trs(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
     return matrix
 
 
-def instances(file: GltfFile, node: Node) -> Iterator[Doubles]:
-    """The world matrices of a node's mesh: its own, or those of EXT_mesh_gpu_instancing."""
+def instances(file: GltfFile, node: Node) -> Doubles:
+    """(k, 4, 4): the world matrices of a node's mesh, its own or those of EXT_mesh_gpu_instancing."""
     extension = node.place.extension("EXT_mesh_gpu_instancing")
     if extension is None:
-        yield node.world
-        return
+        return node.world[None]
     attributes = extension.need("attributes")
     defaults = {"TRANSLATION": (0.0,) * 3, "ROTATION": (0.0, 0.0, 0.0, 1.0), "SCALE": (1.0,) * 3}
     given = {n: read(file, attributes, n, f"VEC{len(d)}") for n, d in defaults.items() if n in attributes}
@@ -137,4 +150,4 @@ def instances(file: GltfFile, node: Node) -> Iterator[Doubles]:
     rows = [np.asarray(given[n], np.float64) if n in given else np.tile(d, (count, 1)) for n, d in defaults.items()]
     if not all(np.isfinite(row).all() for row in rows):
         raise ParseError("its attributes are not all finite", extension.pointer)
-    yield from np.asarray(node.world @ trs(*rows))
+    return np.asarray(node.world @ trs(*rows))

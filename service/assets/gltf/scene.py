@@ -7,35 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import AssetLimits, Doubles, SceneFile, ScenePart
+from service.assets.data import AssetLimits, SceneFile, ScenePart
 from service.assets.errors import ParseError
 from service.assets.gltf import standing
-from service.assets.gltf.file import KNOWN, OPTIONAL, GltfFile
+from service.assets.gltf.extensions import note_unsupported
+from service.assets.gltf.file import GltfFile
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
 from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place, escaped, whole
+from service.assets.gltf.place import Place, whole
+from service.assets.gltf.placements import Part, Placements
 from service.assets.gltf.pose import Skin, morphed, weights
 from service.assets.gltf.primitives import Primitive, read_primitive
-from service.assets.gltf.textures import Chart, Textures
+from service.assets.gltf.textures import Textures
 from service.assets.gltf.written import ply
 from service.assets.parts import MAX_COORDINATE
-
-MOST_SHAPES = 100_000  # beyond, the document itself is the burden
-LEAST_VOLUME = 1e-7  # of the axes at length one: what service.scene.transform takes for invertible
-DEEPEST = 32
-
-
-@dataclass(frozen=True)
-class Part:
-    """A primitive as it was written, once for all its nodes."""
-
-    reference: str
-    bounds: tuple[Doubles, Doubles]
-    triangles: int
-    charts: tuple[Chart | None, ...]
-    colored: bool
-    smooth: bool  # without normals triangles are flat, says the specification
 
 
 @dataclass
@@ -62,13 +48,11 @@ class _Importer:
         self.nodes = Nodes(file)
         self.textures = Textures(file, self.notes, self.files.keep)
         self.materials = Materials(file, self.textures, self.notes)
-        self.shapes: list[dict[str, Any]] = []
-        self.triangles = 0
-        self._held: set[str] = set()  # parts that stand somewhere: nodes share them
-        self._holds = 0  # triangles of these
+        self.placements = Placements()
+        self._held: set[str] = set()  # references of parts
+        self._triangles = 0  # of these
         self._read: dict[str, Primitive | None] = {}
         self._parts: dict[tuple[Any, ...], Part | None] = {}
-        self._corners: list[Doubles] = []
 
     def run(self) -> SceneFile:
         file, shown = self.file, self.nodes.shown
@@ -77,20 +61,20 @@ class _Importer:
                 self._mesh(node)
         lights = standing.lights(file, shown, self.notes)
         self._unread()
-        if not self.shapes:
+        shapes = self.placements.shapes(self.notes)
+        if not shapes:
             raise ParseError("its scene has no triangles")
-        points = np.concatenate(self._corners)
-        bounds = points.min(axis=0), points.max(axis=0)
         document = {
             "version": 1,
-            "camera": standing.camera(file, shown, bounds, self.notes),
+            "camera": standing.camera(file, shown, self.placements.bounds, self.notes),
             "lights": lights,
             "textures": self.textures.documents,
             "materials": self.materials.documents,
-            "shapes": self.shapes,
+            "shapes": shapes,
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
-        return SceneFile(used, self.files.kept, self.notes.document(), self.triangles, bool(lights))
+        triangles = sum(part.triangles for part in self.placements.shown)
+        return SceneFile(used, self.files.kept, self.notes.document(), triangles, bool(lights))
 
     def _mesh(self, node: Node) -> None:
         mesh = self.file.follow(node.place, "mesh", "meshes")
@@ -98,40 +82,11 @@ class _Importer:
         skin = None
         if "skin" in node.place:
             skin = Skin(self.file, self.file.follow(node.place, "skin", "skins"), self.nodes)
+        worlds = np.eye(4)[None] if skin else instances(self.file, node)
         for place in mesh.objects("primitives"):
             part = self._part(place, morph, skin, node)
-            if part is None:
-                continue
-            material, described = self.materials.name(place, part.charts)
-            self._mention(place, part, described)
-            shape = {
-                "type": "mesh",
-                "asset": part.reference,
-                "material": material,
-                "double_sided": described.flag("doubleSided"),
-            } | ({} if part.smooth else {"smooth": False})
-            for world in [np.eye(4)] if skin else instances(self.file, node):
-                self._shape(shape, world, part, node)
-
-    def _shape(self, shape: dict[str, Any], world: Doubles, part: Part, node: Node) -> None:
-        lengths = np.linalg.norm(world[:3, :3], axis=0)
-        if not np.isfinite(world).all() or np.abs(world).max() > MAX_COORDINATE:
-            raise ParseError("its matrix, its parents' applied, is not finite or beyond 1e9", node.place.pointer)
-        if not lengths.min() > 1e-30 or abs(np.linalg.det(world[:3, :3] / lengths)) < LEAST_VOLUME:
-            self.notes.add(node.place.pointer, "its transform makes its mesh flat: left out")
-            return
-        self.triangles += part.triangles
-        if part.reference not in self._held:
-            self._held.add(part.reference)
-            self._holds += part.triangles
-        if self._holds > self.file.limits.max_triangles:
-            raise ParseError(f"its nodes hold more than the {self.file.limits.max_triangles} triangles allowed")
-        if len(self.shapes) >= MOST_SHAPES:
-            raise ParseError(f"its nodes hold more than the {MOST_SHAPES} primitives allowed")
-        placed = {} if np.array_equal(world, np.eye(4)) else {"transform": {"matrix": world.reshape(-1).tolist()}}
-        self.shapes.append(shape | placed)
-        corners = np.stack(np.meshgrid(*zip(*part.bounds, strict=True)), axis=-1).reshape(-1, 3)
-        self._corners.append(corners @ world[:3, :3].T + world[:3, 3])
+            if part is not None:
+                self.placements.add(part, node, worlds)
 
     def _part(self, place: Place, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
         """Of one primitive in one pose; a skinned one belongs to its node."""
@@ -167,20 +122,23 @@ class _Importer:
             if not np.isfinite(rows).all():
                 bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
                 raise place.need("attributes").error(name, f"has an item that is not finite: {rows[bad].tolist()}")
-        return Part(
-            self.files.keep(ply(primitive), place.pointer, len(vertices), len(primitive.faces)),
-            (vertices.min(axis=0).astype(np.float64), vertices.max(axis=0).astype(np.float64)),
-            len(primitive.faces),
-            tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs),
-            primitive.colors is not None and bool((primitive.colors[:, :3] != 1).any()),
-            primitive.normals is not None,
-        )
-
-    def _mention(self, place: Place, part: Part, material: Place) -> None:
-        """What a primitive asks for beyond its triangles."""
-        attributes = place.need("attributes")
-        if part.colored and material.extension("KHR_materials_unlit") is not None:
-            self.notes.add(attributes.at("COLOR_0"), "colours don't tint an unlit material")
+        reference = self.files.keep(ply(primitive), place.pointer, len(vertices), len(primitive.faces))
+        self._triangles += 0 if reference in self._held else len(primitive.faces)
+        self._held.add(reference)
+        limit = self.file.limits.max_triangles
+        if self._triangles > limit:
+            raise ParseError(f"its nodes hold more than the {limit} triangles allowed")
+        charts = tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs)
+        name, material = self.materials.name(place, charts)
+        tinted = primitive.colors is not None and bool((primitive.colors[:, :3] != 1).any())
+        if tinted and material.extension("KHR_materials_unlit") is not None:
+            self.notes.add(place.need("attributes").at("COLOR_0"), "colours don't tint an unlit material")
+        sides = {"double_sided": material.flag("doubleSided")}
+        facets = (
+            {"smooth": False} if primitive.normals is None else {}
+        )  # flat without normals, says the specification
+        shape = {"type": "mesh", "asset": reference, "material": name} | sides | facets
+        return Part(shape, (vertices.min(axis=0), vertices.max(axis=0)), len(primitive.faces))
 
     def _unread(self) -> None:
         """Notes whatever else the file holds that would change the picture."""
@@ -192,14 +150,4 @@ class _Importer:
             self.notes.add("/animations", "are not played: the file's own pose is shown")
         if self.file.count("scenes") > 1:
             self.notes.add("/scenes", f"only number {whole(root.value.get('scene', 0), '/scene')} is shown")
-        stack: list[tuple[Any, str, int]] = [(root.value, "", 0)]
-        while stack:
-            value, pointer, depth = stack.pop()
-            pairs = value.items() if isinstance(value, dict) else enumerate(value)
-            for name, inner in pairs:
-                at = f"{pointer}/{escaped(name)}"
-                if name == "extensions" and isinstance(inner, dict):
-                    for unknown in sorted(inner.keys() - KNOWN - OPTIONAL):
-                        self.notes.add(f"{at}/{escaped(unknown)}", "is an extension that is not had")
-                elif isinstance(inner, dict | list) and name != "extras" and depth < DEEPEST:
-                    stack.append((inner, at, depth + 1))
+        note_unsupported(root, self.notes)

@@ -1,0 +1,83 @@
+"""glTF's extensions: which ones are read, which change nothing in a picture, and what is said of all others."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+from service.assets.errors import ParseError
+from service.assets.gltf.notes import Notes
+from service.assets.gltf.place import Place, escaped, shown
+
+READ = {
+    "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
+    "KHR_materials_emissive_strength", "KHR_materials_ior", "KHR_materials_pbrSpecularGlossiness",
+    "KHR_materials_sheen", "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
+    "KHR_materials_variants", "KHR_materials_volume", "KHR_mesh_quantization", "KHR_node_visibility",
+    "KHR_texture_transform", "EXT_mesh_gpu_instancing", "EXT_texture_webp",
+}  # fmt: skip
+# These describe motion, sound, behaviour, meaning, provenance or coarser versions of the model: a still picture
+# is the same without them.
+UNSEEN = {
+    "KHR_animation_pointer", "KHR_audio_emitter", "KHR_implicit_shapes", "KHR_interactivity",
+    "KHR_node_hoverability", "KHR_node_selectability", "KHR_physics_rigid_bodies", "KHR_xmp", "KHR_xmp_json_ld",
+    "EXT_instance_features", "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "FB_ngon_encoding",
+    "GODOT_single_root", "MSFT_audio_emitter", "MSFT_lod",
+}  # fmt: skip
+# The program that takes a compression out of a file, as its user types it.
+DECOMPRESS = {
+    "EXT_meshopt_compression": "`gltf-transform copy IN.glb OUT.glb`",
+    "KHR_meshopt_compression": "`gltfpack -i IN.glb -o OUT.glb`",
+    "KHR_texture_basisu": "`gltf-transform ktxdecompress IN.glb OUT.glb`",
+}
+PLAIN = {int, float, str}  # an array that begins with one holds no objects: most of a file are numbers
+DEEPEST = 32  # levels of the file that are looked through; a sound file has about ten
+
+Path = tuple[Any, ...]  # (name, path of the parent); () is the root: written out only where it is needed
+
+
+def check_required(root: Place) -> None:
+    """Raises ParseError where a file can't be shown without an extension that is not read."""
+    for k, name in enumerate(root.array("extensionsRequired")):
+        if name not in READ | UNSEEN:
+            detail = f"the file requires {shown(name)}, which is not supported"
+            raise ParseError(detail + remedy([name]), f"/extensionsRequired/{k}")
+
+
+def remedy(names: Any) -> str:
+    """The end of a sentence: how to get rid of one of these extensions. "" where nothing is known to help."""
+    known = [DECOMPRESS[name] for name in names if isinstance(name, str) and name in DECOMPRESS]
+    return f"; {known[0]} writes the model without it" if known else ""
+
+
+def note_unsupported(root: Place, notes: Notes) -> None:
+    """Notes each extension that would change the picture, and each required one that would not."""
+    for k, name in enumerate(root.array("extensionsRequired")):
+        if name in UNSEEN:
+            notes.add(f"/extensionsRequired/{k}", f"{name} is ignored: it changes nothing in a still picture")
+    for path, name in _used(root.value):
+        if name not in READ | UNSEEN:
+            notes.add(_pointer((name, path)), f"{name[:80]} is not supported; the file is shown without it")
+
+
+def _used(root: dict[str, Any]) -> Iterator[tuple[Path, str]]:
+    """Every extension that an object of the file has, with the path of the object that holds it."""
+    stack: list[tuple[Any, Path, int]] = [(root, (), 0)]
+    while stack:
+        value, path, depth = stack.pop()
+        for name, inner in value.items() if type(value) is dict else enumerate(value):
+            kind = type(inner)
+            if kind is not dict and (kind is not list or not inner or type(inner[0]) in PLAIN):
+                continue
+            if name == "extensions" and kind is dict:
+                yield from (((name, path), extension) for extension in sorted(inner))
+            if name != "extras" and depth < DEEPEST:
+                stack.append((inner, (name, path), depth + 1))
+
+
+def _pointer(path: Path) -> str:
+    steps = []
+    while path:
+        name, path = path
+        steps.append(f"/{escaped(name)}")
+    return "".join(reversed(steps))

@@ -1,0 +1,94 @@
+"""Where the parts of a file stand: computed in one go, because numpy takes 100 us for a single matrix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+import numpy.typing as npt
+
+from service.assets.data import Doubles
+from service.assets.errors import ParseError
+from service.assets.gltf.nodes import Node
+from service.assets.gltf.notes import Notes
+from service.assets.parts import MAX_COORDINATE
+
+MOST_SHAPES = 100_000  # beyond, the document itself is the burden
+LEAST_VOLUME = 1e-7  # of the axes at length one: what service.scene.transform takes for invertible
+Bounds = tuple[Doubles, Doubles]  # the least and the greatest coordinates (3,)
+
+
+@dataclass(frozen=True)
+class Part:
+    """A primitive in one pose, written once for all its nodes."""
+
+    shape: dict[str, Any]  # without its transform
+    bounds: Bounds
+    triangles: int
+
+
+class Placements:
+    """Parts and their world matrices, in the order of the file."""
+
+    def __init__(self) -> None:
+        self._parts: list[Part] = []
+        self._nodes: list[Node] = []
+        self._matrices: list[Doubles] = []
+
+    def add(self, part: Part, node: Node, worlds: Doubles) -> None:
+        """`part` stands under each of `worlds` (k, 4, 4), which are `node`'s. Raises ParseError at too many."""
+        if len(self._parts) + len(worlds) > MOST_SHAPES:
+            raise ParseError(f"its nodes hold more than the {MOST_SHAPES} primitives allowed")
+        self._parts += [part] * len(worlds)
+        self._nodes += [node] * len(worlds)
+        self._matrices.extend(worlds)
+
+    def shapes(self, notes: Notes) -> list[dict[str, Any]]:
+        """A shape for each; one whose matrix has no inverse is left out, and noted."""
+        stands, moves = self._stands.tolist(), (self._worlds != np.eye(4)).any(axis=(1, 2)).tolist()
+        matrices = self._worlds.reshape(-1, 16).tolist()
+        found = []
+        for k, part in enumerate(self._parts):
+            if not stands[k]:
+                notes.add(self._nodes[k].place.pointer, "its transform makes its mesh flat: left out")
+            elif moves[k]:
+                found.append({**part.shape, "transform": {"matrix": matrices[k]}})
+            else:
+                found.append(dict(part.shape))
+        return found
+
+    @property
+    def shown(self) -> list[Part]:
+        """The part of each shape."""
+        return [part for part, stands in zip(self._parts, self._stands.tolist(), strict=True) if stands]
+
+    @property
+    def bounds(self) -> Bounds:
+        """The box around all shapes, of which there is at least one."""
+        boxes, worlds = np.array([part.bounds for part in self.shown], np.float64), self._worlds[self._stands]
+        linear, moved = worlds[:, :3, :3], worlds[:, :3, 3]
+        middles = np.einsum("nij,nj->ni", linear, boxes.mean(axis=1)) + moved
+        halves = np.einsum("nij,nj->ni", np.abs(linear), np.ptp(boxes, axis=1) / 2)
+        return (middles - halves).min(axis=0), (middles + halves).max(axis=0)
+
+    @cached_property
+    def _worlds(self) -> Doubles:
+        """(n, 4, 4). Raises ParseError where one is not finite."""
+        worlds = np.array(self._matrices).reshape(-1, 4, 4)
+        beyond = ~(np.abs(worlds).max(axis=(1, 2), initial=0) <= MAX_COORDINATE)  # also where it is not a number
+        if beyond.any():
+            pointer = self._nodes[int(beyond.argmax())].place.pointer
+            raise ParseError("its matrix, its parents' applied, is not finite or beyond 1e9", pointer)
+        return worlds
+
+    @cached_property
+    def _stands(self) -> npt.NDArray[np.bool_]:
+        """(n,): which matrices have an inverse."""
+        axes = self._worlds[:, :3, :3]
+        lengths = np.linalg.norm(axes, axis=1)
+        has_axes = lengths.min(axis=1, initial=np.inf) > 1e-30
+        units = axes / np.where(has_axes[:, None], lengths, 1)[:, None]
+        stands: npt.NDArray[np.bool_] = has_axes & (np.abs(np.linalg.det(units)) >= LEAST_VOLUME)
+        return stands
