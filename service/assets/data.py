@@ -58,7 +58,7 @@ class SceneFile:
 
     document: dict[str, Any]
     parts: list[ScenePart]
-    warnings: list[dict[str, str]]  # what it asks for and does not get: [{pointer, detail}]
+    warnings: list[dict[str, Any]]  # what it asks for and does not get: [{pointer, detail, count?}]
     triangles: int
     lit: bool
 
@@ -67,8 +67,8 @@ class SceneFile:
 class AssetInfo:
     """What an upload is answered with; a mesh has no width and an image no triangles: those are None.
 
-    `warnings`, `[{pointer, detail}]`, say what is odd about it, or what a scene asks for and does not get; a pointer
-    is into the file's own JSON.
+    `warnings`, `[{pointer, detail, count?}]`, say what is odd about it, or what a scene asks for and does not get; a
+    pointer is into the file's own JSON, the first of `count` places.
     """
 
     id: str
@@ -81,7 +81,7 @@ class AssetInfo:
     vertices: int | None = None
     triangles: int | None = None
     bounds: list[list[float]] | None = None  # of an uploaded mesh's triangles: least and greatest x, y, z, m
-    warnings: list[dict[str, str]] | None = None
+    warnings: list[dict[str, Any]] | None = None
 
 
 @dataclass(frozen=True)

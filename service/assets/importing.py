@@ -19,7 +19,7 @@ class Imported:
     """A valid document but for the environment that it may lack, and what the file asks for and does not get."""
 
     document: dict[str, Any]
-    warnings: list[dict[str, str]]
+    warnings: list[dict[str, Any]]
     lit: bool  # has lights of its own
 
     def scene(self, environment: dict[str, Any]) -> dict[str, Any]:

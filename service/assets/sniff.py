@@ -53,7 +53,7 @@ SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe"
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
 OBJ_START = re.compile(rb"(?:\s++|#[^\n]*+\n)*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
 STL_TEXT = re.compile(rb"\s*+solid\b[^\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
-GLTF_TEXT = re.compile(rb"\s*\{")
+GLTF_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*\{")  # perhaps behind a byte order mark
 
 
 def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:

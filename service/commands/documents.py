@@ -54,7 +54,7 @@ def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
     data = files.read(path)
     from service.commands.models import is_model
 
-    if is_model(data):
+    if is_model(path, data):
         return _model(path, data, roots, config)
     from service.images.metadata import EXR_MAGIC, PNG_MAGIC, read_metadata
     from service.scene import load_json, parse_scene

@@ -22,8 +22,8 @@ def run(arguments: argparse.Namespace) -> int:
     from service.assets import AssetStore, FileAssets
     from service.commands.models import import_model, is_model
 
-    if not is_model(data):
-        raise BadInput(f"{str(source)!r}: is no glTF model, neither a GLB nor JSON with an `asset`")
+    if not is_model(source, data) and not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
+        raise BadInput(f"{str(source)!r}: is no glTF model: neither a GLB nor JSON")
     folder = target.with_suffix(".assets")
     with (
         tempfile.TemporaryDirectory(prefix="sunbox-") as scratch,

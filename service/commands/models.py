@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
+from service.assets.errors import ParseError
+from service.assets.gltf.file import load
 from service.commands import BadInput
 from service.problems import AssetError
 
@@ -17,13 +19,13 @@ if TYPE_CHECKING:
     from service.assets.importing import Imported
 
 
-def is_model(data: bytes) -> bool:
-    """By its bytes; of JSON by the `asset` at its root, which is an object, and which no scene's document has."""
-    if data.startswith(b"glTF"):
+def is_model(path: Path, data: bytes) -> bool:
+    """By its name or its bytes; of JSON by the object `asset` at its root, which no scene's document has."""
+    if data.startswith(b"glTF") or path.suffix.lower() in (".glb", ".gltf"):
         return True
     try:
-        tree = json.loads(data) if data.lstrip()[:1] == b"{" else None
-    except (ValueError, RecursionError):
+        tree = load(data) if b'"asset"' in data else None
+    except ParseError:
         return False
     return isinstance(tree, dict) and isinstance(tree.get("asset"), dict)
 
@@ -32,18 +34,19 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) 
     """The model as a document whose references are assets of `store`. Tells its warnings. Raises ServiceError."""
     if not data.startswith(b"glTF"):
         data = _embedded(data, files)
-    imported = store.scene(store.add(data, filename=path.name).id)
+    imported = store.scene(store.add(data, filename="model.gltf").id)
     for warning in imported.warnings:
-        print(f"warning: {warning['pointer']}: {warning['detail']}", file=sys.stderr)
+        place = f"{warning['pointer']}: " if warning["pointer"] else ""
+        print(f"warning: {place}{warning['detail']}", file=sys.stderr)
     return imported
 
 
 def _embedded(data: bytes, files: FileAssets) -> bytes:
     """The JSON of a .gltf with the files that it names put into it."""
     try:
-        tree = json.loads(data)
-    except (ValueError, RecursionError):
-        return data  # whoever reads it says what is wrong
+        tree = load(data)
+    except ParseError:
+        return data  # the importer says what is wrong, and where in the file as it is
     for kind in ("buffers", "images"):
         items = tree.get(kind) if isinstance(tree, dict) else None
         for k, item in enumerate(items if isinstance(items, list) else ()):

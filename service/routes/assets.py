@@ -62,7 +62,7 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
     return JSONResponse(document, headers=headers)
 
 
-def _fitting(warnings: list[dict[str, str]]) -> str:
+def _fitting(warnings: list[dict[str, Any]]) -> str:
     while len(text := json.dumps(warnings)) > HEADER_BYTES:
         warnings = warnings[: len(warnings) * 2 // 3]
     return text

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import ParseError
+from service.assets.gltf.extensions import remedy
 from service.assets.gltf.file import Array, GltfFile
 from service.assets.gltf.place import Place, shown
 
@@ -31,8 +32,9 @@ def read(file: GltfFile, source: Place, name: str, *types: str) -> Array:
     elif "sparse" not in place:
         if not place.value.get("extensions"):
             raise place.error("bufferView", "is missing: the accessor has no data")
-        names = ", ".join(place.need("extensions").value)
-        raise place.error("extensions", f"hold its data in a way that is not read: {names[:80]}")
+        names = sorted(place.need("extensions").value)
+        detail = f"its data are there in compressed form only ({', '.join(names)[:80]})"
+        raise place.error("extensions", detail + remedy(names))
     else:
         values = np.zeros((count, width), dtype)
     if "sparse" in place:

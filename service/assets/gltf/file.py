@@ -5,16 +5,18 @@ from __future__ import annotations
 import base64
 import binascii
 import json
+import math
 import struct
 from typing import Any
+from urllib.parse import unquote_to_bytes
 
 import numpy as np
 import numpy.typing as npt
 
 from service.assets.data import AssetLimits
 from service.assets.errors import ParseError
-from service.assets.gltf.extensions import check_required
-from service.assets.gltf.place import Place, shown, whole
+from service.assets.gltf.extensions import check_required, remedy
+from service.assets.gltf.place import Place, escaped, shown, whole
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MOST_ITEMS = 1 << 20  # of one kind; the time to look at them all is bounded, and a stranger's file may list anything
@@ -92,26 +94,71 @@ def embedded(place: Place) -> Bytes:
     """What a `data:` URI holds."""
     uri = place.text("uri")
     if not uri:
-        raise place.error("uri", "is missing: these bytes are nowhere")
+        held = place.object("extensions")
+        names = sorted(held.value) if held else []
+        which = f": its data are there in compressed form only ({names[0][:60]})" if names else ""
+        raise place.error("uri", f"is missing{which}{remedy(names)}")
     head, comma, body = uri.partition(",")
     if not head.startswith("data:") or not comma or not head.endswith(";base64"):
         raise place.error(
             "uri", f"names another file, {shown(uri)}; only what the file itself holds is read here: save it as GLB"
         )
     try:
-        return np.frombuffer(base64.b64decode(body), np.uint8)
+        # Strictly, or else what is no base64 would be skipped and the bytes behind it shifted. Blanks are harmless.
+        encoded = b"".join(unquote_to_bytes(body).split())
+        return np.frombuffer(base64.b64decode(encoded, validate=True), np.uint8)
     except (ValueError, binascii.Error) as error:
-        raise place.error("uri", f"is not base64: {error}") from None
+        raise place.error("uri", f"is not valid base64: {str(error).lower()}") from None
 
 
-def _root(text: bytes, binary: bool) -> Place:
-    what = "its JSON" if binary else "neither a GLB, which begins with `glTF`, nor JSON"
+def load(text: bytes) -> Any:
+    """The value of a JSON text in UTF-8. Raises ParseError with the line and the column of a mistake."""
     try:
-        tree = json.loads(text.rstrip(b"\0"))
-    except (ValueError, RecursionError) as error:
-        raise ParseError(f"not a glTF file: {what}: {str(error)[:200]}") from None
+        decoded = text.rstrip(b"\0").decode("utf-8-sig")
+    except UnicodeDecodeError as error:
+        raise ParseError(f"byte {error.start} is not UTF-8") from None
+    try:
+        return json.loads(decoded, parse_constant=_refuse_constant)
+    except json.JSONDecodeError as error:
+        raise ParseError(f"line {error.lineno}, column {error.colno}: {error.msg.lower()}") from None
+    except RecursionError:
+        raise ParseError("its arrays and objects are nested too deeply") from None
+    except _Constant as error:
+        raise ParseError(f"must be a finite number, not {error}", _first_constant(json.loads(decoded))) from None
+    except ValueError as error:  # a whole number of more than 4300 digits
+        raise ParseError(str(error)[:200]) from None
+
+
+class _Constant(Exception):
+    """NaN or Infinity, which Python's reader takes and JSON lacks."""
+
+
+def _refuse_constant(name: str) -> None:
+    raise _Constant(name)
+
+
+def _first_constant(tree: Any) -> str:
+    """The pointer to the first number of a tree that is not finite."""
+    stack = [(tree, "")]
+    while stack:
+        value, pointer = stack.pop()
+        if type(value) is float and not math.isfinite(value):
+            return pointer
+        pairs = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+        stack += reversed([(inner, f"{pointer}/{escaped(name)}") for name, inner in pairs])
+    return ""
+
+
+def _root(text: bytes, is_binary: bool) -> Place:
+    try:
+        tree = load(text)
+    except ParseError as error:
+        where = (
+            "the JSON in this GLB: " if is_binary else "this is neither a GLB, which begins with `glTF`, nor JSON: "
+        )
+        raise ParseError(error.detail if error.pointer else where + error.detail, error.pointer) from None
     if not isinstance(tree, dict) or not isinstance(tree.get("asset"), dict):
-        raise ParseError("not a glTF file: its JSON has no `asset`")
+        raise ParseError("this is not glTF: its JSON has no object `asset`")
     for kind, items in tree.items():
         if isinstance(items, list) and len(items) > MOST_ITEMS:
             raise ParseError(f"has {len(items)} items; {MOST_ITEMS} are allowed", f"/{kind[:60]}")

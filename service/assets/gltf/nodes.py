@@ -12,6 +12,7 @@ from service.assets.data import Doubles
 from service.assets.errors import ParseError
 from service.assets.gltf.accessors import read
 from service.assets.gltf.file import GltfFile
+from service.assets.gltf.notes import Notes
 from service.assets.gltf.place import Place, shown
 
 MOST_INSTANCES = 100_000  # shapes in a document; beyond, the document itself is the burden
@@ -26,17 +27,21 @@ class Node:
 
 
 class Nodes:
-    def __init__(self, file: GltfFile) -> None:
-        self._file = file
+    def __init__(self, file: GltfFile, notes: Notes) -> None:
+        self._file, self._notes = file, notes
         self._all = file.root.array("nodes")
-        self._parents: dict[int, int] | None = None
 
     @cached_property
     def shown(self) -> list[Node]:
         """Those of the default scene, or of the first; all, where the file has no scenes. Parents first."""
         places, indices, parents = self._walk()
-        worlds = np.empty((len(places), 4, 4))
-        for k, (local, parent) in enumerate(zip(local_matrices(places), parents, strict=True)):
+        locals_, worlds = local_matrices(places), np.empty((len(places), 4, 4))
+        for place in places:
+            if "rotation" in place and not any(place.value["rotation"]):
+                self._notes.add(
+                    place.at("rotation"), "a quaternion of length 0 is no rotation; the node is not turned"
+                )
+        for k, (local, parent) in enumerate(zip(locals_, parents, strict=True)):
             worlds[k] = local if parent < 0 else worlds[parent] @ local
         return list(map(Node, places, indices, worlds))
 

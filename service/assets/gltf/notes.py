@@ -1,30 +1,54 @@
-"""What a file asks for and does not get: listed with its place, never dropped in silence."""
+"""What a file asks for and does not get: named with its place, never dropped in silence."""
+
+from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
-MOST = 200  # a file of ten thousand materials may ask ten thousand times
-LONGEST = 300
+from service.assets.errors import ParseError
+
+MOST = 200  # different ones; a stranger's file may bring any number
+LONGEST = 300  # characters of a pointer or a detail
 
 
 @dataclass
 class Notes:
-    """Places and texts in the order in which they were found, each once."""
+    """Details in the order in which they were found. Each has the first of its places, and how many there are."""
 
-    _found: dict[tuple[str, str], None] = field(default_factory=dict)
-    _left_out: int = 0
+    _places: dict[str, set[str]] = field(default_factory=dict)  # by detail
+    _first: dict[str, str] = field(default_factory=dict)
+    _unlisted: int = 0
+    _omissions: dict[str, None] = field(default_factory=dict)  # details that say why triangles are missing
 
     def add(self, pointer: str, detail: str) -> None:
-        key = pointer[:LONGEST], detail[:LONGEST]
-        if key in self._found:
-            return
-        if len(self._found) < MOST:
-            self._found[key] = None
+        pointer, detail = pointer[:LONGEST], detail[:LONGEST]
+        if detail in self._first:
+            self._places[detail].add(pointer)
+        elif len(self._first) < MOST:
+            self._first[detail], self._places[detail] = pointer, {pointer}
         else:
-            self._left_out += 1
+            self._unlisted += 1
 
-    def document(self) -> list[dict[str, str]]:
-        """`[{pointer, detail}]`."""
-        listed = [{"pointer": pointer, "detail": detail} for pointer, detail in self._found]
-        if self._left_out:
-            listed.append({"pointer": "", "detail": f"and {self._left_out} more like these"})
+    def leave_out(self, pointer: str, detail: str) -> None:
+        """As `add`; it says why something is not in the picture."""
+        self.add(pointer, detail)
+        self._omissions[detail[:LONGEST]] = None
+
+    def nothing_left(self) -> ParseError:
+        """The refusal of a file that has nothing to show, with the reasons."""
+        found = [note for note in self.document() if note["detail"].startswith(tuple(self._omissions))]
+        if not self._omissions or not found:
+            return ParseError("the scene has no triangles: none of its nodes has a mesh")
+        reasons = "; ".join(note["detail"] for note in found[:3])
+        return ParseError(f"the scene has no triangles: {reasons}", found[0]["pointer"])
+
+    def document(self) -> list[dict[str, Any]]:
+        """`[{pointer, detail, count}]`; without `count` where the pointer is the only place."""
+        listed: list[dict[str, Any]] = []
+        for detail, pointer in self._first.items():
+            count = len(self._places[detail])
+            more = f" (here and in {count - 1} more place{'s' if count > 2 else ''})" if count > 1 else ""
+            listed.append({"pointer": pointer, "detail": detail + more} | ({"count": count} if count > 1 else {}))
+        if self._unlisted:
+            listed.append({"pointer": "", "detail": f"there are {self._unlisted} more warnings"})
         return listed

@@ -52,7 +52,9 @@ class Placements:
         found = []
         for k, part in enumerate(self._parts):
             if not stands[k]:
-                notes.add(self._nodes[k].place.pointer, "its transform makes its mesh flat: left out")
+                notes.leave_out(
+                    self._nodes[k].place.pointer, "the node's transform makes its mesh flat: it is left out"
+                )
             elif moves[k]:
                 found.append({**part.shape, "transform": {"matrix": matrices[k]}})
             else:

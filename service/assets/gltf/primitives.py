@@ -100,10 +100,10 @@ def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | No
     if mode >= len(MODES):
         raise place.error("mode", f"must be from 0 to {len(MODES) - 1}, not {mode}")
     if mode < TRIANGLES:
-        notes.add(place.pointer, f"{MODES[mode]} have no area: left out")
+        notes.leave_out(place.pointer, f"{MODES[mode]} have no area and are left out; only triangles are rendered")
         return None
     if "POSITION" not in attributes:
-        notes.add(place.pointer, "has no POSITION: left out")
+        notes.leave_out(place.pointer, "the primitive has no POSITION and is left out")
         return None
     compressed = place.extension("KHR_draco_mesh_compression")
     packed, faces = draco.decode(file, compressed, attributes) if compressed else ({}, None)
@@ -120,7 +120,7 @@ def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | No
         indices = np.arange(len(vertices))
     triangles = _triangles(mode, indices, len(vertices), place, notes).astype(np.int32)
     if not len(triangles):
-        notes.add(place.pointer, "has no triangles: left out")
+        notes.leave_out(place.pointer, "the primitive has no triangles and is left out")
         return None
     sets = sum(f"JOINTS_{k}" in rows and f"WEIGHTS_{k}" in rows for k in range(len(rows)))
     return Primitive(

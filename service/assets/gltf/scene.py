@@ -11,7 +11,7 @@ from service.assets.data import AssetLimits, SceneFile, ScenePart
 from service.assets.errors import ParseError
 from service.assets.gltf import standing
 from service.assets.gltf.extensions import note_unsupported
-from service.assets.gltf.file import GltfFile
+from service.assets.gltf.file import Array, GltfFile
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
 from service.assets.gltf.notes import Notes
@@ -45,7 +45,7 @@ def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
 class _Importer:
     def __init__(self, file: GltfFile) -> None:
         self.file, self.notes, self.files = file, Notes(), _Files()
-        self.nodes = Nodes(file)
+        self.nodes = Nodes(file, self.notes)
         self.textures = Textures(file, self.notes, self.files.keep)
         self.materials = Materials(file, self.textures, self.notes)
         self.placements = Placements()
@@ -63,7 +63,7 @@ class _Importer:
         self._unread()
         shapes = self.placements.shapes(self.notes)
         if not shapes:
-            raise ParseError("its scene has no triangles")
+            raise self.notes.nothing_left()
         document = {
             "version": 1,
             "camera": standing.camera(file, shown, self.placements.bounds, self.notes),
@@ -116,12 +116,13 @@ class _Importer:
 
     def _write(self, primitive: Primitive, place: Place) -> Part:
         vertices = primitive.vertices
-        if not np.isfinite(vertices).all() or np.abs(vertices).max() > MAX_COORDINATE:
-            raise place.error("attributes", "have a POSITION that is not finite or lies beyond 1e9 m")
+        bad = np.flatnonzero(~(np.abs(vertices) <= MAX_COORDINATE).all(axis=1))  # also what is not a number
+        if len(bad):
+            raise _wrong(primitive, place, "POSITION", vertices, bad[0], "is not finite or lies beyond 1e9 m")
         for name, rows in primitive.detail():
             if not np.isfinite(rows).all():
-                bad = int(np.flatnonzero(~np.isfinite(rows).all(axis=1))[0])
-                raise place.need("attributes").error(name, f"has an item that is not finite: {rows[bad].tolist()}")
+                bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
+                raise _wrong(primitive, place, name, rows, bad[0], "is not finite")
         reference = self.files.keep(ply(primitive), place.pointer, len(vertices), len(primitive.faces))
         self._triangles += 0 if reference in self._held else len(primitive.faces)
         self._held.add(reference)
@@ -134,10 +135,9 @@ class _Importer:
         if tinted and material.extension("KHR_materials_unlit") is not None:
             self.notes.add(place.need("attributes").at("COLOR_0"), "colours don't tint an unlit material")
         sides = {"double_sided": material.flag("doubleSided")}
-        facets = (
-            {"smooth": False} if primitive.normals is None else {}
-        )  # flat without normals, says the specification
-        shape = {"type": "mesh", "asset": reference, "material": name} | sides | facets
+        shape = {"type": "mesh", "asset": reference, "material": name} | sides
+        if primitive.normals is None:  # then triangles are flat, says the specification
+            shape["smooth"] = False
         return Part(shape, (vertices.min(axis=0), vertices.max(axis=0)), len(primitive.faces))
 
     def _unread(self) -> None:
@@ -151,3 +151,12 @@ class _Importer:
         if self.file.count("scenes") > 1:
             self.notes.add("/scenes", f"only number {whole(root.value.get('scene', 0), '/scene')} is shown")
         note_unsupported(root, self.notes)
+
+
+def _wrong(primitive: Primitive, place: Place, name: str, rows: Array, row: int, what: str) -> ParseError:
+    """The refusal of a primitive for a row of its attribute `name`."""
+    attributes = place.need("attributes")
+    item = int(row if primitive.kept is None else primitive.kept[row])
+    accessor = attributes.value.get(name)
+    named = f"item {item} of /accessors/{accessor}" if type(accessor) is int else f"item {item}"
+    return attributes.error(name, f"{named} {what}: {rows[row].tolist()}")

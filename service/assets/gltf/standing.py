@@ -11,12 +11,13 @@ from service.assets.data import Doubles
 from service.assets.gltf.file import GltfFile
 from service.assets.gltf.nodes import Node
 from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place
+from service.assets.gltf.place import Place, shown
 
 Bounds = tuple[Doubles, Doubles]
 FRAMED_VFOV = 35.0  # degrees
 FLAT = 0.15  # of the greatest extent: a wall is looked at from the front, a floor from above
 MARGIN = 1.06
+INSTEAD = "a perspective camera that shows the whole scene is used instead"
 
 
 def lights(file: GltfFile, nodes: list[Node], notes: Notes) -> list[dict[str, Any]]:
@@ -68,16 +69,19 @@ def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> d
         if "camera" not in node.place:
             continue
         place = file.follow(node.place, "camera", "cameras")
+        kind = place.text("type")
         if chosen is not None:
             notes.add(node.place.at("camera"), "is not used: the scene's first camera is")
-        elif place.text("type") == "perspective":
+        elif kind == "perspective":
             lens = place.need("perspective")
             chosen = _perspective(lens, node, bounds)
             shape = lens.number("aspectRatio", 1, 1e-6, 1e6)
             if shape != 1:
                 notes.add(lens.at("aspectRatio"), f"a picture {shape:.3g} times as wide as high frames what it does")
+        elif kind == "orthographic":
+            notes.add(place.pointer, f"orthographic cameras are not supported; {INSTEAD}")
         else:
-            notes.add(place.pointer, "an orthographic camera is not had: one in perspective is framed instead")
+            notes.add(place.at("type"), f"must be perspective or orthographic, not {shown(kind)}; {INSTEAD}")
     return chosen or framed(bounds)
 
 

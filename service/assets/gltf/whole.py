@@ -17,7 +17,7 @@ from service.assets.parts import Parts
 def read_whole(data: bytes | memoryview, limits: AssetLimits) -> Parts:
     """Raises ParseError."""
     file, notes = GltfFile(data, limits), Notes()
-    nodes, read, parts, triangles = Nodes(file), dict[str, Primitive | None](), list[Primitive](), 0
+    nodes, read, parts, triangles = Nodes(file, notes), dict[str, Primitive | None](), list[Primitive](), 0
     for node in nodes.shown:
         if "mesh" not in node.place:
             continue
@@ -37,7 +37,7 @@ def read_whole(data: bytes | memoryview, limits: AssetLimits) -> Parts:
                     raise ParseError(f"its nodes hold more than the {limits.max_triangles} triangles allowed")
                 parts.append(skin.posed(primitive, place) if skin else primitive.moved(world))
     if not parts:
-        raise ParseError("its scene has no triangles")
+        raise notes.nothing_left()
     return _joined(parts, [f"{note['pointer']}: {note['detail']}" for note in notes.document()])
 
 

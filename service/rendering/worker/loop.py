@@ -103,9 +103,7 @@ class Loop:
         except BlockingIOError:
             return
 
-    def _work(
-        self, task: Task, work: Callable[[], object], read: Read | None = None, spare: bool = False
-    ) -> None:
+    def _work(self, task: Task, work: Callable[[], object], read: Read | None = None, spare: bool = False) -> None:
         """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
         in time that nobody wanted, which is not held against it."""
         began = time.perf_counter()
