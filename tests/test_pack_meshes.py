@@ -68,6 +68,25 @@ def test_computed_normals_join_repeated_vertices_by_angle():
     np.testing.assert_allclose(normals[faces], (2 * corners - 1) / np.sqrt(3), atol=1e-12)
 
 
+def test_computed_normals_add_up_in_the_faces_order(monkeypatch):
+    """Pieces are worked out in threads; vertices of one place are looked for only where there are some."""
+    rng = np.random.default_rng(1)
+    points = rng.normal(size=(1000, 3))
+    faces = rng.integers(0, len(points), (9 * CHUNK + 3, 3))
+    threaded, joined = corner_normals(points, faces)
+    np.testing.assert_array_equal(joined, faces)
+
+    def one_by_one(make, take, jobs):
+        for job in jobs:
+            take(job, make(job))
+
+    monkeypatch.setattr("service.pack.normals.in_order", one_by_one)
+    np.testing.assert_array_equal(threaded, corner_normals(points, faces)[0])
+    twice, again = corner_normals(np.tile(points, (2, 1)), faces + 1000 * (np.arange(len(faces))[:, None] % 2))
+    assert len(twice) == len(points)
+    np.testing.assert_array_equal(twice[again], threaded[joined])
+
+
 def test_flat_and_missing_normals():
     cancelled = mesh(vertices=[[0, 0, 0], [1, 0, 0], [0, 1, 0]], faces=[[0, 1, 2], [0, 2, 1]])
     arrays = packed(cancelled, mesh(smooth=False)).arrays

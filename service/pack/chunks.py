@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import os
+from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from typing import TypeVar
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 CHUNK = 1 << 14  # rows; a few float64 of each take a megabyte
 
@@ -24,3 +26,18 @@ def in_threads(call: Callable[[T], None], jobs: Sequence[T]) -> None:
         return
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         list(pool.map(call, jobs))
+
+
+def in_order(make: Callable[[T], U], take: Callable[[T, U], None], jobs: Sequence[T]) -> None:
+    """Calls `take` here with every job and what `make` gave for it in some thread, one after the other."""
+    if len(jobs) < 3:
+        for job in jobs:
+            take(job, make(job))
+        return
+    ahead = 2 * (os.cpu_count() or 1)  # what is made and not yet taken
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        made = deque(pool.submit(make, job) for job in jobs[:ahead])
+        for job, following in zip(jobs, [*jobs[ahead:], *[None] * ahead], strict=False):
+            take(job, made.popleft().result())
+            if following is not None:
+                made.append(pool.submit(make, following))

@@ -148,16 +148,16 @@ class Triangles:
 
     def write_normals(self, places: np.ndarray | None, out: np.ndarray) -> None:
         """Fills `layout.TriangleNormals` records."""
-        own_codes = [None if mesh.normals is None else encode(mesh.normals) for mesh in self.meshes]
+        smooth = [None if mesh.normals is None else _Smooth.of(mesh.normals) for mesh in self.meshes]
 
         def some(number: int, which: Rows, where: Rows) -> None:
-            mesh, own = self.meshes[number], own_codes[number]
+            mesh, own = self.meshes[number], smooth[number]
             record = np.zeros(_count(which), layout.TriangleNormals.dtype)
             if own is not None or mesh.tangents is not None:
                 a, b, c = self._corners(number, which)
                 across = np.cross(b - a, c - a)
-                if mesh.normals is not None and own is not None:
-                    _normals(mesh.normals, own, mesh.normal_faces[which], across, record)
+                if own is not None:
+                    own.fill(mesh.normal_faces[which], across, record)
                 else:
                     record["n0"] = record["n1"] = record["n2"] = encode(across)
                 if mesh.tangents is not None:
@@ -213,22 +213,34 @@ def _squares(v: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("ij,ij->i", v, v, dtype=np.float64))
 
 
-def _normals(
-    normals: np.ndarray, codes: np.ndarray, corners: np.ndarray, cross: np.ndarray, record: np.ndarray
-) -> None:
-    """Fills records of faces that meet `normals`, encoded as `codes`, through `corners`, and face along `cross`."""
-    record["bits"] = layout.NORMALS_SMOOTH
-    found = [normals.take(corners[:, k], axis=0) for k in range(3)]
-    # Outward is counter-clockwise: normals of a file that all point inwards are turned round.
-    behind = np.logical_and.reduce([np.einsum("ij,ij->i", normal, cross) < 0 for normal in found])
-    for name, normal, index in zip(("n0", "n1", "n2"), found, corners.T, strict=True):
-        code = codes.take(index)
-        if behind.any():
-            code[behind] = encode(-normal[behind])
-        missing = ~normal.any(axis=1)
-        if missing.any():
-            code[missing] = encode(cross[missing])
-        record[name] = code
+@dataclass(frozen=True)
+class _Smooth:
+    """A mesh's normals, and what is asked of each once, not at each of its corners."""
+
+    normals: np.ndarray
+    codes: np.ndarray
+    missing: np.ndarray | None  # which of them are zero; None: none of them
+
+    @classmethod
+    def of(cls, normals: np.ndarray) -> _Smooth:
+        missing = np.asarray(~normals.any(axis=1))
+        return cls(normals, encode(normals), missing if missing.any() else None)
+
+    def fill(self, corners: np.ndarray, cross: np.ndarray, record: np.ndarray) -> None:
+        """Fills records of faces that meet the normals through `corners`, and face along `cross`."""
+        record["bits"] = layout.NORMALS_SMOOTH
+        across = cross.astype(np.float64)
+        found = [self.normals.take(corners[:, k], axis=0) for k in range(3)]
+        # Outward is counter-clockwise: normals of a file that all point inwards are turned round.
+        behind = np.logical_and.reduce([np.einsum("ij,ij->i", normal, across) < 0 for normal in found])
+        for name, normal, index in zip(("n0", "n1", "n2"), found, corners.T, strict=True):
+            code = self.codes.take(index)
+            if behind.any():
+                code[behind] = encode(-normal[behind])
+            if self.missing is not None:
+                none = self.missing.take(index)
+                code[none] = encode(cross[none])
+            record[name] = code
 
 
 def _tangents(tangents: Tangents, which: Rows, record: np.ndarray) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.pack.chunks import chunks, in_threads
+from service.pack.chunks import chunks, in_order, in_threads
 
 
 def encode(normals: np.ndarray) -> np.ndarray:
@@ -51,23 +51,29 @@ def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
     faces cancel.
     """
     place = same(vertices)
-    count = int(place.max(initial=-1)) + 1
+    sums = np.zeros((3, int(place.max(initial=-1)) + 1))
     joined = np.empty((len(faces), 3), np.int32)
-    sums = np.zeros((3, count))
-    for some in chunks(len(faces)):
+
+    def weighted(some: slice) -> list[np.ndarray]:
+        """Each face's unit normal times its angle at each of its corners."""
         joined[some] = place.take(faces[some])
-        p = vertices.take(faces[some], axis=0)
-        edges = p[:, [1, 2, 0]] - p  # edge k leads from corner k to the next
-        cross = np.cross(edges[:, 0], edges[:, 1])
+        corners = [vertices.take(faces[some, k], axis=0) for k in range(3)]
+        edges = [corners[(k + 1) % 3] - corners[k] for k in range(3)]  # edge k leads from corner k to the next
+        cross = np.cross(edges[0], edges[1])
         twice_area = np.linalg.norm(cross, axis=1)
         unit = np.divide(cross, twice_area[:, None], out=np.zeros_like(cross), where=twice_area[:, None] > 0)
+        angles = (np.arctan2(twice_area, -np.einsum("ij,ij->i", edges[k], edges[k - 1])) for k in range(3))
+        return [angle[:, None] * unit for angle in angles]
+
+    def add(some: slice, rows: list[np.ndarray]) -> None:
         for k in range(3):
-            angle = np.arctan2(twice_area, -np.einsum("ij,ij->i", edges[:, k], edges[:, k - 1]))
-            add_up(sums, joined[some, k], angle[:, None] * unit)
+            add_up(sums, joined[some, k], rows[k])
+
+    in_order(weighted, add, chunks(len(faces)))
     length = np.sqrt(np.einsum("ij,ij->j", sums, sums))
     cancelled = length < 1e-9  # of faces back to back there is nothing left but rounding
     sums /= np.where(cancelled, np.inf, length)
-    return sums.T, joined
+    return np.ascontiguousarray(sums.T), joined  # rows: what takes some of them would copy all of them first
 
 
 def add_up(sums: np.ndarray, which: np.ndarray, rows: np.ndarray) -> None:
@@ -85,9 +91,15 @@ def same(*columns: np.ndarray) -> np.ndarray:
         mixed ^= _bits(axis)
         mixed *= np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
-    _, first, found = np.unique(mixed, return_index=True, return_inverse=True)
-    place = found.astype(np.int32)
-    del mixed, found
+    order = np.argsort(mixed)
+    ranked = mixed[order]
+    begins = np.concatenate([[True], ranked[1:] != ranked[:-1]])[: len(ranked)]
+    if begins.all():
+        return np.arange(len(mixed), dtype=np.int32)
+    place = np.empty(len(mixed), np.int32)
+    place[order] = np.cumsum(begins, dtype=np.int32) - 1
+    first = order[begins]
+    del mixed, ranked, order
     if all(_same(column, first, place) for column in columns):
         return place
     bits = np.stack([_bits(column[:, k]) for column in columns for k in range(column.shape[1])], axis=1)
