@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from service.assets import oddities as oddities_module
 from service.assets.oddities import oddities
 
 POINTS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -39,6 +40,10 @@ FIN = np.array([[0, 1, 4]], np.int32)
         (POINTS, np.array([[0, 0, 1], [1, 1, 1]], np.int32), []),
     ],
 )
-def test_oddities(vertices: np.ndarray, faces: np.ndarray, told: list[str]) -> None:
+@pytest.mark.parametrize("share", [oddities_module.SHARE, 4])
+def test_oddities(
+    vertices: np.ndarray, faces: np.ndarray, told: list[str], share: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(oddities_module, "SHARE", share)
     found = oddities(vertices, np.ascontiguousarray(faces))
     assert len(found) == len(told) and all(re.search(a, b) for a, b in zip(told, found, strict=True)), found

@@ -9,7 +9,7 @@ from service.assets.data import Doubles, Indices
 
 FLAT = 4 * float(np.finfo(np.float32).eps)
 CHUNK = 1 << 14  # triangles at once: a million's float64 copies take a quarter of a gigabyte
-SHARES = 8  # in which the edges of more are looked at: by the remainder of an end's number
+SHARE = 1 << 20  # triangles whose edges are looked at together: those of a million take a tenth of a gigabyte
 
 
 def oddities(vertices: Doubles, faces: Indices) -> list[str]:
@@ -18,7 +18,7 @@ def oddities(vertices: Doubles, faces: Indices) -> list[str]:
     flat = _flat(vertices, faces)
     if flat.any():  # packing tells of these
         faces = faces[~flat]
-    welded = _places(vertices)[faces]
+    welded = _places(vertices).take(faces)
     count = len(vertices)
     twice = _repeated(welded, count)
     if twice:
@@ -42,10 +42,16 @@ def _flat(vertices: Doubles, faces: Indices) -> npt.NDArray[np.bool_]:
     """(m,) which triangles have no area to speak of: the sine of an angle below what float32 tells from 0."""
     flat = np.empty(len(faces), bool)
     for at in range(0, len(faces), CHUNK):
-        a, b, c = (vertices[faces[at : at + CHUNK, k]] for k in range(3))
-        sides = ((b - a) ** 2).sum(axis=1) * ((c - a) ** 2).sum(axis=1)
-        flat[at : at + CHUNK] = (np.cross(b - a, c - a) ** 2).sum(axis=1) <= FLAT**2 * sides
+        a, b, c = (vertices.take(faces[at : at + CHUNK, k], axis=0) for k in range(3))
+        b -= a
+        c -= a
+        flat[at : at + CHUNK] = _squares(np.cross(b, c)) <= FLAT**2 * (_squares(b) * _squares(c))
     return flat
+
+
+def _squares(rows: Doubles) -> Doubles:
+    squares: Doubles = np.einsum("ij,ij->i", rows, rows)
+    return squares
 
 
 def _places(vertices: Doubles) -> Indices:
@@ -55,7 +61,11 @@ def _places(vertices: Doubles) -> Indices:
     for axis in range(3):  # two positions that mix to one number are as good as never: 1e-8 for a million
         mixed = (mixed ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
-    place: Indices = np.unique(mixed, return_inverse=True)[1].astype(np.int32)
+    order = np.argsort(mixed)
+    ranked = mixed[order]
+    begins = np.concatenate([[True], ranked[1:] != ranked[:-1]])[: len(ranked)]
+    place = np.empty(len(mixed), np.int32)
+    place[order] = np.cumsum(begins, dtype=np.int32) - 1
     return place
 
 
@@ -74,14 +84,16 @@ def _repeated(faces: Indices, count: int) -> int:
 def _edges(faces: Indices, count: int) -> tuple[int, int, int]:
     """How many edges have one triangle, more than two, and two that run along it the same way."""
     boundary, crowded, turned = 0, 0, 0
-    shares = 1 if len(faces) < CHUNK else SHARES
+    shares = -(-len(faces) // SHARE)  # by the remainder of an end's number
     for share in range(shares):
         pieces = []
-        for k in range(3):
-            start, end = faces[:, k], faces[:, (k + 1) % 3]
-            these = np.flatnonzero(np.minimum(start, end) % shares == share)
-            a, b = start[these].astype(np.int64), end[these].astype(np.int64)
-            pieces.append((np.minimum(a, b) * count + np.maximum(a, b)) * 2 + (a > b))
+        for at in range(0, len(faces), CHUNK):
+            for k in range(3):
+                start = faces[at : at + CHUNK, k].astype(np.int64)
+                end = faces[at : at + CHUNK, (k + 1) % 3].astype(np.int64)
+                least = np.minimum(start, end)
+                own = (least * count + np.maximum(start, end)) * 2 + (start > end)
+                pieces.append(own if shares == 1 else own[least % shares == share])
         keys = np.concatenate(pieces)
         if not len(keys):
             continue
