@@ -86,6 +86,19 @@ def test_warming_loads_the_libraries(box: Sandbox) -> None:
     assert "OpenImageIO" in maps
 
 
+def test_a_child_starts_without_what_only_the_service_needs() -> None:
+    script = "import sys, service.assets.child; print(*sys.modules)"
+    loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
+    assert "service.assets.child" in loaded
+    assert not {"pydantic", "service.scene", "service.config", "gpu"} & set(loaded)
+
+
+def test_a_child_that_was_started_ahead_reads_the_first_file(box: Sandbox) -> None:
+    box.start()
+    waiting = box._idle[0].process.pid
+    assert pid_of(box) == waiting
+
+
 def test_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sandbox, "SECONDS_PER_BYTE", 0)
     with Sandbox(AssetLimits(seconds=0.5)) as box:

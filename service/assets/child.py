@@ -22,7 +22,6 @@ import numpy as np
 
 from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile
 from service.assets.errors import ParseError
-from service.assets.gltf.scene import read_scene
 from service.assets.wire import Pieces, publish, receive, send
 from service.shared import trim
 
@@ -112,6 +111,7 @@ def _bound(limits: AssetLimits, memory: int) -> None:
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
     """`whole`: of a file that is a scene not its triangles only."""
+    from service.assets.gltf.scene import read_scene
     from service.assets.image import SIGNATURES, parse_image
     from service.assets.mesh import parse_mesh
 

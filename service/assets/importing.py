@@ -9,7 +9,6 @@ from typing import Any
 
 from service.assets.data import SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
-from service.scene import parse_scene
 
 PART = re.compile(r"part:(\d+)")
 
@@ -34,6 +33,8 @@ class Imported:
 
 def take_apart(file: SceneFile, keep: Callable[[ScenePart], str]) -> Imported:
     """`keep` stores a part and gives its id. Raises AssetError, and what `keep` raises."""
+    from service.scene import parse_scene  # a quarter of a second, which each parsing child would wait for, too
+
     ids: list[str] = []
     for part in file.parts:
         try:

@@ -55,6 +55,10 @@ class Sandbox:
         self._idle: list[_Child] = []
         self._closed = False
 
+    def start(self) -> None:
+        """Starts a child for the first file, without waiting."""
+        self._give_back(self._take())
+
     def warm(self) -> None:
         """Starts a child and has it load every library, without waiting: the first file then finds it ready."""
         child = self._take()
