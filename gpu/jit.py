@@ -5,6 +5,7 @@ from __future__ import annotations
 import functools
 import logging
 import os
+import sys
 from collections.abc import Callable
 from hashlib import sha256
 from pathlib import Path
@@ -27,6 +28,14 @@ def _cache() -> Path:
 os.environ.setdefault("NUMBA_CACHE_DIR", str(_cache()))
 
 import numba  # noqa: E402
+
+# numba asks whether scipy has BLAS for it: 0.15 s of the first loop's start, and no loop here multiplies matrices.
+_BLAS = "scipy.linalg.cython_blas"
+if _BLAS not in sys.modules:
+    sys.modules[_BLAS] = cast(Any, None)  # importing it fails at once
+    import numba.np.arraymath
+
+    del sys.modules[_BLAS]
 
 log = logging.getLogger(__name__)
 
