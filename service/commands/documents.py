@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from threading import Thread
 from typing import TYPE_CHECKING, Any
 
 from service.commands import BadInput, files
@@ -114,12 +115,15 @@ def read_settings(assignments: Sequence[str], config: Config, base: dict[str, An
 @contextmanager
 def source_assets(source: Source, roots: Sequence[str], config: Config) -> Iterator[SourceAssets]:
     """Where the scene's assets are: beside its file, in `roots`, and by sha256 in the data folder."""
+    from service import recipe
     from service.assets import AssetStore, FileAssets
     from service.commands.assets import SourceAssets
     from service.documents import Documents
     from service.quota import Quota
 
     uploaded = source.store or AssetStore(config.data_dir, config, _builtin_assets)
+    if recipe.references(source.document):
+        uploaded.loader.sandbox.start()
     with closing(uploaded), FileAssets(source.path.parent, asset_folders(roots), uploaded) as assets:
         quota = Quota(config.data_dir, config.data_quota, Documents(config.data_dir, uploaded).assets_in_use)
         yield SourceAssets(assets, uploaded, quota, source.assets)
@@ -135,8 +139,12 @@ def asset_folders(roots: Sequence[str]) -> list[Path]:
 
 def pack_scene(source: Source, assets: SourceAssets, config: Config) -> Packed:
     """The scene as arrays."""
-    from service.pack import pack
+    from service.pack import pack, warm_builder
+    from service.scene.shape import MeshShape
 
+    if any(isinstance(shape, MeshShape) and shape.asset for shape in source.scene.shapes):
+        # Loading numba takes about as long as the child that parses a large file, for which pack() would wait first.
+        Thread(target=warm_builder).start()
     with refusals(source.pointer):
         return pack(source.scene, assets, limits=config)
 

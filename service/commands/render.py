@@ -44,6 +44,9 @@ def run(arguments: argparse.Namespace) -> int:
     stats = files.writable(Path(arguments.stats)) if arguments.stats else None
     config = configuration()
     given = read_settings(arguments.set or [], config)
+    from service.shared import reuse_freed  # here, as it loads numpy
+
+    reuse_freed()
     source = read_source(Path(arguments.input), arguments.asset_root, config)
     output = Output(path, format, _view(arguments, format, exposure, source.view))
     chosen = read_settings(arguments.set or [], config, source.settings) if source.settings else given
