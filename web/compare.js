@@ -101,7 +101,7 @@ export class Comparison {
   }
 
   #open() {
-    this.#viewport = new Viewport(this.canvas, { names: this.names, painted: ({ header }) => { this.#header = header; this.painted(); } });
+    this.#viewport = new Viewport(this.canvas, { names: (aov) => this.names(aov, this.#stream.document), painted: ({ header }) => { this.#header = header; this.painted(); } });
     this.#stream = new Stream({
       hello: () => this.#viewport?.restart(),
       frame: (header, bytes, view, acknowledge) => this.#viewport?.show(header, bytes, view, acknowledge),

@@ -4,6 +4,7 @@
 import { fetchAssetScene, upload } from "./api.js";
 import { ball, measure, wayOut } from "./bounds.js";
 import { axes } from "./camera.js";
+import { PLAIN, fresh } from "./materials.js";
 import { at, equal, isObject, pointer, put } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
@@ -16,13 +17,6 @@ export const ACCEPT = Object.keys(ENDINGS).map((ending) => `.${ending}`).join(",
 
 const sort = (file) => ENDINGS[file.name.split(".").at(-1).toLowerCase()];
 const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
-
-// A name that is not taken, from one that is wished for.
-function fresh(wanted, taken) {
-  let name = wanted;
-  for (let i = 2; name in taken; i += 1) name = `${wanted}-${i}`;
-  return name;
-}
 
 export class Importer {
   // `acts` is the editor; `messages` tells; `picked(x, y)` gives the shape under a point of the page, or null.
@@ -86,10 +80,8 @@ export class Importer {
   // In sight: the camera goes where it fills the picture, and what lies inside of something else is put beside it.
   #addMesh({ id, bounds, warnings = [] }, file) {
     const { state } = this.acts;
-    // Images need coordinates that a mesh may lack: it gets a plain material of its own then.
-    const isTextured = JSON.stringify(this.acts.material).includes('"texture":');
-    const material = isTextured ? fresh(stem(file), state.scene.materials) : state.chosen.material;
-    const materials = isTextured ? { ...state.scene.materials, [material]: { type: "principled" } } : state.scene.materials;
+    const material = fresh(stem(file), state.scene.materials);
+    const materials = { ...state.scene.materials, [material]: PLAIN };
     let shape = { type: "mesh", asset: id, material };
     let { camera } = state.scene;
     if (bounds) {

@@ -70,13 +70,12 @@ let painted = 0; // the generation on the canvas
 let header = null; // of the frame on the canvas
 let knobs = {}; // what the chosen quality makes of the settings that are not given
 
-const names = (layer) => {
-  const { shapes, materials } = editor.state.scene;
-  return layer === "shape_id" ? shapes.map(({ type, material }, i) => `${i + 1} ${inWords(type)}, ${inWords(material)}`) : Object.keys(materials).map(inWords);
-};
+const names = (layer, { shapes, materials }) => (layer === "shape_id"
+  ? shapes.map(({ type, material }, i) => `${i + 1} ${inWords(type)}, ${inWords(material)}`)
+  : Object.keys(materials).map(inWords));
 
 const viewport = new Viewport(find("picture"), {
-  names,
+  names: (aov) => names(aov, stream.document),
   painted(frame) {
     ({ header } = frame);
     root.classList.add("live");
@@ -142,7 +141,7 @@ editor.frame = (thing) => stage.frame(thing);
 editor.framed = (around) => stage.framed(around);
 editor.radius = () => stage.radius();
 const panel = new Panel(find("panel"), {
-  schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch),
+  schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch), say: (text) => announcer.say(text),
 });
 const comparison = new Comparison(
   { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },

@@ -1,6 +1,7 @@
 // What the scene contains, as a list to pick from; and which fields the picked thing has.
 
 import { element } from "./dom.js";
+import { PLAIN, added } from "./materials.js";
 import { at, equal, pointer } from "./patch.js";
 import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
@@ -45,6 +46,7 @@ export class Outliner {
   #shown = null;
   #made = null; // what the form was made for
   #forms = [];
+  #newMaterial = element("option", {}, "New material");
 
   // `acts` is the editor; `root` the panel.
   constructor(root, schema, acts) {
@@ -58,6 +60,7 @@ export class Outliner {
     });
     this.list.addEventListener("keydown", (event) => this.#walk(event));
     this.#find("thing-material").addEventListener("change", ({ target }) => {
+      if (target.selectedOptions[0] === this.#newMaterial) return acts.change(added(acts.state, "material", PLAIN));
       acts.edit(`/scene${this.thing}/material`, target.value);
       acts.select(this.thing);
     });
@@ -109,7 +112,9 @@ export class Outliner {
     this.#find("thing-material-row").hidden = !isShape;
     if (isShape) {
       const names = Object.keys(scene.materials);
-      this.#find("thing-material").replaceChildren(...names.map((name) => element("option", { value: name }, inWords(name))));
+      this.#find("thing-material").replaceChildren(
+        ...names.map((name) => element("option", { value: name }, inWords(name))), element("hr"), this.#newMaterial,
+      );
       this.#find("thing-material").value = document.material;
     }
     const marks = [transforms.isSkewed(document?.transform) && "skewed", this.acts.removable(this.thing) && "removable"].filter(Boolean);

@@ -3,7 +3,9 @@
 
 import { element } from "./dom.js";
 import { OWN, fillPicker, materialButtons } from "./library.js";
+import { MaterialPanel } from "./material-panel.js";
 import { Outliner, additions } from "./outliner.js";
+import { PLAIN, fresh } from "./materials.js";
 import { equal } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
@@ -24,8 +26,9 @@ export class Panel {
   #forms = {};
   #shape = {}; // what the exchangeable forms were made for
 
-  // `acts`: the editor, and takeTexture(place, file), frame(thing), radius(). `paint` as materialButtons wants it.
-  constructor(root, { schema, library, acts, paint }) {
+  // `acts`: the editor, and takeTexture(place, file), frame(thing), radius(). `paint` as materialButtons wants it,
+  // `say(text)` reads out.
+  constructor(root, { schema, library, acts, paint, say }) {
     this.root = root;
     this.acts = acts;
     this.materials = materialModels(schema.scene);
@@ -37,6 +40,7 @@ export class Panel {
     this.#forms.settings = this.#mount("settings", main, "/settings");
     this.#forms.more = this.#mount("more", settings.filter((field) => !main.includes(field)), "/settings");
     this.outliner = new Outliner(root, schema, acts);
+    this.materialPanel = new MaterialPanel(root, { acts, say });
     this.#qualities = qualityChoice(this.#find("qualities"), (name) => acts.edit("/settings/quality", name));
     this.#pickers(library, paint);
     this.#additions(schema.scene);
@@ -68,7 +72,10 @@ export class Panel {
       const offer = offers[Number(add.value)];
       add.value = "";
       const { acts } = this;
-      acts.add(offer.kind, offer.make(acts.camera, acts.radius(), acts.state.chosen.material));
+      const { materials } = acts.state.scene;
+      const material = fresh(offer.title.toLowerCase(), materials);
+      const own = offer.kind === "shapes" ? { materials: { ...materials, [material]: PLAIN } } : {};
+      acts.add(offer.kind, offer.make(acts.camera, acts.radius(), material), own);
     });
   }
 
@@ -98,6 +105,7 @@ export class Panel {
     this.#find("environment").value = chosen.environment ?? NONE;
     this.#find("environment").options[0].text = home.environment ? "The scene's own" : "The scene's own: none";
     this.#showMaterial(scene, chosen);
+    this.materialPanel.show(state);
     this.outliner.show(state);
     this.#forms.view.show(view);
     this.#forms.settings.show(settings, knobs);

@@ -13,7 +13,7 @@ export function equal(a, b) {
 // RFC 7396, with the service's rule that a patch which changes an object's `type` replaces it whole.
 export function merge(target, patch) {
   if (!isObject(patch)) return patch;
-  const fresh = !isObject(target) || ("type" in patch && "type" in target && patch.type !== target.type);
+  const fresh = !isObject(target) || ("type" in patch && changesType(target, patch));
   const result = fresh ? {} : { ...target };
   for (const [key, value] of Object.entries(patch)) {
     if (value === null) delete result[key];
@@ -22,10 +22,13 @@ export function merge(target, patch) {
   return result;
 }
 
+// Only texts and absence count: in a table of materials, "type" may be somebody's material.
+const changesType = (from, to) => from.type !== to.type && [from.type, to.type].every((kind) => kind === undefined || typeof kind === "string");
+
 // The patch that leads from one document to another, or undefined where they are the same.
 export function diff(from, to) {
   if (from === to) return undefined;
-  if (!isObject(from) || !isObject(to) || from.type !== to.type) return equal(from, to) ? undefined : to;
+  if (!isObject(from) || !isObject(to) || changesType(from, to)) return equal(from, to) ? undefined : to;
   const patch = {};
   for (const key of Object.keys(from)) if (to[key] === undefined) patch[key] = null;
   for (const [key, value] of Object.entries(to)) {

@@ -6,7 +6,7 @@
 
 import { Problem, message, parseFrame } from "./api.js";
 import { Connection } from "./connection.js";
-import { diff, equal } from "./patch.js";
+import { diff, equal, merge } from "./patch.js";
 
 // A renderer that says nothing for so long (loading, compiling) doesn't hold up the next update.
 const PATIENCE_MS = 3000;
@@ -23,6 +23,7 @@ export class Stream {
   #generation = 0; // rises over all connections
   #wanted = null; // {scene, settings, view}: what the user wants to see
   #sent = null; // the same, as the server was told; null: it must be told everything
+  #document = null; // the scene of #sent as patches have made it over there, where a new name is always the last one
   #valid = null; // the last of which a frame came
   #previous = null; // what an update on its way changes: the server goes on with that if it refuses
   #refused = null; // what the server did not take: not offered again unchanged
@@ -49,6 +50,9 @@ export class Stream {
   }
 
   get session() { return this.#session; }
+
+  // The scene with its names in the server's order, by which its layers number them.
+  get document() { return this.#document; }
 
   connect() { this.#connection.open(); }
 
@@ -149,6 +153,7 @@ export class Stream {
     if (!this.#pending && (patch.scene !== undefined || patch.settings !== undefined)) {
       this.#previous = this.#sent;
       this.#sent = { ...this.#sent, scene, settings };
+      this.#document = merge(this.#document, patch.scene ?? {});
       this.#connection.send(message.update(this.#expect(), patch));
     } else if (!this.#pending) this.#sent = { ...this.#sent, scene, settings }; // the same in other words
     if (diff(this.#sent.view, view)) {
@@ -161,6 +166,7 @@ export class Stream {
     if (this.#refused && diff(this.#refused, this.#wanted) === undefined) return;
     this.#previous = null;
     this.#sent = this.#wanted;
+    this.#document = this.#sent.scene;
     this.#connection.send(message.start(this.#expect(), this.#sent));
     this.#tellView();
   }

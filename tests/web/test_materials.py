@@ -1,0 +1,101 @@
+"""The scene's materials: new ones, copies, names, and what happens to things whose material goes."""
+
+from __future__ import annotations
+
+from tests.web.conftest import Editor
+from tests.web.test_keeping import TRIANGLE
+from tests.web.test_things import document
+
+
+def test_what_is_new_shares_no_material(editor: Editor) -> None:
+    page, users = editor.page, "#material-users"
+    editor.settled()
+    editor.tab("scene")
+    page.select_option("#add", label="Sphere")
+    editor.tab("material")
+    assert editor.text(users) == "Sphere 2 is made of it."
+    page.click("#material-presets [data-name=copper]")
+    editor.wait(
+        "copper", lambda: page.get_attribute("#material-presets [data-name=copper]", "aria-pressed") == "true"
+    )
+    editor.drop("#stage", {"wing.obj": TRIANGLE})
+    editor.wait("the mesh", lambda: editor.text(users) == "Mesh is made of it.")
+    page.click("#material-presets [data-name=chalk]")
+
+    editor.tab("scene")
+    page.click("#thing-acts >> text=Duplicate")
+    editor.tab("material")
+    assert editor.text(users) == "Mesh and Mesh 2 are made of it.", "sharing is told"
+    page.click("#own-material")
+    assert editor.text(users) == "Mesh 2 is made of it." and page.is_hidden("#own-material")
+    page.click("#new-material")
+    scene = document(editor)
+    assert [shape["material"] for shape in scene["shapes"]] == ["subject", "floor", "sphere", "wing", "material"]
+    made = scene["materials"]
+    assert list(made) == ["subject", "floor", "sphere", "wing", "wing-2", "material"]
+    assert made["subject"] != made["sphere"] != made["wing"]
+    assert made["wing-2"] == made["wing"] and made["material"] == {"type": "principled"}
+    editor.settled()
+    assert editor.text("#messages") == ""
+
+
+def test_a_material_is_renamed(editor: Editor) -> None:
+    page, name = editor.page, "dialog[open] input"
+    editor.settled()
+    page.click("#rename-material")
+    page.fill(name, "floor")
+    page.keyboard.press("Enter")
+    assert editor.text("dialog[open] .trouble") == "There is a material named floor already."
+    page.fill(name, "type")  # in patches the word means something
+    page.keyboard.press("Enter")
+    editor.wait("the end of the question", lambda: page.locator("dialog[open]").count() == 0)
+    assert page.input_value("#material") == "type"
+    before = editor.settled()
+    page.click("#material-presets [data-name=gold]")
+    editor.wait_for_change(before)
+    assert editor.text("#messages") == ""
+    scene = document(editor)
+    assert set(scene["materials"]) == {"type", "floor"} and scene["shapes"][0]["material"] == "type"
+
+    # Over there the new name came last: layers number the materials so.
+    editor.tab("render")
+    page.select_option("#layer", "material_id")
+    editor.wait("the legend", lambda: page.is_visible("#legend"))
+    page.keyboard.press("Control+z")
+    page.keyboard.press("Control+z")
+    editor.wait("the first name", lambda: "Subject" in editor.text("#legend"))
+    script = (
+        """([x, y]) => [...picture.getContext("2d").getImageData(x * picture.width, y * picture.height, 1, 1).data]"""
+    )
+    ball, floor = (page.evaluate(script, place)[:3] for place in ((0.5, 0.5), (0.5, 0.95)))
+    keys = page.eval_on_selector_all(
+        "#legend .key", "all => all.map((key) => [key.innerText, getComputedStyle(key.firstChild).backgroundColor])"
+    )
+    shown = {text: [int(x) for x in color[4:-1].split(",")] for text, color in keys}
+    assert shown == {"Subject": ball, "Floor": floor}
+
+
+def test_a_material_in_use_is_deleted_for_another(editor: Editor) -> None:
+    page = editor.page
+    before = editor.settled()
+    page.click("#delete-material")
+    assert "One thing is made of it." in editor.text("dialog[open]")
+    page.keyboard.press("Escape")
+    assert page.is_disabled("#undo"), "nothing was changed"
+    page.click("#delete-material")
+    page.click("dialog[open] .primary")
+    editor.wait_for_change(before)
+    assert page.input_value("#material") == "floor" and page.is_disabled("#delete-material")
+    assert editor.text("#material-users") == "Sphere and Quad are made of it."
+    page.click("#duplicate-material")
+    page.select_option("#material", "floor-2")
+    editor.tab("scene")
+    page.select_option("#thing-material", label="Floor")
+    editor.tab("material")
+    page.select_option("#material", "floor-2")
+    assert editor.text("#material-users") == "Nothing is made of it yet."
+    page.click("#delete-material")  # nobody has to be asked
+    assert page.locator("dialog[open]").count() == 0 and page.input_value("#material") == "floor"
+    for _ in range(4):
+        page.keyboard.press("Control+z")
+    editor.wait("the ball's material", lambda: not editor.differs(before, 8))
