@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -20,6 +21,19 @@ class Imported:
     document: dict[str, Any]
     warnings: list[dict[str, Any]]
     lit: bool  # has lights of its own
+
+    @classmethod
+    def read(cls, text: bytes) -> Imported:
+        """What `written` gave. Raises ValueError."""
+        try:
+            found = cls(**json.loads(text))
+            found.references()
+            return found
+        except (TypeError, KeyError, AttributeError):
+            raise ValueError("this is no record of an import") from None
+
+    def written(self) -> bytes:
+        return json.dumps(vars(self)).encode()  # not asdict: it would copy the whole document
 
     def scene(self, environment: dict[str, Any]) -> dict[str, Any]:
         """The document; under `environment` where the file has no light."""

@@ -5,9 +5,8 @@ import json
 import logging
 import os
 import re
-import tempfile
 from collections.abc import Callable, Iterator
-from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import asdict, replace
 from pathlib import Path
 from typing import BinaryIO, Protocol
@@ -16,17 +15,21 @@ import numpy as np
 
 from service.assets.data import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
 from service.assets.errors import ParseError
+from service.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
 from service.assets.importing import Imported, take_apart
+from service.assets.integrity import Integrity, damaged
 from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
 from service.assets.sniff import KINDS, sniff
-from service.assets.source import Source, digest, format_of, handed, length, write
+from service.assets.source import Source, digest, format_of, handed, length
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 
 log = logging.getLogger(__name__)
 
 ID = re.compile(r"sha256:[0-9a-f]{64}")
-SCENE = ".scene.json"  # of an asset that is one: its document
 FORMATS = "OBJ, PLY, STL, glTF and GLB meshes; EXR, Radiance HDR, PNG, JPEG and WebP images"
+
+
+Room = Callable[[int], AbstractContextManager[None]]
 
 
 class HasLimits(Protocol):
@@ -52,6 +55,7 @@ class AssetStore:
     """For any number of threads, and for several processes on one folder.
 
     `builtin` gives assets that are there without having been uploaded, by id; it is called when one is first missed.
+    `room` is entered with a number of bytes before they are stored, left afterwards, and raises where they have none.
     """
 
     def __init__(
@@ -59,15 +63,18 @@ class AssetStore:
         root: Path,
         config: HasLimits | None = None,
         builtin: Callable[[], dict[str, bytes]] | None = None,
+        room: Room = lambda size: nullcontext(),
     ) -> None:
         self.loader = Loader(_limits(config))
-        self._folder = root / "assets"
+        self._files = AssetFolder(root / "assets")
+        self._integrity = Integrity(self._files)
         self._builtin = builtin
+        self._room = room
 
     def incoming(self) -> BinaryIO:
         """A file without a name, for an upload; gone when it is closed. Raises Unavailable."""
         with self._storing("new"):
-            return tempfile.TemporaryFile(dir=self._folder)
+            return self._files.nameless()
 
     def receive(self, file: BinaryIO, more: bytes) -> None:
         """Raises Unavailable where the disk takes no more."""
@@ -76,10 +83,13 @@ class AssetStore:
             file.flush()
 
     def add(self, data: Source, content_type: str | None = None, filename: str | None = None) -> AssetInfo:
-        """Keeps the bytes, once they have been parsed. Raises UnsupportedMedia, AssetError, Unavailable."""
+        """Keeps the bytes, once they have been parsed; in the place of the same ones if these are damaged.
+
+        Raises UnsupportedMedia, AssetError, Unavailable, and what `room` raises.
+        """
         id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
-        if known is not None:
+        if known is not None and self._is_whole(known):
             return known
         if not size:
             raise AssetError("the asset is empty")
@@ -87,10 +97,10 @@ class AssetStore:
         if format is None:
             raise UnsupportedMedia(f"this is none of the formats known: {FORMATS}")
         if KINDS[format] == "scene":
-            info = self._import(id, format, data)
-        else:
-            info = _describe(id, format, size, self._parse(id, format, lambda: nullcontext(data)))
-        self._store(info, data)
+            return self._import(id, format, data, new=True)[0]
+        info = self._described(id, format, data)
+        with self._room(size):
+            self._store(info, data)
         return info
 
     def scene(self, id: str) -> Imported:
@@ -98,31 +108,26 @@ class AssetStore:
         info = self.info(id)
         if info.kind != "scene":
             raise NotFound(f"{id[:100]} is no scene: it is {'an image' if info.kind == 'image' else 'a mesh'}")
-        try:
-            imported = Imported(**json.loads(self._path(id, SCENE).read_bytes()))
-            if all(self._known(reference) for reference in imported.references()):
-                return imported
-        except (OSError, ValueError, TypeError):
-            pass  # nothing of it is lost: the file itself is still here
-        with self._opened(id) as source:
-            self._import(id, info.format, source)
-        return Imported(**json.loads(self._path(id, SCENE).read_bytes()))
+        imported = self._imported(id)
+        if imported is None:  # nothing of it is lost: the file itself is still here
+            with self.opened(id) as source:
+                imported = self._import(id, info.format, source, new=False)[1]
+        return imported
 
     def read(self, id: str) -> bytes:
         """Raises NotFound."""
-        with self._opened(id) as source:
+        with self.opened(id) as source:
             return source if isinstance(source, bytes) else source.read()
 
-    def _opened(self, id: str) -> AbstractContextManager[bytes | BinaryIO]:
-        """Raises NotFound."""
-        if self._known(id):
-            try:
-                with suppress(OSError):
-                    os.utime(self._path(id))  # who makes room goes by this
-                return self._path(id).open("rb")
-            except FileNotFoundError:  # to make room, just now
-                pass
-        return nullcontext(self._builtin_bytes(id))
+    @contextmanager
+    def opened(self, id: str, again: bool = False) -> Iterator[bytes | BinaryIO]:
+        """An asset's bytes, checked as `Integrity.open` says. Raises NotFound, also where they are damaged."""
+        file = self._integrity.open(id, again) if self._known(id) is not None else None
+        if file is None:
+            yield self._builtin_bytes(id)
+        else:
+            with file:
+                yield file
 
     def holds(self, id: str) -> bool:
         return self._known(id) is not None or (self._builtin is not None and id in self._builtin())
@@ -133,8 +138,7 @@ class AssetStore:
         if known:
             return known
         data = self._builtin_bytes(id)
-        format = _format(data)
-        return _describe(id, format, len(data), self._parse(id, format, lambda: nullcontext(data)))
+        return self._described(id, _format(data), data)
 
     def mesh(self, ref: str) -> MeshData:
         """Raises AssetError."""
@@ -151,39 +155,65 @@ class AssetStore:
     def close(self) -> None:
         self.loader.close()
 
-    def _import(self, id: str, format: str, data: Source) -> AssetInfo:
-        """Stores the parts of a scene and its document, not the file itself."""
+    def _import(self, id: str, format: str, data: Source, new: bool) -> tuple[AssetInfo, Imported]:
+        """Stores the parts of a scene and its document, and the file itself where that is `new`."""
         try:
             file = self.loader.sandbox.parse_scene(format, handed(data))
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
-        imported = take_apart(file, self._keep)
-        with self._storing(id):
-            self._write(self._path(id, SCENE), json.dumps(vars(imported)).encode())
-        warnings = imported.warnings or None
-        return AssetInfo(id, "scene", format, length(data), triangles=file.triangles, warnings=warnings)
+        size = length(data)
+        with self._room(sum(len(part.data) for part in file.parts) + (size if new else 0)):
+            imported = take_apart(file, self._keep)
+            warnings = imported.warnings or None
+            info = AssetInfo(id, "scene", format, size, triangles=file.triangles, warnings=warnings)
+            if new:
+                self._store(info, data, imported)
+            else:
+                with self._storing(id):
+                    self._files.put(id, {SCENE: imported.written()})
+        return info, imported
 
     def _keep(self, part: ScenePart) -> str:
-        """The id of a part of a scene, stored as an asset of its own."""
+        """The id of a part of a scene, stored as an asset of its own.
+
+        Without waiting for the disk, 15 ms a part: a scene has thousands, and can be imported again. Raises
+        AssetError, UnsupportedMedia, Unavailable.
+        """
         id = "sha256:" + hashlib.sha256(part.data).hexdigest()
-        if self._known(id) is None:
-            if part.triangles is None:
-                return self.add(bytes(part.data)).id
+        if self._is_sound(id):
+            return id
+        if part.triangles is not None:
             info = AssetInfo(id, "mesh", "ply", len(part.data), vertices=part.vertices, triangles=part.triangles)
-            self._store(info, part.data, lasting=False)
+        else:
+            format = format_of(part.data)
+            if format is None:
+                raise UnsupportedMedia(f"{part.pointer}: this is none of the formats known: {FORMATS}")
+            info = self._described(id, format, part.data)
+        self._store(info, part.data, lasting=False)
         return id
 
-    def _store(self, info: AssetInfo, data: Source, lasting: bool = True) -> None:
-        """Not `lasting`: what can be made again needs no wait for the disk, 15 ms a part; a scene has thousands."""
+    def _imported(self, id: str, again: bool = False) -> Imported | None:
+        """What a scene was imported as; None where not all of it is here any more. `again`: as of `opened`."""
+        try:
+            imported = Imported.read(self._files.file(id, SCENE).read_bytes())
+        except (OSError, ValueError):
+            return None
+        sound = [self._is_sound(reference, again) for reference in imported.references()]  # finds all that is damaged
+        return imported if all(sound) else None
+
+    def _store(self, info: AssetInfo, data: Source, scene: Imported | None = None, lasting: bool = True) -> None:
+        files: dict[str, Source] = {"": data}
+        if scene is not None:
+            files[SCENE] = scene.written()
+        files[RECORD] = json.dumps(asdict(info)).encode()
         with self._storing(info.id):
-            self._write(self._path(info.id), data, lasting)
-            self._write(self._path(info.id, ".json"), json.dumps(asdict(info)).encode(), lasting)
+            changed = self._files.put(info.id, files, lasting)
+        self._integrity.stored(info.id, changed)
         log.info("asset stored id=%s format=%s bytes=%d", info.id, info.format, info.bytes)
 
     @contextmanager
     def _storing(self, id: str) -> Iterator[None]:
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
             yield
         except OSError as error:
             log.error("could not store an asset id=%s error=%s", id, error)
@@ -195,9 +225,9 @@ class AssetStore:
         known = self._known(ref)
         try:
             format = known.format if known else _format(self._builtin_bytes(ref))
+            return self._parse(ref, format, lambda: self.opened(ref))
         except NotFound as error:
             raise AssetError(error.detail) from None
-        return self._parse(ref, format, lambda: self._opened(ref))
 
     def _parse(self, id: str, format: str, opened: Callable[[], AbstractContextManager[Source]]) -> Parsed:
         def parse() -> Parsed:
@@ -209,13 +239,30 @@ class AssetStore:
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
 
+    def _described(self, id: str, format: str, data: Source) -> AssetInfo:
+        """Of a mesh or an image. Raises AssetError."""
+        return _describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data)))
+
+    def _is_whole(self, info: AssetInfo) -> bool:
+        """Whether nothing that was stored of an asset is damaged or gone, the parts of a scene included."""
+        if not self._is_sound(info.id, again=True):
+            return False
+        return info.kind != "scene" or self._imported(info.id, again=True) is not None
+
+    def _is_sound(self, id: str, again: bool = False) -> bool:
+        try:
+            with self.opened(id, again):
+                return True
+        except NotFound:
+            return False
+
     def _known(self, id: str) -> AssetInfo | None:
         """What stands beside the bytes: it is written last, so that it vouches for them."""
         if not ID.fullmatch(id):
             return None
         try:
-            info = AssetInfo(**json.loads(self._path(id, ".json").read_bytes()))
-            if self._path(id).stat().st_size != info.bytes:
+            info = AssetInfo(**json.loads(self._files.file(id, RECORD).read_bytes()))
+            if self._files.file(id).stat().st_size != info.bytes:
                 return None  # the power failed before the disk had it all
             return replace(info, kind=KINDS[info.format])  # an older version took glTF for a mesh
         except (OSError, ValueError, TypeError, KeyError):
@@ -224,32 +271,10 @@ class AssetStore:
     def _builtin_bytes(self, id: str) -> bytes:
         found = self._builtin().get(id) if self._builtin and ID.fullmatch(id) else None
         if found is None:
+            if ID.fullmatch(id) and self._files.file(id, DAMAGED).exists():
+                raise damaged(id)
             raise NotFound(f"there is no asset {id[:100]!r} here; upload it first")
         return found
-
-    def _path(self, id: str, suffix: str = "") -> Path:
-        return self._folder / (id.removeprefix("sha256:") + suffix)
-
-    def _write(self, path: Path, data: Source, lasting: bool = True) -> None:
-        """Whole or not at all; where it is to last also when the power fails."""
-        fd, beside = tempfile.mkstemp(prefix=".", suffix=".tmp", dir=self._folder)
-        try:
-            with open(fd, "wb") as file:
-                write(data, file)
-                file.flush()
-                if lasting:
-                    os.fsync(fd)
-            os.replace(beside, path)
-        except BaseException:
-            os.unlink(beside)
-            raise
-        if not lasting:
-            return
-        folder = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY)
-        try:
-            os.fsync(folder)
-        finally:
-            os.close(folder)
 
 
 def _limits(config: HasLimits | None) -> AssetLimits:
