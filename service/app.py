@@ -24,15 +24,13 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from service import presets
-from service.assets import AssetStore
 from service.config import Config
 from service.connection_limits import Watch
 from service.connections import connection_class, listen
-from service.documents import Documents
+from service.documents import DamagedFile
 from service.guard import Guard, turning_away
 from service.logs import Requests
 from service.problems import Unavailable
-from service.quota import Quota
 from service.rendering.engine import Engine
 from service.rendering.process import Options
 from service.rendering.reading import Reader
@@ -43,6 +41,7 @@ from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import respond, tell_errors
 from service.routes.house import MESSAGE_BYTES, House
+from service.storage import storage
 
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # proxies cut connections that are idle for a minute
@@ -65,16 +64,14 @@ log = logging.getLogger(__name__)
 
 def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
-    store = AssetStore(config.data_dir, config, presets.builtin_assets)
-    saved = Documents(config.data_dir, store)
-    quota = Quota(config.data_dir, config.data_quota, saved.assets_in_use, lambda: saved.bytes)
+    kept = storage(config)
     own = House(
         config,
-        store,
-        Reader(config, store),
+        kept.assets,
+        Reader(config, kept.assets),
         Engine(Options(config.device, config.hang_s, config.gpu_memory, config.checkpoint_s)),
-        saved,
-        quota,
+        kept.documents,
+        kept.quota,
         Renders(_bounds(config)),
     )
     app = FastAPI(
@@ -111,6 +108,12 @@ def run(config: Config) -> int:
         log.warning(OPEN_TO_ALL, host)
     app = create_app(config)
     own: House = app.state.house
+    try:
+        own.documents.prepare()
+    except DamagedFile as error:
+        log.error("did not start: %s", error)
+        return 1
+    own.quota.clear()
     full = Requests(turning_away(FULL, respond), refuse=respond, heard=own.traffic.heard)
     settings = uvicorn.Config(
         app,

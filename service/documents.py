@@ -6,7 +6,7 @@ import json
 import logging
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager, suppress
+from contextlib import closing, contextmanager, nullcontext
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from service import recipe
 from service.assets import AssetStore
 from service.problems import FieldError, InvalidDocument, NotFound, Unavailable
+from service.quota import Quota
 from service.scene import Material, parse_scene
 from service.scene.mistakes import escaped, validated
 
@@ -23,24 +24,72 @@ log = logging.getLogger(__name__)
 KINDS = ("scenes", "materials")
 LONGEST_NAME = 100  # characters
 BUSY_S = 10.0  # how long a writer waits for another one
+LOG_BYTES = 4 << 20  # to which the log is cut after a large document; by itself it keeps that size while others read
 
-_TABLES = """
+VERSION = 1  # of the tables, in the file's user_version; 0: bodies in the key's own tree, and pages never given back
+_TABLES = f"""
+BEGIN IMMEDIATE;
 CREATE TABLE IF NOT EXISTS documents (
     kind TEXT NOT NULL, name TEXT NOT NULL, title TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (kind, name)
-) WITHOUT ROWID;
+);
 CREATE TABLE IF NOT EXISTS uses (
     asset TEXT NOT NULL, kind TEXT NOT NULL, name TEXT NOT NULL, PRIMARY KEY (asset, kind, name)
 ) WITHOUT ROWID;
+PRAGMA user_version = {VERSION};
+COMMIT;
+"""
+# Looking for a name in a table without row ids reads the bodies on the way: 0.5 s beside one of 256 MiB.
+_CONVERSION = f"""
+BEGIN IMMEDIATE;
+ALTER TABLE documents RENAME TO former;
+CREATE TABLE documents (
+    kind TEXT NOT NULL, name TEXT NOT NULL, title TEXT NOT NULL, body TEXT NOT NULL, PRIMARY KEY (kind, name)
+);
+INSERT INTO documents SELECT kind, name, title, body FROM former;
+DROP TABLE former;
+PRAGMA user_version = {VERSION};
+COMMIT;
 """
 _MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
 
 
-class Documents:
-    """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails."""
+class DamagedFile(Exception):
+    """The file of the documents can't be used; the text is for whoever started the service."""
 
-    def __init__(self, folder: Path, assets: AssetStore) -> None:
+
+class Documents:
+    """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails.
+
+    `quota` makes room for what is saved; None: there is room.
+    """
+
+    def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None) -> None:
         self._path = folder / "documents.sqlite3"
         self._assets = assets
+        self._quota = quota
+
+    def prepare(self) -> None:
+        """Looks at the file and converts what an earlier version wrote, once, which takes as long as copying it does.
+
+        Raises DamagedFile.
+        """
+        if not self._path.exists():
+            return
+        try:
+            with self._connected() as database:
+                self._convert(database)
+                for table in ("documents", "uses"):
+                    database.execute(f"SELECT count(*) FROM {table}").fetchone()
+        except (OSError, sqlite3.Error) as error:
+            if _is_full(error):
+                log.warning("could not compact the saved documents file=%s error=%s", self._path, error)
+            elif isinstance(error, sqlite3.OperationalError | OSError):  # that may pass: others have it, or rights
+                log.error("could not open the saved documents file=%s error=%s", self._path, error)
+            else:
+                raise DamagedFile(
+                    f"the file of the saved documents is damaged ({error}): {self._path}; put a backup in its place, "
+                    "or move it away to start with none"
+                ) from None
 
     def names(self, kind: str) -> list[dict[str, str]]:
         """`[{name, title}]` in the order of the titles. Raises NotFound for an unknown kind."""
@@ -49,14 +98,15 @@ class Documents:
             rows = database.execute("SELECT name, title FROM documents WHERE kind = ? ORDER BY title, name", (kind,))
             return [{"name": name, "title": title} for name, title in rows]
 
-    def get(self, kind: str, name: str) -> Any:
-        """The bare document. Raises NotFound."""
+    def get(self, kind: str, name: str) -> str:
+        """The bare document, as JSON. Raises NotFound."""
         _check_kind(kind)
         with self._open() as database:
             row = database.execute("SELECT body FROM documents WHERE kind = ? AND name = ?", (kind, name)).fetchone()
         if row is None:
             raise _missing(kind, name)
-        return json.loads(row[0])
+        text: str = row[0]
+        return text
 
     def put(self, kind: str, name: str, document: Any, title: str | None = None) -> tuple[str, bool]:
         """Saves a valid document in the place of what had the name; its title now, and whether nothing had it.
@@ -67,13 +117,19 @@ class Documents:
         self._validate(kind, document)
         uses = recipe.references(document) if kind == "scenes" else []
         body = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
-        with self._open() as database, database:
-            key = (kind, name)
-            old = database.execute("SELECT title FROM documents WHERE kind = ? AND name = ?", key).fetchone()
-            kept = title or (old[0] if old else name)
-            database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?)", (*key, kept, body))
-            database.execute("DELETE FROM uses WHERE kind = ? AND name = ?", key)
-            database.executemany("INSERT INTO uses VALUES (?, ?, ?)", [(asset, *key) for asset in uses])
+        key = (kind, name)
+        # Whoever makes room meanwhile spares these assets, so that a document which is refused costs nobody anything.
+        with self._quota.pinned(uses) if self._quota else nullcontext():
+            self._find_assets(document, uses)
+            room = self._quota.room(len(body.encode())) if self._quota else nullcontext()
+            with room, self._open() as database, database:
+                database.execute("BEGIN IMMEDIATE")
+                self._find_assets(document, uses)  # again: another process may have made room
+                old = database.execute("SELECT title FROM documents WHERE kind = ? AND name = ?", key).fetchone()
+                kept = title or (old[0] if old else name)
+                database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?)", (*key, kept, body))
+                database.execute("DELETE FROM uses WHERE kind = ? AND name = ?", key)
+                database.executemany("INSERT INTO uses VALUES (?, ?, ?)", [(asset, *key) for asset in uses])
         log.info("document saved kind=%s name=%s bytes=%d", kind, name, len(body))
         return kept, old is None
 
@@ -87,48 +143,84 @@ class Documents:
             raise _missing(kind, name)
         log.info("document deleted kind=%s name=%s", kind, name)
 
-    def assets_in_use(self) -> set[str]:
-        """The ids of all assets that saved documents refer to."""
+    @contextmanager
+    def assets_in_use(self) -> Iterator[set[str]]:
+        """The ids of all assets that saved documents refer to; while it lasts no document is saved."""
         if not self._path.exists():
-            return set()
-        with self._open() as database:
-            return {asset for (asset,) in database.execute("SELECT DISTINCT asset FROM uses")}
+            yield set()
+            return
+        with self._open() as database, database:
+            database.execute("BEGIN IMMEDIATE")
+            yield {asset for (asset,) in database.execute("SELECT DISTINCT asset FROM uses")}
 
     @property
     def bytes(self) -> int:
-        """Of the file and its log."""
-        total = 0
-        for path in self._path.parent.glob(self._path.name + "*"):
-            with suppress(FileNotFoundError):  # the log goes when the last one who reads or writes has done so
-                total += path.stat().st_size
-        return total
+        """What the documents take, without the log beside them, which goes when nobody has the file open."""
+        if not self._path.exists():
+            return 0
+        with self._open() as database:
+            pages, free, size = (
+                database.execute(f"PRAGMA {name}").fetchone()[0]
+                for name in ("page_count", "freelist_count", "page_size")
+            )
+        return int((pages - free) * size)
 
     def _validate(self, kind: str, document: Any) -> None:
         if kind == "materials":
             validated(_MATERIAL, document, "")
-            return
-        parse_scene(document)
-        errors = [
-            FieldError("".join(f"/{escaped(step)}" for step in place), f"there is no asset {ref[:100]!r} here")
-            for place, ref in recipe.places(document)
-            if not self._assets.holds(ref)
-        ]
-        if errors:
-            raise InvalidDocument(errors)
+        else:
+            parse_scene(document)
+
+    def _find_assets(self, document: Any, uses: list[str]) -> None:
+        """Raises InvalidDocument where one of them is not here."""
+        missing = {ref for ref in uses if not self._assets.holds(ref)}
+        if missing:
+            raise InvalidDocument(
+                FieldError("".join(f"/{escaped(step)}" for step in place), f"there is no asset {ref[:100]!r} here")
+                for place, ref in recipe.places(document)
+                if ref in missing
+            )
+
+    def _convert(self, database: sqlite3.Connection) -> None:
+        (version,) = database.execute("PRAGMA user_version").fetchone()
+        if version > VERSION:
+            raise DamagedFile(f"a newer version of Sunbox wrote the saved documents: {self._path}")
+        if version < VERSION:
+            log.info("converting the saved documents file=%s", self._path)
+            database.executescript(_CONVERSION)
+        if database.execute("PRAGMA auto_vacuum").fetchone() == (0,):
+            database.execute("PRAGMA auto_vacuum = FULL")
+            database.execute("VACUUM")
 
     @contextmanager
     def _open(self) -> Iterator[sqlite3.Connection]:
         try:
-            self._path.parent.mkdir(parents=True, exist_ok=True)
-            with closing(sqlite3.connect(self._path, timeout=BUSY_S)) as database:
-                # A write-ahead log, synced at every commit: what was answered is on the disk, and whole.
-                database.execute("PRAGMA journal_mode = WAL")
-                database.execute("PRAGMA synchronous = FULL")
-                database.executescript(_TABLES)
+            with self._connected() as database:
                 yield database
         except (OSError, sqlite3.Error) as error:
-            log.error("documents failed error=%s", error)
+            log.error("could not reach the saved documents file=%s error=%s", self._path, error)
+            if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_BUSY:
+                raise Unavailable("Others are saving documents just now.", 1) from None
             raise Unavailable("The saved documents can't be reached: the server's disk has a problem.", 30) from None
+
+    @contextmanager
+    def _connected(self) -> Iterator[sqlite3.Connection]:
+        self._path.parent.mkdir(parents=True, exist_ok=True)
+        with closing(sqlite3.connect(self._path, timeout=BUSY_S)) as database:
+            if database.execute("PRAGMA page_count").fetchone() == (0,):
+                # Pages that are free go back to the disk at every commit. It is chosen before anything is written.
+                database.execute("PRAGMA auto_vacuum = FULL")
+            # A write-ahead log, synced at every commit: what was answered is on the disk, and whole.
+            database.execute("PRAGMA journal_mode = WAL")
+            database.execute("PRAGMA synchronous = FULL")
+            database.execute(f"PRAGMA journal_size_limit = {LOG_BYTES}")
+            if database.execute("SELECT count(*) FROM sqlite_master WHERE name = 'documents'").fetchone() == (0,):
+                database.executescript(_TABLES)
+            yield database
+
+
+def _is_full(error: Exception) -> bool:
+    return getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_FULL
 
 
 def _check_kind(kind: str) -> None:

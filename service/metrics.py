@@ -4,9 +4,11 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
+from service.problems import Unavailable
 from service.rendering.statistics import Distribution
 
 if TYPE_CHECKING:
@@ -110,7 +112,8 @@ def _collector(house: House, traffic: Traffic) -> Collector:
             yield gauge("renderer_tasks", "Pictures that the renderer holds.", seen.tasks)
             yield gauge("gpu_bytes", "What they hold on the GPU.", seen.gpu_bytes)
             yield gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(house))
-            yield gauge("data_bytes", "Assets and documents on the disk.", house.quota.used())
+            with suppress(Unavailable):  # the disk fails: all else is still to be told
+                yield gauge("data_bytes", "Assets and documents on the disk.", house.quota.used())
             yield gauge("data_quota_bytes", "What they may take.", house.config.data_quota)
 
     return Sunbox()

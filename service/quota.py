@@ -5,9 +5,12 @@ from __future__ import annotations
 import logging
 import os
 import threading
-from collections.abc import Callable
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator
+from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
+from service.assets.folder import AssetFolder
 from service.problems import TooLarge, Unavailable
 
 log = logging.getLogger(__name__)
@@ -16,74 +19,84 @@ RETRY_S = 60
 
 
 class Quota:
-    """Of the files in `folder`/assets and of `others` bytes beside them; `in_use` names the assets that must stay."""
+    """Of the assets in `folder` and of `others` bytes beside them.
+
+    `in_use` gives the ids of the assets that must stay; while its context lasts no other asset becomes one of them.
+    """
 
     def __init__(
-        self, folder: Path, limit: int, in_use: Callable[[], set[str]], others: Callable[[], int] = lambda: 0
+        self,
+        folder: Path,
+        limit: int,
+        in_use: Callable[[], AbstractContextManager[set[str]]],
+        others: Callable[[], int] = lambda: 0,
     ) -> None:
-        self._folder = folder / "assets"
+        self._files = AssetFolder(folder / "assets")
         self._limit = limit
         self._in_use = in_use
         self._others = others
         self._lock = threading.Lock()
+        self._promised = 0  # bytes, to what is being stored
+        self._pinned: Counter[str] = Counter()  # ids, by how many want them to stay
 
-    def make_room(self, size: int) -> None:
-        """Deletes assets until `size` more bytes are within the limit.
+    @contextmanager
+    def room(self, size: int) -> Iterator[None]:
+        """Room for `size` more bytes, which are to be stored while the context lasts. Deletes assets for it.
 
-        Raises TooLarge for what could never be, Unavailable where saved documents leave no room.
+        Raises TooLarge for what could never be, Unavailable where too much must stay; nothing is deleted then.
         """
         if size > self._limit:
             raise TooLarge(f"{size} bytes are more than all assets may take: {self._limit} (SUNBOX_DATA_QUOTA)")
         with self._lock:
-            used = self.used()
-            if used + size <= self._limit:
-                return
-            kept = {id.removeprefix("sha256:") for id in self._in_use()}
-            for path in self._oldest_first():
-                if path.stem not in kept:
-                    used -= _delete(path)
-                if used + size <= self._limit:
-                    return
-        raise Unavailable("The disk quota is used up by what saved documents refer to (SUNBOX_DATA_QUOTA).", RETRY_S)
+            try:
+                self._make_room(size)
+            except OSError as error:
+                log.error("could not make room error=%s", error)
+                raise Unavailable(f"room could not be made: {os.strerror(error.errno or 0)}", RETRY_S) from None
+            self._promised += size
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._promised -= size
+
+    @contextmanager
+    def pinned(self, ids: Collection[str]) -> Iterator[None]:
+        """While it lasts these assets stay, as far as they are there."""
+        with self._lock:
+            self._pinned.update(ids)
+        try:
+            yield
+        finally:
+            with self._lock:
+                self._pinned -= Counter(ids)
 
     def used(self) -> int:
         """Bytes."""
-        return self._others() + sum(_size(path) for path in self._files())
+        return self._others() + self._files.bytes()
 
-    def _files(self) -> list[Path]:
-        try:
-            return [Path(entry.path) for entry in os.scandir(self._folder) if entry.is_file(follow_symlinks=False)]
-        except FileNotFoundError:
-            return []
+    def clear(self) -> None:
+        """Deletes what a crash left."""
+        self._files.clear()
 
-    def _oldest_first(self) -> list[Path]:
-        """The files that hold assets' bytes, by when they were last read."""
-        return sorted((path for path in self._files() if not path.suffix), key=_used_at)
-
-
-def _delete(path: Path) -> int:
-    """How many bytes that gave. What vouches for an asset goes first: there is never one without its bytes."""
-    freed = 0
-    for file in (path.with_suffix(".json"), *path.parent.glob(f"{path.name}.*"), path):
-        size = _size(file)
-        try:
-            file.unlink()
-            freed += size
-        except FileNotFoundError:
-            pass  # another process did it
-    log.info("asset evicted id=sha256:%s bytes=%d", path.stem, freed)
-    return freed
-
-
-def _size(path: Path) -> int:
-    try:
-        return path.stat().st_size
-    except FileNotFoundError:
-        return 0
-
-
-def _used_at(path: Path) -> float:
-    try:
-        return path.stat().st_mtime
-    except FileNotFoundError:
-        return 0.0
+    def _make_room(self, size: int) -> None:
+        most = self._limit - self._promised - size
+        if self.used() <= most:
+            return
+        self.clear()
+        with self._in_use() as in_use, self._files.alone():
+            held = self._files.held()
+            over = self._others() + sum(one.bytes for one in held.values()) - most
+            stays = {id.removeprefix("sha256:") for id in (*in_use, *self._pinned)}
+            goes = []
+            for hash in sorted(held.keys() - stays, key=lambda hash: held[hash].used):
+                if over <= 0:
+                    break
+                over -= held[hash].bytes
+                goes.append(hash)
+            if over > 0:
+                detail = "The disk quota is used up by saved documents and what they refer to (SUNBOX_DATA_QUOTA)."
+                raise Unavailable(detail, RETRY_S)
+            for hash in goes:
+                self._files.delete(hash)
+                log.info("asset evicted id=sha256:%s bytes=%d", hash, held[hash].bytes)

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import sqlite3
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
 import httpx
 import pytest
+import uvicorn
 
+from service import app
 from service.assets import AssetStore
-from service.documents import Documents
-from service.problems import NotFound, TooLarge, Unavailable
-from service.quota import Quota
+from service.config import Config
+from service.documents import DamagedFile, Documents
+from service.problems import Unavailable
 from tests.serving import SCENE, Server
-from tests.test_rest import OBJ, is_problem
+from tests.test_rest import is_problem
 
 MATERIAL = {"type": "diffuse", "albedo": [0.1, 0.2, 0.3]}
 
@@ -38,6 +42,12 @@ def saved(tmp_path: Path, store: AssetStore) -> Documents:
 
 def mesh_scene(asset: str) -> dict[str, Any]:
     return {**SCENE, "shapes": [{"type": "mesh", "asset": asset, "material": "ball"}]}
+
+
+def large_scene() -> dict[str, Any]:
+    """0.9 MB of it."""
+    ball = {"type": "sphere", "center": [0.123456789, 0.123456789, 0.123456789], "radius": 1, "material": "ball"}
+    return {**SCENE, "shapes": [ball] * 10_000}
 
 
 def test_a_document_comes_and_goes(server: Server) -> None:
@@ -92,7 +102,8 @@ for i in range(10 ** 6):
     os.kill(writer.pid, signal.SIGKILL)
     last = int((writer.stdout.read().split() or [line])[-1])
     writer.wait()
-    found = {entry["name"]: saved.get("materials", entry["name"])["albedo"] for entry in saved.names("materials")}
+    names = [entry["name"] for entry in saved.names("materials")]
+    found = {name: json.loads(saved.get("materials", name))["albedo"] for name in names}
     assert len(found) == 50
     for i in range(last - 48, last + 1):
         assert found[f"m{i % 50}"] >= (i % 1000) / 1000
@@ -101,38 +112,99 @@ for i in range(10 ** 6):
         assert database.execute("PRAGMA journal_mode").fetchone() == ("wal",)
 
 
-def test_the_log_may_go_while_it_is_measured(saved: Documents, tmp_path: Path) -> None:
+def test_documents_give_their_room_back(saved: Documents, tmp_path: Path) -> None:
+    """Deleted or replaced by smaller ones, also while somebody else has the file open."""
+    file = tmp_path / "documents.sqlite3"
+    saved.put("scenes", "0", SCENE)
+    little = saved.bytes
+    with closing(sqlite3.connect(file)) as other:
+        other.execute("SELECT count(*) FROM documents").fetchone()
+        for name in "123":
+            saved.put("scenes", name, large_scene())
+        assert saved.bytes > little + 2_500_000
+        saved.delete("scenes", "1")
+        saved.delete("scenes", "3")
+        saved.put("scenes", "2", SCENE)
+        assert saved.bytes < little + 50_000
+    saved.put("scenes", "0", SCENE)
+    assert sum(path.stat().st_size for path in tmp_path.glob("documents*")) < little + 50_000
+
+
+def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_path: Path) -> None:
+    """Nothing is lost, the pages that deleted ones left go back to the disk, and it happens once."""
+    file, body = tmp_path / "documents.sqlite3", json.dumps(SCENE)
+    with closing(sqlite3.connect(file)) as old, old:
+        old.executescript(
+            """
+            PRAGMA journal_mode = WAL;
+            CREATE TABLE documents (kind TEXT NOT NULL, name TEXT NOT NULL, title TEXT NOT NULL, body TEXT NOT NULL,
+                PRIMARY KEY (kind, name)) WITHOUT ROWID;
+            CREATE TABLE uses (asset TEXT NOT NULL, kind TEXT NOT NULL, name TEXT NOT NULL,
+                PRIMARY KEY (asset, kind, name)) WITHOUT ROWID;
+            """
+        )
+        old.execute("INSERT INTO documents VALUES ('scenes', 'a', 'A', ?)", (body,))
+        old.execute("INSERT INTO documents VALUES ('scenes', 'b', 'B', ?)", ("x" * 4_000_000,))
+        old.execute("INSERT INTO uses VALUES ('sha256:1', 'scenes', 'a')")
+        old.execute("DELETE FROM documents WHERE name = 'b'")
+    assert file.stat().st_size > 4_000_000
+    saved.prepare()
+    assert file.stat().st_size < 100_000
+    assert saved.names("scenes") == [{"name": "a", "title": "A"}] and saved.get("scenes", "a") == body
+    with saved.assets_in_use() as used:
+        assert used == {"sha256:1"}
+    before = file.stat().st_mtime_ns
+    saved.prepare()
+    assert file.stat().st_mtime_ns == before
+    saved.put("scenes", "b", large_scene())
+    saved.delete("scenes", "b")
+    assert saved.bytes < 100_000
+
+
+def test_a_conversion_that_was_killed_goes_on(saved: Documents, tmp_path: Path) -> None:
+    """The tables are new, and the file has not been compacted yet."""
+    file = tmp_path / "documents.sqlite3"
     saved.put("materials", "m", MATERIAL)
-    size = saved.bytes
-    (tmp_path / "documents.sqlite3-wal").symlink_to("gone")  # listed, and not there when it is looked at
-    assert saved.bytes == size > 0
+    with closing(sqlite3.connect(file)) as database:
+        database.execute("PRAGMA auto_vacuum = NONE")
+        database.execute("VACUUM")
+        assert database.execute("PRAGMA auto_vacuum").fetchone() == (0,)
+    saved.prepare()
+    with closing(sqlite3.connect(file)) as database:
+        assert database.execute("PRAGMA auto_vacuum").fetchone() == (1,)
 
 
-def test_a_damaged_file_is_told_of(saved: Documents, tmp_path: Path) -> None:
-    (tmp_path / "documents.sqlite3").write_bytes(b"no database at all" * 100)
+def test_looking_for_a_document_reads_no_other(saved: Documents) -> None:
+    for name in "bcd":
+        saved.put("scenes", name, large_scene())
+    saved.put("scenes", "a", SCENE)
+
+    def bytes_read() -> int:
+        return int(Path("/proc/self/io").read_text().split()[1])
+
+    before = bytes_read()
+    saved.get("scenes", "a")
+    saved.names("scenes")
+    assert bytes_read() - before < 500_000
+
+
+def test_a_damaged_file_is_told_of(
+    saved: Documents, tmp_path: Path, caplog: pytest.LogCaptureFixture, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """At the start by its name, and it is left as it is; later as what the caller can't help."""
+    file, nonsense = tmp_path / "documents.sqlite3", b"no database at all" * 100
+    file.write_bytes(nonsense)
     with pytest.raises(Unavailable, match="disk"):
         saved.names("scenes")
+    monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: pytest.fail("it was started"))
+    assert app.run(Config(port=0, data_dir=tmp_path)) == 1
+    assert str(file) in caplog.text and "backup" in caplog.text and "Traceback" not in caplog.text
+    assert file.read_bytes() == nonsense
 
 
-def test_assets_of_documents_are_never_evicted(saved: Documents, store: AssetStore, tmp_path: Path) -> None:
-    ids = [store.add(OBJ + b"#" * (1000 + i)).id for i in range(4)]
-    for i, id in enumerate(ids):
-        os.utime(tmp_path / "assets" / id.removeprefix("sha256:"), (i, i))
-    saved.put("scenes", "mine", mesh_scene(ids[0]))
-    store.read(ids[1])  # used just now
-    quota = Quota(tmp_path, 6000, saved.assets_in_use)
-    quota.make_room(0)
-    assert all(store.holds(id) for id in ids)
-    quota.make_room(6000 - quota.used() + 500)
-    assert [store.holds(id) for id in ids] == [True, True, False, True]
-    quota.make_room(4000)
-    assert [store.holds(id) for id in ids] == [True, False, False, False]
-    with pytest.raises(Unavailable, match="SUNBOX_DATA_QUOTA"):
-        quota.make_room(5900)
-    with pytest.raises(TooLarge):
-        quota.make_room(6001)
-    saved.delete("scenes", "mine")
-    quota.make_room(5900)
-    assert quota.used() == 0 and not store.holds(ids[0])
-    with pytest.raises(NotFound):
-        store.read(ids[0])
+def test_a_later_version_s_file_is_refused(saved: Documents, tmp_path: Path) -> None:
+    saved.put("materials", "m", MATERIAL)
+    with closing(sqlite3.connect(tmp_path / "documents.sqlite3")) as database:
+        database.execute("PRAGMA user_version = 99")
+    with pytest.raises(DamagedFile, match="newer version"):
+        saved.prepare()

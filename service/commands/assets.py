@@ -9,7 +9,6 @@ from typing import Any
 from service import recipe
 from service.assets import AssetStore, FileAssets, ImageData, MeshData
 from service.problems import AssetError, NotFound, ServiceError
-from service.quota import Quota
 
 log = logging.getLogger(__name__)
 
@@ -17,9 +16,8 @@ log = logging.getLogger(__name__)
 class SourceAssets:
     """Files by path and uploads by id. `names` leads from ids to files that may still lie where they lay."""
 
-    def __init__(self, found: FileAssets, store: AssetStore, quota: Quota, names: dict[str, str]) -> None:
+    def __init__(self, found: FileAssets, store: AssetStore, names: dict[str, str]) -> None:
         self._found = found
-        self._quota = quota
         self._store = store
         self._names = names
 
@@ -39,7 +37,6 @@ class SourceAssets:
         for ref in recipe.references(scene):
             if not ref.startswith("sha256:"):
                 try:
-                    self._quota.make_room(len(self._found.read(ref)))
                     self._found.keep(ref)
                 except (ServiceError, OSError) as error:  # somebody else's folder may not even be listed
                     log.warning("asset not kept ref=%s error=%s", ref, error)

@@ -78,11 +78,12 @@ def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
 
 def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Source:
     from service import presets
-    from service.assets import AssetStore, FileAssets
+    from service.assets import FileAssets
     from service.commands.models import import_model
     from service.scene import parse_scene
+    from service.storage import storage
 
-    store = AssetStore(config.data_dir, config, presets.builtin_assets)
+    store = storage(config).assets
     try:
         with refusals(), FileAssets(path.parent, asset_folders(roots), store) as files_:
             document = import_model(path, data, store, files_).scene(presets.default_environment())
@@ -116,17 +117,15 @@ def read_settings(assignments: Sequence[str], config: Config, base: dict[str, An
 def source_assets(source: Source, roots: Sequence[str], config: Config) -> Iterator[SourceAssets]:
     """Where the scene's assets are: beside its file, in `roots`, and by sha256 in the data folder."""
     from service import recipe
-    from service.assets import AssetStore, FileAssets
+    from service.assets import FileAssets
     from service.commands.assets import SourceAssets
-    from service.documents import Documents
-    from service.quota import Quota
+    from service.storage import storage
 
-    uploaded = source.store or AssetStore(config.data_dir, config, _builtin_assets)
+    uploaded = source.store or storage(config).assets
     if recipe.references(source.document):
         uploaded.loader.sandbox.start()
     with closing(uploaded), FileAssets(source.path.parent, asset_folders(roots), uploaded) as assets:
-        quota = Quota(config.data_dir, config.data_quota, Documents(config.data_dir, uploaded).assets_in_use)
-        yield SourceAssets(assets, uploaded, quota, source.assets)
+        yield SourceAssets(assets, uploaded, source.assets)
 
 
 def asset_folders(roots: Sequence[str]) -> list[Path]:
@@ -147,12 +146,6 @@ def pack_scene(source: Source, assets: SourceAssets, config: Config) -> Packed:
         Thread(target=warm_builder).start()
     with refusals(source.pointer):
         return pack(source.scene, assets, limits=config)
-
-
-def _builtin_assets() -> dict[str, bytes]:
-    from service import presets
-
-    return presets.builtin_assets()
 
 
 def _value(text: str) -> Any:

@@ -33,14 +33,12 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     kind = request.headers.get("content-type")
     own = house(request)
-    file, size = await asyncio.to_thread(own.assets.incoming), 0
+    file = await asyncio.to_thread(own.assets.incoming)
     async for chunk in request.stream():
-        size += len(chunk)
         await asyncio.to_thread(own.assets.receive, file, chunk)
 
     def add() -> AssetInfo:
         with file:  # here: a request that is cancelled does not wait for this thread
-            own.quota.make_room(size)
             return own.assets.add(file, kind, filename)
 
     info = await packing(add)

@@ -1,0 +1,31 @@
+"""What is kept in the data folder: assets and documents, within one quota."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from service.assets import AssetStore
+from service.config import Config
+from service.documents import Documents
+from service.quota import Quota
+
+
+@dataclass(frozen=True)
+class Storage:
+    assets: AssetStore
+    documents: Documents
+    quota: Quota
+
+
+def storage(config: Config) -> Storage:
+    # Each asks another one: assets for room, the quota for what documents use, documents for assets.
+    quota = Quota(config.data_dir, config.data_quota, lambda: documents.assets_in_use(), lambda: documents.bytes)
+    assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
+    documents = Documents(config.data_dir, assets, quota)
+    return Storage(assets, documents, quota)
+
+
+def _builtin_assets() -> dict[str, bytes]:
+    from service import presets  # the command line seldom needs them
+
+    return presets.builtin_assets()

@@ -1,0 +1,259 @@
+"""Room on the disk: who makes way, who stays, and what does not count."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import subprocess
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.assets import AssetStore
+from service.config import Config
+from service.problems import AssetError, InvalidDocument, NotFound, TooLarge, Unavailable, UnsupportedMedia
+from service.storage import Storage, storage
+from tests.asset_files import OBJ, glb, gltf
+from tests.serving import SCENE
+
+LIMIT = 20_000
+
+
+@pytest.fixture
+def kept(tmp_path: Path) -> Iterator[Storage]:
+    kept = storage(Config(data_dir=tmp_path, data_quota=LIMIT))
+    yield kept
+    kept.assets.close()
+
+
+def file(folder: Path, id: str, suffix: str = "") -> Path:
+    return folder / "assets" / (id.removeprefix("sha256:") + suffix)
+
+
+def uploads(kept: Storage, folder: Path, count: int, size: int = 1000) -> list[str]:
+    """Ids, the one that was used longest ago first."""
+    ids = [kept.assets.add(OBJ + b"#" * (size - len(OBJ) + i)).id for i in range(count)]
+    for i, id in enumerate(ids, 1):
+        os.utime(file(folder, id), (i, i))
+    return ids
+
+
+def mesh_scene(*assets: str) -> dict[str, Any]:
+    return {**SCENE, "shapes": [{"type": "mesh", "asset": asset, "material": "ball"} for asset in assets]}
+
+
+def here(kept: Storage, ids: list[str]) -> list[bool]:
+    return [kept.assets.holds(id) for id in ids]
+
+
+def make_room(kept: Storage, size: int) -> None:
+    with kept.quota.room(size):
+        pass
+
+
+def test_what_was_used_longest_ago_makes_way(kept: Storage, tmp_path: Path) -> None:
+    ids = uploads(kept, tmp_path, 4)
+    kept.assets.read(ids[0])  # used just now
+    kept.assets.add(OBJ + b"#" * (1000 - len(OBJ) + 1))  # ids[1] again
+    make_room(kept, 0)
+    assert here(kept, ids) == [True] * 4
+    make_room(kept, LIMIT - kept.quota.used() + 500)
+    assert here(kept, ids) == [True, True, False, True]
+    make_room(kept, LIMIT)
+    assert here(kept, ids) == [False] * 4 and kept.quota.used() == 0
+    with pytest.raises(NotFound):
+        kept.assets.read(ids[0])
+    with pytest.raises(TooLarge):
+        make_room(kept, LIMIT + 1)
+
+
+def test_assets_of_documents_stay(tmp_path: Path) -> None:
+    kept = storage(Config(data_dir=tmp_path, data_quota=100_000))
+    ids = uploads(kept, tmp_path, 2)
+    kept.documents.put("scenes", "mine", mesh_scene(ids[0]))
+    make_room(kept, 100_000 - kept.quota.used() + 500)
+    assert here(kept, ids) == [True, False]
+    other = kept.assets.add(OBJ).id
+    with pytest.raises(Unavailable, match="SUNBOX_DATA_QUOTA"):
+        make_room(kept, 99_900)  # the document and its asset are in the way
+    assert kept.assets.holds(other)  # it would not have helped
+    kept.documents.delete("scenes", "mine")
+    make_room(kept, 100_000 - kept.documents.bytes)
+    assert not kept.assets.holds(ids[0])
+    kept.assets.close()
+
+
+def test_deleted_documents_do_not_count(tmp_path: Path) -> None:
+    kept = storage(Config(data_dir=tmp_path, data_quota=1_000_000))
+    ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "ball"}
+    for name in "ab":
+        kept.documents.put("scenes", name, {**SCENE, "shapes": [ball] * 6000})
+    with pytest.raises(Unavailable):
+        make_room(kept, 900_000)
+    for name in "ab":
+        kept.documents.delete("scenes", name)
+    make_room(kept, 900_000)
+    kept.assets.close()
+
+
+@pytest.fixture
+def full(tmp_path: Path) -> Iterator[tuple[Storage, list[str]]]:
+    """Storage without room for more than 2 kB, and the assets in it."""
+    kept = storage(Config(data_dir=tmp_path, data_quota=100_000))
+    kept.documents.put("scenes", "first", SCENE)  # the file of the documents, with its empty pages
+    ids = uploads(kept, tmp_path, 3)
+    size = 100_000 - kept.quota.used() - 2000
+    ids += [kept.assets.add(OBJ + b"#" * (size - len(OBJ))).id]
+    yield kept, ids
+    kept.assets.close()
+
+
+def test_what_is_refused_costs_nobody_anything(full: tuple[Storage, list[str]]) -> None:
+    kept, ids = full
+    ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "ball"}
+    missing = {**mesh_scene("sha256:" + "0" * 64), "lights": SCENE["lights"] * 100}
+    for document in (missing, {**SCENE, "shapes": [ball] * 100 + [{"type": "sphere"}]}):
+        with pytest.raises(InvalidDocument):
+            kept.documents.put("scenes", "refused", document)
+    with pytest.raises(TooLarge):
+        kept.documents.put("scenes", "refused", {**SCENE, "shapes": [ball] * 2000})
+    with pytest.raises(UnsupportedMedia):
+        kept.assets.add(b"hello" * 2000)
+    with pytest.raises(AssetError):
+        kept.assets.add(OBJ + b"f 7 8 9\n" + b"#" * 9000)
+    with pytest.raises(AssetError):
+        kept.assets.add(glb(gltf(meshes=[]), bytes(9000)))
+    assert all(here(kept, ids))
+    assert [entry["name"] for entry in kept.documents.names("scenes")] == ["first"]
+
+
+def test_a_document_makes_room_but_not_of_its_own_assets(full: tuple[Storage, list[str]]) -> None:
+    """The one used longest ago is named by the very document that needs room."""
+    kept, ids = full
+    kept.documents.put("scenes", "mine", {**mesh_scene(ids[0]), "lights": SCENE["lights"] * 40})
+    assert here(kept, ids) == [True, False, True, True]
+
+
+def test_no_asset_goes_between_the_look_and_the_saving(
+    full: tuple[Storage, list[str]], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    kept, ids = full
+    holds = AssetStore.holds
+
+    def looked(self: AssetStore, id: str) -> bool:
+        monkeypatch.undo()
+        found = holds(self, id)
+        make_room(kept, 100_000 - kept.documents.bytes - 2000)  # somebody else's upload
+        return found
+
+    monkeypatch.setattr(AssetStore, "holds", looked)
+    kept.documents.put("scenes", "mine", mesh_scene(ids[0]))
+    assert here(kept, ids) == [True, False, False, False]
+
+
+def test_what_is_being_stored_has_its_room(kept: Storage, tmp_path: Path) -> None:
+    ids = uploads(kept, tmp_path, 2)
+    free = LIMIT - kept.quota.used()
+    with kept.quota.room(free - 2000):
+        make_room(kept, 2000)
+        assert all(here(kept, ids))
+        make_room(kept, 2500)
+        assert here(kept, ids) == [False, True]
+        with pytest.raises(Unavailable):
+            make_room(kept, 6000)
+        assert here(kept, ids) == [False, True]
+    make_room(kept, free)
+    assert here(kept, ids) == [False, True]
+
+
+def test_parts_of_scenes_need_room_too(kept: Storage, tmp_path: Path) -> None:
+    ids = uploads(kept, tmp_path, 10, 1700)
+    info = kept.assets.add(glb(gltf()))
+    kept.assets.scene(info.id)
+    assert kept.quota.used() <= LIMIT and not kept.assets.holds(ids[0]) and kept.assets.holds(ids[9])
+
+
+def test_what_a_killed_upload_leaves_does_not_count(kept: Storage, tmp_path: Path) -> None:
+    """Killed in the middle of its writing: the next start clears that away, and not what others are writing."""
+    kept.assets.add(OBJ)
+    used = kept.quota.used()
+    program = f"""
+import os, sys
+from pathlib import Path
+from service.assets.folder import AssetFolder
+def stop(fd):
+    print(flush=True)
+    sys.stdin.read()
+os.fsync = stop
+AssetFolder(Path({str(tmp_path / "assets")!r})).put("sha256:" + "a" * 64, {{"": b"x" * 100_000, ".json": b""}})
+"""
+    writer = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
+    assert writer.stdout is not None and writer.stdout.readline()
+    folder = tmp_path / "assets"
+    assert len(list(folder.iterdir())) == 3 and kept.quota.used() == used
+    kept.quota.clear()
+    assert len(list(folder.iterdir())) == 3  # it is still being written
+    writer.send_signal(signal.SIGKILL)
+    writer.communicate()
+    assert len(list(folder.iterdir())) == 3
+    kept.quota.clear()
+    assert len(list(folder.iterdir())) == 2 and kept.quota.used() == used
+
+
+def test_leftovers_are_cleared_away(kept: Storage, tmp_path: Path) -> None:
+    id = kept.assets.add(OBJ).id
+    used, folder = kept.quota.used(), tmp_path / "assets"
+    lost = "sha256:" + "b" * 64
+    file(tmp_path, lost, ".json").write_bytes(b"{}" * 9000)
+    file(tmp_path, lost, ".scene.json").write_bytes(b"{}" * 9000)
+    file(tmp_path, "c" * 64).write_bytes(b"bytes without a record" * 1000)
+    (folder / ".abcd.tmp").write_bytes(b"half" * 9000)
+    (folder / "a friend's notes").write_bytes(b"not ours")
+    assert kept.quota.used() == used
+    make_room(kept, LIMIT - used)
+    assert kept.assets.holds(id)
+    make_room(kept, LIMIT - used + 1)
+    assert [path.name for path in folder.iterdir()] == ["a friend's notes"]
+
+
+def test_a_server_clears_away_what_a_crash_left(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    import uvicorn
+
+    from service import app
+
+    (tmp_path / "assets").mkdir()
+    (tmp_path / "assets" / ".abcd.tmp").write_bytes(b"half")
+    monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: sockets[0].close())
+    app.run(Config(port=0, data_dir=tmp_path))
+    assert not list((tmp_path / "assets").iterdir())
+
+
+def test_damaged_bytes_make_way_first(kept: Storage, tmp_path: Path) -> None:
+    ids = uploads(kept, tmp_path, 2)
+    file(tmp_path, ids[1]).write_bytes(bytes(1001))
+    with pytest.raises(NotFound, match="damaged"):
+        kept.assets.read(ids[1])
+    assert file(tmp_path, ids[1], ".damaged").exists()
+    make_room(kept, LIMIT - kept.quota.used() + 500)
+    assert not file(tmp_path, ids[1], ".damaged").exists() and kept.assets.holds(ids[0])
+
+
+def test_the_folder_is_counted_when_it_has_changed(
+    kept: Storage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Not at every look at /metrics."""
+    kept.assets.add(OBJ)
+    counted = []
+    scandir = os.scandir
+    monkeypatch.setattr("os.scandir", lambda path: counted.append(path) or scandir(path))
+    used = kept.quota.used()
+    assert kept.quota.used() == used and len(counted) == 2  # it changed a moment ago, and may again in this one
+    os.utime(tmp_path / "assets", (1000, 1000))
+    assert {kept.quota.used() for _ in range(5)} == {used} and len(counted) == 3
+    id = kept.assets.add(OBJ + b"#").id
+    assert kept.quota.used() == used + len(OBJ) + 1 + len(file(tmp_path, id, ".json").read_bytes())
+    assert json.loads(file(tmp_path, id, ".json").read_bytes())["id"] == id
