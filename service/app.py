@@ -111,7 +111,7 @@ def run(config: Config) -> int:
     try:
         own.documents.prepare()
     except DamagedFile as error:
-        log.error("did not start: %s", error)
+        log.error("did not start reason=%s", error)
         return 1
     own.quota.clear()
     full = Requests(turning_away(FULL, respond), refuse=respond, heard=own.traffic.heard)
