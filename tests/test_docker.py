@@ -29,7 +29,7 @@ def test_the_image_has_what_was_tested() -> None:
 
 
 def test_the_image_has_the_packages_that_make_run_asks_for() -> None:
-    (packages,) = re.findall(r"install_packages (lib.*)", (ROOT / ".ci/setup").read_text())
+    (packages,) = re.findall(r'^MESA="(.*)"', (ROOT / ".ci/packages").read_text(), re.MULTILINE)
     for package in packages.split():
         assert f" {package}" in DOCKERFILE
 
