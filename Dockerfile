@@ -1,27 +1,29 @@
 # syntax=docker/dockerfile:1
 # Sunbox on an NVIDIA GPU where the container is given one, else on the processor through Mesa's llvmpipe.
 #   docker build -t sunbox .
-#   docker run --rm -p 8000:8000 --read-only -v sunbox:/data sunbox
-#   docker run --rm -p 8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
+#   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data sunbox
+#   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
+# Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22.
 
-FROM python:3.11-slim-bookworm AS build
+FROM python:3.13-slim-trixie AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/sunbox
 WORKDIR /source
-COPY requirements.serve.lock ./
+COPY requirements.serve.lock requirements.build.lock ./
 RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r requirements.serve.lock
 COPY pyproject.toml README.md ./
 COPY gpu gpu
 COPY service service
 COPY shaders shaders
 COPY web web
-RUN python -m venv /opt/build && /opt/build/bin/pip install hatchling==1.33.0 \
+RUN python -m venv /opt/build \
+    && /opt/build/bin/pip install --require-hashes --only-binary :all: -r requirements.build.lock \
     && /opt/build/bin/python -m hatchling build -t wheel -d /tmp/wheel \
     && /opt/sunbox/bin/pip install --no-deps /tmp/wheel/*.whl \
     && /opt/sunbox/bin/pip uninstall -y pip \
     && /opt/sunbox/bin/python -m compileall -q /opt/sunbox/lib
 
-FROM python:3.11-slim-bookworm
+FROM python:3.13-slim-trixie
 # Mesa's software renderer, and glvnd, which finds NVIDIA's driver when the container runtime brings one along.
 # hadolint ignore=DL3008
 RUN apt-get update \
@@ -48,6 +50,6 @@ ENV PATH=/opt/sunbox/bin:$PATH \
 USER 10001
 VOLUME /data
 EXPOSE 8000
-HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD ["python", "-c", "import os, urllib.request as r; r.urlopen(f'http://127.0.0.1:{os.environ[\"SUNBOX_PORT\"]}/healthz', timeout=4)"]
+HEALTHCHECK --interval=30s --timeout=5s --start-period=20s CMD ["python", "-m", "service.commands.health"]
 ENTRYPOINT ["sunbox"]
 CMD ["serve"]

@@ -2,6 +2,7 @@
 # make test              set everything up and pass the tests
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/test_hostile.py
+# make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
 # make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
@@ -11,7 +12,7 @@
 PORT ?= 8000
 export PYTHON
 
-.PHONY: run test extremes hostile soak bench bench-compare tradeoff gallery lint setup
+.PHONY: run test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
 
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
@@ -29,6 +30,9 @@ extremes: setup
 hostile:
 	@.ci/setup test
 	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/test_hostile.py
+
+image-test: setup
+	SUNBOX_IMAGE=1 .venv/bin/pytest -s -rs tests/test_image.py
 
 soak:
 	@.ci/setup test

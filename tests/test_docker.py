@@ -6,12 +6,17 @@ import re
 import tomllib
 from pathlib import Path
 
+import httpx
 import pytest
 
+from service import app
+from service.commands import health
 from service.config import Config
+from tests.serving import Server
 
 ROOT = Path(__file__).parent.parent
-DOCKERFILE = (ROOT / "Dockerfile").read_text()
+DOCKERFILE, COMPOSE = (ROOT / "Dockerfile").read_text(), (ROOT / "compose.yaml").read_text()
+LOCKS = ("requirements.lock", "requirements.serve.lock", "requirements.build.lock")
 PIN = re.compile(r"^([a-z0-9_.-]+)==[^\\]+\\\n(?:    --hash=\S+(?: \\)?\n)+", re.MULTILINE | re.IGNORECASE)
 
 
@@ -20,8 +25,12 @@ def pins(name: str) -> dict[str, str]:
 
 
 def test_the_image_has_what_was_tested() -> None:
-    """requirements.serve.lock is requirements.lock without the extras: uv pip compile, with that as constraint."""
-    everything, serving = pins("requirements.lock"), pins("requirements.serve.lock")
+    """requirements.serve.lock is requirements.lock without the extras: uv pip compile, with that as constraint.
+
+    requirements.build.lock is hatchling, and what that needs.
+    """
+    everything, serving, building = map(pins, LOCKS)
+    assert "hatchling" in building and {name: everything.get(name) for name in building} == building
     assert len(serving) > 20 and {name: everything.get(name) for name in serving} == serving
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = {re.split(r"[<>=\[; ]", text)[0].lower() for text in project["dependencies"]}
@@ -50,3 +59,31 @@ def test_the_image_runs_as_nobody_in_particular_and_writes_to_one_place() -> Non
     assert re.findall(r"^VOLUME (.*)$", DOCKERFILE, re.MULTILINE) == ["/data"]
     for variable in ("SUNBOX_DATA_DIR", "XDG_CACHE_HOME", "HOME"):
         assert re.search(rf"{variable}=/data\b", DOCKERFILE)
+
+
+def test_the_proxy_needs_a_key_and_keeps_the_metrics_to_itself() -> None:
+    assert "SUNBOX_API_KEY: ${SUNBOX_API_KEY:?" in COMPOSE and "respond /metrics 404" in COMPOSE
+
+
+def test_the_proxy_gives_idle_connections_up_first() -> None:
+    """Else a request is sent on one that the server just closes, and is answered 502."""
+    (minutes,) = re.findall(r"keepalive (\d+)m$", COMPOSE, re.MULTILINE)
+    assert 60 * int(minutes) < app.KEEP_ALIVE_S
+
+
+def test_the_health_check_asks_where_the_server_was_told_to_listen(
+    server: Server, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    started = ["serve", "--host", "127.0.0.1", "--port", "0"]
+    monkeypatch.setattr(health, "_commands", lambda: iter([started]))
+    assert health.main() == 1 and "no answer" in capsys.readouterr().err
+    started[-1] = str(httpx.URL(server.url).port)
+    assert health.main() == 0
+    monkeypatch.setattr(health, "_commands", lambda: iter([]))
+    monkeypatch.setenv("SUNBOX_HOST", "0.0.0.0")
+    monkeypatch.setenv("SUNBOX_PORT", started[-1])
+    assert health.main() == 0
+
+
+def test_the_health_check_finds_the_server(server: Server) -> None:
+    assert ["serve", "--port", "0"] in list(health._commands())
