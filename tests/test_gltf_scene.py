@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.assets import AssetStore, MeshData
+from service.assets import AssetStore, MeshData, importing
 from service.assets.importing import Imported
 from service.pack import instances, pack
 from service.problems import AssetError
@@ -324,3 +324,18 @@ def test_a_broken_image_is_named(store: AssetStore) -> None:
     with pytest.raises(AssetError, match=r"^/images/0: ") as refusal:
         store.add(file.glb())
     assert refusal.value.place == "/images/0"
+
+
+def test_what_an_older_importer_made_is_made_anew(store: AssetStore, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its warnings and its exposure would be those of then."""
+    file = Gltf()
+    file.node(mesh=file.mesh(), name="imported twice")
+    monkeypatch.setattr(importing, "IMPORTER", importing.IMPORTER - 1)
+    info = store.add(file.glb())
+    monkeypatch.undo()
+    made: list[str] = []
+    parse = store.loader.sandbox.parse_scene
+    monkeypatch.setattr(store.loader.sandbox, "parse_scene", lambda *given: made.append(info.id) or parse(*given))
+    assert store.scene(info.id).importer == importing.IMPORTER and len(made) == 1
+    store.add(file.glb())
+    assert len(made) == 1

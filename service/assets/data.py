@@ -61,6 +61,8 @@ class SceneFile:
     warnings: list[dict[str, Any]]  # what it asks for and does not get: [{pointer, detail, count?}]
     triangles: int
     lit: bool
+    exposure: float | None = None  # in stops, that suits its lights; None: 0 does
+    aspect_ratio: float | None = None  # of its camera's picture, width over height
 
 
 @dataclass(frozen=True)
@@ -82,6 +84,8 @@ class AssetInfo:
     triangles: int | None = None
     bounds: list[list[float]] | None = None  # of an uploaded mesh's triangles: least and greatest x, y, z, m
     warnings: list[dict[str, Any]] | None = None
+    exposure: float | None = None  # in stops, that suits a scene's lights; None: 0 does
+    aspect_ratio: float | None = None  # of the picture of a scene's camera, width over height
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from typing import Any
 from service.assets.data import SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
 
+IMPORTER = 1  # counted up whenever a file is to be imported anew: its document or what is said of it has changed
 PART = re.compile(r"part:(\d+)")
 
 
@@ -21,16 +22,21 @@ class Imported:
     document: dict[str, Any]
     warnings: list[dict[str, Any]]
     lit: bool  # has lights of its own
+    exposure: float | None = None  # in stops, that suits these lights; None: 0 does
+    aspect_ratio: float | None = None  # of the picture of its camera, width over height
+    importer: int = 0  # the IMPORTER that wrote it
 
     @classmethod
     def read(cls, text: bytes) -> Imported:
-        """What `written` gave. Raises ValueError."""
+        """What `written` gave. Raises ValueError, also on what an older importer wrote."""
         try:
             found = cls(**json.loads(text))
             found.references()
-            return found
         except (TypeError, KeyError, AttributeError):
             raise ValueError("this is no record of an import") from None
+        if found.importer != IMPORTER:
+            raise ValueError(f"importer {found.importer} wrote this, and {IMPORTER} does now")
+        return found
 
     def written(self) -> bytes:
         return json.dumps(vars(self)).encode()  # not asdict: it would copy the whole document
@@ -71,4 +77,4 @@ def take_apart(file: SceneFile, keep: Callable[[ScenePart], str]) -> Imported:
         parse_scene(document)
     except InvalidDocument as error:
         raise AssetError(f"as a scene it has a mistake at {error.errors[0]}") from None
-    return Imported(document, file.warnings, file.lit)
+    return Imported(document, file.warnings, file.lit, file.exposure, file.aspect_ratio, IMPORTER)

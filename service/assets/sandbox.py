@@ -225,4 +225,7 @@ def _scene(text: Array, files: Array) -> SceneFile:
     for size, pointer, vertices, triangles in told["parts"]:
         parts.append(ScenePart(view[at : at + size], str(pointer), vertices, triangles))
         at += size
-    return SceneFile(told["document"], parts, told["warnings"], int(told["triangles"]), bool(told["lit"]))
+    return SceneFile(
+        told["document"], parts, told["warnings"], int(told["triangles"]), bool(told["lit"]), told["exposure"],
+        told["aspect_ratio"],
+    )  # fmt: skip

@@ -164,8 +164,10 @@ class AssetStore:
         size = length(data)
         with self._room(sum(len(part.data) for part in file.parts) + (size if new else 0)):
             imported = take_apart(file, self._keep)
-            warnings = imported.warnings or None
-            info = AssetInfo(id, "scene", format, size, triangles=file.triangles, warnings=warnings)
+            info = AssetInfo(
+                id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,
+                exposure=imported.exposure, aspect_ratio=imported.aspect_ratio,
+            )  # fmt: skip
             if new:
                 self._store(info, data, imported)
             else:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Sequence
 from contextlib import closing, contextmanager
 from dataclasses import dataclass, field
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
     from service.recipe import PictureView
     from service.scene import Scene, Settings
 
+WIDEST = 16.0  # width over height of a picture that nobody asked for: no file makes it a line
 SHOWN_ERRORS = 8  # a mesh of NaN has a mistake in every line
 
 
@@ -48,6 +50,7 @@ class Source:
     assets: dict[str, str] = field(default_factory=dict)  # names of files by the id that the document uses
     pointer: str = ""  # to the scene, from the root of what was read
     store: AssetStore | None = None  # a model's, with what it was taken apart into
+    aspect_ratio: float | None = None  # of the picture of a model's camera, width over height
 
 
 def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
@@ -80,14 +83,18 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
     from service import presets
     from service.assets import FileAssets
     from service.commands.models import import_model
+    from service.recipe import PictureView
     from service.scene import parse_scene
     from service.storage import storage
 
     store = storage(config).assets
     try:
         with refusals(), FileAssets(path.parent, asset_folders(roots), store) as files_:
-            document = import_model(path, data, store, files_).scene(presets.default_environment())
-            return Source(path, document, parse_scene(document), store=store)
+            model = import_model(path, data, store, files_)
+            document = model.scene(presets.default_environment())
+            view = None if model.exposure is None else PictureView(exposure=model.exposure)
+            aspect = model.aspect_ratio
+            return Source(path, document, parse_scene(document), view=view, store=store, aspect_ratio=aspect)
     except BaseException:
         store.close()
         raise
@@ -111,6 +118,23 @@ def read_settings(assignments: Sequence[str], config: Config, base: dict[str, An
     document = {key: value for key, value in (base or {}).items() if key not in knobs} | document
     with refusals("setting "):
         return parse_settings(document, limits=config)
+
+
+def picture_size(settings: Settings, aspect: float | None) -> dict[str, int]:
+    """What is not given of a picture's width and height, for a model whose camera has this aspect ratio.
+
+    Where neither is given there are about as many pixels as by default.
+    """
+    given = settings.model_fields_set & {"width", "height"}
+    if aspect is None or len(given) == 2:
+        return {}
+    aspect = min(max(aspect, 1 / WIDEST), WIDEST)
+    if given == {"width"}:
+        return {"height": max(round(settings.width / aspect), 1)}
+    if given == {"height"}:
+        return {"width": max(round(settings.height * aspect), 1)}
+    width = math.sqrt(settings.width * settings.height * aspect)
+    return {"width": round(width), "height": round(width / aspect)}
 
 
 @contextmanager

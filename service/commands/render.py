@@ -16,7 +16,15 @@ from typing import TYPE_CHECKING, Any
 
 from service.commands import BadInput, Failed, files
 from service.commands.configuration import configuration
-from service.commands.documents import pack_scene, read_settings, read_source, refusals, source_assets
+from service.commands.documents import (
+    Source,
+    pack_scene,
+    picture_size,
+    read_settings,
+    read_source,
+    refusals,
+    source_assets,
+)
 
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
@@ -49,7 +57,10 @@ def run(arguments: argparse.Namespace) -> int:
     reuse_freed()
     source = read_source(Path(arguments.input), arguments.asset_root, config)
     output = Output(path, format, _view(arguments, format, exposure, source.view))
-    chosen = read_settings(arguments.set or [], config, source.settings) if source.settings else given
+    size = picture_size(given, source.aspect_ratio)
+    base = source.settings | size
+    chosen = read_settings(arguments.set or [], config, base) if base else given
+    _tell(source, output, exposure, (chosen.width, chosen.height) if size else None)
     with source_assets(source, arguments.asset_root, config) as assets:
         packed = pack_scene(source, assets, config)
         with refusals():
@@ -112,6 +123,16 @@ def _view(
     given = {name: value for name, value in options.items() if value is not None}
     view = (before or PictureView()).model_copy(update=given)
     return view.model_copy(update={"aov": "color"}) if view.aov == "all" and format != "exr" else view
+
+
+def _tell(source: Source, output: Output, exposure: float | None, size: tuple[int, int] | None) -> None:
+    """Says what was taken from a model because the command line did not say it."""
+    if size:
+        print(f"note: {size[0]} x {size[1]} pixels, as wide for its height as the camera's picture", file=sys.stderr)
+    is_model = source.store is not None
+    if is_model and source.view and exposure is None and output.format == "png":
+        stops = f"{source.view.exposure:g}"
+        print(f"note: exposure {stops}, which suits the file's lights; --exposure sets another", file=sys.stderr)
 
 
 def _choose(option: str, value: str, known: tuple[str, ...]) -> None:

@@ -77,10 +77,35 @@ class Render(BaseModel):
     settings: dict[str, Any] = Field(description="What each knob became; null is no such limit.")
 
 
+class AssetWarning(BaseModel):
+    pointer: str = Field(description="RFC 6901, into the file's own JSON: the first place; empty where it has none.")
+    detail: str
+    count: int | None = Field(None, description="How many places; not there where the pointer is the only one.")
+
+
 class Asset(BaseModel):
     id: str
     kind: Literal["mesh", "image", "scene"]
+    format: str
     bytes: int
+    width: int | None = Field(None, description="Of an image, texels.")
+    height: int | None = Field(None, description="Of an image, texels.")
+    channels: int | None = Field(None, description="Of an image.")
+    vertices: int | None = Field(None, description="Of a mesh.")
+    triangles: int | None = Field(None, description="Of a mesh or a scene.")
+    bounds: list[list[float]] | None = Field(None, description="Of a mesh: the least and the greatest x, y, z, m.")
+    warnings: list[AssetWarning] | None = Field(
+        None, description="What is odd about the file, and what it asks for and does not get."
+    )
+    exposure: float | None = Field(
+        None,
+        description="Of a scene whose own lights expose the picture more than 4 stops from middle grey: the exposure "
+        "in stops that suits them, metered from the logarithmic mean of the luminance in the camera's picture. "
+        "Photometric lights, such as Blender exports, need about -10.",
+    )
+    aspect_ratio: float | None = Field(
+        None, description="Of a scene whose camera says it: the width of its picture over the height."
+    )
 
 
 def problems(*statuses: int) -> Responses:

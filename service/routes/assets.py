@@ -52,11 +52,15 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
     responses=answers.DOCUMENT | answers.problems(404, 422),
 )
 async def scene(request: Request, id: answers.AssetId) -> Response:
-    """Its references are assets here. What the file asks for and does not get is told in the answer to its upload
-    (`warnings`), and here in the header `Sunbox-Warnings`: as much of that list as has room, as JSON."""
+    """Its references are assets here. The answer to the file's upload has `warnings`, `exposure` and `aspect_ratio`;
+    here they are in headers: `Sunbox-Warnings` (as much of the list as has room, as JSON), `Sunbox-Exposure` and
+    `Sunbox-Aspect-Ratio`, each only where there is something to say."""
     imported = await packing(lambda: house(request).assets.scene(id))
     document = imported.scene(presets.default_environment())
     headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
+    for name in ("exposure", "aspect_ratio"):
+        if (value := getattr(imported, name)) is not None:
+            headers[f"sunbox-{name.replace('_', '-')}"] = repr(value)
     return JSONResponse(document, headers=headers)
 
 

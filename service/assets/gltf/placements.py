@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles
+from service.assets.data import Doubles, Indices
 from service.assets.errors import ParseError
+from service.assets.gltf.file import Array
 from service.assets.gltf.nodes import Node
 from service.assets.gltf.notes import Notes
+from service.assets.gltf.rays import Placed
 from service.assets.parts import MAX_COORDINATE
 
 MOST_SHAPES = 100_000  # beyond, the document itself is the burden
@@ -25,8 +27,16 @@ class Part:
     """A primitive in one pose, written once for all its nodes."""
 
     shape: dict[str, Any]  # without its transform
-    bounds: Bounds
-    triangles: int
+    vertices: Array  # (n, 3)
+    faces: Indices  # (m, 3)
+
+    @property
+    def triangles(self) -> int:
+        return len(self.faces)
+
+    @cached_property
+    def bounds(self) -> Bounds:
+        return self.vertices.min(axis=0), self.vertices.max(axis=0)
 
 
 class Placements:
@@ -65,6 +75,14 @@ class Placements:
     def shown(self) -> list[Part]:
         """The part of each shape."""
         return [part for part, stands in zip(self._parts, self._stands.tolist(), strict=True) if stands]
+
+    def placed(self) -> list[Placed]:
+        """The shapes as rays meet them."""
+        worlds = self._worlds[self._stands]
+        return [
+            Placed(part.vertices, part.faces, world, part.shape["double_sided"], part.shape["material"])
+            for part, world in zip(self.shown, worlds, strict=True)
+        ]
 
     @property
     def bounds(self) -> Bounds:

@@ -9,7 +9,7 @@ import numpy as np
 
 from service.assets.data import AssetLimits, SceneFile, ScenePart
 from service.assets.errors import ParseError
-from service.assets.gltf import standing
+from service.assets.gltf import metering, standing
 from service.assets.gltf.extensions import note_unsupported
 from service.assets.gltf.file import Array, GltfFile
 from service.assets.gltf.materials import Materials
@@ -64,17 +64,30 @@ class _Importer:
         shapes = self.placements.shapes(self.notes)
         if not shapes:
             raise self.notes.nothing_left()
+        camera, aspect = standing.camera(file, shown, self.placements.bounds, self.notes)
         document = {
             "version": 1,
-            "camera": standing.camera(file, shown, self.placements.bounds, self.notes),
+            "camera": camera,
             "lights": lights,
             "textures": self.textures.documents,
             "materials": self.materials.documents,
             "shapes": shapes,
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
+        exposure = self._metered(used, aspect) if lights else None
         triangles = sum(part.triangles for part in self.placements.shown)
-        return SceneFile(used, self.files.kept, self.notes.document(), triangles, bool(lights))
+        return SceneFile(used, self.files.kept, self.notes.document(), triangles, bool(lights), exposure, aspect)
+
+    def _metered(self, document: dict[str, Any], aspect: float | None) -> float | None:
+        """The exposure that suits the file's lights, where 0 does not; noted, as is that nothing else lights it."""
+        place = "/extensions/KHR_lights_punctual"
+        stops = metering.exposure(document, self.placements.placed(), aspect)
+        if stops is not None:
+            side = "above" if stops < 0 else "below"
+            told = f"the file's lights expose the picture {abs(stops):g} stops {side} middle grey"
+            self.notes.add(place, f"{told}; they are kept as they are, and an exposure of {stops:g} suits them")
+        self.notes.add(place, "the file has lights and no environment: there is no sky, and the background is empty")
+        return stops
 
     def _mesh(self, node: Node) -> None:
         mesh = self.file.follow(node.place, "mesh", "meshes")
@@ -138,7 +151,7 @@ class _Importer:
         shape = {"type": "mesh", "asset": reference, "material": name} | sides
         if primitive.normals is None:  # then triangles are flat, says the specification
             shape["smooth"] = False
-        return Part(shape, (vertices.min(axis=0), vertices.max(axis=0)), len(primitive.faces))
+        return Part(shape, vertices, primitive.faces)
 
     def _unread(self) -> None:
         """Notes whatever else the file holds that would change the picture."""

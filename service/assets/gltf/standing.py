@@ -62,9 +62,11 @@ def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
     }
 
 
-def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> dict[str, Any]:
-    """The first camera of the scene; a framed one where there is none with a perspective."""
+def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> tuple[dict[str, Any], float | None]:
+    """The first camera of the scene, or a framed one where none has a perspective; and, where the camera says it, the
+    width of its picture over the height."""
     chosen: dict[str, Any] | None = None
+    aspect: float | None = None
     for node in nodes:
         if "camera" not in node.place:
             continue
@@ -75,14 +77,14 @@ def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> d
         elif kind == "perspective":
             lens = place.need("perspective")
             chosen = _perspective(lens, node, bounds)
-            shape = lens.number("aspectRatio", 1, 1e-6, 1e6)
-            if shape != 1:
-                notes.add(lens.at("aspectRatio"), f"a picture {shape:.3g} times as wide as high frames what it does")
+            aspect = lens.number("aspectRatio", 1, 1e-6, 1e6) if "aspectRatio" in lens else None
+            if aspect is not None and aspect != 1:
+                notes.add(lens.at("aspectRatio"), f"the camera's picture is {aspect:.3g} times as wide as high")
         elif kind == "orthographic":
             notes.add(place.pointer, f"orthographic cameras are not supported; {INSTEAD}")
         else:
             notes.add(place.at("type"), f"must be perspective or orthographic, not {shown(kind)}; {INSTEAD}")
-    return chosen or framed(bounds)
+    return chosen or framed(bounds), aspect
 
 
 def _perspective(place: Place, node: Node, bounds: Bounds) -> dict[str, Any]:
