@@ -28,6 +28,7 @@ from service.config import Config
 from service.connection_limits import Watch
 from service.connections import connection_class, listen
 from service.documents import DamagedFile
+from service.downloads import Pieces
 from service.guard import Guard, turning_away
 from service.logs import Requests
 from service.problems import Unavailable
@@ -90,6 +91,7 @@ def create_app(config: Config) -> FastAPI:
     tell_errors(app)
     describe(app, keyed=bool(config.api_key))
     app.add_middleware(Guard, config=config, refuse=respond)
+    app.add_middleware(Pieces)
     app.add_middleware(Requests, refuse=respond, heard=own.traffic.heard)
     return app
 

@@ -25,6 +25,7 @@ LAYERS = [
     {"service.storage"},
     {"service.pack"},
     {"service.logs", "service.log_output"},
+    {"service.downloads"},
     {"service.rendering"},
     {"service.readiness"},
     {"service.keys"},

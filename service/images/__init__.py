@@ -5,15 +5,15 @@ from __future__ import annotations
 import io
 import json
 import os
-from collections.abc import Mapping
-from typing import Any
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, BinaryIO
 
 import numpy as np
 import numpy.typing as npt
 
 from service.images.metadata import KEY, png_with_text, read_metadata
 
-__all__ = ["LAYERS", "MIME", "encode", "encode_layers", "read_metadata"]
+__all__ = ["LAYERS", "MIME", "encode", "encode_layers", "read_metadata", "write", "write_layers"]
 
 MIME = {
     "png": "image/png",
@@ -26,6 +26,7 @@ MIME = {
 QUALITY = 80
 FULL_COLOUR = 90  # from this JPEG quality on colour is kept at full resolution: 4:4:4
 PNG_LEVEL = 1  # zlib's: higher ones take several times as long for some percent
+BAND = 128  # rows of all layers that are put together at a time; a multiple of the 16 that EXR compresses at once
 CHANNELS = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 LAYERS = {
     "color": ("R", "G", "B", "A"),
@@ -49,15 +50,9 @@ def encode(
     PNG, JPEG and WebP take display-encoded values with straight alpha, uint8 or float 0..1; JPEG is laid over black.
     EXR, HDR and npy take linear float32, colour premultiplied; HDR drops alpha. `bits`, 8 or 16, is for PNG alone.
     """
+    if format in ("npy", "exr", "hdr"):
+        return _in_memory(lambda file: write(file, pixels, format, metadata=metadata))
     pixels = pixels.reshape(*pixels.shape[:2], -1)
-    if format == "npy":
-        stream = io.BytesIO()
-        np.save(stream, np.ascontiguousarray(pixels, np.float32), allow_pickle=False)
-        return stream.getvalue()
-    if format == "exr":
-        return _exr(pixels, CHANNELS[pixels.shape[2]], metadata)
-    if format == "hdr":
-        return _openimageio("hdr", _three(pixels), "float", {})
     if format == "png":
         png = _pillow(_bytes(pixels), "PNG", compress_level=PNG_LEVEL) if bits == 8 else _png16(pixels)
         return png_with_text(png, _text(metadata)) if metadata is not None else png
@@ -70,50 +65,82 @@ def encode(
     raise ValueError(f"unknown image format {format!r}; known are {', '.join(MIME)}")
 
 
+def write(file: BinaryIO, pixels: Array, format: str, *, bits: int = 8, metadata: Metadata | None = None) -> None:
+    """Writes what `encode` gives to an empty file of the system, large formats without a copy in memory."""
+    flat = pixels.reshape(*pixels.shape[:2], -1)
+    if format == "npy":
+        np.save(file, np.ascontiguousarray(flat, np.float32), allow_pickle=False)
+    elif format == "exr":
+        _write_exr(file, [flat], CHANNELS[flat.shape[2]], metadata)
+    elif format == "hdr":
+        _write(file, "hdr", [_three(flat)], "float", {})
+    else:
+        file.write(encode(pixels, format, bits=bits, metadata=metadata))
+
+
 def encode_layers(layers: dict[str, Array], metadata: Metadata | None = None) -> bytes:
     """An EXR with every AOV as a layer: R G B A, albedo.R, normal.X, depth.Z ... in the order of LAYERS."""
+    return _in_memory(lambda file: write_layers(file, layers, metadata))
+
+
+def write_layers(file: BinaryIO, layers: dict[str, Array], metadata: Metadata | None = None) -> None:
+    """Writes what `encode_layers` gives, as `write` does."""
     names = [name for name in LAYERS if name in layers]
     flat = [layers[name].reshape(*layers[name].shape[:2], -1) for name in names]
-    return _exr(np.concatenate(flat, axis=2), tuple(c for name in names for c in LAYERS[name]), metadata)
+    _write_exr(file, flat, tuple(c for name in names for c in LAYERS[name]), metadata)
 
 
-def _exr(pixels: Array, channels: tuple[str, ...], metadata: Metadata | None) -> bytes:
+def _write_exr(file: BinaryIO, layers: Sequence[Array], channels: tuple[str, ...], metadata: Metadata | None) -> None:
     attributes = {"compression": "zip", "DateTime": ""}  # or the hour of writing: the same picture is the same file
     if metadata is not None:
         attributes[KEY] = _text(metadata)
-    return _openimageio("openexr", pixels, "float", attributes, channels)
+    _write(file, "openexr", layers, "float", attributes, channels)
 
 
 def _png16(pixels: Array) -> bytes:
     """Pillow knows no colour of 16 bits."""
     whole = pixels if pixels.dtype == np.uint16 else np.rint(_unit(pixels) * 65535).astype(np.uint16)
     attributes = {"oiio:UnassociatedAlpha": 1, "png:compressionLevel": PNG_LEVEL}
-    return _openimageio("png", whole, "uint16", attributes)
+    return _in_memory(lambda file: _write(file, "png", [whole], "uint16", attributes))
 
 
-def _openimageio(
-    format: str, pixels: Array, kind: str, attributes: Mapping[str, str | int], channels: tuple[str, ...] = ()
-) -> bytes:
-    """Written into memory: the library knows files by name only, and a memfd has one."""
+def _in_memory(write: Callable[[BinaryIO], None]) -> bytes:
+    with os.fdopen(os.memfd_create("sunbox-image", os.MFD_CLOEXEC), "w+b") as file:
+        write(file)
+        file.flush()
+        return os.pread(file.fileno(), os.fstat(file.fileno()).st_size, 0)
+
+
+def _write(
+    file: BinaryIO,
+    format: str,
+    layers: Sequence[Array],
+    kind: str,
+    attributes: Mapping[str, str | int],
+    channels: tuple[str, ...] = (),
+) -> None:
+    """By OpenImageIO. `layers` are (height, width, channels) each, and stand beside each other in the file."""
     import OpenImageIO as oiio
 
-    height, width, depth = pixels.shape
+    height, width = layers[0].shape[:2]
+    depth = sum(layer.shape[2] for layer in layers)
     spec = oiio.ImageSpec(width, height, depth, kind)
     if channels:
         spec.channelnames = channels
         spec.alpha_channel = channels.index("A") if "A" in channels else -1
     for name, value in attributes.items():
         spec.attribute(name, value)
-    fd = os.memfd_create("sunbox-image", os.MFD_CLOEXEC)
-    try:
-        output = oiio.ImageOutput.create(format)
-        data = np.ascontiguousarray(pixels, np.uint16 if kind == "uint16" else np.float32)
-        assert output is not None, f"this OpenImageIO writes no {format}"
-        if not (output.open(f"/proc/self/fd/{fd}", spec) and output.write_image(data) and output.close()):
-            raise OSError(f"{format} could not be written: {output.geterror()}")
-        return os.pread(fd, os.fstat(fd).st_size, 0)
-    finally:
-        os.close(fd)
+    output = oiio.ImageOutput.create(format)
+    assert output is not None, f"this OpenImageIO writes no {format}"
+    # The library knows files by name only, and each open one has this one.
+    fine = output.open(f"/proc/self/fd/{file.fileno()}", spec)
+    for top in range(0, height, BAND):
+        rows = [layer[top : top + BAND] for layer in layers]
+        band = rows[0] if len(rows) == 1 else np.concatenate(rows, axis=2)
+        data = np.ascontiguousarray(band, np.uint16 if kind == "uint16" else np.float32)
+        fine = fine and output.write_scanlines(top, top + len(band), 0, data)
+    if not (fine and output.close()):
+        raise OSError(f"{format} could not be written: {output.geterror()}")
 
 
 def _pillow(pixels: npt.NDArray[np.uint8], format: str, **options: Any) -> bytes:

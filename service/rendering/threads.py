@@ -20,7 +20,8 @@ def _yield_to_others() -> None:
 
 
 _PACKING = ThreadPoolExecutor(2, "packing", _yield_to_others)  # parsing and packing scenes: seconds for the largest
-_ENCODING = ThreadPoolExecutor(2, "encoding")  # pictures to JPEG and the like: milliseconds, and somebody looks
+_ENCODING = ThreadPoolExecutor(2, "encoding")  # frames to JPEG and the like: milliseconds, and somebody looks
+_WRITING = ThreadPoolExecutor(2, "writing", _yield_to_others)  # pictures to files: seconds for the largest
 
 
 class Lane:
@@ -42,3 +43,7 @@ async def packing(work: Callable[[], T]) -> T:
 
 async def encoding(work: Callable[[], T]) -> T:
     return await asyncio.get_running_loop().run_in_executor(_ENCODING, work)
+
+
+async def writing(work: Callable[[], T]) -> T:
+    return await asyncio.get_running_loop().run_in_executor(_WRITING, work)

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 import json
+import os
+from contextlib import ExitStack
 from dataclasses import asdict
 from typing import Annotated, Any
 
@@ -12,6 +14,7 @@ from fastapi.responses import JSONResponse
 
 from service import presets
 from service.assets import AssetInfo
+from service.downloads import FileAnswer
 from service.rendering.threads import packing
 from service.routes import answers
 from service.routes.house import house
@@ -19,6 +22,7 @@ from service.routes.house import house
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
 FOREVER = "public, max-age=31536000, immutable"  # an id is the hash of what it names
+BYTES = "application/octet-stream"
 HEADER_BYTES = 4096  # proxies refuse headers not much longer
 
 
@@ -77,6 +81,10 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     responses=answers.files("application/octet-stream") | answers.problems(404),
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
-    data = await packing(lambda: house(request).assets.read(id))
-    headers = {"content-disposition": "attachment", "cache-control": FOREVER}
-    return Response(data, media_type="application/octet-stream", headers=headers)
+    with ExitStack() as stack:
+        source = await asyncio.to_thread(stack.enter_context, house(request).assets.opened(id))
+        headers = {"content-disposition": "attachment", "cache-control": FOREVER}
+        if isinstance(source, bytes):
+            return Response(source, media_type=BYTES, headers=headers)
+        # A description of its own: the file stays open, whatever becomes of the asset meanwhile.
+        return FileAnswer(os.fdopen(os.dup(source.fileno()), "rb"), BYTES, headers)

@@ -13,6 +13,7 @@ from starlette.requests import HTTPConnection
 from service.assets import AssetStore
 from service.config import Config
 from service.documents import Documents
+from service.downloads import Downloads
 from service.metrics import Traffic
 from service.problems import Unavailable
 from service.quality import priced
@@ -40,10 +41,12 @@ class House:
     renders: Renders = field(default_factory=Renders)
     traffic: Traffic = field(default_factory=Traffic)
     sessions: Sessions = field(init=False)
+    downloads: Downloads = field(init=False)
     readiness: Readiness = field(init=False)
 
     def __post_init__(self) -> None:
         self.readiness = Readiness(self.engine, self.reader, self.config.require_gpu)
+        self.downloads = Downloads(self.config.data_dir)
         self.sessions = Sessions(self.engine, self.reader, self.config.max_clients)
 
     async def info(self) -> dict[str, Any]:

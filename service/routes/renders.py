@@ -8,18 +8,19 @@ import time
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, BinaryIO, Literal
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import images, recipe
+from service.downloads import Downloads, FileAnswer, Written, disconnected, present
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.rendering.job import Job
 from service.rendering.messages import Encoding, View
 from service.rendering.reading import unfolded
-from service.rendering.threads import encoding, packing
+from service.rendering.threads import packing, writing
 from service.routes import answers
 from service.routes.bodies import json_body
 from service.routes.errors import GONE
@@ -82,7 +83,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
             return Response(status_code=GONE)
         if job.state == "cancelled":
             raise Unavailable("The server is shutting down.")
-        return await _image(job, query, view)
+        return await _image(request, job, query, view)
     finally:
         job.cancel()
         job.release()
@@ -139,7 +140,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving:
     responses=answers.files(*images.MIME.values()) | answers.problems(404, 409, 410, 422),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
-    return await _image(house(request).renders.get(id, owner(request)), query, query.view())
+    return await _image(request, house(request).renders.get(id, owner(request)), query, query.view())
 
 
 @router.delete(
@@ -165,37 +166,57 @@ async def _job(request: Request) -> Job:
 
 async def _finished_or_gone(request: Request, job: Job) -> None:
     """Returns when the job is finished, or the connection closed."""
-    gone = asyncio.ensure_future(_disconnected(request))
+    gone = asyncio.ensure_future(disconnected(request.receive))
     finished = asyncio.ensure_future(job.finished.wait())
     await asyncio.wait({gone, finished}, return_when=asyncio.FIRST_COMPLETED)
     gone.cancel()
     finished.cancel()
 
 
-async def _disconnected(request: Request) -> None:
-    while (await request.receive())["type"] != "http.disconnect":
-        pass
+async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
+    downloads = house(request).downloads
+    client = owner(request) or (request.client.host if request.client else "")
+    key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
+    async with present(request.receive) as gone, downloads.turn(client):
+        if gone():
+            return Response(status_code=GONE)
+        written = downloads.find(key)
+        if written is None:
+            downloads.admit(client, _most_bytes(job, query))
+            written = await _written(downloads, job, query, view)
+            downloads.keep(client, key, written)
+    return FileAnswer(written.file, images.MIME[query.format], {"cache-control": "no-store"}, held=written)
 
 
-async def _image(job: Job, query: ImageQuery, view: View) -> Response:
-    aovs = list(images.LAYERS) if query.aov == "all" else [query.aov]
+async def _written(downloads: Downloads, job: Job, query: ImageQuery, view: View) -> Written:
     layers: dict[str, np.ndarray] = {}
     samples = 0
-    for aov in aovs:
+    for aov in _aovs(query):
         layers[aov], progress = await job.image(replace(view, aov=aov))
         samples = samples or progress.samples
         if samples == 0:
             raise Conflict("There is no sample yet.")
-    data = await encoding(partial(_encoded, layers, query, job, samples))
-    return Response(data, media_type=images.MIME[query.format], headers={"cache-control": "no-store"})
+    return await writing(lambda: downloads.write(partial(_write, layers, query, job, samples)))
 
 
-def _encoded(layers: dict[str, np.ndarray], query: ImageQuery, job: Job, samples: int) -> bytes:
+def _aovs(query: ImageQuery) -> list[str]:
+    return list(images.LAYERS) if query.aov == "all" else [query.aov]
+
+
+def _most_bytes(job: Job, query: ImageQuery) -> int:
+    """About as many as a file takes that can't be compressed."""
+    channels = sum(len(images.LAYERS[aov]) for aov in _aovs(query))
+    deep = query.format not in DISPLAYED
+    return job.settings.width * job.settings.height * channels * (4 if deep else query.bits // 8)
+
+
+def _write(layers: dict[str, np.ndarray], query: ImageQuery, job: Job, samples: int, file: BinaryIO) -> None:
     bits: Literal[8, 16] = 16 if query.bits == Bits.SIXTEEN else 8
     made_from = None
     if query.format in ("png", "exr"):
         view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
         made_from = recipe.write(unfolded(job.document), job.settings, samples, view)
     if query.aov == "all":
-        return images.encode_layers(layers, made_from)
-    return images.encode(layers[query.aov], query.format, bits=bits, metadata=made_from)
+        images.write_layers(file, layers, made_from)
+    else:
+        images.write(file, layers[query.aov], query.format, bits=bits, metadata=made_from)

@@ -1,0 +1,150 @@
+"""Large answers: sent in pieces, as the client takes them, from files that hold no memory.
+
+Pictures are written one at a time for each client, so that whoever asks for many waits for himself, and what one
+client does not fetch leaves room for others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import tempfile
+import weakref
+from collections import Counter
+from collections.abc import AsyncIterator, Callable, Hashable, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.problems import Unavailable
+
+PIECE = 1 << 18  # bytes that are read and sent at a time
+AT_ONCE = 2  # pictures that are fetched from the renderer and written
+ROOM = 4 << 30  # bytes on the disk of pictures that are being sent; one client has at most half
+RETRY_S = 10
+
+log = logging.getLogger(__name__)
+
+
+class Pieces:
+    """ASGI middleware: a body in memory goes out in pieces too; nothing is copied whole into the connection."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def sending(message: Message) -> None:
+            body = message.get("body", b"")
+            if message["type"] != "http.response.body" or len(body) <= PIECE:
+                return await send(message)
+            view, more = memoryview(body), message.get("more_body", False)
+            for start in range(0, len(body), PIECE):
+                end = start + PIECE
+                await send({**message, "body": view[start:end], "more_body": more or end < len(body)})
+
+        await self._app(scope, receive, sending if scope["type"] == "http" else send)
+
+
+class FileAnswer(Response):
+    """The bytes of an open file, which need not have a name. `held` is kept until the answer's end."""
+
+    def __init__(self, file: BinaryIO, media_type: str, headers: Mapping[str, str], held: object = None) -> None:
+        self._file = file
+        self._held = held
+        self._size = os.fstat(file.fileno()).st_size
+        super().__init__(None, media_type=media_type, headers={**headers, "content-length": str(self._size)})
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        sent = 0
+        async with present(receive) as gone:
+            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+            while not gone():
+                data = await asyncio.to_thread(os.pread, self._file.fileno(), PIECE, sent)
+                sent += len(data)
+                if not data and sent < self._size:
+                    raise OSError(f"a file became shorter while it was sent: {sent} of {self._size} bytes")
+                await send({"type": "http.response.body", "body": data, "more_body": sent < self._size})
+                if sent >= self._size:
+                    break
+        self._held = None
+
+
+@asynccontextmanager
+async def present(receive: Receive) -> AsyncIterator[Callable[[], bool]]:
+    """Tells whether the client has gone away meanwhile; what it still sends is thrown away."""
+    listening = asyncio.ensure_future(disconnected(receive))
+    try:
+        yield lambda: listening.done() and listening.exception() is None
+    finally:
+        listening.cancel()
+        await asyncio.gather(listening, return_exceptions=True)
+
+
+async def disconnected(receive: Receive) -> None:
+    """Returns when nobody is there any more."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+class Written:
+    """A picture's file. It has no name, and is gone with the last that refers to this object."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        self.bytes = os.fstat(file.fileno()).st_size
+
+
+class Downloads:
+    """Pictures that are written and sent, for the event loop."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._room = asyncio.Semaphore(AT_ONCE)
+        self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
+        self._written: weakref.WeakValueDictionary[Hashable, Written] = weakref.WeakValueDictionary()
+        self._held: Counter[str] = Counter()  # bytes, by client
+
+    @asynccontextmanager
+    async def turn(self, client: str) -> AsyncIterator[None]:
+        """The client's turn to have a picture written, of which each has one at a time."""
+        mine = self._turns.setdefault(client, asyncio.Lock())
+        async with mine, self._room:
+            yield
+
+    def find(self, key: Hashable) -> Written | None:
+        """A picture that is still being sent to somebody."""
+        return self._written.get(key)
+
+    def admit(self, client: str, most_bytes: int) -> None:
+        """Raises Unavailable where so many more would be too much, for the client or for all."""
+        held, total = self._held[client], self._held.total()
+        if (held and held + most_bytes > ROOM // 2) or (total and total + most_bytes > ROOM):
+            raise Unavailable("Too many pictures are being sent already, to clients that take them slowly.", RETRY_S)
+
+    def write(self, fill: Callable[[BinaryIO], None]) -> Written:
+        """A file that `fill` has written. For any thread. Raises Unavailable where the disk takes no more."""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            file = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 (`Written` has it)
+            fill(file)
+            file.flush()
+        except OSError as error:
+            log.error("could not write a picture error=%s", error)
+            raise Unavailable("The picture could not be written to the disk.", RETRY_S) from None
+        return Written(file)
+
+    def keep(self, client: str, key: Hashable | None, written: Written) -> None:
+        """Counts a picture as long as it is being sent; with `key` another request for it finds it."""
+        if key is not None:
+            self._written[key] = written
+        self._held[client] += written.bytes
+        weakref.finalize(written, self._let_go, client, written.bytes)
+
+    def _let_go(self, client: str, size: int) -> None:
+        self._held[client] -= size
+        if not self._held[client]:
+            del self._held[client]
