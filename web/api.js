@@ -46,6 +46,7 @@ export const save = (kind, title, document) =>
   ask("PUT", `${saved(kind, title)}?${new URLSearchParams({ title })}`, json(document));
 export const forget = (kind, name) => ask("DELETE", saved(kind, name));
 
+export const fetchAsset = async (id) => (await ask("GET", `assets/${id}`)).blob();
 export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
 
 // A small picture of a scene, as a PNG.

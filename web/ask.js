@@ -2,9 +2,9 @@
 
 import { element, freshId } from "./dom.js";
 
-// Resolves to what `answer(value)` makes of the button that was pressed. `choices`: [{label, value}], the first one
-// being what Enter does; `check()` may keep the dialog open.
-function open({ title, detail = "", body = [], choices, no = "Cancel", answer = (value) => value, check = () => true }) {
+// Resolves to what `answer(value)` makes of the button that was pressed: one of `choices` [{label, value}], the first
+// of which is what Enter does, or one in `body`. `check()` may keep the dialog open.
+export function question({ title, detail = "", body = [], choices = [], no = "Cancel", answer = (value) => value, check = () => true }) {
   return new Promise((resolve) => {
     const id = freshId("question");
     let given = null;
@@ -15,7 +15,7 @@ function open({ title, detail = "", body = [], choices, no = "Cancel", answer = 
         method: "dialog",
         onsubmit: (event) => {
           if (!check()) return event.preventDefault();
-          given = answer(event.submitter?.value ?? choices[0].value);
+          given = answer(event.submitter.value);
         },
       },
       element("h2", { id }, title), detail ? element("p", { class: "dim" }, detail) : null, ...body,
@@ -34,10 +34,7 @@ function open({ title, detail = "", body = [], choices, no = "Cancel", answer = 
 }
 
 // Whether the person says `yes`.
-export const ask = async ({ yes, ...question }) => (await open({ ...question, choices: [{ label: yes, value: "yes" }] })) !== null;
-
-// One of some answers, [{label, value}]: its value.
-export const choose = (question) => open(question);
+export const ask = async ({ yes, ...asked }) => (await question({ ...asked, choices: [{ label: yes, value: "yes" }] })) !== null;
 
 // A name; `problem(name)` says what is wrong with one, or null.
 export function askName({ title, label, value, action, problem }) {
@@ -45,7 +42,7 @@ export function askName({ title, label, value, action, problem }) {
   const entry = element("input", { class: "entry", id, value, autocomplete: "off", spellcheck: "false" });
   const trouble = element("p", { class: "trouble", id: `${id}-trouble`, role: "alert", hidden: true });
   entry.setAttribute("aria-describedby", trouble.id);
-  const asked = open({
+  const asked = question({
     title, body: [element("label", { for: id }, label), entry, trouble], choices: [{ label: action, value: "given" }],
     answer: () => entry.value.trim(),
     check() {
@@ -64,7 +61,7 @@ export function askName({ title, label, value, action, problem }) {
 export function askWhich({ title, detail, label, options, action }) {
   const id = freshId("which");
   const select = element("select", { id }, ...options.map((each) => element("option", { value: each.value }, each.title)));
-  return open({
+  return question({
     title, detail, body: [element("label", { for: id }, label), select], choices: [{ label: action, value: "given" }],
     answer: () => select.value,
   });

@@ -1,5 +1,7 @@
 // Files that are dropped, picked, or handed out.
 
+import { element } from "./dom.js";
+
 // Calls `take(file)` with the first file dropped onto an element; the page's own drop stays out of it.
 export function acceptFiles(node, take) {
   node.addEventListener("dragover", (event) => {
@@ -15,6 +17,19 @@ export function acceptFiles(node, take) {
     if (!file) return;
     event.preventDefault(); // the page sees it too, and only puts its own hint away
     take(file);
+  });
+}
+
+// Files that the person picks: [] for none.
+export function browse(accept) {
+  return new Promise((resolve) => {
+    const input = element("input", {
+      type: "file", accept, class: "unseen", tabindex: "-1", "aria-label": "File",
+      onchange: () => { input.remove(); resolve([...input.files]); },
+      oncancel: () => { input.remove(); resolve([]); },
+    });
+    document.body.append(input); // some browsers forget one that stands nowhere
+    input.click();
   });
 }
 

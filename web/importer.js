@@ -5,23 +5,27 @@ import { fetchAssetScene, upload } from "./api.js";
 import { ball, measure, wayOut } from "./bounds.js";
 import { axes } from "./camera.js";
 import { PLAIN, fresh } from "./materials.js";
-import { at, equal, isObject, pointer, put } from "./patch.js";
+import { pointer } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
+import { pictured } from "./textures.js";
 import { sentence } from "./words.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
 
-export const ACCEPT = Object.keys(ENDINGS).map((ending) => `.${ending}`).join(",");
+const accepted = (kinds) => Object.keys(ENDINGS).filter((ending) => kinds.includes(ENDINGS[ending])).map((ending) => `.${ending}`).join(",");
+export const ACCEPT = accepted(ORDER);
+export const ACCEPT_IMAGES = accepted(["image", "light"]);
 
 const sort = (file) => ENDINGS[file.name.split(".").at(-1).toLowerCase()];
 const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
 
 export class Importer {
-  // `acts` is the editor; `messages` tells; `picked(x, y)` gives the shape under a point of the page, or null.
-  constructor({ schema, acts, messages, picked }) {
-    Object.assign(this, { schema: schema.scene, acts, messages, picked });
+  // `acts` is the editor; `messages` tells; `picked(x, y)` gives the shape under a point of the page, or null;
+  // `thumbnails` are those of textures.
+  constructor({ schema, acts, messages, picked, thumbnails }) {
+    Object.assign(this, { schema: schema.scene, acts, messages, picked, thumbnails });
     this.takesTextures = schema.scene.properties.textures !== undefined;
   }
 
@@ -113,17 +117,8 @@ export class Importer {
   #paint(place, { id, kind }, file) {
     if (!this.takesTextures || !place) throw new Error("Nothing here takes an image.");
     if (kind !== "image") throw new Error("An image is needed here: PNG, JPEG, WebP, EXR or HDR.");
-    const { state } = this.acts;
-    const textures = state.scene.textures ?? {};
-    // An image that takes another's place is read as that one was, and lies as it lay.
-    const before = at(state, place);
-    const reading = isObject(before) ? before : {};
-    const { type, ...lying } = textures[reading.texture] ?? {};
-    const texture = { ...(type ? {} : lying), asset: id };
-    const same = Object.keys(textures).find((name) => equal(textures[name], texture));
-    const name = same ?? fresh(stem(file), textures);
-    const scene = { ...state.scene, textures: { ...textures, [name]: texture } };
-    this.acts.change(put({ ...state, scene }, place, { ...reading, texture: name }));
+    this.thumbnails.keep(id, file);
+    this.acts.change(pictured(this.acts.state, place, id, stem(file)));
   }
 }
 

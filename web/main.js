@@ -19,6 +19,8 @@ import { Stage, viewOf } from "./stage.js";
 import { Status } from "./status.js";
 import { Stream } from "./stream.js";
 import { watchTabs } from "./tabs.js";
+import { textureActs } from "./texture-slot.js";
+import { TextureThumbnails } from "./texture-thumbnails.js";
 import { Thumbnails } from "./thumbnails.js";
 import { Viewport, pictureSize } from "./viewport.js";
 import { inWords } from "./words.js";
@@ -135,13 +137,15 @@ const stage = new Stage({
   find, acts: editor, desk, stream, viewport, complain, say: (text) => announcer.say(text),
 });
 const thumbnails = new Thumbnails(() => isConnected && ended === painted && !isPaused);
-const importer = new Importer({ schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y) });
+const textureThumbnails = new TextureThumbnails();
+const importer = new Importer({ schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y), thumbnails: textureThumbnails });
 editor.takeTexture = (place, file) => importer.texture(place, file);
 editor.frame = (thing) => stage.frame(thing);
 editor.framed = (around) => stage.framed(around);
 editor.radius = () => stage.radius();
 const panel = new Panel(find("panel"), {
   schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch), say: (text) => announcer.say(text),
+  textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
 });
 const comparison = new Comparison(
   { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },

@@ -10,6 +10,7 @@ import { equal } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
 import { qualityChoice } from "./quality.js";
+import { TextureSlot } from "./texture-slot.js";
 import { TextureForm } from "./texturing.js";
 import { inWords } from "./words.js";
 
@@ -27,9 +28,10 @@ export class Panel {
   #shape = {}; // what the exchangeable forms were made for
 
   // `acts`: the editor, and takeTexture(place, file), frame(thing), radius(). `paint` as materialButtons wants it,
-  // `say(text)` reads out.
-  constructor(root, { schema, library, acts, paint, say }) {
+  // `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants them.
+  constructor(root, { schema, library, acts, paint, say, textureActs }) {
     this.root = root;
+    this.textureActs = textureActs;
     this.acts = acts;
     this.materials = materialModels(schema.scene);
     this.schema = schema;
@@ -87,6 +89,7 @@ export class Panel {
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
       takeFile: (name, file) => this.acts.takeTexture(`${place}/${name}`, file),
+      slot: (field, remove) => new TextureSlot(field, { ...this.textureActs(`${place}/${field.name}`, field), remove }),
       beneath: (field) => {
         const made = new TextureForm(field, { schema: this.schema.scene, place: `${place}/${field.name}`, acts: this.acts });
         textures.push(made);

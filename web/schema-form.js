@@ -12,19 +12,9 @@ import { unitText } from "./words.js";
 const isSame = ({ widget }, a, b) =>
   widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);
 
-// What stands in for the control while an image has its place.
-function textureChip(field, { drop }) {
-  const name = element("span", { class: "name" });
-  const remove = element("button", {
-    type: "button", class: "forget", "aria-label": `Remove the image from ${field.title}`, onclick: drop,
-  }, "×");
-  const node = element("div", { class: "texture", hidden: true }, "▦", name, remove);
-  return { element: node, show: (value) => { name.textContent = value.texture; name.title = JSON.stringify(value); } };
-}
-
 const isTexture = (value) => isObject(value) && value.texture !== undefined;
 
-function row(field, { change, commit, forgive, takeFile, beneath }) {
+function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
   const id = freshId(field.name);
   const trouble = element("p", { class: "trouble", id: `${id}-trouble`, hidden: true });
   const mark = (text) => {
@@ -53,11 +43,11 @@ function row(field, { change, commit, forgive, takeFile, beneath }) {
     label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
   }
   const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
-  const chip = field.takesTexture && textureChip(field, { drop: () => { change(field.name, undefined); commit(); } });
-  const under = chip ? beneath?.(field) : undefined;
-  const parts = [label, widget.element, chip?.element, reset, under?.element, hint, trouble].filter(Boolean);
-  const node = element("div", { class: "field", "data-field": field.name }, ...parts);
-  if (chip && takeFile) acceptFiles(node, (file) => takeFile(field.name, file));
+  const image = field.takesTexture ? slot?.(field, () => { change(field.name, undefined); commit(); }) : undefined;
+  const under = image && beneath?.(field);
+  const parts = [label, widget.element, image?.chip, image?.button, reset, under?.element, hint, trouble].filter(Boolean);
+  const node = element("div", { class: image ? "field pictured" : "field", "data-field": field.name }, ...parts);
+  if (image && takeFile) acceptFiles(node, (file) => takeFile(field.name, file));
   for (const input of node.querySelectorAll("input, select")) {
     input.setAttribute("aria-describedby", `${hint ? hint.id : ""} ${trouble.id}`.trim());
   }
@@ -67,10 +57,9 @@ function row(field, { change, commit, forgive, takeFile, beneath }) {
     show(value, initial = field.initial) {
       latest = value ?? initial;
       const textured = isTexture(latest);
-      if (chip) {
-        chip.element.hidden = !textured;
-        widget.element.hidden = textured;
-        if (textured) chip.show(latest);
+      if (image) {
+        widget.element.hidden = textured || field.widget === "texture";
+        image.show(latest);
         under?.show(latest);
       }
       if (trouble.hidden && !textured) widget.show(latest); // else what was refused stays in sight
@@ -81,8 +70,8 @@ function row(field, { change, commit, forgive, takeFile, beneath }) {
 
 // Calls `change(name, value)` with each new value (undefined: the default again), `commit()` when the
 // hand comes to rest, `forgive()` when something refused is taken back by hand, `takeFile(name, file)` when an
-// image is dropped onto a field that takes textures; `beneath(field)` may make {element, show} for what such a
-// field has to say of its image.
+// image is dropped onto a field that takes textures; `slot(field, remove)` may make the TextureSlot of such a field,
+// and `beneath(field)` {element, show} for what it has to say of its image.
 export function schemaForm(fields, acts) {
   const rows = new Map(fields.map((field) => [field.name, row(field, acts)]));
   return {

@@ -2,13 +2,11 @@
 // The first belongs to the parameter, the second to the texture, which other parameters may share.
 
 import { element } from "./dom.js";
-import { at, isObject, pointer } from "./patch.js";
+import { at, pointer } from "./patch.js";
 import { fields, textureModel } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
-
-// How many parameters of the scene's materials show this texture.
-const users = ({ materials }, name) =>
-  Object.values(materials).flatMap(Object.values).filter((value) => isObject(value) && value.texture === name).length;
+import { users } from "./textures.js";
+import { inWords } from "./words.js";
 
 // For the parameter at `place` in the editor's state. `parts` are the forms shown now, each with its place.
 export class TextureForm {
@@ -16,11 +14,12 @@ export class TextureForm {
 
   constructor(field, { schema, place, acts }) {
     Object.assign(this, { field, schema, place, acts, parts: [] });
+    this.kind = element("span", {});
     this.body = element("div", {});
     this.shared = element("p", { class: "dim" });
     this.element = element(
       "details", { class: "more beneath", hidden: true },
-      element("summary", {}, "Image ", element("span", { class: "unseen" }, `of ${field.title}`)), this.body, this.shared,
+      element("summary", {}, this.kind, " ", element("span", { class: "unseen" }, `of ${field.title}`)), this.body, this.shared,
     );
   }
 
@@ -30,6 +29,7 @@ export class TextureForm {
     const texture = scene.textures?.[value?.texture];
     this.element.hidden = !texture;
     if (!texture) return;
+    this.kind.textContent = texture.type ? inWords(texture.type) : "Image";
     const made = JSON.stringify([value.texture, texture.type]);
     if (made !== this.#made) {
       this.#made = made;

@@ -224,7 +224,7 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.settled()
     r, g, _, _ = overlay(editor, "picture")[height * 6 // 10, width // 2]
     assert g > r, "the ball is green"
-    editor.page.click("[data-field=base_color] .texture button")
+    editor.page.click("[data-field=base_color] .texture .forget")
     editor.wait("no texture", lambda: editor.page.is_hidden("[data-field=base_color] .texture"))
     editor.drop("#stage", {"broken.glb": b"glTF nonsense"})
     editor.wait("a refusal", lambda: "broken.glb was not taken" in editor.text("#messages"))

@@ -68,7 +68,7 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     assert lies == {"wrap": "mirror", "color_space": "linear", "rotation": 30, "scale": [3, 1]}
 
     editor.tab("material")
-    page.click("[data-field=base_color] .texture button")
+    page.click("[data-field=base_color] .texture .forget")
     editor.wait("no texture", lambda: page.is_hidden(BENEATH) and page.is_hidden("[data-field=base_color] .texture"))
     page.keyboard.press("Control+z")
     editor.wait("the texture again", lambda: page.is_visible(f"{BENEATH} [data-field=wrap]"))
@@ -117,3 +117,63 @@ def test_what_is_wrong_with_a_texture_is_said_at_its_control(editor: Editor) -> 
     second.fill("1")
     second.press("Enter")
     editor.wait("forgiveness", lambda: page.is_hidden(f"{BENEATH} [data-field=uv] .trouble"))
+
+
+def painted(editor: Editor, canvas: str) -> list[int]:
+    """The colours of a thumbnail a quarter and three quarters across, red, green, blue and alpha each."""
+    script = """([canvas]) => {
+        const context = document.querySelector(canvas).getContext("2d");
+        return [16, 48].flatMap((x) => [...context.getImageData(x, 16, 1, 1).data]);
+    }"""
+    values: list[int] = editor.page.evaluate(script, [canvas])
+    return values
+
+
+def test_every_place_for_an_image_is_reached_by_keyboard(editor: Editor) -> None:
+    page = editor.page
+    schema = page.request.get(page.url + "v1/schema").json()["scene"]["$defs"]
+    principled = next(m for m in schema.values() if "sheen_roughness" in m["properties"])["properties"]
+    takes = {name for name, field in principled.items() if "Texture" in json.dumps(field)}
+    offered = page.eval_on_selector_all("#material-form .pictured", "all => all.map((row) => row.dataset.field)")
+    assert set(offered) == takes and len(takes) > 20
+
+    page.locator("[data-field=normal_map] .choose").focus()
+    page.keyboard.press("Enter")
+    with page.expect_file_chooser() as asked:
+        page.keyboard.press("Enter")  # the first of what is offered
+    asked.value.set_files({"name": "halves.png", "mimeType": "image/png", "buffer": halves()})
+    editor.wait("the normal map", lambda: page.is_visible("[data-field=normal_map] .texture"))
+    thumbnail = "[data-field=normal_map] .texture canvas"
+    editor.wait("its picture", lambda: painted(editor, thumbnail) == [0, 220, 0, 255, 0, 0, 40, 255])
+
+
+def test_textures_are_used_again_and_checkers_made(editor: Editor) -> None:
+    page = editor.page
+    editor.drop("#material-form [data-field=base_color]", {"halves.png": halves()})
+    editor.wait("the texture", lambda: page.is_visible("[data-field=base_color] .texture"))
+    kept = "JSON.stringify([{ ...localStorage }, { ...sessionStorage }])"
+    editor.wait("autosave", lambda: "halves" in page.evaluate(kept))
+    page.reload()  # so that the picture has to come from the server
+    editor.wait("the work", lambda: page.is_visible("[data-field=base_color] .texture"))
+    page.click("[data-field=roughness] .image")
+    tile = "dialog[open] .tile[value='texture:halves']"
+    assert "used once" in editor.text(tile)
+    editor.wait("its picture", lambda: painted(editor, f"{tile} canvas") == [0, 220, 0, 255, 0, 0, 40, 255])
+    page.click(tile)
+    page.click("[data-field=metallic] .image")
+    page.click("dialog[open] .tile[value=checker]")
+    assert editor.text("[data-field=metallic] .beneath > summary").startswith("Checker")
+    # Another one in the place of the first is chosen from its picture.
+    page.click("[data-field=roughness] .texture .open")
+    page.click("dialog[open] .tile[value='texture:checker']")
+    editor.wait("the server's picture of it", lambda: page.get_attribute("#stage", "aria-busy") == "false")
+    assert page.locator(".message.refusal").count() == 0
+    editor.tab("keep")
+    document = json.loads(editor.shot("text=Scene as JSON"))
+    coat = document["materials"]["subject"]
+    assert [coat[name]["texture"] for name in ("base_color", "roughness", "metallic")] == [
+        "halves",
+        "checker",
+        "checker",
+    ]
+    assert document["textures"]["checker"] == {"type": "checker", "a": 0.8, "b": 0.2}
