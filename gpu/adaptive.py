@@ -11,7 +11,7 @@ from gpu import features
 from gpu.bindings import Slot
 from gpu.kernels import Kernels
 from gpu.plan import AREA, CLASSES, DECISIONS, WORDS, Plan, pixels_of, weights_of
-from gpu.tiles import GUESS_S, PASS_S, SLICE_S, USUAL_BOUNCES, Tile
+from gpu.tiles import GUESS_S, SLICE_S, USUAL_BOUNCES, Tile, usual_pass
 
 _MOST_AREAS = 1 << 14  # of a dispatch
 
@@ -123,8 +123,7 @@ class Adaptive:
         """How many samples a pixel gets in the next pass, in the mean."""
         if samples == 0 or self.cost_s == 0:
             return 1
-        width, height = self._picture
-        return max(1, min(int(PASS_S / (self.cost_s * width * height)), samples))
+        return max(1, usual_pass(self._picture, self.cost_s, samples))
 
     def bind(self, tile: Tile | None) -> Tile:
         """Binds the plan and, but for the meter, the areas of the slice; the tile of the picture that they lie in."""

@@ -9,6 +9,9 @@ import numpy as np
 
 SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
 PASS_S = 0.2  # samples per pass aim at this, once there are some
+# Samples per pass, at least, as soon as there are twice as many: to begin and end an invocation, which fetches and
+# stores 48 bytes of sums, costs llvmpipe a third of a sample of a simple scene.
+LEAST_A_PASS = 4
 MAX_SAMPLES_A_PASS = 256
 LOOP_TURNS = 65_535  # llvmpipe ends all loops of an invocation after so many turns together
 BAND = 16  # rows
@@ -66,9 +69,15 @@ class Tiles:
         """How many samples of every pixel to take at once after `samples`: the smallest tile shall fit a slice."""
         if samples == 0 or self.cost_s == 0:
             return 1
-        width, height = self.size
-        most = min(PASS_S / (self.cost_s * width * height), SLICE_S / (self._rates.max() * self._least * self._band))
-        return max(1, min(int(most), samples, self._most_samples))
+        fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
+        return max(1, min(fits, usual_pass(self.size, self.cost_s, samples), self._most_samples))
+
+
+def usual_pass(size: tuple[int, int], cost_s: float, samples: int) -> int:
+    """How many samples of every pixel to take at once after `samples`, each at `cost_s`: as many as take PASS_S or
+    LEAST_A_PASS, but never so many that a picture at its beginning would be long in changing."""
+    width, height = size
+    return min(samples, max(int(PASS_S / (cost_s * width * height)), min(LEAST_A_PASS, samples // 2)))
 
 
 def samples_at_once(max_bounces: int, shapes: int, nodes: int) -> int:

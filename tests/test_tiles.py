@@ -7,7 +7,7 @@ import pytest
 
 from gpu import Renderer
 from gpu import context as contexts
-from gpu.tiles import SLICE_S, Tiles
+from gpu.tiles import BAND, LEAST_A_PASS, SLICE_S, Tiles
 from tests.extremes.scenes import everything
 from tests.rendering import picture
 
@@ -44,6 +44,18 @@ def test_a_dear_band_gets_small_tiles_and_its_cheap_neighbours_large_ones() -> N
     _, _, width, height = tiles.tile(320, 0, 1)
     assert width * height * 1e-4 < 2 * SLICE_S
     assert tiles.pass_samples(1000) == 1
+
+
+@pytest.mark.parametrize("size", [256, 512, 1024, 2048, 4096])
+def test_large_pictures_get_several_samples_a_pass_as_small_ones_do(size: int) -> None:
+    """Beginning and ending an invocation costs as much as a third of a sample: a pixel would cost more in those."""
+    tiles = Tiles(size, size, 1 << 30)
+    for band in range(0, size, BAND):
+        tiles.took((0, band, size, BAND), 1, 1e-7 * size * BAND)
+    passes = [tiles.pass_samples(samples) for samples in range(65)]
+    assert passes[:2] == [1, 1]
+    assert min(passes[8:]) >= LEAST_A_PASS
+    assert all(each <= max(1, samples) for samples, each in enumerate(passes))
 
 
 def test_paths_that_may_be_long_begin_with_small_tiles() -> None:
