@@ -5,6 +5,7 @@ import { fetchPreset } from "./api.js";
 import * as moving from "./camera.js";
 import { linear } from "./color.js";
 import { OWN } from "./library.js";
+import { exposed } from "./lighting.js";
 import { at, isObject, pointer, put } from "./patch.js";
 import { defaults, environmentModels, fields, materialModels, model } from "./schema.js";
 import { Store } from "./store.js";
@@ -30,11 +31,12 @@ function highlight({ roughness, base_color = 0.5, metallic = 0 }) {
   };
 }
 
-const picked = (name, scene) => ({
+const picked = (name, scene, exposure) => ({
   scene, home: scene, compare: null,
   chosen: {
     scene: name, environment: OWN, thing: pointer("shapes", subject(scene)),
     material: scene.shapes[subject(scene)]?.material ?? Object.keys(scene.materials)[0],
+    ...(exposure === undefined ? {} : { exposure }),
   },
 });
 
@@ -101,7 +103,10 @@ export class Editor extends Store {
 
   pickScene(name) { return this.#fetch("scenes", name, (scene) => this.openScene(scene, name)); }
 
-  openScene(scene, name) { this.change(picked(name, scene)); }
+  // `exposure`: the view's that suits the scene's own lights.
+  openScene(scene, name, exposure) {
+    this.change({ ...picked(name, scene, exposure), ...exposed(this.state, exposure) });
+  }
 
   pickEnvironment(name) {
     if (name === null) this.putEnvironment(undefined, name);

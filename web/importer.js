@@ -4,6 +4,7 @@
 import { fetchAssetScene, upload } from "./api.js";
 import { ball, measure, wayOut } from "./bounds.js";
 import { axes } from "./camera.js";
+import { isUnderNoSky, studio } from "./lighting.js";
 import { PLAIN, fresh } from "./materials.js";
 import { pointer } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
@@ -69,16 +70,27 @@ export class Importer {
     else throw new Error("It holds neither a scene nor a material.");
   }
 
-  async #openScene({ id, warnings = [] }, file) {
+  async #openScene({ id, exposure, warnings = [] }, file) {
     const document = await fetchAssetScene(id);
-    this.acts.openScene(document, stem(file));
-    this.#tell(file, warnings, "not everything was taken.");
+    this.acts.openScene(document, stem(file), exposure);
+    const taken = exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
+    const action = isUnderNoSky(document) && { label: "Add the studio", does: () => this.#addStudio(exposure) };
+    this.#tell(file, [...taken, ...warnings], "good to know.", action);
   }
 
-  #tell(file, warnings, what) {
+  async #addStudio(exposure) {
+    try {
+      this.acts.putEnvironment(await studio(exposure), "studio");
+      this.messages.hide("import");
+    } catch (problem) {
+      this.acts.complain(problem);
+    }
+  }
+
+  #tell(file, warnings, what, action = null) {
     if (!warnings.length) return;
     const list = warnings.map((each) => (typeof each === "string" ? each : [each.pointer, each.detail].filter(Boolean).join(": ")));
-    this.messages.show("import", { title: `${file.name}: ${what}`, list });
+    this.messages.show("import", { title: `${file.name}: ${what}`, list, action });
   }
 
   // In sight: the camera goes where it fills the picture, and what lies inside of something else is put beside it.

@@ -74,19 +74,21 @@ class _Importer:
             "shapes": shapes,
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
-        exposure = self._metered(used, aspect) if lights else None
+        lighting = Notes()
+        exposure = self._metered(used, aspect, lighting) if lights else None
+        warnings = [*lighting.document(), *self.notes.document()]  # first what concerns the whole picture
         triangles = sum(part.triangles for part in self.placements.shown)
-        return SceneFile(used, self.files.kept, self.notes.document(), triangles, bool(lights), exposure, aspect)
+        return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect)
 
-    def _metered(self, document: dict[str, Any], aspect: float | None) -> float | None:
+    def _metered(self, document: dict[str, Any], aspect: float | None, notes: Notes) -> float | None:
         """The exposure that suits the file's lights, where 0 does not; noted, as is that nothing else lights it."""
         place = "/extensions/KHR_lights_punctual"
         stops = metering.exposure(document, self.placements.placed(), aspect)
         if stops is not None:
             side = "above" if stops < 0 else "below"
             told = f"the file's lights expose the picture {abs(stops):g} stops {side} middle grey"
-            self.notes.add(place, f"{told}; they are kept as they are, and an exposure of {stops:g} suits them")
-        self.notes.add(place, "the file has lights and no environment: there is no sky, and the background is empty")
+            notes.add(place, f"{told}; they are kept as they are, and an exposure of {stops:g} suits them")
+        notes.add(place, "the file has lights and no environment: there is no sky, and the background is empty")
         return stops
 
     def _mesh(self, node: Node) -> None:
