@@ -205,6 +205,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     await own.farewell()
     await own.engine.close()
     await asyncio.to_thread(own.assets.close)
+    own.bodies.close()
 
 
 def _bounds(config: Config) -> Bounds:

@@ -63,6 +63,12 @@ class Config(BaseSettings):
 
     max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body, as decompressed.")
     max_bodies: int = Field(GIB, ge=1, description="Most bytes of all bodies that are being dealt with.")
+    max_json: int = Field(32 * MIB, ge=1, description="Most bytes of a JSON body; of all that wait, four times that.")
+    max_json_memory: int = Field(
+        512 * MIB,
+        ge=1,
+        description="Most bytes of memory that JSON bodies take as values: one, and all that are read at a time.",
+    )
     body_timeout: float = Field(30.0, gt=0, description="Longest pause (s) within a body that is being sent.")
     max_connections: int = Field(
         1024, ge=2, description="Most connections at a time, streams included; one address has at most half of them."

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
-import json
 import logging
 import sqlite3
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, nullcontext
+from dataclasses import dataclass
+from itertools import islice
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal, get_args
 
 from pydantic import TypeAdapter
 
@@ -17,11 +18,15 @@ from service.assets import AssetStore
 from service.problems import FieldError, InvalidDocument, NotFound, Unavailable
 from service.quota import Quota
 from service.scene import Material, parse_scene
+from service.scene.base import MOST_MISTAKES
+from service.scene.document import Limits
 from service.scene.mistakes import escaped, validated
+from service.scene.text import dump_json
 
 log = logging.getLogger(__name__)
 
-KINDS = ("scenes", "materials")
+Kind = Literal["scenes", "materials"]
+KINDS: tuple[Kind, ...] = get_args(Kind)
 LONGEST_NAME = 100  # characters
 BUSY_S = 10.0  # how long a writer waits for another one
 LOG_BYTES = 4 << 20  # to which the log is cut after a large document; by itself it keeps that size while others read
@@ -55,6 +60,25 @@ _MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
 
 class DamagedFile(Exception):
     """The file of the documents can't be used; the text is for whoever started the service."""
+
+
+@dataclass(frozen=True)
+class CheckedDocument:
+    """A valid document as it is stored, and where it refers to assets, which may not be there."""
+
+    body: str
+    uses: list[tuple[str, str]]  # JSON pointer, reference
+
+
+def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDocument:
+    """Raises InvalidDocument with pointers from the document's root. Of a large document in seconds."""
+    if kind == "materials":
+        validated(_MATERIAL, document, "")
+    else:
+        parse_scene(document, limits=limits)
+    places = recipe.places(document) if kind == "scenes" else ()
+    uses = [("".join(f"/{escaped(step)}" for step in place), reference) for place, reference in places]
+    return CheckedDocument(dump_json(document), uses)
 
 
 class Documents:
@@ -93,14 +117,14 @@ class Documents:
 
     def names(self, kind: str) -> list[dict[str, str]]:
         """`[{name, title}]` in the order of the titles. Raises NotFound for an unknown kind."""
-        _check_kind(kind)
+        check_kind(kind)
         with self._open() as database:
             rows = database.execute("SELECT name, title FROM documents WHERE kind = ? ORDER BY title, name", (kind,))
             return [{"name": name, "title": title} for name, title in rows]
 
     def get(self, kind: str, name: str) -> str:
         """The bare document, as JSON. Raises NotFound."""
-        _check_kind(kind)
+        check_kind(kind)
         with self._open() as database:
             row = database.execute("SELECT body FROM documents WHERE kind = ? AND name = ?", (kind, name)).fetchone()
         if row is None:
@@ -108,15 +132,13 @@ class Documents:
         text: str = row[0]
         return text
 
-    def put(self, kind: str, name: str, document: Any, title: str | None = None) -> tuple[str, bool]:
-        """Saves a valid document in the place of what had the name; its title now, and whether nothing had it.
+    def put(self, kind: str, name: str, document: CheckedDocument, title: str | None = None) -> tuple[str, bool]:
+        """Saves a document in the place of what had the name; its title now, and whether nothing had it.
 
-        Raises InvalidDocument with pointers from the document's root.
+        Raises InvalidDocument, with pointers from the document's root, where an asset is missing.
         """
-        _check_kind(kind)
-        self._validate(kind, document)
-        uses = recipe.references(document) if kind == "scenes" else []
-        body = json.dumps(document, separators=(",", ":"), ensure_ascii=False, allow_nan=False)
+        check_kind(kind)
+        body, uses = document.body, list(dict.fromkeys(reference for _, reference in document.uses))
         key = (kind, name)
         # Whoever makes room meanwhile spares these assets, so that a document which is refused costs nobody anything.
         with self._quota.pinned(uses) if self._quota else nullcontext():
@@ -135,7 +157,7 @@ class Documents:
 
     def delete(self, kind: str, name: str) -> None:
         """Raises NotFound."""
-        _check_kind(kind)
+        check_kind(kind)
         with self._open() as database, database:
             deleted = database.execute("DELETE FROM documents WHERE kind = ? AND name = ?", (kind, name)).rowcount
             database.execute("DELETE FROM uses WHERE kind = ? AND name = ?", (kind, name))
@@ -165,20 +187,14 @@ class Documents:
             )
         return int((pages - free) * size)
 
-    def _validate(self, kind: str, document: Any) -> None:
-        if kind == "materials":
-            validated(_MATERIAL, document, "")
-        else:
-            parse_scene(document)
-
-    def _find_assets(self, document: Any, uses: list[str]) -> None:
+    def _find_assets(self, document: CheckedDocument, uses: list[str]) -> None:
         """Raises InvalidDocument where one of them is not here."""
-        missing = {ref for ref in uses if not self._assets.holds(ref)}
+        missing = set(islice((ref for ref in uses if not self._assets.holds(ref)), MOST_MISTAKES))
         if missing:
+            told = ((pointer, ref) for pointer, ref in document.uses if ref in missing)
             raise InvalidDocument(
-                FieldError("".join(f"/{escaped(step)}" for step in place), f"there is no asset {ref[:100]!r} here")
-                for place, ref in recipe.places(document)
-                if ref in missing
+                FieldError(pointer, f"there is no asset {ref[:100]!r} here")
+                for pointer, ref in islice(told, MOST_MISTAKES)
             )
 
     def _convert(self, database: sqlite3.Connection) -> None:
@@ -223,9 +239,11 @@ def _is_full(error: Exception) -> bool:
     return getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_FULL
 
 
-def _check_kind(kind: str) -> None:
+def check_kind(kind: str) -> Kind:
+    """Raises NotFound for an unknown kind."""
     if kind not in KINDS:
         raise NotFound(f"there are no documents of {kind[:80]!r}; there are {', '.join(KINDS)}")
+    return kind
 
 
 def _missing(kind: str, name: str) -> NotFound:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import select
+import socket
 import time
 from collections.abc import Mapping
 from contextlib import suppress
@@ -24,6 +26,18 @@ class Spell:
     @property
     def had_s(self) -> float:
         return had_s(time.monotonic() - self._began, self._ran, ran(self._pid))
+
+
+def answers(link: socket.socket, pid: int, seconds: float) -> bool:
+    """Whether something comes from that process within so many seconds of its own."""
+    poll = select.poll()
+    poll.register(link, select.POLLIN)
+    spell, left = Spell(pid), seconds
+    while left > 0:
+        if poll.poll(max(1, left * 1000)):
+            return True
+        left = seconds - spell.had_s
+    return False
 
 
 def had_s(passed_s: float, before: Ran, after: Ran) -> float:

@@ -20,7 +20,7 @@ import uvicorn
 from service import app
 from service.assets import AssetStore
 from service.config import Config
-from service.documents import DamagedFile, Documents
+from service.documents import DamagedFile, Documents, checked
 from service.problems import Unavailable
 from tests.serving import SCENE, Server
 from tests.test_rest import is_problem
@@ -87,11 +87,12 @@ def test_documents_survive_a_kill(saved: Documents, store: AssetStore, tmp_path:
 import sys
 from pathlib import Path
 from service.assets import AssetStore
-from service.documents import Documents
+from service.documents import Documents, checked
 folder = Path({str(tmp_path)!r})
 documents = Documents(folder, AssetStore(folder))
 for i in range(10 ** 6):
-    documents.put("materials", f"m{{i % 50}}", {{"type": "diffuse", "albedo": (i % 1000) / 1000}})
+    grey = {{"type": "diffuse", "albedo": (i % 1000) / 1000}}
+    documents.put("materials", f"m{{i % 50}}", checked("materials", grey))
     print(i, flush=True)
 """
     writer = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True)
@@ -115,18 +116,18 @@ for i in range(10 ** 6):
 def test_documents_give_their_room_back(saved: Documents, tmp_path: Path) -> None:
     """Deleted or replaced by smaller ones, also while somebody else has the file open."""
     file = tmp_path / "documents.sqlite3"
-    saved.put("scenes", "0", SCENE)
+    saved.put("scenes", "0", checked("scenes", SCENE))
     little = saved.bytes
     with closing(sqlite3.connect(file)) as other:
         other.execute("SELECT count(*) FROM documents").fetchone()
         for name in "123":
-            saved.put("scenes", name, large_scene())
+            saved.put("scenes", name, checked("scenes", large_scene()))
         assert saved.bytes > little + 2_500_000
         saved.delete("scenes", "1")
         saved.delete("scenes", "3")
-        saved.put("scenes", "2", SCENE)
+        saved.put("scenes", "2", checked("scenes", SCENE))
         assert saved.bytes < little + 50_000
-    saved.put("scenes", "0", SCENE)
+    saved.put("scenes", "0", checked("scenes", SCENE))
     assert sum(path.stat().st_size for path in tmp_path.glob("documents*")) < little + 50_000
 
 
@@ -156,7 +157,7 @@ def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_pat
     before = file.stat().st_mtime_ns
     saved.prepare()
     assert file.stat().st_mtime_ns == before
-    saved.put("scenes", "b", large_scene())
+    saved.put("scenes", "b", checked("scenes", large_scene()))
     saved.delete("scenes", "b")
     assert saved.bytes < 100_000
 
@@ -164,7 +165,7 @@ def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_pat
 def test_a_conversion_that_was_killed_goes_on(saved: Documents, tmp_path: Path) -> None:
     """The tables are new, and the file has not been compacted yet."""
     file = tmp_path / "documents.sqlite3"
-    saved.put("materials", "m", MATERIAL)
+    saved.put("materials", "m", checked("materials", MATERIAL))
     with closing(sqlite3.connect(file)) as database:
         database.execute("PRAGMA auto_vacuum = NONE")
         database.execute("VACUUM")
@@ -176,8 +177,8 @@ def test_a_conversion_that_was_killed_goes_on(saved: Documents, tmp_path: Path) 
 
 def test_looking_for_a_document_reads_no_other(saved: Documents) -> None:
     for name in "bcd":
-        saved.put("scenes", name, large_scene())
-    saved.put("scenes", "a", SCENE)
+        saved.put("scenes", name, checked("scenes", large_scene()))
+    saved.put("scenes", "a", checked("scenes", SCENE))
 
     def bytes_read() -> int:
         return int(Path("/proc/self/io").read_text().split()[1])
@@ -203,7 +204,7 @@ def test_a_damaged_file_is_told_of(
 
 
 def test_a_later_version_s_file_is_refused(saved: Documents, tmp_path: Path) -> None:
-    saved.put("materials", "m", MATERIAL)
+    saved.put("materials", "m", checked("materials", MATERIAL))
     with closing(sqlite3.connect(tmp_path / "documents.sqlite3")) as database:
         database.execute("PRAGMA user_version = 99")
     with pytest.raises(DamagedFile, match="newer version"):

@@ -15,7 +15,7 @@ SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {"
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
-    {"service.problems", "service.shared", "service.spell"},
+    {"service.problems", "service.shared", "service.spell", "service.confined"},
     {"service.config"},
     {"service.scene", "service.images"},
     {"service.quality", "service.presets", "service.assets"},

@@ -15,6 +15,7 @@ import pytest
 
 from service.assets import AssetStore
 from service.config import Config
+from service.documents import checked
 from service.problems import AssetError, InvalidDocument, NotFound, TooLarge, Unavailable, UnsupportedMedia
 from service.storage import Storage, storage
 from tests.asset_files import OBJ, glb, gltf
@@ -74,7 +75,7 @@ def test_what_was_used_longest_ago_makes_way(kept: Storage, tmp_path: Path) -> N
 def test_assets_of_documents_stay(tmp_path: Path) -> None:
     kept = storage(Config(data_dir=tmp_path, data_quota=100_000))
     ids = uploads(kept, tmp_path, 2)
-    kept.documents.put("scenes", "mine", mesh_scene(ids[0]))
+    kept.documents.put("scenes", "mine", checked("scenes", mesh_scene(ids[0])))
     make_room(kept, 100_000 - kept.quota.used() + 500)
     assert here(kept, ids) == [True, False]
     other = kept.assets.add(OBJ).id
@@ -91,7 +92,7 @@ def test_deleted_documents_do_not_count(tmp_path: Path) -> None:
     kept = storage(Config(data_dir=tmp_path, data_quota=1_000_000))
     ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "ball"}
     for name in "ab":
-        kept.documents.put("scenes", name, {**SCENE, "shapes": [ball] * 6000})
+        kept.documents.put("scenes", name, checked("scenes", {**SCENE, "shapes": [ball] * 6000}))
     with pytest.raises(Unavailable):
         make_room(kept, 900_000)
     for name in "ab":
@@ -104,7 +105,7 @@ def test_deleted_documents_do_not_count(tmp_path: Path) -> None:
 def full(tmp_path: Path) -> Iterator[tuple[Storage, list[str]]]:
     """Storage without room for more than 2 kB, and the assets in it."""
     kept = storage(Config(data_dir=tmp_path, data_quota=100_000))
-    kept.documents.put("scenes", "first", SCENE)  # the file of the documents, with its empty pages
+    kept.documents.put("scenes", "first", checked("scenes", SCENE))  # the file of the documents, with its empty pages
     ids = uploads(kept, tmp_path, 3)
     size = 100_000 - kept.quota.used() - 2000
     ids += [kept.assets.add(OBJ + b"#" * (size - len(OBJ))).id]
@@ -118,9 +119,9 @@ def test_what_is_refused_costs_nobody_anything(full: tuple[Storage, list[str]]) 
     missing = {**mesh_scene("sha256:" + "0" * 64), "lights": SCENE["lights"] * 100}
     for document in (missing, {**SCENE, "shapes": [ball] * 100 + [{"type": "sphere"}]}):
         with pytest.raises(InvalidDocument):
-            kept.documents.put("scenes", "refused", document)
+            kept.documents.put("scenes", "refused", checked("scenes", document))
     with pytest.raises(TooLarge):
-        kept.documents.put("scenes", "refused", {**SCENE, "shapes": [ball] * 2000})
+        kept.documents.put("scenes", "refused", checked("scenes", {**SCENE, "shapes": [ball] * 2000}))
     with pytest.raises(UnsupportedMedia):
         kept.assets.add(b"hello" * 2000)
     with pytest.raises(AssetError):
@@ -134,7 +135,7 @@ def test_what_is_refused_costs_nobody_anything(full: tuple[Storage, list[str]]) 
 def test_a_document_makes_room_but_not_of_its_own_assets(full: tuple[Storage, list[str]]) -> None:
     """The one used longest ago is named by the very document that needs room."""
     kept, ids = full
-    kept.documents.put("scenes", "mine", {**mesh_scene(ids[0]), "lights": SCENE["lights"] * 40})
+    kept.documents.put("scenes", "mine", checked("scenes", {**mesh_scene(ids[0]), "lights": SCENE["lights"] * 40}))
     assert here(kept, ids) == [True, False, True, True]
 
 
@@ -151,7 +152,7 @@ def test_no_asset_goes_between_the_look_and_the_saving(
         return found
 
     monkeypatch.setattr(AssetStore, "holds", looked)
-    kept.documents.put("scenes", "mine", mesh_scene(ids[0]))
+    kept.documents.put("scenes", "mine", checked("scenes", mesh_scene(ids[0])))
     assert here(kept, ids) == [True, False, False, False]
 
 

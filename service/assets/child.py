@@ -4,16 +4,12 @@ One request after the other: a format and a file come in, arrays in sealed memor
 does, and is killed where a file takes too much time; memory that a file must not take is refused to it.
 """
 
-import contextlib
-import ctypes
 import errno
 import fcntl
 import importlib
 import json
 import mmap
 import os
-import resource
-import signal
 import socket
 import sys
 from typing import Any
@@ -23,16 +19,17 @@ import numpy as np
 from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile
 from service.assets.errors import ParseError
 from service.assets.wire import Pieces, publish, receive, send
+from service.confined import bound, confine, unbind
 from service.shared import trim
 
-CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
+NICENESS = 5
 LARGE = 1 << 20  # bytes of a file after which memory is given back to the system
 LIBRARIES = ("numpy", "PIL.Image", "OpenImageIO", "DracoPy", "trimesh.exchange.stl")
 
 
 def main() -> None:
     link = socket.socket(fileno=int(sys.argv[1]))
-    _confine()
+    confine(NICENESS)
     while True:
         try:
             request, source = receive(link)
@@ -55,28 +52,10 @@ def main() -> None:
             os.close(result)
 
 
-def _confine() -> None:
-    """Never a core file, no network where the kernel lets us drop it, and the first to go when memory runs out."""
-    _limit(resource.RLIMIT_CORE, 0)
-    libc = ctypes.CDLL(None, use_errno=True)
-    if libc.unshare(CLONE_NEWNET) != 0:
-        libc.unshare(CLONE_NEWUSER | CLONE_NEWNET)
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle; it closes the socket
-    os.nice(5)
-    with contextlib.suppress(OSError), open("/proc/self/oom_score_adj", "w") as score:
-        score.write("1000")
-
-
-def _limit(which: int, value: int) -> None:
-    """The soft limit, as far as the hard one that we were given lets us; it can be lifted again for the next file."""
-    hard = resource.getrlimit(which)[1]
-    resource.setrlimit(which, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))
-
-
 def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[dict[str, Any], int]:
     limits = AssetLimits(**request["limits"])
     try:
-        _bound(limits, request["memory"])
+        bound(request["memory"], limits.seconds)
         # A signal when the parent hangs up, whose default is to end: also in the middle of a library's loop.
         fcntl.fcntl(link, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
@@ -96,17 +75,7 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
     finally:
         fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) & ~os.O_ASYNC)
-        hard = resource.getrlimit(resource.RLIMIT_AS)[1]
-        resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
-
-
-def _bound(limits: AssetLimits, memory: int) -> None:
-    """Memory beyond what the libraries have taken already, and processor time beyond what earlier files took."""
-    with open("/proc/self/statm") as sizes:
-        taken = int(sizes.read().split()[0]) * mmap.PAGESIZE
-    _limit(resource.RLIMIT_AS, taken + memory)
-    used = resource.getrusage(resource.RUSAGE_SELF)
-    _limit(resource.RLIMIT_CPU, int(used.ru_utime + used.ru_stime + limits.seconds) + 1)
+        unbind()
 
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:

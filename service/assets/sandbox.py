@@ -3,7 +3,6 @@
 import json
 import logging
 import os
-import select
 import signal
 import socket
 import subprocess
@@ -18,7 +17,7 @@ from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile, Sce
 from service.assets.errors import ParseError
 from service.assets.sniff import KINDS
 from service.assets.wire import Array, adopt, memory, receive, send
-from service.spell import Spell
+from service.spell import answers
 
 log = logging.getLogger(__name__)
 
@@ -166,24 +165,13 @@ class _Child:
         wait = limits.seconds if self.started else limits.seconds + START_SECONDS
         try:
             send(self.link, request, fd)
-            if not self._answers(wait):
+            if not answers(self.link, self.process.pid, wait):
                 raise ParseError(f"reading it takes longer than the {limits.seconds:g} s allowed")
             reply = receive(self.link)
         except (EOFError, OSError):
             raise ParseError(self._death(limits)) from None
         self.started = True
         return reply
-
-    def _answers(self, wait: float) -> bool:
-        """Whether it does within so many seconds of its own: waiting for a processor is no fault of the file."""
-        poll = select.poll()
-        poll.register(self.link, select.POLLIN)
-        spell, left = Spell(self.process.pid), wait
-        while left > 0:
-            if poll.poll(max(1, left * 1000)):
-                return True
-            left = wait - spell.had_s
-        return False
 
     def _death(self, limits: AssetLimits) -> str:
         try:

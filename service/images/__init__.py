@@ -39,7 +39,7 @@ LAYERS = {
 }
 
 Array = npt.NDArray[Any]
-Metadata = dict[str, Any]
+Metadata = dict[str, Any] | str  # or the JSON of one, in ASCII
 
 
 def encode(
@@ -180,4 +180,4 @@ def _three(pixels: Array) -> Array:
 
 def _text(metadata: Metadata) -> str:
     """ASCII, so that the plainest text chunk carries any name."""
-    return json.dumps(metadata, separators=(",", ":"))
+    return metadata if isinstance(metadata, str) else json.dumps(metadata, separators=(",", ":"))

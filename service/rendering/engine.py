@@ -8,6 +8,7 @@ import logging
 import os
 import time
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Any, Protocol
 
 from service.problems import Unavailable
@@ -35,6 +36,7 @@ from service.rendering.messages import (
 from service.rendering.process import Cause, Options, Process
 from service.rendering.record import Record
 from service.rendering.statistics import Kind, Statistics
+from service.rendering.threads import sending, tending
 
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
 BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start, ever
@@ -175,7 +177,7 @@ class Engine:
         if held is None:
             return
         update = replace(update, client=held.client)
-        encoded = await asyncio.to_thread(link.encode, update)
+        encoded = await sending(partial(link.encode, update))
         if update.task not in self._tasks:
             return link.discard(encoded)
         held.record.scene_told(update, encoded)
@@ -213,7 +215,7 @@ class Engine:
     async def _bring_back(self, task: int, held: _Held) -> None:
         """Gives the renderer a picture that it has no more, to go on with or to be read."""
         process = self._process
-        encoded = await asyncio.to_thread(link.encode, held.record.kept)
+        encoded = await tending(partial(link.encode, held.record.kept))
         if held.resident or process is None or process is not self._process or task not in self._tasks:
             return link.discard(encoded)
         held.resident = True

@@ -53,7 +53,7 @@ class Job:
         owner: str = "",
         document: bytes = b"",
     ) -> None:
-        """`owner` may ask for it, others may not; `document` is the scene as `reading.folded` gave it."""
+        """`owner` may ask for it, others may not; `document` is the scene as `parsing.folded` gave it."""
         self.id = secrets.token_urlsafe(ID_BYTES)
         self.owner = owner
         self.document = document

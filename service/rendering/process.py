@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import asyncio
 import logging
 import os
 import signal
@@ -12,11 +11,13 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any, Literal
 
 from service import logs
 from service.rendering import link, pulse
+from service.rendering.threads import tending
 from service.spell import Spell
 
 ROOT = Path(__file__).parents[2]
@@ -82,7 +83,7 @@ class Process:
     async def end(self, patience_s: float) -> Cause:
         """Gives it that time to end, kills it, buries it; what it died of. The pulse still says where it was."""
         self.link.close()
-        code = await asyncio.to_thread(_reap, self._process, patience_s)
+        code = await tending(partial(_reap, self._process, patience_s))
         self.pulse.read()
         self.pulse.close()
         if self._condemned is not None:

@@ -19,9 +19,26 @@ def _yield_to_others() -> None:
     raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, os.getpid()) + NICENESS)
 
 
-_PACKING = ThreadPoolExecutor(2, "packing", _yield_to_others)  # parsing and packing scenes: seconds for the largest
-_ENCODING = ThreadPoolExecutor(2, "encoding")  # frames to JPEG and the like: milliseconds, and somebody looks
-_WRITING = ThreadPoolExecutor(2, "writing", _yield_to_others)  # pictures to files: seconds for the largest
+class Pool:
+    """Threads for one kind of work, which waits for no other kind: `await pool(work)`."""
+
+    def __init__(self, name: str, threads: int, polite: bool = False) -> None:
+        self._threads = ThreadPoolExecutor(threads, name, _yield_to_others if polite else None)
+
+    async def __call__(self, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+
+
+parsing = Pool("parsing", 2, polite=True)  # small bodies: milliseconds
+waiting_for_parsers = Pool("waiting", 2)  # of large ones, each in a process of its own: seconds
+packing = Pool("packing", 2, polite=True)  # scenes: seconds for the largest
+storing = Pool("storing", 2, polite=True)  # assets, which are parsed and hashed first: seconds
+saving = Pool("saving", 2)  # documents: the disk's time
+encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, and somebody looks
+writing = Pool("writing", 2, polite=True)  # pictures to files: seconds for the largest
+sending = Pool("sending", 2)  # scenes to the renderer: copied to shared memory
+tending = Pool("tending", 2)  # the renderers' ends and replacements, and what they rendered before
+measuring = Pool("measuring", 1)  # /metrics
 
 
 class Lane:
@@ -35,15 +52,3 @@ class Lane:
 
     def close(self) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)
-
-
-async def packing(work: Callable[[], T]) -> T:
-    return await asyncio.get_running_loop().run_in_executor(_PACKING, work)
-
-
-async def encoding(work: Callable[[], T]) -> T:
-    return await asyncio.get_running_loop().run_in_executor(_ENCODING, work)
-
-
-async def writing(work: Callable[[], T]) -> T:
-    return await asyncio.get_running_loop().run_in_executor(_WRITING, work)

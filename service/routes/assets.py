@@ -7,6 +7,7 @@ import json
 import os
 from contextlib import ExitStack
 from dataclasses import asdict
+from functools import partial
 from typing import Annotated, Any
 
 from fastapi import APIRouter, Query, Request, Response
@@ -14,10 +15,12 @@ from fastapi.responses import JSONResponse
 
 from service import presets
 from service.assets import AssetInfo
+from service.assets.importing import Imported
 from service.downloads import FileAnswer
-from service.rendering.threads import packing
+from service.rendering.threads import storing
 from service.routes import answers
 from service.routes.house import house
+from service.scene.text import dump_json
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
@@ -45,7 +48,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
         with file:  # here: a request that is cancelled does not wait for this thread
             return own.assets.add(file, kind, filename)
 
-    info = await packing(add)
+    info = await storing(add)
     return {name: value for name, value in asdict(info).items() if value is not None}
 
 
@@ -59,13 +62,17 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
     """Its references are assets here. The answer to the file's upload has `warnings`, `exposure` and `aspect_ratio`;
     here they are in headers: `Sunbox-Warnings` (as much of the list as has room, as JSON), `Sunbox-Exposure` and
     `Sunbox-Aspect-Ratio`, each only where there is something to say."""
-    imported = await packing(lambda: house(request).assets.scene(id))
-    document = imported.scene(presets.default_environment())
+
+    def read() -> tuple[Imported, str]:
+        imported = house(request).assets.scene(id)
+        return imported, dump_json(imported.scene(presets.default_environment()))
+
+    imported, text = await storing(read)
     headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
     for name in ("exposure", "aspect_ratio"):
         if (value := getattr(imported, name)) is not None:
             headers[f"sunbox-{name.replace('_', '-')}"] = repr(value)
-    return JSONResponse(document, headers=headers)
+    return Response(text, media_type="application/json", headers=headers)
 
 
 def _fitting(warnings: list[dict[str, Any]]) -> str:
@@ -82,7 +89,7 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
     with ExitStack() as stack:
-        source = await asyncio.to_thread(stack.enter_context, house(request).assets.opened(id))
+        source = await storing(partial(stack.enter_context, house(request).assets.opened(id)))
         headers = {"content-disposition": "attachment", "cache-control": FOREVER}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)

@@ -1,18 +1,65 @@
-"""Bodies that are JSON."""
+"""Bodies that are JSON: taken in, counted, and parsed where they keep nobody waiting."""
 
 from __future__ import annotations
 
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
 from starlette.requests import Request
 
-from service.problems import UnsupportedMedia
+from service.config import Config
+from service.problems import TooLarge, Unavailable, UnsupportedMedia
+from service.rendering.parser_pool import ParserPool
+from service.rendering.parsing import PARSERS, Kind
+from service.rendering.threads import parsing, waiting_for_parsers
 
 # The last three are what programs say who have not been told what they send (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
+SMALL = 64 * 1024  # bytes that are parsed in some ms: a process beside would take as long to be told
+AT_ONCE = 4  # as many of the largest bodies may wait
+RETRY_S = 5
 
 
-async def json_body(request: Request) -> bytes:
-    """The whole body. Raises UnsupportedMedia where the sender says that it is something else than JSON."""
-    told = request.headers.get("content-type", "").partition(";")[0].strip().lower()
-    if told not in TAKEN and not told.endswith("+json"):
-        raise UnsupportedMedia(f"{told[:100]!r} is not taken here: send application/json")
-    return await request.body()
+class Bodies:
+    """Of the whole service."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+        self._pool = ParserPool(config)
+        self._held = 0  # bytes of large ones
+
+    async def parsed(self, kind: Kind, body: bytearray) -> Any:
+        """What PARSERS[kind] makes of it, or raises; TooLarge too."""
+        if len(body) <= SMALL:
+            return await parsing(partial(PARSERS[kind], self._config, body))
+        return await waiting_for_parsers(partial(self._pool.parse, kind, body))
+
+    def close(self) -> None:
+        self._pool.close()
+
+    @asynccontextmanager
+    async def taken(self, request: Request) -> AsyncIterator[bytearray]:
+        """The body, whose bytes count as long as it is needed. Raises UnsupportedMedia, TooLarge, Unavailable."""
+        told = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        if told not in TAKEN and not told.endswith("+json"):
+            raise UnsupportedMedia(f"{told[:100]!r} is not taken here: send application/json")
+        body, received, held = bytearray(), 0, 0
+        try:
+            async for chunk in request.stream():
+                received += len(chunk)
+                if received > self._config.max_json:  # taken to its end, so that its sender hears the answer
+                    body = bytearray()
+                    continue
+                body += chunk
+                if received > SMALL:
+                    more = received - held
+                    self._held, held = self._held + more, received
+                    if self._held > AT_ONCE * self._config.max_json:
+                        raise Unavailable("There is no room for this body just now (SUNBOX_MAX_JSON).", RETRY_S)
+            if received > self._config.max_json:
+                raise TooLarge(f"A JSON body holds at most {self._config.max_json} bytes (SUNBOX_MAX_JSON)")
+            yield body
+        finally:
+            self._held -= held

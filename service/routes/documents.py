@@ -2,17 +2,15 @@
 
 from __future__ import annotations
 
-import asyncio
 from functools import partial
 from typing import Annotated
 
 from fastapi import APIRouter, Path, Query, Request, Response
 
-from service.documents import LONGEST_NAME
+from service.documents import LONGEST_NAME, CheckedDocument, check_kind
+from service.rendering.threads import saving
 from service.routes import answers
-from service.routes.bodies import json_body
 from service.routes.house import house
-from service.scene import load_json
 
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
 
@@ -31,12 +29,12 @@ Title = Annotated[str | None, Query(min_length=1, max_length=200, description="F
 
 @router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
 async def names(request: Request, kind: answers.DocumentKind) -> list[answers.Named]:
-    return [answers.Named(**entry) for entry in await asyncio.to_thread(house(request).documents.names, kind)]
+    return [answers.Named(**entry) for entry in await saving(partial(house(request).documents.names, kind))]
 
 
 @router.get("/{kind}/{name}", summary="The bare document", responses=answers.DOCUMENT | answers.problems(404, 422))
 async def document(request: Request, kind: answers.DocumentKind, name: Name) -> Response:
-    text = await asyncio.to_thread(house(request).documents.get, kind, name)
+    text = await saving(partial(house(request).documents.get, kind, name))
     return Response(text, media_type="application/json")
 
 
@@ -50,13 +48,10 @@ async def document(request: Request, kind: answers.DocumentKind, name: Name) -> 
 async def put(
     request: Request, response: Response, kind: answers.DocumentKind, name: Name, title: Title = None
 ) -> answers.Named:
-    data = await json_body(request)
     own = house(request)
-
-    def save() -> tuple[str, bool]:
-        return own.documents.put(kind, name, load_json(data), title)
-
-    kept, new = await asyncio.to_thread(save)
+    async with own.bodies.taken(request) as body:
+        checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body)
+    kept, new = await saving(partial(own.documents.put, kind, name, checked, title))
     if new:
         response.status_code = 201
     return answers.Named(name=name, title=kept)
@@ -64,4 +59,4 @@ async def put(
 
 @router.delete("/{kind}/{name}", status_code=204, summary="Delete a document", responses=answers.problems(404, 422))
 async def delete(request: Request, kind: answers.DocumentKind, name: Name) -> None:
-    await asyncio.to_thread(partial(house(request).documents.delete, kind, name))
+    await saving(partial(house(request).documents.delete, kind, name))

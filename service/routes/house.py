@@ -23,6 +23,7 @@ from service.rendering.engine import Engine
 from service.rendering.reading import Reader
 from service.rendering.renders import Renders
 from service.rendering.sessions import Sessions
+from service.routes.bodies import Bodies
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
@@ -42,9 +43,11 @@ class House:
     traffic: Traffic = field(default_factory=Traffic)
     sessions: Sessions = field(init=False)
     downloads: Downloads = field(init=False)
+    bodies: Bodies = field(init=False)
     readiness: Readiness = field(init=False)
 
     def __post_init__(self) -> None:
+        self.bodies = Bodies(self.config)
         self.readiness = Readiness(self.engine, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
         self.sessions = Sessions(self.engine, self.reader, self.config.max_clients)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
-from functools import cache
+from functools import cache, partial
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
@@ -13,6 +13,7 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 from service import scene
 from service.metrics import MIME, text
 from service.rendering import protocol
+from service.rendering.threads import measuring
 from service.routes import answers
 from service.routes.house import house
 
@@ -43,7 +44,7 @@ async def readyz(request: Request) -> dict[str, str]:
 )
 async def metrics(request: Request) -> Response:
     own = house(request)
-    return Response(await asyncio.to_thread(text, own, own.traffic), media_type=MIME)
+    return Response(await measuring(partial(text, own, own.traffic)), media_type=MIME)
 
 
 @router.get("/v1/info", summary="Version, renderer, limits, quality presets")

@@ -19,10 +19,9 @@ from service.downloads import Downloads, FileAnswer, Written, disconnected, pres
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.rendering.job import Job
 from service.rendering.messages import Encoding, View
-from service.rendering.reading import unfolded
+from service.rendering.parsing import ParsedRequest, unfolded
 from service.rendering.threads import packing, writing
 from service.routes import answers
-from service.routes.bodies import json_body
 from service.routes.errors import GONE
 from service.routes.house import STARTING_S, House, house, owner
 
@@ -156,12 +155,13 @@ async def cancel(request: Request, id: answers.RenderId) -> None:
 async def _job(request: Request) -> Job:
     began = time.monotonic()
     own: House = house(request)
-    body = await json_body(request)
-    own.renders.admit(owner(request))
-    await own.engine.able(STARTING_S)
-    order = await packing(partial(own.reader.request, body))
+    async with own.bodies.taken(request) as body:
+        own.renders.admit(owner(request))
+        await own.engine.able(STARTING_S)
+        parsed: ParsedRequest = await own.bodies.parsed("request", body)
+    packed = await packing(partial(own.reader.pack, parsed.scene))
     setup_s = time.monotonic() - began
-    return Job(own.engine, order.packed, order.settings, setup_s, owner(request), order.document)
+    return Job(own.engine, packed, parsed.settings, setup_s, owner(request), parsed.document)
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:
@@ -215,7 +215,7 @@ def _write(layers: dict[str, np.ndarray], query: ImageQuery, job: Job, samples: 
     made_from = None
     if query.format in ("png", "exr"):
         view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
-        made_from = recipe.write(unfolded(job.document), job.settings, samples, view)
+        made_from = recipe.write_text(unfolded(job.document), job.settings, samples, view)
     if query.aov == "all":
         images.write_layers(file, layers, made_from)
     else:

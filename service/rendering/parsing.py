@@ -1,0 +1,95 @@
+"""From JSON to a scene and settings that are valid, by the service's limits. No assets, no packing, nothing kept."""
+
+from __future__ import annotations
+
+import json
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any, Literal
+
+from pydantic import Field, TypeAdapter
+
+from service.config import Config
+from service.documents import checked
+from service.problems import FieldError, InvalidDocument
+from service.quality import ResolvedSettings, resolve
+from service.scene import Scene, load_json, parse_scene, parse_settings
+from service.scene.base import Model
+from service.scene.document import Parsed
+from service.scene.mistakes import validated
+
+
+class _Request(Model):
+    scene: Any
+    settings: Any = Field(default_factory=dict)
+
+
+_REQUEST = TypeAdapter(_Request)
+
+
+@dataclass(frozen=True)
+class ParsedRequest:
+    """A whole request; `document` is its scene as it was written, folded."""
+
+    settings: ResolvedSettings
+    scene: Scene
+    document: bytes
+
+
+class Parser:
+    """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+
+    def request(self, body: bytearray | memoryview) -> ParsedRequest:
+        """A whole `{scene, settings}`. Raises MalformedJson too."""
+        request = validated(_REQUEST, load_json(body), "")
+        scene, settings = self.both(request.scene, request.settings)
+        return ParsedRequest(settings, scene, folded(request.scene))
+
+    def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
+        """Both documents, or the mistakes of both."""
+        errors: list[FieldError] = []
+        understood: list[Any] = []
+        for parse, document in ((self.scene, scene), (self.settings, settings)):
+            try:
+                understood.append(parse(document))
+            except InvalidDocument as error:
+                errors += error.errors
+        if errors:
+            raise InvalidDocument(errors)
+        return understood[0], understood[1]
+
+    def scene(self, document: Any, before: Parsed | None = None) -> Scene:
+        """With the one `before` an edit costs only what it changes."""
+        return parse_scene(document, "/scene", self._config, before)
+
+    def settings(self, document: Any) -> ResolvedSettings:
+        settings = parse_settings(document, "/settings", self._config)
+        most = self._config.max_seconds
+        if most is not None and settings.time_limit is not None and settings.time_limit > most:
+            detail = f"must be at most {most:g} (SUNBOX_MAX_SECONDS)"
+            raise InvalidDocument([FieldError("/settings/time_limit", detail)])
+        resolved = resolve(settings)
+        return replace(resolved, time_limit=most) if most is not None and resolved.time_limit is None else resolved
+
+
+def folded(document: Any) -> bytes:
+    """JSON (ASCII) in few bytes, for what is seldom looked at and may hold a mesh."""
+    return zlib.compress(json.dumps(document, separators=(",", ":")).encode(), 1)
+
+
+def unfolded(data: bytes) -> str:
+    """The JSON text."""
+    return zlib.decompress(data).decode("ascii")
+
+
+Kind = Literal["request", "scenes", "materials"]
+# What can be asked of a process that parses large bodies, by name.
+PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
+    "request": lambda config, body: Parser(config).request(body),
+    "scenes": lambda config, body: checked("scenes", load_json(body), config),
+    "materials": lambda config, body: checked("materials", load_json(body), config),
+}

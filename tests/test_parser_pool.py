@@ -1,0 +1,140 @@
+"""Large JSON bodies are parsed beside the service, as small ones are within it, and cost no more than they may."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import threading
+from collections.abc import Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.config import MIB, Config
+from service.problems import InvalidDocument, MalformedJson, ServiceError, TooLarge
+from service.rendering import parser_pool
+from service.rendering.parser_pool import ParserPool
+from service.rendering.parsing import Parser, unfolded
+from service.scene import MeshShape, load_json
+from service.scene.text import most_bytes, weigh
+from tests.serving import SCENE, SMALL
+
+ROWS = [[0.5 * i, i % 7, -1e-3 * i] for i in range(3000)]
+MESH = {"type": "mesh", "vertices": ROWS, "faces": [[0, 1, 2], [2, 3, 4]], "material": "ball"}
+REQUEST = {"scene": {**SCENE, "shapes": [*SCENE["shapes"], MESH]}, "settings": SMALL}
+
+
+def config(**limits: Any) -> Config:
+    return Config(_env_file=None, **limits)  # type: ignore[call-arg]
+
+
+def written(document: Any) -> bytearray:
+    return bytearray(json.dumps(document).encode())
+
+
+@pytest.fixture(scope="module")
+def pool() -> Iterator[ParserPool]:
+    pool = ParserPool(config(api_key=["secret"]))
+    yield pool
+    pool.close()
+
+
+def children() -> list[int]:
+    found = []
+    for task in Path("/proc/self/task").iterdir():
+        found += [int(pid) for pid in (task / "children").read_text().split()]
+    return [pid for pid in found if b"parser_child" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+
+
+def test_a_request_is_understood_as_in_the_service(pool: ParserPool) -> None:
+    body = written(REQUEST)
+    found, expected = pool.parse("request", body), Parser(config()).request(body)
+    assert found.scene == expected.scene and found.settings == expected.settings
+    assert found.document == expected.document and json.loads(unfolded(found.document)) == REQUEST["scene"]
+    mesh = found.scene.shapes[-1]
+    assert isinstance(mesh, MeshShape) and mesh.vertices is not None
+    assert np.array_equal(mesh.vertices, np.array(ROWS)) and not mesh.vertices.flags.writeable
+
+
+@pytest.mark.parametrize(
+    ("text", "kind", "said"),
+    [
+        (b'{"scene": {', MalformedJson, "line 1"),
+        (b'{"scene": 1, "scene": 2}', MalformedJson, "twice"),
+        (b"\xff", MalformedJson, "UTF-8"),
+        (b"[" * 5000, MalformedJson, "deep|nested"),
+        (b'{"scene": {"camera": NaN}}', InvalidDocument, "/scene/camera"),
+        (b'{"scene": {"camera": 1}, "settings": {"width": 0}}', InvalidDocument, "and 2 more"),
+    ],
+)
+def test_mistakes_are_told_as_in_the_service(
+    pool: ParserPool, text: bytes, kind: type[ServiceError], said: str
+) -> None:
+    with pytest.raises(kind, match=said) as beside:
+        pool.parse("request", bytearray(text))
+    with pytest.raises(kind) as within:
+        Parser(config()).request(bytearray(text))
+    assert str(beside.value) == str(within.value)
+    if isinstance(beside.value, InvalidDocument) and isinstance(within.value, InvalidDocument):
+        assert beside.value.errors == within.value.errors
+
+
+def test_the_process_lives_on_and_has_no_key(pool: ParserPool) -> None:
+    pool.parse("request", written(REQUEST))
+    before = children()
+    assert len(before) == 1
+    with pytest.raises(MalformedJson):
+        pool.parse("request", bytearray(b"{"))
+    pool.parse("request", written(REQUEST))
+    assert children() == before
+    assert b"SUNBOX_" not in Path(f"/proc/{before[0]}/environ").read_bytes()
+
+
+def test_what_would_take_too_much_memory_is_not_begun() -> None:
+    """The same text as one long list of numbers is fine: what counts is what the values take."""
+    with pytest.raises(TooLarge, match="SUNBOX_MAX_JSON_MEMORY"):
+        ParserPool(config(max_json_memory=8 * MIB)).parse("request", bytearray(b"[" + b"[]," * 300_000 + b"[]]"))
+
+
+def test_what_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
+    pool = ParserPool(config(parse_seconds=0.01, max_json_memory=1 << 40))
+    pool.parse("request", written(REQUEST))
+    monkeypatch.setattr(parser_pool, "SECONDS_PER_BYTE", 0)
+    with pytest.raises(TooLarge, match="longer"):
+        pool.parse("request", bytearray(b"[" + b'{"a":1},' * 800_000 + b"1]"))
+    assert pool._idle == []
+    pool.close()
+
+
+def test_a_process_that_dies_is_replaced(pool: ParserPool) -> None:
+    pool.parse("request", written(REQUEST))
+    (pid,) = children()
+    big = bytearray(b"[" + b'{"a":1},' * 1_000_000 + b"1]")
+    killer = threading.Timer(0.2, os.kill, [pid, signal.SIGKILL])
+    killer.start()
+    with pytest.raises(TooLarge, match="memory"):
+        pool.parse("request", big)
+    killer.join()
+    assert pool.parse("request", written(REQUEST)).scene.shapes
+    assert children() != [pid]
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["[" + "[]," * 1000 + "[]]", "[" + "{}," * 1000 + "{}]", "[" + "0.25," * 1000 + "1]", json.dumps(REQUEST),
+     '{"a":' * 40 + "1" + "}" * 40, json.dumps({str(i): [i] for i in range(1000)})],
+)  # fmt: skip
+def test_memory_is_never_taken_for_less_than_it_is(text: str) -> None:
+    import tracemalloc
+
+    tracemalloc.start()
+    try:
+        value = load_json(text)
+        taken = tracemalloc.get_traced_memory()[0]
+    finally:
+        tracemalloc.stop()
+    assert taken < most_bytes(text) == most_bytes(text.encode())
+    assert taken < weigh(value) + 20_000 < 8 * taken + 40_000
