@@ -56,8 +56,8 @@ class Server:
         self.url = said[said.index("http://") :].strip().rstrip("/")
         self.http = httpx.Client(base_url=self.url, timeout=PATIENCE_S)
 
-    def wait(self) -> None:
-        until = time.monotonic() + PATIENCE_S
+    def wait(self, patience_s: float = PATIENCE_S) -> None:
+        until = time.monotonic() + patience_s
         while self.http.get("/readyz").status_code != 200:
             assert time.monotonic() < until, self.log.read_text()
             time.sleep(0.05)

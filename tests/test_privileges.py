@@ -5,6 +5,7 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
+import sys
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -16,6 +17,7 @@ from gpu import Renderer
 from tests.privileges import capabilities, python_of
 from tests.serving import SCENE, SMALL, Server
 
+COLD_S = 150.0  # caches are empty: every kernel is compiled
 USER = 47_123  # nobody's, on any machine
 TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 MATERIAL = {"type": "diffuse", "albedo": 0.5}
@@ -25,7 +27,8 @@ MATERIAL = {"type": "diffuse", "albedo": 0.5}
 def served(folder: Path, **options: Any) -> Iterator[Server]:
     server = Server(folder, **options)
     try:
-        server.wait()
+        server.http.timeout = COLD_S
+        server.wait(COLD_S)
         yield server
     finally:
         assert server.stop() == 0
@@ -60,13 +63,19 @@ def test_another_user_can_serve(gpu: Renderer) -> None:
 
 def test_what_root_left_behind_keeps_nobody_from_rendering(gpu: Renderer, tmp_path: Path) -> None:
     """After `sudo make run`: caches that no longer can be read, a data folder that cannot be written."""
+    # As a cluster starts what it would rather lose.
+    raised = ["sh", "-c", 'echo 700 >/proc/self/oom_score_adj && exec "$0" "$@"', sys.executable]
     closed = [tmp_path / "sunbox" / name for name in ("kernels", "assets")]
     for folder in closed:
         folder.mkdir(parents=True)
         folder.chmod(0)
     try:
-        with served(tmp_path, XDG_CACHE_HOME=str(tmp_path), SUNBOX_DATA_DIR=str(tmp_path / "sunbox")) as server:
+        with served(
+            tmp_path, python=raised, XDG_CACHE_HOME=str(tmp_path), SUNBOX_DATA_DIR=str(tmp_path / "sunbox")
+        ) as server:
             assert picture(server).startswith(b"\x89PNG")
+            score = Path(f"/proc/{server.renderer()}/oom_score_adj").read_text()
+            assert int(score) == 1000  # as only root may lower it, 500 more than the server's 700, or all there is
             answer = server.http.post("/v1/assets?format=obj", content=TRIANGLE)
             assert answer.status_code == 503 and "Permission denied" in answer.json()["detail"]
         log = server.log.read_text()
@@ -75,3 +84,12 @@ def test_what_root_left_behind_keeps_nobody_from_rendering(gpu: Renderer, tmp_pa
     finally:
         for folder in closed:
             folder.chmod(0o700)
+
+
+def test_who_may_not_use_the_gpu_is_told(tmp_path: Path) -> None:
+    for name, mode in (("renderD128", 0), ("renderD129", 0o600), ("card0", 0)):
+        (tmp_path / name).touch(mode)
+    program = "import sys, pathlib; from service.rendering.worker.__main__ import closed_gpus; "
+    program += "print(*closed_gpus(pathlib.Path(sys.argv[1])))"
+    told = subprocess.run([sys.executable, "-c", program, tmp_path], capture_output=True, text=True, check=True)
+    assert told.stdout.split() == [f"{tmp_path}/renderD128"]

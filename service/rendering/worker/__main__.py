@@ -17,8 +17,9 @@ from service.rendering.priority import raise_process_niceness
 from service.rendering.pulse import Pulse
 from service.rendering.worker.lifeline import end_with
 
-OOM_SCORE = 500  # of 1000
+OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
 NICENESS = 10  # steps above the server's: its event loop and encoders come first, before llvmpipe's threads too
+DEVICES = Path("/dev/dri")
 
 log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
 
@@ -66,16 +67,26 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS)
     link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
+    if renderer.info["software"] and (closed := closed_gpus(DEVICES)):
+        log.warning(
+            "the processor renders, as this user may not use the GPU device=%s group=%s", closed[0], closed[0].group()
+        )
     limit = arguments.memory or default_limit(bool(renderer.info["software"]))
     pulse, lifeline = Pulse(arguments.pulse), arguments.lifeline
     Loop(end, renderer, pulse, limit, arguments.device, arguments.checkpoint, lifeline).run()
     return 0
 
 
+def closed_gpus(folder: Path) -> list[Path]:
+    """The GPUs' devices that this user may not open: they are their group's, mostly `render`."""
+    return [device for device in sorted(folder.glob("renderD*")) if not os.access(device, os.R_OK | os.W_OK)]
+
+
 def _offer_itself() -> None:
     """Where memory runs out the kernel shall take this process, which is replaced, and not the server."""
+    own = Path("/proc/self/oom_score_adj")
     with contextlib.suppress(OSError):
-        Path("/proc/self/oom_score_adj").write_text(str(OOM_SCORE))
+        own.write_text(str(min(1000, int(own.read_text()) + OOM_SCORE)))
 
 
 if __name__ == "__main__":

@@ -19,6 +19,7 @@ from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
 from service.rendering import link
+from service.rendering.priority import HIGHEST, raise_thread_niceness
 from service.rendering.worker.compiler import Compiled, records
 from service.rendering.worker.lifeline import end_with, end_with_pipe, hung_up
 
@@ -37,7 +38,10 @@ def main() -> int:
     parser.add_argument("--spare", action="store_true", help="only while nobody else wants the processor")
     arguments = parser.parse_args()
     if arguments.spare:
-        os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        try:
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        except OSError:  # a container's runtime may refuse it
+            raise_thread_niceness(HIGHEST)
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not (end_with(arguments.parent) if arguments.lifeline is None else end_with_pipe(arguments.lifeline)):
         return 0
