@@ -10,7 +10,7 @@ import { pointer } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 import { pictured } from "./textures.js";
-import { sentence } from "./words.js";
+import { inWords, sentence } from "./words.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
@@ -33,9 +33,11 @@ export class Importer {
   // One after the other; `at` is where they were dropped.
   async take(files, at = null) {
     const known = [...files].sort((a, b) => ORDER.indexOf(sort(a)) - ORDER.indexOf(sort(b)));
+    // An image that comes with a mesh is for that, wherever they fell.
+    const place = known.some((file) => ["mesh", "scene"].includes(sort(file))) ? null : at;
     for (const file of known) {
       try {
-        await this.#take(file, at);
+        await this.#take(file, place);
       } catch (problem) {
         this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: sentence(problem.message) });
       }
@@ -51,9 +53,24 @@ export class Importer {
     if (info.kind === "scene") return this.#openScene(info, file);
     if (info.kind === "mesh") return this.#addMesh(info, file);
     if (kind === "light") return this.acts.putEnvironment({ type: "image", asset: info.id });
-    const shape = at && (await this.picked(at.x, at.y));
-    if (shape !== null && shape !== undefined) this.acts.select(pointer("shapes", shape));
-    return this.#paint(this.#colorField(), info, file);
+    const isCertain = at === null || (await this.#aim(at, file));
+    this.#paint(this.#colorField(), info, file);
+    if (!isCertain) {
+      const material = inWords(this.acts.state.chosen.material);
+      this.messages.show("import", { title: `${file.name} is on ${material}.`, detail: "The picture was not ready to tell what it fell on, so the selected material took it." });
+    }
+  }
+
+  // Selects what an image fell on, if it is not the background; false where that can't be told.
+  async #aim({ x, y }, file) {
+    this.messages.show("upload", { title: `Finding what ${file.name} fell on`, lasting: true });
+    try {
+      const shape = await this.picked(x, y);
+      if (shape !== null) this.acts.select(pointer("shapes", shape));
+      return true;
+    } catch {
+      return false; // no picture yet, or no connection: what was dropped must not be lost with it
+    }
   }
 
   async upload(file) {

@@ -5,6 +5,7 @@ import { ray } from "./camera.js";
 import { add, scale } from "./vector.js";
 
 const RAW = { format: "rgba32f", quality: null, bits: 8 };
+const PATIENCE_MS = 3000; // after which a preview tells what is under a hand
 
 export class Picker {
   #stream;
@@ -23,9 +24,10 @@ export class Picker {
       this.#layers.clear();
     }
     if (!this.#layers.has(aov)) {
-      const { header, bytes, scene: shown } = await this.#stream.capture({ ...RAW, aov });
+      const { header, bytes, scene: shown } = await this.#stream.capture({ ...RAW, aov }, { patience_ms: PATIENCE_MS, rough: true });
       const layer = { floats: new Float32Array(bytes), width: header.width, height: header.height };
-      if (shown?.camera !== this.#camera || shown?.shapes !== this.#shapes) return layer; // things moved meanwhile
+      const isStale = shown?.camera !== this.#camera || shown?.shapes !== this.#shapes; // things moved meanwhile
+      if (isStale || header.scale < 1) return layer;
       this.#layers.set(aov, layer);
     }
     return this.#layers.get(aov);

@@ -7,10 +7,17 @@ import { watchGestures } from "./gestures.js";
 import { Inspector } from "./inspector.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
 import { Picker, drawOutline } from "./picking.js";
+import { NotReady } from "./stream.js";
 import { watchChoice } from "./tabs.js";
 import { at, pointer } from "./patch.js";
 import { dot } from "./vector.js";
 import { inWords } from "./words.js";
+
+// A click before there is a picture.
+const EARLY = {
+  focus: "Nothing can be focused on yet: the picture is still being prepared. Click again once it is there.",
+  select: "Nothing can be selected in the picture yet: it is still being prepared. The outline in the Scene tab has everything.",
+};
 
 const OUTLINE_MS = 900;
 const OVERLAY_MS = 200; // between two histograms
@@ -98,7 +105,7 @@ export class Stage {
       if (tool === "focus") await this.focus(place);
       else await this.select(place);
     } catch (error) {
-      this.complain(error);
+      this.complain(error instanceof NotReady ? new Error(EARLY[tool === "focus" ? "focus" : "select"]) : error);
     }
   }
 

@@ -15,6 +15,9 @@ const REMIND_MS = 1500; // until a picture that did not come is asked for again
 
 const MIME = { jpeg: "image/jpeg", png: "image/png", webp: "image/webp", rgba32f: "application/octet-stream" };
 
+// There is no picture yet of what is wanted, or none at full size.
+export class NotReady extends Error {}
+
 export class Stream {
   #on;
   #connection;
@@ -84,16 +87,18 @@ export class Stream {
       && scene === this.#wanted.scene && equal(settings, this.#wanted.settings);
   }
 
-  // The picture as the server has it now, seen otherwise: {header, bytes, generation, scene}. Costs no sample.
-  capture(view) {
+  // The picture as the server has it now, seen otherwise: {header, bytes, scene}. Costs no sample. Raises NotReady
+  // after `patience_ms` without one at full size; a preview will do then where it is `rough`.
+  capture(view, { patience_ms = CAPTURE_MS, rough = false } = {}) {
     return new Promise((resolve, reject) => {
       if (!this.#sent) return reject(new Error("There is no connection to the server."));
-      const capture = { view, resolve, reject };
+      const capture = { view, resolve, reject, rough, preview: null };
       capture.timer = setTimeout(() => {
         this.#captures = this.#captures.filter((each) => each !== capture);
-        reject(new Error("The server sent no picture."));
+        if (capture.preview) resolve(capture.preview);
+        else reject(new NotReady("The picture is still being prepared. Try again once it is there."));
         this.#tellView();
-      }, CAPTURE_MS);
+      }, patience_ms);
       this.#captures.push(capture);
       if (this.#captures.length === 1) this.#tellView();
     });
@@ -239,10 +244,14 @@ export class Stream {
     if (this.#seen) clearTimeout(this.#reminder);
     if (!capture) return this.#on.frame(header, bytes, view, acknowledge);
     acknowledge();
-    if (header.scale < 1 && !this.#halted.user) return; // a paused picture may never become larger
+    const captured = { header, bytes, scene: this.#sent?.scene };
+    if (header.scale < 1 && !this.#halted.user) { // a paused picture may never become larger
+      if (capture.rough) capture.preview = captured;
+      return;
+    }
     clearTimeout(capture.timer);
     this.#captures.shift();
-    capture.resolve({ header, bytes, scene: this.#sent?.scene });
+    capture.resolve(captured);
     this.#tellView();
   }
 

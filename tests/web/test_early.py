@@ -1,0 +1,70 @@
+"""Clicks and drops while the picture is still being prepared."""
+
+from __future__ import annotations
+
+import json
+
+from playwright.sync_api import BrowserContext, WebSocketRoute
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.test_picture import click
+from tests.web.test_textures import halves
+
+
+class Slow:
+    """Frames of a server that takes its time: all pass, only previews, or none."""
+
+    def __init__(self, editor: Editor) -> None:
+        self.passing = "all"
+        editor.page.route_web_socket("**/v1/stream**", self._pass_on)
+
+    def _pass_on(self, route: WebSocketRoute) -> None:
+        server = route.connect_to_server()
+
+        def hear(data: str | bytes) -> None:
+            if isinstance(data, bytes) and self.passing != "all":
+                header = json.loads(data[4 : 4 + int.from_bytes(data[:4], "little")])
+                if self.passing == "none" or header["scale"] == 1:
+                    server.send(json.dumps({"type": "ack", "seq": header["seq"]}))
+                    return
+            route.send(data)
+
+        server.on_message(hear)
+
+
+def test_nothing_is_lost_before_there_is_a_picture(context: BrowserContext, server: Server) -> None:
+    editor = Editor(context.new_page())
+    slow = Slow(editor)
+    editor.open(server.url)
+    editor.settled()
+    page = editor.page
+    editor.tab("scene")
+    page.click("#outline-list [data-thing='/shapes/1']")
+    editor.tab("material")
+    page.evaluate("document.activeElement.blur()")  # where arrows would go through the tabs
+
+    slow.passing = "none"
+    page.keyboard.press("ArrowLeft")  # another view, of which no picture comes
+    page.keyboard.press("3")
+    click(editor, 0.5, 0.5)
+    editor.wait("what to do", lambda: "Nothing can be focused on yet" in editor.text("#messages"))
+    page.keyboard.press("1")
+    editor.drop("#stage", {"halves.png": halves()})
+    editor.wait("the texture", lambda: page.is_visible("#material-form .texture"))
+    assert page.input_value("#material") == "floor"
+    assert "halves.png is on Floor." in editor.text("#messages")
+
+    slow.passing = "previews"
+    page.keyboard.press("ArrowLeft")
+    click(editor, 0.5, 0.5)
+    editor.wait("the ball, found in a preview", lambda: page.input_value("#material") == "subject")
+
+
+def test_an_image_that_comes_with_a_mesh_is_for_the_mesh(editor: Editor) -> None:
+    page = editor.page
+    triangle = b"v -1 0 0\nv 1 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt .5 1\nf 1/1 2/2 3/3\n"
+    editor.drop("#stage", {"halves.png": halves(), "sail.obj": triangle})  # the ball is where they fall
+    editor.wait("the texture", lambda: page.is_visible("#material-form .texture"))
+    assert page.input_value("#material") == "sail"
+    assert "halves" not in editor.text("#messages")
