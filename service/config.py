@@ -74,6 +74,9 @@ class Config(BaseSettings):
         1024, ge=2, description="Most connections at a time, streams included; one address has at most half of them."
     )
     max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
+    max_stream_memory: int = Field(
+        512 * MIB, ge=8, description="Most bytes of memory that the streams' scenes take as values; one's, an eighth."
+    )
     gpu_memory: int | None = Field(
         None, ge=1, description="Most bytes of scenes and pictures on the device (default: half of a CPU's memory)."
     )
@@ -108,6 +111,9 @@ class Config(BaseSettings):
     max_jobs: int = Field(64, ge=1, description="Most renders, running and waiting, of one key.")
     keep_renders: int = Field(64, ge=1, description="How many ended renders are kept for each key.")
     keep_bytes: int = Field(GIB, ge=1, description="Most bytes that the ended renders of all keys hold.")
+    keep_packed: int = Field(
+        GIB, ge=1, description="Most bytes of packed scenes that are kept for the next edits of all streams."
+    )
     keep_seconds: float = Field(3600.0, gt=0, description="How long an ended render is kept (s).")
 
     @property

@@ -10,7 +10,7 @@ import pytest
 
 from gpu import layout
 from gpu.layout import Model
-from service.pack import PackCache, pack_camera, pack_materials
+from service.pack import CacheBudget, PackCache, pack_camera, pack_materials
 from service.scene import parse_scene
 from tests.documents import (
     CAMERA,
@@ -271,7 +271,7 @@ def test_cache_forgets_the_oldest_and_trusts_no_path():
     for _ in range(2):
         packed(mesh(asset="cube.obj"), assets=shelf, cache=cache)
     assert shelf.fetched == ["cube.obj", "cube.obj"]
-    small = PackCache(max_bytes=1)
+    small = PackCache(budget=CacheBudget(1))
     kept = packed(mesh(), cache=small).arrays.triangles
     assert packed(mesh(), cache=small).arrays.triangles is kept
 

@@ -13,7 +13,7 @@ moved       what of it differs where shapes have moved
 scene       the whole; `cache` keeps geometries and skies between edits, and `moves` which meshes these have moved
 """
 
-from service.pack.cache import PackCache
+from service.pack.cache import CacheBudget, PackCache
 from service.pack.moved import moved
 from service.pack.scene import Packed, pack
 from service.pack.textures import repacked
@@ -21,6 +21,7 @@ from service.pack.tree import warm as warm_builder
 from service.pack.values import pack_camera, pack_materials, pack_turn
 
 __all__ = [
+    "CacheBudget",
     "PackCache",
     "Packed",
     "moved",

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import hashlib
 import threading
+import weakref
 from collections import OrderedDict
 from collections.abc import Callable, Hashable
 from typing import Any, TypeVar
@@ -16,12 +17,32 @@ from service.scene.shape import MeshShape, Shape
 T = TypeVar("T")
 
 
-class PackCache:
-    """The few last used geometries and skies, within `max_bytes` (the newest is kept in any case). Any thread."""
+class CacheBudget:
+    """Bytes that several caches may hold together. Any thread."""
 
-    def __init__(self, entries: int = 4, max_bytes: int = 1 << 30) -> None:
+    def __init__(self, most: int = 1 << 30) -> None:
+        self._most = most
+        self._caches: weakref.WeakSet[PackCache] = weakref.WeakSet()
+        self._lock = threading.Lock()
+
+    def join(self, cache: PackCache) -> None:
+        with self._lock:
+            self._caches.add(cache)
+
+    @property
+    def exceeded(self) -> bool:
+        with self._lock:
+            return sum(cache.bytes for cache in self._caches) > self._most
+
+
+class PackCache:
+    """The few last used geometries and skies, within `budget` (the newest is kept in any case). Any thread."""
+
+    def __init__(self, entries: int = 4, budget: CacheBudget | None = None) -> None:
+        self.bytes = 0
         self._entries = entries
-        self._max_bytes = max_bytes
+        self._budget = budget or CacheBudget()
+        self._budget.join(self)
         self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
         self.moves = Moves()
@@ -35,12 +56,11 @@ class PackCache:
                 return value
         value = make()
         with self._lock:
+            replaced = self._kept.pop(key, (None, 0))[1]
             self._kept[key] = value, _freeze(value)
-            self._kept.move_to_end(key)
-            while len(self._kept) > 1 and (
-                len(self._kept) > self._entries or sum(size for _, size in self._kept.values()) > self._max_bytes
-            ):
-                self._kept.popitem(last=False)
+            self.bytes += self._kept[key][1] - replaced
+            while len(self._kept) > 1 and (len(self._kept) > self._entries or self._budget.exceeded):
+                self.bytes -= self._kept.popitem(last=False)[1][1]
         return value
 
     def gather(self, kind: type[T]) -> list[T]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -14,6 +16,9 @@ from service.rendering.messages import Update
 from service.rendering.reading import Reader, stop_rule
 from service.scene import Scene, merge_patch
 from service.scene.document import Parsed
+from service.scene.text import weigh
+
+MOST_GOOD = 4  # while the renderer compiles for one, a hand makes hundreds of them
 
 
 @dataclass(frozen=True)
@@ -42,7 +47,8 @@ class Live:
         self.version: Version | None = None  # the last valid one
         self._reader = reader
         self._task = task
-        self._cache = PackCache()
+        self._cache = PackCache(budget=reader.caches)
+        self._bytes = 0  # that the scene's document takes at most
         self._given: Version | None = None  # the last one that the renderer has
         self._good: dict[int, Good] = {}  # that the renderer may go back to, by generation
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
@@ -87,8 +93,29 @@ class Live:
             return self._give(version)
         return None
 
+    def close(self) -> None:
+        self._reader.memory.release(self)
+
+    @contextmanager
+    def _held(self, document: Any, most: int) -> Iterator[None]:
+        """Counts the scene's document, which takes `most` bytes or less; as before where it is refused after all.
+
+        Raises TooLarge, Unavailable.
+        """
+        before, memory = self._bytes, self._reader.memory
+        size = weigh(document) if most > memory.each else most
+        memory.hold(self, size)
+        self._bytes = size
+        try:
+            yield
+        except BaseException:
+            memory.hold(self, before)
+            self._bytes = before
+            raise
+
     def _started(self, message: protocol.Start) -> Version:
-        scene, settings = self._reader.both(message.scene, message.settings)
+        with self._held(message.scene, weigh(message.scene)):
+            scene, settings = self._reader.both(message.scene, message.settings)
         return Version(message.generation, message.scene, message.settings, scene, settings)
 
     def _updated(self, message: protocol.Update) -> Version:
@@ -98,7 +125,8 @@ class Live:
         new = replace(old, generation=message.generation)
         if "scene" in message.model_fields_set:
             document = merge_patch(old.scene_document, message.scene)
-            scene = self._reader.scene(document, Parsed(old.scene_document, old.scene))
+            with self._held(document, self._bytes + weigh(message.scene)):
+                scene = self._reader.scene(document, Parsed(old.scene_document, old.scene))
             new = replace(new, scene_document=document, scene=scene)
         if "settings" in message.model_fields_set:
             document = merge_patch(old.settings_document, message.settings)
@@ -112,6 +140,8 @@ class Live:
         if newest is not None:
             self._good = {g: kept for g, kept in self._good.items() if g >= newest}
         self._good[version.generation] = Good(version, self._arrays)
+        if len(self._good) > MOST_GOOD:  # the one that works, and the newest
+            del self._good[sorted(self._good)[1]]
         return update
 
     def _difference(self, new: Version) -> Update:

@@ -10,12 +10,14 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from service import images
+from service.problems import TooLarge
 from service.rendering.messages import Encoding, Frame
 from service.rendering.messages import View as PictureView
 from service.scene.base import Model, hint
 from service.scene.mistakes import validated
-from service.scene.text import load_json
+from service.scene.text import load_json, most_bytes
 
+MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact
 QUALITY, LAST_QUALITY = 80, 90  # JPEG: 4:2:0 while it converges, 4:4:4 for the frame that stays
 MOST_FPS = 240
@@ -84,7 +86,9 @@ _MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discrimina
 
 
 def parse(text: str) -> Message:
-    """Raises MalformedJson, or InvalidDocument with pointers from the message's root."""
+    """Raises MalformedJson, TooLarge, or InvalidDocument with pointers from the message's root."""
+    if most_bytes(text) > MOST_MEMORY:
+        raise TooLarge("What this message holds takes too much memory: big geometry goes through assets.")
     return validated(_MESSAGE, load_json(text), "")
 
 

@@ -7,11 +7,12 @@ from contextlib import contextmanager
 
 from service.assets import Assets
 from service.config import Config
-from service.pack import PackCache, Packed, pack
+from service.pack import CacheBudget, PackCache, Packed, pack
 from service.problems import InvalidDocument
 from service.quality import ResolvedSettings
 from service.rendering.messages import StopRule
 from service.rendering.parsing import Parser
+from service.rendering.stream_memory import StreamMemory
 from service.scene import Scene
 
 
@@ -20,6 +21,8 @@ class Reader(Parser):
 
     def __init__(self, config: Config, assets: Assets) -> None:
         super().__init__(config)
+        self.memory = StreamMemory(config.max_stream_memory)
+        self.caches = CacheBudget(config.keep_packed)
         self._assets = assets
 
     def pack(self, scene: Scene, cache: PackCache | None = None) -> Packed:

@@ -23,6 +23,7 @@ from service.rendering.threads import Lane, encoding
 
 TAKEN_UP, LOST = 4409, 4500  # close codes
 WAITING = 64  # messages to take, or to send; more of them wait in the network
+WAITING_CHARACTERS = 256 * 1024  # of messages behind another one: as values they are 30 times larger
 SMALL = 16 * 1024  # characters of JSON that are parsed faster than a thread is woken
 STALLED_S = 30.0  # a client that takes nothing for so long is gone: its network may never say so
 CLOSING_S = 1.0  # for one that reads slowly to be told why
@@ -45,6 +46,12 @@ class Socket(Protocol):
 class Closing:
     code: int
     reason: str
+
+
+@dataclass(frozen=True)
+class _Heard:
+    message: protocol.Message | ServiceError | Failed
+    characters: int = 0  # that it was parsed from
 
 
 class Attendance:
@@ -72,7 +79,7 @@ class Stream:
         self._paused = False  # by the client
         self._done: dict[str, Any] | None = None  # what was said last of the present generation
         self._attendance: Attendance | None = None
-        self._inbox: deque[protocol.Message | ServiceError | Failed] = deque()
+        self._inbox: deque[_Heard] = deque()
         self._outbox: deque[dict[str, Any] | Frame] = deque()
         self._speaking = False  # something of the outbox is being sent
         self._stirred = asyncio.Event()  # one of them has changed
@@ -92,9 +99,9 @@ class Stream:
                 return
         except ServiceError as error:
             message = error
-        self._inbox.append(message)
+        self._inbox.append(_Heard(message, len(text or "")))
         self._stir()
-        while len(self._inbox) > WAITING:
+        while self._is_full():
             await self._stirring()
 
     async def run(self) -> None:
@@ -105,6 +112,7 @@ class Stream:
             self._flow.close()
             self._engine.drop(self._task)
             self._lane.close()
+            self._live.close()
 
     def attach(self, socket: Socket) -> Attendance:
         """From now on this connection is the client's; one that was is told so and closed."""
@@ -170,7 +178,7 @@ class Stream:
                 self._post(self._done)
         elif isinstance(message, Failed):
             self._refuse(error_of(message), message.generation)
-            self._inbox.append(message)
+            self._inbox.append(_Heard(message))
             self._stir()
         elif isinstance(message, Loaded):
             self._live.works = message.generation
@@ -186,7 +194,7 @@ class Stream:
         while True:
             while not self._inbox or len(self._outbox) > WAITING:
                 await self._stirring()
-            message = self._inbox.popleft()
+            message = self._inbox.popleft().message
             self._stir()
             if isinstance(message, ServiceError):
                 self._refuse(message, self._flow.generation)
@@ -208,9 +216,9 @@ class Stream:
                     self._flow.look(message.view.over(self._flow.view))
             except ServiceError as error:
                 self._refuse(error, message.generation)
-            if not self._inbox or not isinstance(self._inbox[0], Edit):
+            if not self._inbox or not isinstance(self._inbox[0].message, Edit):
                 break
-            message = cast(Edit, self._inbox.popleft())
+            message = cast(Edit, self._inbox.popleft().message)
         self._stir()
         try:
             await self._tell(await self._lane.run(self._live.settle), began)
@@ -292,6 +300,10 @@ class Stream:
     def _post(self, item: dict[str, Any] | Frame) -> None:
         self._outbox.append(item)
         self._stir()
+
+    def _is_full(self) -> bool:
+        characters = sum(heard.characters for heard in self._inbox)
+        return len(self._inbox) > WAITING or (len(self._inbox) > 1 and characters > WAITING_CHARACTERS)
 
     def _stir(self) -> None:
         self._stirred.set()

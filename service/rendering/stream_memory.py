@@ -1,0 +1,37 @@
+"""What the scenes of all streams take as JSON values, within one bound: merge patches can add to them for ever."""
+
+from __future__ import annotations
+
+import threading
+import weakref
+
+from service.config import MIB
+from service.problems import TooLarge, Unavailable
+
+EACH = 8  # a stream may take that part of it
+RETRY_S = 5
+
+
+class StreamMemory:
+    """Holders count as long as they live. Any thread."""
+
+    def __init__(self, most: int) -> None:
+        self.each = most // EACH
+        self._most = most
+        self._held: weakref.WeakKeyDictionary[object, int] = weakref.WeakKeyDictionary()
+        self._lock = threading.Lock()
+
+    def hold(self, holder: object, size: int) -> None:
+        """From now on `holder` takes so many bytes. Raises TooLarge or Unavailable, and it takes what it took."""
+        if size > self.each:
+            allowed = f"the {self.each / MIB:g} MiB of memory allowed (SUNBOX_MAX_STREAM_MEMORY)"
+            raise TooLarge(f"This scene takes more than {allowed}: big geometry goes through assets.")
+        with self._lock:
+            before = self._held.get(holder, 0)
+            if size > before and sum(self._held.values()) - before + size > self._most:
+                raise Unavailable("There is no room for this scene just now (SUNBOX_MAX_STREAM_MEMORY).", RETRY_S)
+            self._held[holder] = size
+
+    def release(self, holder: object) -> None:
+        with self._lock:
+            self._held.pop(holder, None)
