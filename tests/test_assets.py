@@ -106,9 +106,9 @@ def test_unknown_and_wrong_references(store: AssetStore) -> None:
         store.mesh(unknown)
     with pytest.raises(AssetError, match="not the id"):
         store.image("studio.exr")
-    with pytest.raises(AssetError, match="is a mesh; an image is wanted"):
+    with pytest.raises(AssetError, match="is a mesh; an image is needed"):
         store.image(store.add(OBJ).id)
-    with pytest.raises(AssetError, match="is an image; a mesh is wanted"):
+    with pytest.raises(AssetError, match="is an image; a mesh is needed"):
         store.mesh(store.add(EXR).id)
 
 
@@ -205,16 +205,16 @@ def test_files_beside_the_scene(folder: Path) -> None:
         ("sub/../../outside.obj", "leaves the scene's folder"),
         ("link.obj", "leaves the scene's folder"),
         ("/etc/hostname", "absolute"),
-        ("t\0.png", "no file name"),
-        ("", "no file name"),
+        ("t\0.png", "is not a file name"),
+        ("", "is not a file name"),
         (".", "is a folder"),
         ("sub", "is a folder"),
         ("nosuch.obj", "no such file"),
         ("x" * 300, "too long"),
         ("m.obj/x", "directory|no such"),
-        ("notes.txt", "no mesh or image of a known format"),
+        ("notes.txt", "is not a mesh or an image in a supported format"),
         ("empty.ply", "empty"),
-        ("e.exr", "is an image; a mesh is wanted"),
+        ("e.exr", "is an image; a mesh is needed"),
         ("sha256:" + "0" * 64, "no asset"),
     ],
 )
@@ -225,7 +225,7 @@ def test_files_refused(folder: Path, ref: str, reason: str) -> None:
 
 def test_a_pipe_is_no_file(folder: Path) -> None:
     os.mkfifo(folder / "pipe.obj")
-    with FileAssets(folder, []) as assets, pytest.raises(AssetError, match="no ordinary file"):
+    with FileAssets(folder, []) as assets, pytest.raises(AssetError, match="not an ordinary file"):
         assets.mesh("pipe.obj")
 
 

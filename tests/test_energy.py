@@ -53,6 +53,7 @@ def test_between_nodes_of_stretched_lobes_little_is_missing(at: tuple[int, ...])
 
 def test_a_fit_errs_to_both_sides_and_stays_above() -> None:
     """Of a curved function: nodes that lie on it interpolate to one side of it."""
+
     def wave(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         return np.asarray(0.5 + 0.4 * np.sin(5 * x[:, None]) * np.cos(4 * y), np.float32)
 

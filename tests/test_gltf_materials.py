@@ -272,7 +272,7 @@ def test_an_image_without_alpha_is_opaque(store: AssetStore) -> None:
 def test_a_grey_normal_map_is_left_out_with_a_word(store: AssetStore, dtype: Any) -> None:
     file = Gltf()
     found = imported(store, file.of({"normalTexture": {"index": file.texture(PIXELS[..., :1].astype(dtype))}}))
-    assert noted(found) == {"/materials/0/normalTexture": "is grey, and no normal map: left out"}
+    assert noted(found) == {"/materials/0/normalTexture": "a grey image is not a normal map; it is left out"}
 
 
 def test_what_is_brushed_needs_a_direction(store: AssetStore) -> None:
@@ -338,7 +338,7 @@ def test_directions_of_an_anisotropy_texture_become_angles(store: AssetStore) ->
     angles = image[..., 0] / 255 * turned["factor"]
     off = (angles - directions - 20 + 90) % 180 - 90  # a stretch has no sense
     assert np.abs(off).max() < 1.2
-    assert any("directions become angles" in detail for detail in noted(found).values())
+    assert any("directions are converted to angles" in detail for detail in noted(found).values())
     # All the same, or the same where there is any strength: a number.
     made, _ = brushed(store, np.full((4, 4), 30.0))
     assert made["anisotropic_rotation"] % 180 == pytest.approx(50, abs=0.5)

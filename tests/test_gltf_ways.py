@@ -118,6 +118,22 @@ def test_a_picture_is_the_right_way_round(
     assert np.abs(pixels[[[7], [16]], [7, 16]].astype(int) - expected).max() < 6
 
 
+@pytest.mark.parametrize("textured", [False, True])
+def test_unlit_colours_are_exact_with_a_linear_tone_map(
+    gpu: Any, tmp_path: Path, data_dir: Path, textured: bool
+) -> None:
+    """The file's (255, 128, 0), as a factor or as an image, comes out as (255, 128, 0)."""
+    color, file = (255, 128, 0), Gltf()
+    rough: dict[str, Any] = {"baseColorFactor": [1, ((128 / 255 + 0.055) / 1.055) ** 2.4, 0, 1]}
+    if textured:
+        rough = {"baseColorTexture": {"index": file.texture(np.full((4, 4, 3), color, np.uint8))}}
+    model, picture = tmp_path / "m.glb", tmp_path / "a.png"
+    model.write_bytes(file.of({"pbrMetallicRoughness": rough, "extensions": {"KHR_materials_unlit": {}}}).glb())
+    assert main(["render", str(model), "-o", str(picture), *SMALL]) == 0
+    pixels = np.asarray(Image.open(picture).convert("RGB"))
+    assert (pixels[8:16, 8:16] == color).all()
+
+
 def test_import(gpu: Any, tmp_path: Path, data_dir: Path) -> None:
     """A document that stands on its own feet: nothing in the data folder."""
     model, document = tmp_path / "m.glb", tmp_path / "s.json"

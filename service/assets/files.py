@@ -85,7 +85,7 @@ class FileAssets:
         with open(fd, "rb", closefd=False) as file:
             format = format_of(file, filename=ref) if size else None
         if format is None:
-            what = "is empty" if not size else "is no mesh or image of a known format"
+            what = "is empty" if not size else "is not a mesh or an image in a supported format"
             raise AssetError(f"{ref!r} {what}")
         try:
             return self._loader.sandbox.parse(format, fd)
@@ -95,7 +95,7 @@ class FileAssets:
     def _find(self, ref: str) -> Path:
         """The file itself, no link on the way to it. It may be gone when it is opened."""
         if not ref or "\0" in ref:
-            raise AssetError(f"{ref[:100]!r} is no file name")
+            raise AssetError(f"{ref[:100]!r} is not a file name")
         if os.path.isabs(ref):
             raise AssetError(f"{ref[:100]!r} is an absolute path; write it relative to the scene's file")
         candidates = [Path(os.path.realpath(base / ref)) for base in self._bases]
@@ -122,5 +122,5 @@ def _open(path: Path, ref: str) -> int:
     mode = os.fstat(fd).st_mode
     if not stat.S_ISREG(mode):
         os.close(fd)
-        raise AssetError(f"{ref[:100]!r} is {'a folder' if stat.S_ISDIR(mode) else 'no ordinary file'}")
+        raise AssetError(f"{ref[:100]!r} is {'a folder' if stat.S_ISDIR(mode) else 'not an ordinary file'}")
     return fd

@@ -145,7 +145,7 @@ def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
         if header is None:
             raise ParseError("the header is cut off: it gives no size such as `-Y 512 +X 1024`")
         if b"xyze" in data[: header.start()]:
-            raise ParseError("its texels are XYZ (32-bit_rle_xyze); 32-bit_rle_rgbe is read")
+            raise ParseError("its texels are XYZ (32-bit_rle_xyze); 32-bit_rle_rgbe is supported")
         check_size(int(header[5]), int(header[3]), limits)
     elif format == "exr":
         attributes = exr_attributes(data)
@@ -188,9 +188,9 @@ def _colored(names: list[str]) -> list[int]:
 
 def _plain(spec: Any, part: int, channels: list[int]) -> tuple[int, list[int]]:
     if spec.deep:
-        raise ParseError("deep images are not read")
+        raise ParseError("deep images are not supported")
     if spec.depth > 1:
-        raise ParseError("images with depth are not read")
+        raise ParseError("images with depth are not supported")
     return part, channels
 
 
@@ -202,7 +202,7 @@ def _framed(pixels: npt.NDArray[Any], spec: Any) -> Floats:
     framed = np.zeros((spec.full_height, spec.full_width, pixels.shape[2]), np.float32)
     x, y = max(left, 0), max(top, 0)
     if x >= spec.full_width or y >= spec.full_height or min(spec.width + left, spec.height + top) <= 0:
-        raise ParseError("its data window lies outside of its display window: nothing of it is to be seen")
+        raise ParseError("its data window lies outside of its display window: none of it is visible")
     inside = pixels[y - top : spec.full_height - top, x - left : spec.full_width - left]
     framed[y : y + inside.shape[0], x : x + inside.shape[1]] = inside
     return framed

@@ -60,13 +60,13 @@ class Loader:
 
 def as_mesh(parsed: Parsed, name: str) -> MeshData:
     if not isinstance(parsed, MeshData):
-        raise AssetError(f"{name} is an image; a mesh is wanted here")
+        raise AssetError(f"{name} is an image; a mesh is needed here")
     return parsed
 
 
 def as_image(parsed: Parsed, name: str) -> ImageData:
     if not isinstance(parsed, ImageData):
-        raise AssetError(f"{name} is a mesh; an image is wanted here")
+        raise AssetError(f"{name} is a mesh; an image is needed here")
     return parsed
 
 

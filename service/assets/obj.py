@@ -63,7 +63,7 @@ def read_obj(data: bytes | memoryview) -> Parts:
                     bad, (one, many) = int(index.argmax()), NAMES[keyword]
                     row = int(np.repeat(np.arange(len(counts)), counts)[bad])
                     have = found.rows(keyword)
-                    raise block.rows["f"].error(row, f"{one} {index[bad]} does not exist, there are {have} {many}")
+                    raise block.rows["f"].error(row, f"{one} {index[bad]} does not exist; there are {have} {many}")
                 found.corners[keyword].append(index.astype(np.int32))
     if not found.counts:
         raise ParseError("it has no faces")
@@ -80,7 +80,7 @@ def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces:
         if len(bad):
             one, many = NAMES[keyword]
             named, have = index[back[bad[0]]], before[row[bad[0]]]
-            raise faces.error(int(row[bad[0]]), f"{one} {named} does not exist, there are {have} {many} before it")
+            raise faces.error(int(row[bad[0]]), f"{one} {named} does not exist; there are {have} {many} before it")
         index[back] = resolved
 
 
@@ -149,7 +149,7 @@ def _check(index: Ints, have: int, keyword: str, found: Found, counts: Longs) ->
         face = int(np.searchsorted(np.cumsum(counts), bad, "right"))
         one, many = NAMES[keyword]
         line = np.concatenate(found.lines)[face]
-        raise ParseError(f"line {line}: {one} {index[bad]} does not exist, there are {have} {many}")
+        raise ParseError(f"line {line}: {one} {index[bad]} does not exist; there are {have} {many}")
 
 
 def _vectors(found: Rows, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:

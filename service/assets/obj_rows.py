@@ -55,7 +55,7 @@ class Rows:
             pass
         for row, content in enumerate(self.text.split(b"\n")[:-1]):
             if not re.fullmatch(pattern, content, re.IGNORECASE):
-                raise self.error(row, "not understood")
+                raise self.error(row, "the line is not understood")
         raise ParseError("it holds numbers that can't be read")
 
 

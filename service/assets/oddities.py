@@ -22,19 +22,19 @@ def oddities(vertices: Doubles, faces: Indices) -> list[str]:
     count = len(vertices)
     twice = _repeated(welded, count)
     if twice:
-        stand = "1 triangle stands" if twice == 1 else f"{twice} triangles stand"
-        found.append(f"{stand} where another one does: chance says which of them is met")
+        coincide = "1 triangle coincides" if twice == 1 else f"{twice} triangles coincide"
+        found.append(f"{coincide} with another one: which of the two a ray hits is arbitrary")
     if not len(welded):
         return found
     boundary, crowded, turned = _edges(welded, count)
     if crowded:
         belong = "1 edge belongs" if crowded == 1 else f"{crowded} edges belong"
-        found.append(f"{belong} to more than two triangles: inside and outside are not clear there")
+        found.append(f"{belong} to more than two triangles: what is inside and what is outside is ambiguous there")
     if turned:
-        lie = "1 edge lies" if turned == 1 else f"{turned} edges lie"
-        found.append(f"{lie} between triangles that face opposite ways")
+        join = "1 edge joins" if turned == 1 else f"{turned} edges join"
+        found.append(f"{join} triangles that face opposite ways")
     if not boundary and not crowded and not turned and _volume(vertices, faces) < 0:
-        found.append("it is closed and all of it faces inwards: light and glass take the inside for the outside")
+        found.append("the mesh is closed and faces inwards: light and glass take its inside for its outside")
     return found
 
 

@@ -95,7 +95,7 @@ class AssetStore:
             raise AssetError("the asset is empty")
         format = format_of(data, content_type, filename)
         if format is None:
-            raise UnsupportedMedia(f"this is none of the formats known: {FORMATS}")
+            raise UnsupportedMedia(f"the format is not supported; supported are {FORMATS}")
         if KINDS[format] == "scene":
             return self._import(id, format, data, new=True)[0]
         info = self._described(id, format, data)
@@ -107,7 +107,7 @@ class AssetStore:
         """A glTF file as a document whose references are assets here. Raises NotFound, AssetError, Unavailable."""
         info = self.info(id)
         if info.kind != "scene":
-            raise NotFound(f"{id[:100]} is no scene: it is {'an image' if info.kind == 'image' else 'a mesh'}")
+            raise NotFound(f"{id[:100]} is not a scene but {'an image' if info.kind == 'image' else 'a mesh'}")
         imported = self._imported(id)
         if imported is None:  # nothing of it is lost: the file itself is still here
             with self.opened(id) as source:
@@ -189,7 +189,7 @@ class AssetStore:
         else:
             format = format_of(part.data)
             if format is None:
-                raise UnsupportedMedia(f"{part.pointer}: this is none of the formats known: {FORMATS}")
+                raise UnsupportedMedia(f"{part.pointer}: the format is not supported; supported are {FORMATS}")
             info = self._described(id, format, part.data)
         self._store(info, part.data, lasting=False)
         return id

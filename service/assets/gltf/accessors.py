@@ -28,7 +28,7 @@ def read(file: GltfFile, source: Place, name: str, *types: str) -> Array:
     if "bufferView" in place:
         values = _strided(file, place, dtype, count, width)
     elif count > 3 * file.limits.max_triangles:
-        raise place.error("count", f"is {count}, more than any mesh allowed has")
+        raise place.error("count", f"is {count}; a mesh has at most {3 * file.limits.max_triangles}")
     elif "sparse" not in place:
         if not place.value.get("extensions"):
             raise place.error("bufferView", "is missing: the accessor has no data")

@@ -18,7 +18,7 @@ def decode(file: GltfFile, extension: Place, attributes: Place) -> tuple[dict[st
     try:
         decoded = DracoPy.decode(data.tobytes())
     except Exception as error:
-        raise extension.error("bufferView", f"holds no Draco mesh that can be read ({str(error)[:100]})") from None
+        raise extension.error("bufferView", f"does not hold a readable Draco mesh ({str(error)[:100]})") from None
     faces = getattr(decoded, "faces", None)
     if faces is None or not len(faces):
         raise extension.error("bufferView", "holds Draco data without triangles")

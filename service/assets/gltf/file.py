@@ -38,9 +38,9 @@ class GltfFile:
         asset = self.root.need("asset")
         version, least = asset.text("version"), asset.text("minVersion", "2.0")
         if not version.startswith("2."):
-            raise ParseError(f"glTF 2.0 is read, this is version {shown(version)}", "/asset/version")
+            raise ParseError(f"glTF 2.0 is supported; this is version {shown(version)}", "/asset/version")
         if least != "2.0":
-            raise ParseError(f"glTF 2.0 is read, this asks for {shown(least)}", "/asset/minVersion")
+            raise ParseError(f"glTF 2.0 is supported; the file needs {shown(least)}", "/asset/minVersion")
         check_required(self.root)
 
     def count(self, kind: str) -> int:
@@ -51,7 +51,7 @@ class GltfFile:
         items = self.root.array(kind)
         k = whole(index, pointer)
         if k >= len(items):
-            raise ParseError(f"refers to /{kind}/{k}, and there are {len(items)}", pointer)
+            raise ParseError(f"refers to /{kind}/{k}; there are {len(items)}", pointer)
         return Place(items[k], f"/{kind}/{k}")
 
     def follow(self, place: Place, name: str, kind: str) -> Place:
@@ -101,7 +101,7 @@ def embedded(place: Place) -> Bytes:
     head, comma, body = uri.partition(",")
     if not head.startswith("data:") or not comma or not head.endswith(";base64"):
         raise place.error(
-            "uri", f"names another file, {shown(uri)}; only what the file itself holds is read here: save it as GLB"
+            "uri", f"refers to another file, {shown(uri)}, which is not part of this one; save the model as a GLB"
         )
     try:
         # Strictly, or else what is no base64 would be skipped and the bytes behind it shifted. Blanks are harmless.
@@ -171,7 +171,7 @@ def _chunks(data: memoryview) -> tuple[memoryview, memoryview | None]:
         raise ParseError("the file is cut off: it is shorter than a GLB's header")
     version, length, at = *struct.unpack_from("<II", data, 4), 12
     if version != 2:
-        raise ParseError(f"glTF 2.0 is read, this GLB is version {version}")
+        raise ParseError(f"glTF 2.0 is supported; this GLB is version {version}")
     if length > len(data):
         raise ParseError(f"the file is cut off: its header promises {length} bytes, there are {len(data)}")
     chunks: dict[int, memoryview] = {}

@@ -37,14 +37,14 @@ def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[s
     if info is None:
         return {}
     if read.textures.channels(info) == "L":
-        read.notes.add(info.pointer, "is grey, and no normal map: left out")
+        read.notes.add(info.pointer, "a grey image is not a normal map; it is left out")
         return {}
     texture = read.textures.use(info, "linear", read.charts)
     if texture is None:
         return {}
     scale = info.number("scale", 1, -1e6, 1e6)
     if scale < 0:
-        read.notes.add(info.at("scale"), "a negative scale is not had: the map is left out")
+        read.notes.add(info.at("scale"), "a negative scale is not supported; the normal map is left out")
         return {}
     return {parameter: {"texture": texture} | ({"scale": scale} if scale != 1 else {})}
 
@@ -54,7 +54,7 @@ def _ior(read: Reading) -> float:
     ior = extension.number("ior", DEFAULT_IOR, 0) if extension else DEFAULT_IOR
     if extension and not 1 <= ior <= LARGEST_IOR:
         nearest = 1.0 if 0 < ior < 1 else LARGEST_IOR  # 0 asks for full reflection
-        read.notes.add(extension.at("ior"), f"{ior:g} is not had: {nearest:g} is, of 1 to {LARGEST_IOR:g}")
+        read.notes.add(extension.at("ior"), f"an ior of {ior:g} is not supported; {nearest:g} is used instead")
         return nearest
     return ior
 
@@ -76,21 +76,33 @@ def _specular(read: Reading, document: dict[str, Any], ior: float, clear: bool) 
     if share == 1 and not textured:
         return
     if clear:
-        read.notes.add(extension.at("specularFactor"), "is not had beside transmission: the index alone reflects")
+        read.notes.add(
+            extension.at("specularFactor"),
+            "specularFactor is not supported beside transmission; the ior alone sets the reflection",
+        )
         return
     f0 = ((ior - 1) / (ior + 1)) ** 2 * share
     if 0 < weight < 1 or textured:
-        read.notes.add(extension.at("specularFactor"), "lowers the reflection head-on; grazing stays as it is")
+        read.notes.add(
+            extension.at("specularFactor"),
+            "specularFactor lowers the reflection seen head-on only; at grazing angles it stays as it is",
+        )
     document.pop("ior", None)
     if textured:
         if f0 > 0.08:
-            read.notes.add(extension.at("specularFactor"), f"F0 of {f0:.3g} under a texture is lowered to 0.08")
+            read.notes.add(
+                extension.at("specularFactor"),
+                f"a reflectance (F0) of {f0:.3g} under a texture is not supported; 0.08 is used instead",
+            )
         document["specular"] = read.scalar(extension, "specularTexture", min(f0 / 0.08, 1.0), "a")
         return
     root = math.sqrt(min(f0, 1.0))
     eta = (1 + root) / (1 - root) if root < 0.6 else LARGEST_IOR
     if eta >= LARGEST_IOR:
-        read.notes.add(extension.at("specularColorFactor"), f"F0 of {f0:.3g} is lowered to 0.36, an index of 4")
+        read.notes.add(
+            extension.at("specularColorFactor"),
+            f"a reflectance (F0) of {f0:.3g} is not supported; 0.36, an ior of 4, is used instead",
+        )
     document["ior"] = min(max(eta, 1.0), LARGEST_IOR)
 
 
@@ -114,7 +126,9 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
     if extension is None or not strength:
         return
     if not read.directed:
-        read.notes.add(extension.pointer, "needs TEXCOORD_0 or TANGENT to run along: left out on a mesh without")
+        read.notes.add(
+            extension.pointer, "anisotropy needs TEXCOORD_0 or TANGENT; it is left out on a mesh that has neither"
+        )
         return
     turn, info = extension.number("anisotropyRotation", 0, -1e6, 1e6), extension.object("anisotropyTexture")
     rotation = brushed.rotation(read.textures, info, read.texture(extension, "anisotropyTexture", "linear"), turn)
@@ -122,10 +136,15 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
         document["anisotropic_rotation"] = rotation
     if isinstance(rotation, dict):
         where = extension.at("anisotropyTexture")
-        read.notes.add(where, "its directions become angles: a line of one texel is off where these begin anew")
+        read.notes.add(
+            where,
+            "the directions are converted to angles; where these wrap around, a line one texel wide may be wrong",
+        )
     roughness = document["roughness"]
     if "anisotropyTexture" in extension or isinstance(roughness, dict):
-        read.notes.add(extension.pointer, "stretches the highlight along and across under a texture")
+        read.notes.add(
+            extension.pointer, "under a texture, anisotropy stretches the highlight in both directions instead of one"
+        )
         document["anisotropic"] = read.scalar(extension, "anisotropyTexture", strength * strength, "b")
         return
     along = roughness**2 + (1 - roughness**2) * strength**2
@@ -149,7 +168,10 @@ def _volume(read: Reading, document: dict[str, Any], ior: float) -> None:
     volume = read.place.extension("KHR_materials_volume")
     if volume is not None and volume.number("thicknessFactor", 0, 0) > 0:
         if "thicknessTexture" in volume:
-            read.notes.add(volume.at("thicknessTexture"), "is not used: rays go through the geometry itself")
+            read.notes.add(
+                volume.at("thicknessTexture"),
+                "the thickness texture is not used; rays go through the geometry itself",
+            )
         if "attenuationDistance" in volume:
             document["attenuation_distance"] = volume.number("attenuationDistance", 1, 1e-9, 1e9)
             document["attenuation_color"] = factor(read.share(volume, "attenuationColor", (1.0, 1.0, 1.0)))
@@ -158,11 +180,11 @@ def _volume(read: Reading, document: dict[str, Any], ior: float) -> None:
     extension = read.place.extension("KHR_materials_transmission")
     where = extension.pointer if extension else read.place.pointer
     if document.get("roughness") != 0:
-        read.notes.add(where, "a thin wall (no thickness) shows what is behind it unblurred")
+        read.notes.add(where, "the roughness of a thin wall (one without thickness) does not blur what is behind it")
     document["ior"] = 1.0
     document.pop("specular", None)
     if "clearcoat" in document:
-        read.notes.add(where, "a thin wall under a coat reflects by the coat alone")
+        read.notes.add(where, "a thin wall with a clearcoat reflects by the clearcoat alone")
         return
     f0 = ((ior - 1) / (ior + 1)) ** 2
     document["clearcoat"] = min(f0 / COAT_F0, 1.0)

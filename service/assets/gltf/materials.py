@@ -34,7 +34,7 @@ class Reading:
         """A colour within 0..1, perhaps with alpha."""
         found = owner.color(name, default)
         if max(found) > 1:
-            self.notes.add(owner.at(name), "what lies beyond 1 is lowered to it")
+            self.notes.add(owner.at(name), "values above 1 are not supported; 1 is used instead")
         return tuple(min(value, 1.0) for value in found)
 
     def scalar(self, owner: Place, name: str, value: float, channel: str, space: ColorSpace = "linear") -> Any:
@@ -75,7 +75,7 @@ class Materials:
     def _document(self, read: Reading) -> dict[str, Any]:
         place = read.place
         if "occlusionTexture" in place:
-            self.notes.add(place.at("occlusionTexture"), "is not used: light that corners lose is traced")
+            self.notes.add(place.at("occlusionTexture"), "the occlusion texture is not used; occlusion is traced")
         glossy = place.extension("KHR_materials_pbrSpecularGlossiness")
         if place.extension("KHR_materials_unlit") is not None:
             document = self._unlit(read)

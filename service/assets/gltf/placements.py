@@ -50,7 +50,7 @@ class Placements:
     def add(self, part: Part, node: Node, worlds: Doubles) -> None:
         """`part` stands under each of `worlds` (k, 4, 4), which are `node`'s. Raises ParseError at too many."""
         if len(self._parts) + len(worlds) > MOST_SHAPES:
-            raise ParseError(f"its nodes hold more than the {MOST_SHAPES} primitives allowed")
+            raise ParseError(f"the scene has more than the {MOST_SHAPES} primitives allowed, counted in each node")
         self._parts += [part] * len(worlds)
         self._nodes += [node] * len(worlds)
         self._matrices.extend(worlds)
@@ -63,7 +63,7 @@ class Placements:
         for k, part in enumerate(self._parts):
             if not stands[k]:
                 notes.leave_out(
-                    self._nodes[k].place.pointer, "the node's transform makes its mesh flat: it is left out"
+                    self._nodes[k].place.pointer, "the node's transform makes its mesh flat; it is left out"
                 )
             elif moves[k]:
                 found.append({**part.shape, "transform": {"matrix": matrices[k]}})
@@ -100,7 +100,7 @@ class Placements:
         beyond = ~(np.abs(worlds).max(axis=(1, 2), initial=0) <= MAX_COORDINATE)  # also where it is not a number
         if beyond.any():
             pointer = self._nodes[int(beyond.argmax())].place.pointer
-            raise ParseError("its matrix, its parents' applied, is not finite or beyond 1e9", pointer)
+            raise ParseError("the node's matrix in the world is not finite or has a number beyond 1e9", pointer)
         return worlds
 
     @cached_property

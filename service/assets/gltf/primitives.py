@@ -147,14 +147,17 @@ def _rows(file: GltfFile, attributes: Place, packed: dict[str, Array], notes: No
         if kind not in TYPES or (number and not (number.isascii() and number.isdigit())):
             continue  # a program's own
         if number and int(number[:4]) >= {"TEXCOORD": UV_SETS, "COLOR": 1}.get(kind, MOST_SETS):
-            notes.add(attributes.at(name), "is not read: there are two sets of uv and one of colours")
+            notes.add(
+                attributes.at(name),
+                "this set is not supported; two sets of texture coordinates and one of colours are",
+            )
             continue
         if name not in packed:
             found[name] = accessors.read(file, attributes, name, *TYPES[kind])
         elif packed[name].shape[1] in [accessors.WIDTHS[one] for one in TYPES[kind]]:
             found[name] = packed[name]
         else:
-            raise attributes.error(name, f"has {packed[name].shape[1]} numbers an item in the Draco data")
+            raise attributes.error(name, f"has {packed[name].shape[1]} numbers for each vertex in the Draco data")
     return found
 
 
@@ -174,12 +177,12 @@ def _unit(rows: Array) -> Floats:
 
 def _triangles(mode: int, indices: Longs, vertices: int, place: Place, notes: Notes) -> Longs:
     if len(indices) and not 0 <= indices.min() <= indices.max() < vertices:
-        raise place.error("indices", f"name vertex {indices.max()} where there are {vertices}")
+        raise place.error("indices", f"refer to vertex {indices.max()}; there are {vertices}")
     k = np.arange(max(len(indices) - 2, 0))
     if mode == STRIP:
         return indices[np.stack([k, k + 1 + k % 2, k + 2 - k % 2], axis=1)]
     if mode == FAN:
         return indices[np.stack([k + 1, k + 2, 0 * k], axis=1)]
     if len(indices) % 3:
-        notes.add(place.pointer, f"its {len(indices)} indices are no whole triangles: the last are left out")
+        notes.add(place.pointer, f"{len(indices)} indices do not make whole triangles; the last ones are left out")
     return indices[: len(indices) // 3 * 3].reshape(-1, 3)

@@ -143,12 +143,15 @@ class _Importer:
         self._held.add(reference)
         limit = self.file.limits.max_triangles
         if self._triangles > limit:
-            raise ParseError(f"its nodes hold more than the {limit} triangles allowed")
+            raise ParseError(f"the scene has more than the {limit} triangles allowed")
         charts = tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs)
         name, material = self.materials.name(place, charts)
         tinted = primitive.colors is not None and bool((primitive.colors[:, :3] != 1).any())
         if tinted and material.extension("KHR_materials_unlit") is not None:
-            self.notes.add(place.need("attributes").at("COLOR_0"), "colours don't tint an unlit material")
+            self.notes.add(
+                place.need("attributes").at("COLOR_0"),
+                "vertex colours on an unlit material are not supported; they are ignored",
+            )
         sides = {"double_sided": material.flag("doubleSided")}
         shape = {"type": "mesh", "asset": reference, "material": name} | sides
         if primitive.normals is None:  # then triangles are flat, says the specification
@@ -160,11 +163,11 @@ class _Importer:
         root = self.file.root
         variants = root.extension("KHR_materials_variants")
         if variants is not None:
-            self.notes.add(variants.pointer, "is not chosen from: primitives have the materials they name themselves")
+            self.notes.add(variants.pointer, "material variants are not supported; the default materials are used")
         if root.array("animations"):
-            self.notes.add("/animations", "are not played: the file's own pose is shown")
+            self.notes.add("/animations", "animations are not played; the file's own pose is shown")
         if self.file.count("scenes") > 1:
-            self.notes.add("/scenes", f"only number {whole(root.value.get('scene', 0), '/scene')} is shown")
+            self.notes.add("/scenes", f"only scene {whole(root.value.get('scene', 0), '/scene')} is shown")
         note_unsupported(root, self.notes)
 
 

@@ -72,7 +72,9 @@ def _textured(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> d
         return {}
     placing = [{k: p.get(k) for k in ("uv", "scale", "offset", "rotation", "wrap")} for p in placings]
     if placing[0] != placing[-1]:
-        read.notes.add(infos[1].pointer, "is placed as the diffuse texture is: they become one")
+        read.notes.add(
+            infos[1].pointer, "this texture is transformed like the diffuse texture, because the two are merged"
+        )
     settings = {name: value for name, value in placings[0].items() if name not in ("asset", "color_space")}
     key = "specular glossiness", place.pointer
     if key not in textures.made:

@@ -43,7 +43,7 @@ def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
     if kind == "directional":
         return {"type": "directional", "direction": direction, "irradiance": power}
     if "range" in place:
-        notes.add(place.at("range"), "is not used: light falls off as 1/d^2 and never ends")
+        notes.add(place.at("range"), "a light's range is not used; its light falls off as 1/d^2 without end")
     if kind == "point":
         return {"type": "point", "position": position, "intensity": power}
     if kind != "spot":
@@ -51,7 +51,7 @@ def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
     spot = place.object("spot") or Place({}, place.at("spot"))
     inner = spot.number("innerConeAngle", 0, 0, math.pi / 2)
     outer = spot.number("outerConeAngle", math.pi / 4, inner, math.pi / 2 + 1e-6)
-    notes.add(spot.pointer, "the edge fades as a smoothstep of the cosine, not as its square")
+    notes.add(spot.pointer, "the edge of the cone fades as a smoothstep of the cosine, not as its square")
     return {
         "type": "spot",
         "position": position,
@@ -73,7 +73,7 @@ def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> t
         place = file.follow(node.place, "camera", "cameras")
         kind = place.text("type")
         if chosen is not None:
-            notes.add(node.place.at("camera"), "is not used: the scene's first camera is")
+            notes.add(node.place.at("camera"), "this camera is not used; the scene's first camera is used instead")
         elif kind == "perspective":
             lens = place.need("perspective")
             chosen = _perspective(lens, node, bounds)

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 
 from service.assets.errors import ParseError
+from service.assets.gltf.extensions import remedy
 from service.assets.gltf.file import GltfFile
 from service.assets.gltf.notes import Notes
 from service.assets.gltf.place import Place, number
@@ -40,7 +41,7 @@ class Textures:
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
     def use(self, info: Place | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
-        """The name of a texture. None, and noted, where it can't be had; `charts`: the uv sets of the mesh."""
+        """The name of a texture; None, and noted, where it can't be used. `charts`: the uv sets of the mesh."""
         if info is None:
             return None
         texture = self.file.follow(info, "index", "textures")
@@ -50,11 +51,15 @@ class Textures:
         if image is None:
             return None
         if uv >= UV_SETS:
-            self.notes.add(info.at("texCoord"), f"TEXCOORD_{uv} is not read, only 0 and 1: the texture is left out")
+            self.notes.add(
+                info.at("texCoord"), f"TEXCOORD_{uv} is not supported, only 0 and 1; the texture is left out"
+            )
             return None
         chart = charts[uv]
         if chart is None:
-            self.notes.add(info.pointer, f"a mesh with this material has no TEXCOORD_{uv}: there it goes untextured")
+            self.notes.add(
+                info.pointer, f"a mesh with this material has no TEXCOORD_{uv}; it is shown without the texture"
+            )
             return None
         wrap = self._wrap(texture, _reach(chart, placing))
         return self.add(image, {"color_space": space, "wrap": wrap, **placing}, texture)
@@ -86,8 +91,11 @@ class Textures:
             if owner is not None and "source" in owner:
                 return self.file.follow(owner, "source", "images")
         other = texture.object("extensions")
-        which = f" ({', '.join(other.value)[:80]})" if other else ""
-        self.notes.add(texture.pointer, f"has no image in PNG, JPEG or WebP{which}: the texture is left out")
+        names = sorted(other.value) if other else []
+        which = f" ({', '.join(names)[:80]})" if names else ""
+        self.notes.add(
+            texture.pointer, f"the texture has no image in PNG, JPEG or WebP{which} and is left out{remedy(names)}"
+        )
         return None
 
     def image(self, texture: Place) -> str | None:
@@ -99,7 +107,7 @@ class Textures:
             data = self.file.image(place)
             if sniff(data) not in READ:
                 at = "bufferView" if "bufferView" in place else "uri"
-                raise place.error(at, f"is no PNG, JPEG or WebP image: it begins with {data[:12]!r}")
+                raise place.error(at, f"is not a PNG, JPEG or WebP image; it begins with {data[:12]!r}")
             self._kept[place.pointer] = self.keep(data, place.pointer)
         return self._kept[place.pointer]
 
@@ -126,9 +134,15 @@ class Textures:
         if found[0] != found[1] and not all(reach):
             found = found[::-1] if reach[1] else found
         elif found[0] != found[1]:
-            self.notes.add(sampler.at("wrapT"), f"{found[1]} is not had beside {found[0]} in u, which both take")
+            self.notes.add(
+                sampler.at("wrapT"),
+                f"{found[1]} in v beside {found[0]} in u is not supported; {found[0]} is used for both",
+            )
         if sampler.whole("magFilter", 9729) in NEAREST:
-            self.notes.add(sampler.at("magFilter"), "nearest texels are not had: bilinear is")
+            self.notes.add(
+                sampler.at("magFilter"),
+                "nearest-neighbour filtering is not supported; bilinear filtering is used instead",
+            )
         return found[0]
 
     def _placing(self, info: Place) -> dict[str, Any]:

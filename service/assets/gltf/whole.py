@@ -34,7 +34,7 @@ def read_whole(data: bytes | memoryview, limits: AssetLimits) -> Parts:
             for world in [np.eye(4)] if skin else instances(file, node):
                 triangles += len(primitive.faces)
                 if triangles > limits.max_triangles:  # before the memory is taken: one mesh may stand in many nodes
-                    raise ParseError(f"its nodes hold more than the {limits.max_triangles} triangles allowed")
+                    raise ParseError(f"the scene has more than the {limits.max_triangles} triangles allowed")
                 parts.append(skin.posed(primitive, place) if skin else primitive.moved(world))
     if not parts:
         raise notes.nothing_left()
