@@ -189,13 +189,11 @@ class Documents:
 
     def _find_assets(self, document: CheckedDocument, uses: list[str]) -> None:
         """Raises InvalidDocument where one of them is not here."""
-        missing = set(islice((ref for ref in uses if not self._assets.holds(ref)), MOST_MISTAKES))
-        if missing:
-            told = ((pointer, ref) for pointer, ref in document.uses if ref in missing)
-            raise InvalidDocument(
-                FieldError(pointer, f"there is no asset {ref[:100]!r} here")
-                for pointer, ref in islice(told, MOST_MISTAKES)
-            )
+        missing = ((ref, why) for ref in uses if (why := self._assets.missing(ref)) is not None)
+        first = dict(islice(missing, MOST_MISTAKES))
+        if first:
+            told = (FieldError(pointer, first[ref]) for pointer, ref in document.uses if ref in first)
+            raise InvalidDocument(islice(told, MOST_MISTAKES))
 
     def _convert(self, database: sqlite3.Connection) -> None:
         (version,) = database.execute("PRAGMA user_version").fetchone()

@@ -60,6 +60,16 @@ def test_sending_it_again_heals(
         assert one.read(info.id) == data and names(tmp_path) == before
 
 
+def test_sending_it_again_heals_what_the_disk_lost_in_silence(store: AssetStore, tmp_path: Path) -> None:
+    """The file's time of change is what it was when its hash was right."""
+    path = file(tmp_path, store.add(OBJ).id)
+    changed = path.stat().st_mtime_ns
+    damage(path)
+    os.utime(path, ns=(changed, changed))
+    store.add(OBJ)
+    assert path.read_bytes() == OBJ
+
+
 def test_damage_is_found_at_the_first_load(store: AssetStore, restarted: AssetStore, tmp_path: Path) -> None:
     """It is told by name, served to nobody, and kept for whoever looks into it."""
     mesh, image = store.add(OBJ).id, store.add(PNG).id
@@ -74,7 +84,7 @@ def test_damage_is_found_at_the_first_load(store: AssetStore, restarted: AssetSt
         for ask in (one.read, one.info):
             with pytest.raises(NotFound, match="damaged"):
                 ask(mesh)
-        assert not one.holds(mesh)
+        assert not one.holds(mesh) and "damaged" in str(one.missing(mesh))
     assert file(tmp_path, mesh, ".damaged").read_bytes() == bytes(len(OBJ))
     restarted.add(OBJ)
     assert len(restarted.mesh(mesh).faces) == 1 and not file(tmp_path, mesh, ".damaged").exists()
@@ -111,7 +121,7 @@ def test_what_cannot_be_read_is_damaged(
         restarted.read(id)
 
 
-@pytest.mark.parametrize("how", ["import", "scene"])
+@pytest.mark.parametrize("how", ["import", "scene", "scene without its document"])
 def test_importing_a_scene_again_heals_its_parts(
     how: str, store: AssetStore, restarted: AssetStore, tmp_path: Path
 ) -> None:
@@ -123,7 +133,10 @@ def test_importing_a_scene_again_heals_its_parts(
         damage(file(tmp_path, part))
         if how == "import":
             one.add(GLB)
-        assert one.scene(id).document == document
+        else:
+            if how != "scene":
+                file(tmp_path, id, ".scene.json").unlink()
+            assert one.scene(id).document == document
         assert one.read(part) == good and len(one.mesh(part).faces) == 1
 
 

@@ -17,7 +17,7 @@ import httpx
 import pytest
 import uvicorn
 
-from service import app
+from service import app, documents
 from service.assets import AssetStore
 from service.config import Config
 from service.documents import DamagedFile, Documents, checked
@@ -129,6 +129,18 @@ def test_documents_give_their_room_back(saved: Documents, tmp_path: Path) -> Non
         assert saved.bytes < little + 50_000
     saved.put("scenes", "0", checked("scenes", SCENE))
     assert sum(path.stat().st_size for path in tmp_path.glob("documents*")) < little + 50_000
+
+
+def test_the_log_does_not_stay_large(saved: Documents, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Somebody who reads all the time keeps SQLite from deleting it."""
+    monkeypatch.setattr(documents, "LOG_BYTES", 50_000)
+    saved.put("scenes", "0", SCENE)
+    with closing(sqlite3.connect(tmp_path / "documents.sqlite3")) as other:
+        other.execute("SELECT count(*) FROM documents").fetchone()
+        for _ in range(6):  # it is written back when it has grown to 4 MB, and begins anew at the next saving
+            saved.put("scenes", "1", large_scene())
+        log = tmp_path / "documents.sqlite3-wal"
+        assert log.stat().st_size < 3_000_000
 
 
 def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_path: Path) -> None:

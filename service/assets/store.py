@@ -132,6 +132,16 @@ class AssetStore:
     def holds(self, id: str) -> bool:
         return self._known(id) is not None or (self._builtin is not None and id in self._builtin())
 
+    def missing(self, id: str) -> str | None:
+        """Why there is no such asset here; None where there is one."""
+        if self.holds(id):
+            return None
+        try:
+            self._builtin_bytes(id)
+        except NotFound as error:
+            return error.detail
+        return None
+
     def info(self, id: str) -> AssetInfo:
         """Raises NotFound."""
         known = self._known(id)

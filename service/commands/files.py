@@ -37,7 +37,10 @@ def write(path: Path, data: bytes) -> None:
     beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         try:
-            beside.write_bytes(data)
+            with beside.open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())  # or else a loss of power leaves an empty file under the final name
             os.replace(beside, path)
         finally:
             with suppress(OSError):
