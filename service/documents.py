@@ -122,7 +122,7 @@ class Documents:
             rows = database.execute("SELECT name, title FROM documents WHERE kind = ? ORDER BY title, name", (kind,))
             return [{"name": name, "title": title} for name, title in rows]
 
-    def get(self, kind: str, name: str) -> str:
+    def get(self, kind: str, name: str) -> bytes:
         """The bare document, as JSON. Raises NotFound."""
         check_kind(kind)
         with self._open() as database:
@@ -130,7 +130,7 @@ class Documents:
         if row is None:
             raise _missing(kind, name)
         text: str = row[0]
-        return text
+        return text.encode()
 
     def put(self, kind: str, name: str, document: CheckedDocument, title: str | None = None) -> tuple[str, bool]:
         """Saves a document in the place of what had the name; its title now, and whether nothing had it.

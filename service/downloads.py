@@ -115,6 +115,17 @@ class Downloads:
         async with mine, self._room:
             yield
 
+    async def answer(self, client: str, data: bytes, media_type: str) -> FileAnswer:
+        """An answer that holds no memory. Raises Unavailable."""
+
+        def fill(file: BinaryIO) -> None:
+            file.write(data)
+
+        self.admit(client, len(data))
+        written = await asyncio.to_thread(self.write, fill)
+        self.keep(client, None, written)
+        return FileAnswer(written.file, media_type, {}, written)
+
     def find(self, key: Hashable) -> Written | None:
         """A picture that is still being sent to somebody."""
         return self._written.get(key)
@@ -123,7 +134,7 @@ class Downloads:
         """Raises Unavailable where so many more would be too much, for the client or for all."""
         held, total = self._held[client], self._held.total()
         if (held and held + most_bytes > ROOM // 2) or (total and total + most_bytes > ROOM):
-            raise Unavailable("Too many pictures are being sent already, to clients that take them slowly.", RETRY_S)
+            raise Unavailable("Too much is being sent already, to clients that take it slowly.", RETRY_S)
 
     def write(self, fill: Callable[[BinaryIO], None]) -> Written:
         """A file that `fill` has written. For any thread. Raises Unavailable where the disk takes no more."""
@@ -133,8 +144,8 @@ class Downloads:
             fill(file)
             file.flush()
         except OSError as error:
-            log.error("could not write a picture error=%s", error)
-            raise Unavailable("The picture could not be written to the disk.", RETRY_S) from None
+            log.error("could not write an answer error=%s", error)
+            raise Unavailable("The answer could not be written to the disk.", RETRY_S) from None
         return Written(file)
 
     def keep(self, client: str, key: Hashable | None, written: Written) -> None:

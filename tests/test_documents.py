@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -11,17 +12,21 @@ import sys
 from collections.abc import Iterator
 from contextlib import closing
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import httpx
 import pytest
 import uvicorn
+from starlette.requests import Request
 
 from service import app, documents
 from service.assets import AssetStore
 from service.config import Config
 from service.documents import DamagedFile, Documents, checked
+from service.downloads import Downloads, FileAnswer
 from service.problems import Unavailable
+from service.routes.documents import document
 from tests.serving import SCENE, Server
 from tests.test_rest import is_problem
 
@@ -75,7 +80,8 @@ def test_only_valid_documents_are_saved(server: Server) -> None:
     assert is_problem(http.put("/v1/documents/scenes/a", content=b"{"), 400)
     assert is_problem(http.put("/v1/documents/scenes/a", content=b"{}", headers={"content-type": "text/html"}), 415)
     assert is_problem(http.put("/v1/documents/shapes/a", json={}), 404)
-    assert is_problem(http.put(f"/v1/documents/scenes/{'x' * 101}", json=SCENE), 422, "/name")
+    for name in ("x" * 101, "a%0Ab", "a%C2%9Bb", "a%E2%80%AEb"):
+        assert is_problem(http.put(f"/v1/documents/scenes/{name}", json=SCENE), 422, "/name")
     assert is_problem(http.get("/v1/documents/scenes/a"), 404)
     allowed = http.post("/v1/documents/scenes/a", json=SCENE)
     assert is_problem(allowed, 405) and allowed.headers["allow"] == "DELETE, GET, HEAD, PUT"
@@ -134,11 +140,12 @@ def test_documents_give_their_room_back(saved: Documents, tmp_path: Path) -> Non
 def test_the_log_does_not_stay_large(saved: Documents, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Somebody who reads all the time keeps SQLite from deleting it."""
     monkeypatch.setattr(documents, "LOG_BYTES", 50_000)
-    saved.put("scenes", "0", SCENE)
+    saved.put("scenes", "0", checked("scenes", SCENE))
     with closing(sqlite3.connect(tmp_path / "documents.sqlite3")) as other:
         other.execute("SELECT count(*) FROM documents").fetchone()
+        large = checked("scenes", large_scene())
         for _ in range(6):  # it is written back when it has grown to 4 MB, and begins anew at the next saving
-            saved.put("scenes", "1", large_scene())
+            saved.put("scenes", "1", large)
         log = tmp_path / "documents.sqlite3-wal"
         assert log.stat().st_size < 3_000_000
 
@@ -163,7 +170,7 @@ def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_pat
     assert file.stat().st_size > 4_000_000
     saved.prepare()
     assert file.stat().st_size < 100_000
-    assert saved.names("scenes") == [{"name": "a", "title": "A"}] and saved.get("scenes", "a") == body
+    assert saved.names("scenes") == [{"name": "a", "title": "A"}] and saved.get("scenes", "a") == body.encode()
     with saved.assets_in_use() as used:
         assert used == {"sha256:1"}
     before = file.stat().st_mtime_ns
@@ -199,6 +206,18 @@ def test_looking_for_a_document_reads_no_other(saved: Documents) -> None:
     saved.get("scenes", "a")
     saved.names("scenes")
     assert bytes_read() - before < 500_000
+
+
+def test_a_large_document_is_sent_from_a_file(tmp_path: Path) -> None:
+    """In memory, those that slow clients fetch would add up."""
+    text = b'{"a": ' + b"1" * 3_000_000 + b"}"
+    saved = SimpleNamespace(documents=SimpleNamespace(get=lambda *key: text), downloads=Downloads(tmp_path))
+    scope = {"type": "http", "app": SimpleNamespace(state=SimpleNamespace(house=saved)), "client": ("::1", 1)}
+    answer: Any = asyncio.run(document(Request(scope), "scenes", "large"))
+    assert isinstance(answer, FileAnswer) and answer.media_type == "application/json"
+    with open(answer._file.fileno(), "rb", closefd=False) as file:
+        file.seek(0)
+        assert file.read() == text
 
 
 def test_a_damaged_file_is_told_of(

@@ -172,7 +172,7 @@ def test_what_is_being_stored_has_its_room(kept: Storage, tmp_path: Path) -> Non
 
 
 def test_parts_of_scenes_need_room_too(kept: Storage, tmp_path: Path) -> None:
-    ids = uploads(kept, tmp_path, 10, 1700)
+    ids = uploads(kept, tmp_path, 10, 1500)
     info = kept.assets.add(glb(gltf()))
     kept.assets.scene(info.id)
     assert kept.quota.used() <= LIMIT and not kept.assets.holds(ids[0]) and kept.assets.holds(ids[9])

@@ -29,6 +29,8 @@ ID = re.compile(r"sha256:[0-9a-f]{64}")
 FORMATS = "OBJ, PLY, STL, glTF and GLB meshes; EXR, Radiance HDR, PNG, JPEG and WebP images"
 
 
+RECORD_BYTES = 512  # about what the record of an asset takes
+
 Room = Callable[[int], AbstractContextManager[None]]
 
 
@@ -99,7 +101,7 @@ class AssetStore:
         if KINDS[format] == "scene":
             return self._import(id, format, data, new=True)[0]
         info = self._described(id, format, data)
-        with self._room(size):
+        with self._room(size + RECORD_BYTES):
             self._store(info, data)
         return info
 
@@ -172,7 +174,8 @@ class AssetStore:
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
         size = length(data)
-        with self._room(sum(len(part.data) for part in file.parts) + (size if new else 0)):
+        text = len(json.dumps(file.document)) + RECORD_BYTES * (len(file.parts) + len(file.document["shapes"]))
+        with self._room(text + sum(len(part.data) for part in file.parts) + (size if new else 0)):
             imported = take_apart(file, self._keep)
             info = AssetInfo(
                 id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,

@@ -8,18 +8,23 @@ from typing import Annotated
 from fastapi import APIRouter, Path, Query, Request, Response
 
 from service.documents import LONGEST_NAME, CheckedDocument, check_kind
+from service.downloads import PIECE
 from service.rendering.threads import saving
 from service.routes import answers
-from service.routes.house import house
+from service.routes.house import caller, house
 
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
+
+JSON = "application/json"
+# Neither slashes nor what moves the text around it, in a menu or a log: control characters, and marks of direction.
+NAME = r"^[^\x00-\x1f\x7f-\x9f/\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
 
 Name = Annotated[
     str,
     Path(
         min_length=1,
         max_length=LONGEST_NAME,
-        pattern=r"^[^\x00-\x1f\x7f/]+$",
+        pattern=NAME,
         description="Of your choice, without slashes.",
         examples=["my-scene"],
     ),
@@ -34,8 +39,12 @@ async def names(request: Request, kind: answers.DocumentKind) -> list[answers.Na
 
 @router.get("/{kind}/{name}", summary="The bare document", responses=answers.DOCUMENT | answers.problems(404, 422))
 async def document(request: Request, kind: answers.DocumentKind, name: Name) -> Response:
-    text = await saving(partial(house(request).documents.get, kind, name))
-    return Response(text, media_type="application/json")
+    own = house(request)
+    data = await saving(partial(own.documents.get, kind, name))
+    if len(data) <= PIECE:
+        return Response(data, media_type=JSON)
+    # From a file, or else it would stay in memory until it has been fetched.
+    return await own.downloads.answer(caller(request), data, JSON)
 
 
 @router.put(

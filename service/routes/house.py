@@ -90,6 +90,11 @@ def house(connection: HTTPConnection) -> House:
     return found
 
 
+def caller(connection: HTTPConnection) -> str:
+    """Whom to count what is sent against: the key, or else the address."""
+    return owner(connection) or (connection.client.host if connection.client else "")
+
+
 def owner(connection: HTTPConnection) -> str:
     """Whose key it was, by a name that the guard gave it; "" where no keys are asked for."""
     found: str = connection.scope.get("owner", "")

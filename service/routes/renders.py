@@ -23,7 +23,7 @@ from service.rendering.parsing import ParsedRequest, unfolded
 from service.rendering.threads import packing, writing
 from service.routes import answers
 from service.routes.errors import GONE
-from service.routes.house import STARTING_S, House, house, owner
+from service.routes.house import STARTING_S, House, caller, house, owner
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 
@@ -175,7 +175,7 @@ async def _finished_or_gone(request: Request, job: Job) -> None:
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
     downloads = house(request).downloads
-    client = owner(request) or (request.client.host if request.client else "")
+    client = caller(request)
     key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
     async with present(request.receive) as gone, downloads.turn(client):
         if gone():
