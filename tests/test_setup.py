@@ -64,6 +64,7 @@ def test_a_faster_mesa_comes_from_backports_and_leaves_no_trace(tmp_path: Path) 
     assert done.returncode == 0, done.stderr
     update, install = machine.asked
     assert update.endswith(" update") and " -t bookworm-backports libegl1 " in install and "--no-remove" in install
+    assert "libglx-mesa0" in install  # not to be mixed with another version's
     for words in (update, install):
         assert "Dir::Etc::SourceParts=/dev/null" in words
         for place in ("Dir::Etc::SourceList", "Dir::State::Lists", "Dir::Cache"):
