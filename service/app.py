@@ -173,10 +173,12 @@ class _Server(uvicorn.Server):
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
+        log.info("started address=%s version=%s", self._address, metadata.version("sunbox"))
         sys.stdout.write(f"Sunbox is at {self._address}\n")
         sys.stdout.flush()
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
+        log.info("shutting down connections=%d", len(self.server_state.connections))
         await self._house.farewell()
         await super().shutdown(sockets)
 

@@ -65,6 +65,13 @@ def test_the_proxy_needs_a_key_and_keeps_the_metrics_to_itself() -> None:
     assert "SUNBOX_API_KEY: ${SUNBOX_API_KEY:?" in COMPOSE and "respond /metrics 404" in COMPOSE
 
 
+def test_the_proxy_logs_no_secrets() -> None:
+    """Its error log has each failed request: the stream's address holds a session's id, a subprotocol the key."""
+    hidden = COMPOSE[COMPOSE.index("format filter") : COMPOSE.index("${SITE:-localhost}")]
+    for line in ("request>uri query {", "replace session ", "replace beside ", "Sec-Websocket-Protocol delete"):
+        assert line in hidden
+
+
 def test_the_proxy_gives_idle_connections_up_first() -> None:
     """Else a request is sent on one that the server just closes, and is answered 502."""
     (minutes,) = re.findall(r"keepalive (\d+)m$", COMPOSE, re.MULTILINE)
