@@ -49,6 +49,7 @@ def test_over_rest(server: Server) -> None:
     assert answer.status_code == 201
     info = answer.json()
     assert (info["kind"], info["triangles"]) == ("scene", 4)
+    assert info["bounds"] == [[-1, -1, -5], [1, 1, 0]], "of both nodes, where they stand"
     assert info["warnings"][0]["pointer"] == "/materials/0/extensions/KHR_materials_iridescence"
     scene = http.get(f"/v1/assets/{info['id']}/scene")
     document = scene.json()

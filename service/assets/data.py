@@ -63,6 +63,7 @@ class SceneFile:
     lit: bool
     exposure: float | None = None  # in stops, that suits its lights; None: 0 does
     aspect_ratio: float | None = None  # of its camera's picture, width over height
+    bounds: list[list[float]] | None = None  # of its triangles where they stand: least and greatest x, y, z, m
 
 
 @dataclass(frozen=True)
@@ -82,7 +83,7 @@ class AssetInfo:
     channels: int | None = None
     vertices: int | None = None
     triangles: int | None = None
-    bounds: list[list[float]] | None = None  # of an uploaded mesh's triangles: least and greatest x, y, z, m
+    bounds: list[list[float]] | None = None  # of the triangles of a mesh or a scene: least and greatest x, y, z, m
     warnings: list[dict[str, Any]] | None = None
     exposure: float | None = None  # in stops, that suits a scene's lights; None: 0 does
     aspect_ratio: float | None = None  # of the picture of a scene's camera, width over height

@@ -215,5 +215,5 @@ def _scene(text: Array, files: Array) -> SceneFile:
         at += size
     return SceneFile(
         told["document"], parts, told["warnings"], int(told["triangles"]), bool(told["lit"]), told["exposure"],
-        told["aspect_ratio"],
+        told["aspect_ratio"], told["bounds"],
     )  # fmt: skip

@@ -179,7 +179,7 @@ class AssetStore:
             imported = take_apart(file, self._keep)
             info = AssetInfo(
                 id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,
-                exposure=imported.exposure, aspect_ratio=imported.aspect_ratio,
+                exposure=imported.exposure, aspect_ratio=imported.aspect_ratio, bounds=file.bounds,
             )  # fmt: skip
             if new:
                 self._store(info, data, imported)

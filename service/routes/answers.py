@@ -93,7 +93,7 @@ class Asset(BaseModel):
     channels: int | None = Field(None, description="Of an image.")
     vertices: int | None = Field(None, description="Of a mesh.")
     triangles: int | None = Field(None, description="Of a mesh or a scene.")
-    bounds: list[list[float]] | None = Field(None, description="Of a mesh: the least and the greatest x, y, z, m.")
+    bounds: list[list[float]] | None = Field(None, description="Of a mesh or a scene: least and greatest x, y, z, m.")
     warnings: list[AssetWarning] | None = Field(
         None, description="What is odd about the file, and what it asks for and does not get."
     )

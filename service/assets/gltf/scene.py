@@ -78,7 +78,8 @@ class _Importer:
         exposure = self._metered(used, aspect, lighting) if lights else None
         warnings = [*lighting.document(), *self.notes.document()]  # first what concerns the whole picture
         triangles = sum(part.triangles for part in self.placements.shown)
-        return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect)
+        bounds = [corner.tolist() for corner in self.placements.bounds]
+        return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect, bounds)
 
     def _metered(self, document: dict[str, Any], aspect: float | None, notes: Notes) -> float | None:
         """The exposure that suits the file's lights, where 0 does not; noted, as is that nothing else lights it."""
