@@ -24,7 +24,7 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from service import presets
-from service.config import Config
+from service.config import Config, unknown_variables
 from service.connection_limits import Watch
 from service.connections import connection_class, listen
 from service.documents import DamagedFile
@@ -103,6 +103,8 @@ def run(config: Config) -> int:
     """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 when the address can't be had."""
     _give_memory_back()
     sys.setswitchinterval(SWITCH_S)
+    if unknown := unknown_variables():
+        log.warning("these variables are no settings and change nothing names=%s", ",".join(unknown))
     most = min(config.max_connections, _take_descriptors() // 2)  # files, scenes and images take others
     try:
         listener = listen(config.host, config.port)

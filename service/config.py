@@ -18,6 +18,7 @@ LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota")  # how the names of 
 HOST = re.compile(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")  # a name, an IPv4 or an IPv6 address
 
 Words = Annotated[list[str], NoDecode]
+Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class ConfigError(Exception):
@@ -51,42 +52,53 @@ class Config(BaseSettings):
         default_factory=list, description="Origins besides the server's own that may call, separated by commas."
     )
     data_dir: Path = Field(
-        default_factory=_default_data_dir, description="Folder for assets and documents (default: ~/.cache/sunbox)."
+        default_factory=_default_data_dir,
+        description="Folder of assets and documents (default: `sunbox` in `$XDG_CACHE_HOME` or `~/.cache`).",
     )
     data_quota: int = Field(
-        10 * GIB, ge=1, description="Most bytes of assets and documents; assets longest unused make room."
+        10 * GIB,
+        ge=1,
+        description="Most bytes of assets and documents; assets unused longest make room, unless documents use them.",
     )
     device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
     require_gpu: bool = Field(False, description="Refuse to start on a software renderer.")
-    log_format: Literal["console", "json"] = Field("console", description="Logs for eyes, or a JSON object a line.")
-    log_level: Literal["debug", "info", "warning", "error"] = Field("info", description="The least that is logged.")
+    log_format: Literal["console", "json"] = Field(
+        "console", description="`console` for people, or `json`: one object a line."
+    )
+    log_level: Literal["debug", "info", "warning", "error"] = Field(
+        "info", description="The least level that is logged: debug, info, warning or error."
+    )
 
-    max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body, as decompressed.")
-    max_bodies: int = Field(GIB, ge=1, description="Most bytes of all bodies that are being dealt with.")
+    max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body; it may not be compressed.")
+    max_bodies: int = Field(GIB, ge=1, description="Most bytes of all requests' bodies at a time.")
     max_json: int = Field(32 * MIB, ge=1, description="Most bytes of a JSON body; of all that wait, four times that.")
     max_json_memory: int = Field(
         512 * MIB,
         ge=1,
         description="Most bytes of memory that JSON bodies take as values: one, and all that are read at a time.",
     )
-    body_timeout: float = Field(30.0, gt=0, description="Longest pause (s) within a body that is being sent.")
+    body_timeout: Seconds = Field(30.0, description="Longest pause within a body that is being sent.")
     max_connections: int = Field(
         1024, ge=2, description="Most connections at a time, streams included; one address has at most half of them."
     )
-    max_clients: int = Field(64, ge=1, description="Most streams that are connected at a time.")
+    max_clients: int = Field(64, ge=1, description="Most streams at a time.")
     max_stream_memory: int = Field(
         512 * MIB, ge=8, description="Most bytes of memory that the streams' scenes take as values; one's, an eighth."
     )
     gpu_memory: int | None = Field(
-        None, ge=1, description="Most bytes of scenes and pictures on the device (default: half of a CPU's memory)."
+        None,
+        ge=1,
+        description="Most bytes of scenes and pictures on the device (default: all that a GPU has; half of the "
+        "machine's memory for a software renderer).",
     )
-    hang_s: float = Field(
-        10.0, gt=0, description="Without progress for so long (s), and ten slices, the renderer is replaced."
+    hang_s: Seconds = Field(
+        10.0,
+        description="A renderer is replaced that makes no progress for so long, and for ten times its last step.",
     )
-    checkpoint_s: float = Field(
+    checkpoint_s: Seconds = Field(
         2.0,
-        gt=0,
-        description="A render of up to 5 megapixels is saved so often (s), or with 1 % of its time, to go on.",
+        description="How often a render of up to 5 megapixels is saved, to go on after a renderer's loss; less often "
+        "where that would cost more than 1 % of its time.",
     )
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(
@@ -102,19 +114,21 @@ class Config(BaseSettings):
     max_texels: int = Field(
         2**26, ge=1, le=2**27, description="Most texels of an image, and of a scene's textures: four of 4096 x 4096."
     )
-    max_asset: int = Field(GIB, ge=1, description="Most bytes of one asset.")
-    parse_seconds: float = Field(20.0, gt=0, description="Longest that an asset is parsed (s), and .25 s a MiB.")
+    max_asset: int = Field(GIB, ge=1, description="Most bytes of one asset; over HTTP `SUNBOX_MAX_BODY` counts too.")
+    parse_seconds: Seconds = Field(
+        20.0, description="Longest that parsing an asset takes, and 0.25 s more for each MiB of it."
+    )
     parse_memory: int = Field(8 * GIB, ge=256 * MIB, description="Most bytes of memory that parsing an asset takes.")
-    max_seconds: float | None = Field(None, gt=0, description="Longest that a picture is rendered (s).")
-    max_running: int = Field(8, ge=1, description="Renders at once; more wait in line.")
+    max_seconds: Seconds | None = Field(None, description="Longest that a picture is rendered (default: no limit).")
+    max_running: int = Field(8, ge=1, description="Most renders at a time; others wait in line.")
     max_queue: int = Field(256, ge=1, description="Most renders that wait in line.")
     max_jobs: int = Field(64, ge=1, description="Most renders, running and waiting, of one key.")
-    keep_renders: int = Field(64, ge=1, description="How many ended renders are kept for each key.")
+    keep_renders: int = Field(64, ge=1, description="Most ended renders that are kept for each key.")
     keep_bytes: int = Field(GIB, ge=1, description="Most bytes that the ended renders of all keys hold.")
     keep_packed: int = Field(
         GIB, ge=1, description="Most bytes of packed scenes that are kept for the next edits of all streams."
     )
-    keep_seconds: float = Field(3600.0, gt=0, description="How long an ended render is kept (s).")
+    keep_seconds: Seconds = Field(3600.0, description="How long an ended render is kept.")
 
     @property
     def limits(self) -> dict[str, float | None]:
@@ -168,6 +182,12 @@ def load_config(**given: Any) -> Config:
     except ValidationError as error:
         lines = [f"SUNBOX_{str(e['loc'][0]).upper()}: {_said(e['msg'])}" for e in error.errors()]
         raise ConfigError("; ".join(lines)) from None
+
+
+def unknown_variables() -> list[str]:
+    """SUNBOX_* in the environment that are no settings: they may be misspelt ones, and the key may be among those."""
+    known = {f"SUNBOX_{name.upper()}" for name in Config.model_fields}
+    return sorted(name for name in os.environ if name.upper().startswith("SUNBOX_") and name.upper() not in known)
 
 
 def _said(message: str) -> str:

@@ -8,7 +8,7 @@ from typing import Any, get_args
 
 import pytest
 
-from service.config import ConfigError, load_config
+from service.config import ConfigError, load_config, unknown_variables
 from service.problems import InvalidDocument
 from service.quality import PRESETS, ResolvedSettings, resolve
 from service.scene import Settings, parse_settings
@@ -167,3 +167,18 @@ def test_hosts_are_names(monkeypatch: pytest.MonkeyPatch) -> None:
         monkeypatch.setenv("SUNBOX_ALLOWED_HOSTS", wrong)
         with pytest.raises(ConfigError, match=r"^SUNBOX_ALLOWED_HOSTS: '.*' is no host name"):
             load_config()
+
+
+@pytest.mark.parametrize("name", ["BODY_TIMEOUT", "MAX_SECONDS", "KEEP_SECONDS", "HANG_S"])
+def test_times_are_finite(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    """GET /v1/info tells them, in JSON."""
+    for value in ("inf", "nan", "0", "-1"):
+        monkeypatch.setenv(f"SUNBOX_{name}", value)
+        with pytest.raises(ConfigError, match=f"^SUNBOX_{name}: "):
+            load_config()
+
+
+def test_misspelt_variables_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_APIKEY", "secret")
+    monkeypatch.setenv("SUNBOX_PORT", "1")
+    assert "SUNBOX_APIKEY" in unknown_variables() and "SUNBOX_PORT" not in unknown_variables()

@@ -32,15 +32,19 @@ def writable(path: Path) -> Path:
     return target
 
 
-def write(path: Path, data: bytes) -> None:
-    """Writes beside `path` and renames: readers see the old file or the whole new one. Raises Failed."""
+def write(path: Path, data: bytes, lasting: bool = True) -> None:
+    """Writes beside `path` and renames: readers see the old file or the whole new one. Raises Failed.
+
+    Not `lasting`, without waiting for the disk (15 ms): after a loss of power the new one may be empty.
+    """
     beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:
         try:
             with beside.open("wb") as file:
                 file.write(data)
                 file.flush()
-                os.fsync(file.fileno())  # or else a loss of power leaves an empty file under the final name
+                if lasting:
+                    os.fsync(file.fileno())
             os.replace(beside, path)
         finally:
             with suppress(OSError):

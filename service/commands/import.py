@@ -40,7 +40,7 @@ def run(arguments: argparse.Namespace) -> int:
             if id in builtin:
                 return id
             name = f"{id.removeprefix('sha256:')[:16]}.{store.info(id).format}"
-            files.write(folder / name, store.read(id))
+            files.write(folder / name, store.read(id), lasting=False)  # thousands, and the model is still there
             return f"{folder.name}/{name}"
 
         named = {ref: written(ref) for ref in recipe.references(document)}
