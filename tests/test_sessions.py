@@ -4,16 +4,21 @@ from __future__ import annotations
 
 import asyncio
 import time
-from typing import Any
+from typing import Any, cast
 
 import pytest
 from websockets.exceptions import ConnectionClosed
 
+from service.assets import Assets
+from service.config import Config
 from service.problems import NotFound, TooManyRequests
 from service.rendering import sessions
 from service.rendering.engine import Engine
+from service.rendering.reading import Reader
 from service.rendering.sessions import Sessions
 from tests.serving import ENDLESS, SMALL, Client, Picture, Server
+
+READER = Reader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
 
 
 def entered(server: Server, session: str | None = None) -> tuple[Client, str]:
@@ -100,7 +105,7 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
     async def test() -> None:
         engine: Any = Engine()
         engine.open = lambda listener: 1
-        kept = Sessions(engine, None, most=2)  # type: ignore[arg-type]
+        kept = Sessions(engine, READER, most=2)
         one, two = kept.enter(None), kept.enter(None)
         assert one.id != two.id and kept.attended == 2
         with pytest.raises(TooManyRequests):
@@ -135,7 +140,7 @@ def test_two_variants_count_as_one_client() -> None:
     async def test() -> None:
         engine: Any = Engine()
         engine.open = lambda listener: 1
-        kept = Sessions(engine, None, most=1)  # type: ignore[arg-type]
+        kept = Sessions(engine, READER, most=1)
         first = kept.enter(None)
         second = kept.enter(None, first.id)
         assert kept.attended == 1
