@@ -128,6 +128,7 @@ def test_import_says_it(tmp_path: Path, data_dir: Path, capsys: pytest.CaptureFi
     assert main(["import", str(model), "-o", str(tmp_path / "s.json")]) == 0
     told = capsys.readouterr().err
     assert "an exposure of -12" in told and "there is no sky" in told
+    assert "1.5 times as wide as high: --set width=627 --set height=418 renders it" in told
     assert json.loads((tmp_path / "s.json").read_text())["lights"][0]["irradiance"] == [6830] * 3
 
 

@@ -233,7 +233,7 @@ def test_the_first_camera(store: AssetStore) -> None:
     assert camera["position"] == [4, 0, 0] and camera["vfov"] == pytest.approx(math.degrees(0.7))
     assert np.allclose(camera["target"], [0, 0, 0], atol=1e-6) and np.allclose(camera["up"], [0, 1, 0])
     assert "first camera" in noted(found)["/nodes/2/camera"]
-    assert "1.5 times as wide" in noted(found)["/cameras/0/perspective/aspectRatio"]
+    assert found.aspect_ratio == 1.5
 
 
 def test_an_orthographic_camera_is_framed_instead(store: AssetStore) -> None:

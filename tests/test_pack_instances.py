@@ -119,7 +119,7 @@ def test_triangles_without_area_are_counted_for_each() -> None:
     found = packed(*(mesh(asset="sha256:odd", transform={"scale": 1 + i}) for i in range(2)), assets=shelf)
     assert len(found.arrays.instances) == 2 and len(found.arrays.triangles) == 1280
     told = [warning for warning in found.warnings if "degenerate" in warning]
-    assert told == [f"/shapes/{i}: 2 degenerate triangles skipped" for i in range(2)]
+    assert told == ["/shapes/0: 2 degenerate triangles skipped (here and in 1 more shape)"]
 
 
 def test_what_moves_leaves_the_models_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:

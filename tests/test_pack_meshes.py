@@ -110,6 +110,17 @@ def test_degenerate_triangles_are_skipped_and_counted():
     assert result.warnings == ["/shapes/1: 3 degenerate triangles skipped"]
 
 
+def test_equal_warnings_about_shapes_are_one_with_a_count():
+    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]]
+    fan, flat = [[0, 1, 2], [0, 1, 3], [0, 1, 4]], [0, 0, 1]
+    fans = [mesh(vertices=vertices, faces=[*fan, *[flat] * count]) for count in (2, 2, 3)]
+    crowded = "1 edge belongs to more than two triangles: what is inside and what is outside is ambiguous there"
+    assert packed(sphere(), *fans).warnings == [
+        f"/shapes/1: {crowded} (here and in 2 more shapes)",
+        "/shapes/1: 2 degenerate triangles skipped (with other counts also in 2 more shapes)",
+    ]
+
+
 def grid(size):
     """A bumpy one of 2 size^2 triangles, some of them degenerate: (vertices, faces, uvs)."""
     u, v = np.meshgrid(np.linspace(0, 1, size + 1), np.linspace(0, 1, size + 1), indexing="ij")

@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import argparse
 import json
+import sys
 import tempfile
 from contextlib import closing
 from pathlib import Path
 
 from service.commands import BadInput, files
 from service.commands.configuration import configuration
-from service.commands.documents import asset_folders, refusals
+from service.commands.documents import asset_folders, picture_size, read_settings, refusals
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -31,7 +32,15 @@ def run(arguments: argparse.Namespace) -> int:
         FileAssets(source.parent, asset_folders(arguments.asset_root), store) as beside,
         refusals(),
     ):
-        document = import_model(source, data, store, beside).scene(presets.default_environment())
+        model = import_model(source, data, store, beside)
+        if (aspect := model.aspect_ratio) not in (None, 1):
+            size = picture_size(read_settings([], config), aspect)
+            told = f"--set width={size['width']} --set height={size['height']}"
+            print(
+                f"note: the camera's picture is {aspect:.3g} times as wide as high: {told} renders it",
+                file=sys.stderr,
+            )
+        document = model.scene(presets.default_environment())
         builtin = presets.builtin_assets().keys()
         files.make_folder(folder)
 

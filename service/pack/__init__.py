@@ -8,6 +8,7 @@ geometry    all of that together, with the shapes that shine
 sky         environment -> texels and the tables that draw from them
 textures    images -> texels, and which number of which material reads which of them
 glow        what textured shapes shine with
+warnings    about shapes: equal ones become one with a count
 lights      how often each light is picked
 moved       what of it differs where shapes have moved
 scene       the whole; `cache` keeps geometries and skies between edits, and `moves` which meshes these have moved

@@ -22,6 +22,7 @@ from service.pack.records import Bounds
 from service.pack.textures import Reads
 from service.pack.tree import LINEAR, plant, stand_out
 from service.pack.values import vec3
+from service.pack.warnings import counted
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
 from service.shared import LEAST, Shelf, trim
@@ -216,9 +217,7 @@ def _inverse(order: np.ndarray | None) -> np.ndarray | None:
 
 
 def _degenerate(counts: Mapping[int, int]) -> tuple[str, ...]:
-    return tuple(
-        f"/shapes/{i}: {n} degenerate triangle{'s' if n > 1 else ''} skipped" for i, n in sorted(counts.items())
-    )
+    return counted((i, f"{n} degenerate triangle{'s' if n > 1 else ''} skipped") for i, n in sorted(counts.items()))
 
 
 def _hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
@@ -245,7 +244,7 @@ def _mesh_extents(every: World, key: Hashable) -> Meshes:
     boxes += [each.box for each in every.standing]
     around = np.array(boxes).reshape(-1, 6)
     owners = [mesh.shape for mesh in some] + [each.used[1] for each in every.standing]
-    return Meshes(key, around[:, :3], around[:, 3:], np.array(owners, np.uint32), tuple(every.odd))
+    return Meshes(key, around[:, :3], around[:, 3:], np.array(owners, np.uint32), counted(every.odd))
 
 
 def _extents(

@@ -20,8 +20,6 @@ from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
 
-MOST_ODD = 20  # warnings: a model of a thousand parts may have them all
-
 
 @dataclass
 class World:
@@ -30,7 +28,7 @@ class World:
     placed: Placed = field(default_factory=Placed)
     meshes: list[PlacedMesh] = field(default_factory=list)
     standing: list[Standing] = field(default_factory=list)  # meshes that share their triangles
-    odd: list[str] = field(default_factory=list)  # about meshes
+    odd: list[tuple[int, str]] = field(default_factory=list)  # warnings about meshes, each with its shape's number
 
     @property
     def models(self) -> list[Model]:
@@ -52,13 +50,11 @@ def place(
     for i, shape in enumerate(shapes):
         if isinstance(shape, MeshShape):
             data = _data(shape, i, assets, files)
-            out.odd += [f"/shapes/{i}: {warning}" for warning in data.warnings]
+            out.odd += [(i, warning) for warning in data.warnings]
             read = reads.get(shape.material, Reads())
             _check_charts(i, shape, data, read.uv_sets)
             used, matrix = (materials[shape.material], i), _matrix(shape)
             wanted.append(Wanted(shape, data, matrix, used, read, shape.material in emissive))
-    if len(out.odd) > MOST_ODD:
-        out.odd[MOST_ODD:] = [f"and {len(out.odd) - MOST_ODD} more like these"]
     standing, room = _standing(wanted, known or {}, apart, max_triangles)
     for each, stands in zip(wanted, standing, strict=True):
         if stands is not None:

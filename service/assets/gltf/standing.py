@@ -78,8 +78,6 @@ def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> t
             lens = place.need("perspective")
             chosen = _perspective(lens, node, bounds)
             aspect = lens.number("aspectRatio", 1, 1e-6, 1e6) if "aspectRatio" in lens else None
-            if aspect is not None and aspect != 1:
-                notes.add(lens.at("aspectRatio"), f"the camera's picture is {aspect:.3g} times as wide as high")
         elif kind == "orthographic":
             notes.add(place.pointer, f"orthographic cameras are not supported; {INSTEAD}")
         else:
