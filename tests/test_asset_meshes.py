@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore, MeshData
+from service.assets.sniff import sniff
 from tests import asset_files as make
 from tests.asset_files import OBJ, TRIANGLE
 
@@ -240,3 +241,17 @@ def test_draco_is_no_placeholder(store: AssetStore) -> None:
     assert (np.einsum("ij,ij->i", read.vertices, read.normals)).min() > 0.99
     a, b, c = triangles(read).transpose(1, 0, 2)
     assert (np.cross(b - a, c - a) * (a + b + c)).sum(axis=1).min() > 0  # still outward
+
+
+@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16"])
+@pytest.mark.parametrize("name", ["m.obj", "m.stl"])
+def test_texts_as_windows_writes_them(store: AssetStore, name: str, encoding: str) -> None:
+    """A byte order mark before the first vertex must not cost it: faces would name the wrong ones."""
+    obj = "v 5 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 9\nf 1 2 3\n"
+    corners = "vertex 5 0 0\nvertex 1 0 0\nvertex 0 1 0\n"
+    stl = f"solid a\nfacet normal 0 0 1\nouter loop\n{corners}endloop\nendfacet\nendsolid\n"
+    data = (obj if name == "m.obj" else stl).encode(encoding)
+    assert sniff(data) == name[2:]
+    info = store.add(data)
+    mesh = store.mesh(info.id)
+    assert mesh.vertices[mesh.faces[0]].tolist() == [[5, 0, 0], [1, 0, 0], [0, 1, 0]]

@@ -11,6 +11,7 @@ from service.assets.data import AssetLimits, Floats, Indices, MeshData
 from service.assets.errors import ParseError
 from service.assets.oddities import oddities
 from service.assets.parts import Numbers, Parts, check, unit_colors, unit_normals
+from service.assets.sniff import text
 
 
 def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
@@ -38,7 +39,7 @@ def _floats(rows: Numbers | None) -> Floats | None:
 def _obj(data: memoryview, limits: AssetLimits) -> Parts:
     from service.assets.obj import read_obj
 
-    return read_obj(data)
+    return read_obj(text(bytes(data)) if bytes(data[:1]) in (b"\xef", b"\xfe", b"\xff") else data)
 
 
 def _ply(data: memoryview, limits: AssetLimits) -> Parts:
@@ -60,6 +61,7 @@ def _stl(view: memoryview, limits: AssetLimits) -> Parts:
     data = bytes(view)
     promised = int.from_bytes(data[80:84], "little")
     if len(data) < 84 or len(data) != 84 + 50 * promised:
+        data = text(data)
         if not re.match(rb"\s*+solid\b", data, re.IGNORECASE):
             raise ParseError(
                 f"not an STL file: {len(data)} bytes; its header promises {84 + 50 * promised}, and it is no text"

@@ -1,6 +1,7 @@
 """Which format some bytes are in: by the bytes themselves, else by what the sender called them."""
 
 import re
+from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from mmap import mmap
 
 from service.assets.data import Kind
@@ -53,7 +54,16 @@ SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe"
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
 OBJ_START = re.compile(rb"(?:\s++|#[^\n]*+\n)*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
 STL_TEXT = re.compile(rb"\s*+solid\b[^\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
-GLTF_TEXT = re.compile(rb"(?:\xef\xbb\xbf)?\s*\{")  # perhaps behind a byte order mark
+GLTF_TEXT = re.compile(rb"\s*\{")
+
+
+def text(data: bytes) -> bytes:
+    """A text in UTF-8 without a byte order mark; whatever else it is, as it is. Windows writes marks, and UTF-16."""
+    if data.startswith(BOM_UTF8):
+        return data.removeprefix(BOM_UTF8)
+    if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
+        return data.decode("utf-16", "ignore").encode()
+    return data
 
 
 def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:
@@ -66,11 +76,12 @@ def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | N
         return "webp"
     if len(data) >= 84 and len(data) == 84 + 50 * int.from_bytes(head[80:84], "little"):
         return "stl"
-    if STL_TEXT.match(head):
+    words = text(head)
+    if STL_TEXT.match(words):
         return "stl"
-    if GLTF_TEXT.match(head) and data.find(b'"asset"') >= 0:
+    if GLTF_TEXT.match(words) and data.find(b'"asset"') >= 0:
         return "gltf"
-    if OBJ_START.match(head):
+    if OBJ_START.match(words):
         return "obj"
     named = (content_type or "").partition(";")[0].strip().lower()
     if named in CONTENT_TYPES:
