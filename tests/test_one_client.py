@@ -30,6 +30,7 @@ PAGE = 4096
 # How long the others may have to wait, s: for an answer to /healthz, to a bad request, for their next frame.
 BOUNDS = {"alive": 1.0, "refused": 2.0, "frame": 2.5}
 TRIES = 3
+CALM_S = 0.5
 GROWTH = 700 * MIB
 LEFT = 250 * MIB  # of that, after the attack: processes for large bodies stay, the values in them do not
 ATTACK_S = 40.0
@@ -192,10 +193,10 @@ def mesh(side: int) -> dict[str, Any]:
 
 
 def honest(server: Server) -> None:
-    """Four meshes of four megabytes, one after the other: each is rendered."""
+    """A mesh of four megabytes, twice: it is rendered."""
     body = json.dumps({"scene": {**SCENE, "shapes": [mesh(210)]}, "settings": {**SMALL, "max_samples": 1}}).encode()
     assert len(body) > 3.5 * MIB
-    for _ in range(3):
+    for _ in range(2):
         (answer,) = posted(server, body, path="/v1/render?format=png")
         assert answer.status_code == 200 and answer.headers["content-type"] == "image/png"
 
@@ -237,14 +238,16 @@ def test_others_are_served_meanwhile(alone: Server, attack: Callable[[Server], N
     seen = []
     for _ in range(TRIES):
         with Victim(alone) as victim:
-            time.sleep(0.3)  # so that a wait that begins before the attack is seen whole
+            time.sleep(CALM_S)
+            calm = dict(victim.waits)  # without anybody else, on this machine just now
             began = time.monotonic()
             attack(alone)
             took_s = time.monotonic() - began
         waits, most = victim.waits, victim.memory
         left = private(alone.process.pid) - victim.before
         seen.append(f"{took_s:.1f} s, {waits}, +{most / MIB:.0f} MiB, {left / MIB:.0f} MiB stay")
-        if all(waits[what] < bound for what, bound in BOUNDS.items()) and most < GROWTH and left < LEFT:
+        served = all(waits[what] < bound + 3 * calm[what] for what, bound in BOUNDS.items())
+        if served and most < GROWTH and left < LEFT:
             break
     else:
         pytest.fail("\n".join(seen))
