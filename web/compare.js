@@ -8,10 +8,11 @@ import { inWords } from "./words.js";
 
 const MODES = { swipe: "Swipe", beside: "Side by side", difference: "Difference" };
 const DIFFERENCE_MS = 250; // between two of them
-const GAIN = 4; // an eighth of the range is seen as half of it
+const GAINS = [1, 2, 4, 8, 16, 64];
+const USUAL = 4; // an eighth of the range is seen as half of it
 
 // {rmse, psnr, most} of two pictures of one size, in displayed values of 0..1; paints |a - b| * gain.
-export function difference(a, b, out = null) {
+export function difference(a, b, out = null, gain = 1) {
   let sum = 0;
   let most = 0;
   for (let i = 0; i < a.data.length; i += 4) {
@@ -19,7 +20,7 @@ export function difference(a, b, out = null) {
       const d = Math.abs(a.data[i + k] - b.data[i + k]);
       sum += d * d;
       most = Math.max(most, d);
-      if (out) out.data[i + k] = d * GAIN;
+      if (out) out.data[i + k] = d * gain;
     }
     if (out) out.data[i + 3] = 255;
   }
@@ -29,6 +30,7 @@ export function difference(a, b, out = null) {
 
 export class Comparison {
   mode = "swipe";
+  gain = USUAL;
   #stream = null;
   #viewport = null;
   #header = null;
@@ -37,9 +39,9 @@ export class Comparison {
 
   // `places`: {root, stage, divider, canvas, difference}; `first` the viewport of A; `acts` the editor;
   // `changed()` when the picture's size may be another one; `models` those that B can be turned into;
-  // `beside()` the session of A, `samplesOfA()` those of its picture.
-  constructor(places, { first, acts, models, changed, names, lost, beside, samplesOfA }) {
-    Object.assign(this, places, { first, acts, changed, names, lost, beside, samplesOfA });
+  // `beside()` the session of A, `headerOfA()` that of its picture.
+  constructor(places, { first, acts, models, changed, names, lost, beside, headerOfA }) {
+    Object.assign(this, places, { first, acts, changed, names, lost, beside, headerOfA });
     this.#build(models);
     this.divider.addEventListener("input", () => this.#split());
   }
@@ -58,8 +60,12 @@ export class Comparison {
     }, element("option", { value: "" }, "B as…"), ...models.map((name) => element("option", { value: name }, inWords(name))));
     const swap = element("button", { type: "button", class: "button small", onclick: () => this.acts.swapVariants() }, "Swap");
     const close = element("button", { type: "button", class: "button small", onclick: () => this.acts.stopComparing() }, "Done");
+    this.gains = element("select", {
+      "aria-label": "How much the difference is brightened",
+      onchange: () => { this.gain = Number(this.gains.value); this.painted(); },
+    }, ...GAINS.map((gain) => element("option", { value: String(gain), selected: gain === USUAL }, `×${gain}`)));
     this.metric = element("span", { class: "metric" });
-    this.root.append(modes, sides, turn, swap, close, this.metric);
+    this.root.append(modes, this.gains, sides, turn, swap, close, this.metric);
     this.markMode = watchChoice(modes, "button", ({ dataset }) => this.pick(dataset.value));
     this.markSide = watchChoice(sides, "button", ({ dataset }) => this.acts.editSide(dataset.value));
   }
@@ -71,9 +77,10 @@ export class Comparison {
 
   get isOn() { return this.#stream !== null; }
 
-  // Halves of the stage, where both stand beside each other.
+  // Where both stand beside each other, each has half the width, and as much less height: all of the view stays.
   fit(box) {
-    return this.mode === "beside" ? { width: box.width / 2 - 1, height: box.height } : box;
+    const width = box.width / 2 - 1;
+    return this.mode === "beside" ? { width, height: (width * box.height) / box.width } : box;
   }
 
   // `wanted` for variant B as Stream.show takes it, or null: no comparison.
@@ -86,7 +93,7 @@ export class Comparison {
     else delete this.stage.dataset.compare;
     this.canvas.hidden = !on;
     this.divider.hidden = !on || this.mode !== "swipe";
-    this.difference.hidden = !on || this.mode !== "difference";
+    this.difference.hidden = this.gains.hidden = !on || this.mode !== "difference";
     if (!on) return;
     this.markMode(({ dataset }) => dataset.value === this.mode);
     this.markSide(({ dataset }) => dataset.value === this.acts.state.compare.side);
@@ -139,21 +146,39 @@ export class Comparison {
     }, Math.max(0, this.#differed + DIFFERENCE_MS - performance.now()));
   }
 
+  // What the halves are: "A · Principled · 16 samples".
+  #label(headers) {
+    const { compare, scene } = this.acts.state;
+    const types = [scene.materials[compare.material]?.type, compare.document.type];
+    ["a", "b"].forEach((side, i) => {
+      const words = [side.toUpperCase(), types[i] && inWords(types[i]), headers[i] && `${headers[i].samples} samples`];
+      this.stage.querySelector(`.variant.${side}`).textContent = words.filter(Boolean).join(" · ");
+    });
+  }
+
   #compare() {
     this.#differed = performance.now();
+    if (!this.isOn) return;
+    const headers = [this.headerOfA(), this.#header];
+    this.#label(headers);
+    // A preview is not the picture: what is measured on it says nothing.
+    if (headers.some((header) => !(header?.scale >= 1))) {
+      this.metric.replaceChildren("RMSE …");
+      return;
+    }
     const [a, b] = [this.first.canvas, this.canvas];
-    if (!this.isOn || a.width !== b.width || a.height !== b.height) return;
+    if (a.width !== b.width || a.height !== b.height) return;
     const isShown = this.mode === "difference";
     const out = isShown ? new ImageData(a.width, a.height) : null;
-    const { rmse, psnr, most } = difference(this.first.pixels(), this.#viewport.pixels(), out);
+    const { rmse, psnr, most } = difference(this.first.pixels(), this.#viewport.pixels(), out, this.gain);
     if (out) {
       Object.assign(this.difference, { width: a.width, height: a.height });
       this.difference.getContext("2d").putImageData(out, 0, 0);
     }
     const percent = (x) => `${(100 * x).toFixed(2)} %`;
-    const [ofA, ofB] = [this.samplesOfA(), this.#header.samples];
+    const [ofA, ofB] = headers.map(({ samples }) => samples);
     this.metric.replaceChildren(
-      "RMSE ", element("b", {}, percent(rmse)), isShown ? ` · shown ×${GAIN}` : "",
+      "RMSE ", element("b", {}, percent(rmse)),
       element("span", { class: "beside" }, [
         "", ...(Number.isFinite(psnr) ? [`PSNR ${psnr.toFixed(1)} dB`] : []), `largest ${percent(most)}`,
         ...(ofA === ofB ? [] : [`at ${ofA} and ${ofB} samples`]),

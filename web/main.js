@@ -149,7 +149,7 @@ const panel = new Panel(find("panel"), {
 });
 const comparison = new Comparison(
   { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },
-  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {}, beside: () => stream.session, samplesOfA: () => header?.samples ?? 0 },
+  { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {}, beside: () => stream.session, headerOfA: () => header },
 );
 
 const keep = new Keep(find("page-keep"), {
@@ -198,7 +198,7 @@ function push() {
   const { scene: document, settings } = editor.state;
   const second = editor.sceneB;
   const view = viewOf({ ...desk.state, checkered: isCheckered() }, shownView(), {
-    isPaused: isPaused || (second && comparison.mode === "difference"), quality: PAUSED_QUALITY,
+    isPaused, quality: PAUSED_QUALITY, isExact: second !== null,
   });
   comparison.show(second && { scene: second, settings: { ...settings, ...size() }, view }, isPaused);
   stream.show({ scene: document, settings: { ...settings, ...size() }, view });

@@ -158,13 +158,14 @@ export class Stage {
   }
 }
 
-// How frames are to come for a layer: numbers where the page paints them itself.
-export function viewOf(desk, view, { isPaused, quality }) {
+// How frames are to come for a layer: numbers where the page paints them itself; without a loss where `isExact`, so
+// that what is measured between two pictures is not what JPEG did to them.
+export function viewOf(desk, view, { isPaused, quality, isExact }) {
   const { layer } = desk;
   const painted = isPainted(layer);
   return {
     ...view, aov: layer, bits: 8, quality: isPaused ? quality : null,
-    format: painted ? "rgba32f" : desk.checkered ? "png" : "jpeg",
-    max_fps: painted ? 4 : null,
+    format: painted ? "rgba32f" : desk.checkered || isExact ? "png" : "jpeg",
+    max_fps: painted ? 4 : isExact ? 8 : null,
   };
 }
