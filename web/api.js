@@ -9,8 +9,10 @@ export const PROTOCOL = "sunbox.v1";
 
 // What the service refused, as RFC 9457 tells it: `detail`, `status` and `errors` [{pointer, detail}].
 export class Problem extends Error {
-  constructor({ title, detail, status, errors = [] }) {
+  // `type` is "about:blank" where only the status says what is wrong.
+  constructor({ type = "about:blank", title, detail, status, errors = [] }) {
     super(detail || title || "The server refused the request.");
+    this.isGeneric = type === "about:blank";
     this.title = title;
     this.status = status;
     this.errors = errors;
@@ -22,6 +24,8 @@ const authorization = () => (readKey() ? { authorization: `Bearer ${readKey()}` 
 async function ask(method, path, { body, headers = {}, signal } = {}) {
   const response = await fetch(new URL(path, root), {
     method, body, signal, headers: { accept: "application/json", ...authorization(), ...headers },
+  }).catch((error) => {
+    throw error.name === "AbortError" ? error : new Error("The server does not answer. Your work is safe here.");
   });
   if (response.ok) return response;
   const told = await response.json().catch(() => ({}));

@@ -230,15 +230,16 @@ export class Editor extends Store {
   }
 
   // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and
-  // says which place the control is for (null: none has it).
+  // says which place the control is for (null: none has it). These places come back.
   takeBack({ errors }, valid, mark) {
     const places = errors
       .filter(({ pointer: wrong }) => /^\/(scene|settings)(\/|$)/.test(wrong))
       .map(({ pointer: wrong, detail }) => mark(wrong, detail));
-    if (!valid || !places.length) return;
+    if (!valid || !places.length) return places;
     const { scene, settings } = valid;
     if (places.includes(null)) this.amend({ scene, settings: this.#own(settings), chosen: this.#chosenIn(scene) });
     else this.amend(places.reduce((state, place) => put(state, place, at(valid, place)), this.state));
+    return places;
   }
 
   // What is chosen, as far as the scene has it.

@@ -15,6 +15,8 @@ import { Announcer, Messages } from "./messages.js";
 import { DISPLAY, Panel } from "./panel.js";
 import { defaults, materialModels } from "./schema.js";
 import { essence, linkTo, revived } from "./share.js";
+import { Preparing } from "./preparing.js";
+import { detailWords, fieldTitles, problemText } from "./problem-text.js";
 import { Stage, viewOf } from "./stage.js";
 import { Status } from "./status.js";
 import { Stream } from "./stream.js";
@@ -23,7 +25,7 @@ import { textureActs } from "./texture-slot.js";
 import { TextureThumbnails } from "./texture-thumbnails.js";
 import { Thumbnails } from "./thumbnails.js";
 import { Viewport, pictureSize } from "./viewport.js";
-import { inWords } from "./words.js";
+import { inWords, sentence } from "./words.js";
 import { forgetWork, keepWork } from "./work.js";
 
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
@@ -37,18 +39,17 @@ const PAUSED_QUALITY = 90;
 
 const find = (id) => document.getElementById(id);
 const root = find("stage");
-const messages = new Messages(find("messages"));
+// A refusal goes with the next change of the picture, what was said of a file with its scene, a greeting at once.
+const ABOUT = { refusal: ({ scene, settings, compare }) => [scene, settings, compare], work: ({ scene, settings }) => [scene, settings] };
+const messages = new Messages(find("messages"), (kind) => (ABOUT[kind] ?? (({ home }) => [home]))(editor?.state ?? {}));
 const announcer = new Announcer(find("announcer"));
 const status = new Status(document);
 const desk = new Desk();
 
-function complain(problem) {
-  const [first, ...others] = problem.errors ?? [];
-  const more = others.length ? ` (and ${others.length} more)` : "";
-  const detail = first ? `${first.pointer}: ${first.detail}${more}` : problem.message;
-  messages.show("refusal", { title: first ? "Not taken." : "That did not work.", detail });
-}
+let titles = {};
+const complain = (problem) => { messages.show("refusal", { title: problemText(problem, titles) }); };
 
+let editor = null;
 const { schema, library, calls, name, scene, left } = await boot({
   keyDialog: find("key-dialog"), complain,
   told(problem) {
@@ -57,7 +58,8 @@ const { schema, library, calls, name, scene, left } = await boot({
     messages.show("connection", { title: "The server does not answer.", detail: "Trying again…", lasting: true });
   },
 });
-const editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal") });
+titles = fieldTitles(schema.scene, schema.settings, schema.view);
+editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal") });
 if (left) editor.amend(left.state);
 
 const displayDefaults = defaults(schema.view, schema.view, DISPLAY);
@@ -69,6 +71,7 @@ let isConnected = false;
 let isWaiting = false;
 let ended = null; // the generation that is done
 let painted = 0; // the generation on the canvas
+let shownHome = null; // the scene on the canvas, as it was picked
 let header = null; // of the frame on the canvas
 let knobs = {}; // what the chosen quality makes of the settings that are not given
 
@@ -82,6 +85,8 @@ const viewport = new Viewport(find("picture"), {
     ({ header } = frame);
     root.classList.add("live");
     painted = header.generation;
+    preparing.end();
+    if (!isWaiting) shownHome = editor.state.home;
     status.frame(header, limit());
     stage.painted(frame);
     comparison.painted();
@@ -105,7 +110,8 @@ const stream = new Stream({
   waiting(is) {
     isWaiting = is;
     if (is) stage.inspector.forget();
-    setTimeout(tellState, is ? 500 : 0);
+    preparing.wait(is);
+    tellState();
   },
   done({ generation }) {
     ended = generation;
@@ -114,14 +120,28 @@ const stream = new Stream({
     thumbnails.work();
   },
   refused(problem, valid) {
-    editor.takeBack(problem, valid, (pointer, detail) => panel.mark(pointer, detail));
-    complain(problem);
+    const places = editor.takeBack(problem, valid, (pointer, detail) => panel.mark(pointer, sentence(detailWords(detail))));
+    // Said once: at the control, where that can be seen.
+    preparing.end();
+    if (!places.length || places.includes(null) || !panel.isMarkSeen) complain(problem);
+    else announcer.say(problemText(problem, titles));
   },
   lost,
 });
 
+const preparing = new Preparing({
+  stage: root, label: find("preparing"), begun: () => { status.blank(); tellState(); },
+  subject() {
+    const { home, chosen } = editor.state;
+    const isOther = home !== shownHome;
+    const title = library.scenes.find(({ name: each }) => each === chosen.scene)?.title ?? chosen.scene;
+    return { isOther, name: isOther ? title || "the scene" : "the change" };
+  },
+});
+
 function lost({ title, detail = "", key }, wait_ms) {
   isConnected = false;
+  preparing.end();
   tellState();
   if (key) {
     askForKey(find("key-dialog"), sessionStorage.getItem("sunbox.key") !== null).then(() => stream.retry());
@@ -188,7 +208,7 @@ function size() {
 
 function tellState() {
   root.setAttribute("aria-busy", String(!stream.isNewest(painted)));
-  const busy = isWaiting ? "Preparing" : "Rendering";
+  const busy = preparing.isShown || !header ? "Preparing" : "Rendering";
   status.state(!isConnected ? "Offline" : isPaused ? "Paused" : ended === painted && !isWaiting ? "Done" : busy);
 }
 
@@ -218,6 +238,7 @@ function refresh() {
   find("redo").disabled = !editor.canRedo;
   find("paste-material").disabled = clip === null && !navigator.clipboard?.readText;
   push();
+  messages.review();
   clearTimeout(keeping);
   if (editor.canUndo || left) keeping = setTimeout(() => keepWork(essence(editor.state)), KEEP_REST_MS);
 }

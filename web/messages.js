@@ -1,13 +1,16 @@
-// Messages over the picture's edge: they take nothing away and wait for nobody. One of each kind at a time.
+// Messages at the foot of the panel, where they cover nothing: one of each kind at a time, and each goes when what it
+// is about has gone.
 
 import { element } from "./dom.js";
 
 export class Messages {
   #shown = new Map();
 
-  // `root` is a live region: what is put in is read out once.
-  constructor(root) {
+  // `root` is a live region: what is put in is read out once. `about(kind)` lists the values that messages of this
+  // kind are about: when one of them is another, `review` takes the message away.
+  constructor(root, about) {
     this.root = root;
+    this.about = about;
   }
 
   // `action` is {label, does}; a message without `lasting` can be closed by hand; `list` are lines under it.
@@ -22,14 +25,22 @@ export class Messages {
     if (list.length) text.append(element("ul", {}, ...list.map((line) => element("li", {}, line))));
     const bar = progress ? element("progress", { max: "1", value: "0", "aria-label": title }) : null;
     const node = element("div", { class: `message ${kind}` }, text, bar, button, close);
-    this.#shown.set(kind, node);
+    this.#shown.set(kind, { node, about: lasting ? [] : this.about(kind) });
     this.root.append(node);
     return (share) => { if (bar) bar.value = share; };
   }
 
   hide(kind) {
-    this.#shown.get(kind)?.remove();
+    this.#shown.get(kind)?.node.remove();
     this.#shown.delete(kind);
+  }
+
+  // Call when anything has changed.
+  review() {
+    for (const [kind, { about }] of this.#shown) {
+      const now = this.about(kind);
+      if (about.some((each, i) => each !== now[i])) this.hide(kind);
+    }
   }
 }
 

@@ -154,6 +154,11 @@ export class Panel {
     return this.outliner.mark(wrong, text);
   }
 
+  // Whether such words are in sight.
+  get isMarkSeen() {
+    return [...this.root.querySelectorAll(".trouble:not([hidden])")].some((words) => words.checkVisibility());
+  }
+
   // Takes all such words away.
   forgive() {
     for (const form of this.#places()) form.forgive();

@@ -27,6 +27,13 @@ export class Status {
     places.preview.textContent = `Preview, 1/${Math.round(1 / scale)} size`;
   }
 
+  // The readings of a picture that is no longer wanted are nobody's.
+  blank() {
+    for (const name of ["samples", "rate", "noise", "elapsed", "left"]) this.#places[name].textContent = NOTHING;
+    this.#places.progress.value = 0;
+    this.#places.preview.hidden = true;
+  }
+
   // "Rendering", "Paused", "Done", ...: the word that leads the line.
   state(word) {
     if (this.#places.state.textContent === word) return;

@@ -1,0 +1,89 @@
+"""What the page says: in words, once, beside the picture, and only while it is true."""
+
+from __future__ import annotations
+
+import json
+from typing import Any
+
+from playwright.sync_api import BrowserContext, Route, WebSocketRoute
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+
+PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
+
+
+def test_refusals_are_short_and_go_with_the_next_change(editor: Editor) -> None:
+    page = editor.page
+    editor.settled()
+    page.evaluate(PASTE, json.dumps({"type": "principled", "shine": 1, "roughness": 3}))
+    page.click("#paste-material")
+    editor.wait("the refusal", lambda: editor.text("#messages"))
+    said = page.inner_text("#messages strong")
+    assert said == "Roughness of material Subject must be at most 1, not 3. Another value is wrong, too."
+    covered = page.evaluate("""() => {
+        const [stage, text] = ["stage", "messages"].map((id) => document.getElementById(id).getBoundingClientRect());
+        return text.left < stage.right && text.top < stage.bottom;
+    }""")
+    assert not covered, "the picture is not covered"
+    page.click("#material-presets [data-name=gold]")
+    editor.wait("its end", lambda: editor.text("#messages") == "")
+
+    page.evaluate(PASTE, json.dumps({"type": "principled", "shine": 1}))
+    page.click("#paste-material")
+    editor.wait("the refusal", lambda: editor.text("#messages"))
+    said = page.inner_text("#messages strong")
+    assert said.startswith("“shine” of material Subject is not known here") and len(said) < 80
+
+
+def test_no_answer_is_told_in_words(editor: Editor) -> None:
+    def fail(route: Route) -> None:
+        route.abort()
+
+    editor.page.route("**/v1/presets/scenes/*", fail)
+    editor.tab("scene")
+    before = editor.page.input_value("#scene")
+    editor.page.select_option("#scene", "cornell-boxes")
+    editor.wait("the words", lambda: editor.text("#messages"))
+    assert editor.page.inner_text("#messages strong") == "The server does not answer. Your work is safe here."
+    assert editor.page.input_value("#scene") == before
+    editor.page.unroute("**/v1/presets/scenes/*")
+    editor.page.select_option("#scene", "cornell-boxes")
+    editor.wait("the end of the words", lambda: editor.text("#messages") == "")
+
+
+def test_the_old_scene_is_not_taken_for_the_new_one(context: BrowserContext, server: Server) -> None:
+    editor = Editor(context.new_page())
+    page = editor.page
+    held: list[Any] | None = None
+    routes: list[WebSocketRoute] = []
+
+    def pass_on(route: WebSocketRoute) -> None:
+        routes.append(route)
+
+        def hear(message: Any) -> None:
+            if held is None or isinstance(message, str):
+                route.send(message)
+            else:
+                held.append(message)
+
+        route.connect_to_server().on_message(hear)
+
+    page.route_web_socket("**/v1/stream**", pass_on)
+    editor.open(server.url)
+    assert page.is_hidden("#preparing")
+    held = []
+    editor.tab("scene")
+    page.select_option("#scene", "cornell-boxes")
+    title = page.eval_on_selector("#scene", "(select) => select.selectedOptions[0].text")
+    editor.wait("the words", lambda: page.is_visible("#preparing"))
+    assert page.inner_text("#preparing").startswith(f"Preparing {title}…")
+    dark = "getComputedStyle(document.getElementById('sheet')).filter"
+    assert "brightness" in page.evaluate(dark), "the old picture is dimmed"
+    for reading in ("samples", "rate", "noise", "elapsed", "left"):
+        assert page.text_content(f"#{reading}") == "–", "the readings were the old picture's"
+    late, held = held, None
+    for frame in late:
+        routes[-1].send(frame)
+    editor.wait("the new picture", lambda: page.is_hidden("#preparing") and editor.samples() >= 1)
+    assert page.evaluate(dark) == "none"
