@@ -1,6 +1,7 @@
 // Wires the rest. State flows one way: control -> store -> stream -> frame -> viewport.
 
 import { boot } from "./boot.js";
+import { commands } from "./commands.js";
 import { Comparison } from "./compare.js";
 import { Desk } from "./desk.js";
 import { element } from "./dom.js";
@@ -299,43 +300,21 @@ const toggleChecker = () => desk.set({ checker: !isCheckered() });
 const showKeys = () => find("keys-dialog").showModal();
 const reset = () => editor.putMaterial({ type: editor.material.type });
 
-const tools = ["orbit", "fly", "focus", "inspect"];
-const acts = [
-  { keys: ["z"], ctrl: true, shift: false, does: () => travel(() => editor.undo()), says: "undo, also the camera", group: "Work" },
-  { keys: ["z"], ctrl: true, shift: true, does: () => travel(() => editor.redo()), says: "redo", group: "Work" },
-  { keys: ["y"], ctrl: true, does: () => travel(() => editor.redo()), says: "redo", group: "Work" },
-  { keys: ["c"], ctrl: true, notInText: true, does: copyMaterial, says: "copy the material", group: "Work" },
-  { keys: ["v"], ctrl: true, notInText: true, does: pasteMaterial, says: "paste a material or a scene", group: "Work" },
-  {
-    keys: ["delete"], group: "Work", says: "delete the selected thing",
-    does: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
-  },
-  { keys: ["o"], ctrl: true, does: () => find("file").click(), says: "open files", group: "Work" },
-  { keys: [" "], does: togglePause, says: "pause, resume", group: "Work" },
-  { keys: ["p"], does: download, says: "the picture as a PNG", group: "Work" },
-  { keys: ["n"], does: () => keep.snapshot(), says: "take a snapshot", group: "Work" },
-  ...tools.map((tool, i) => ({
-    keys: [String(i + 1)], does: () => desk.set({ tool }), group: "Tools",
-    says: ["orbit and select", "look around", "focus by clicking", "zoom to pixels; arrows move the cross"][i],
-  })),
-  { keys: ["f"], does: () => stage.frame(), says: "frame the selection", group: "View" },
-  { keys: ["home"], does: () => editor.resetView(), says: "back to the first view", group: "View" },
-  { keys: ["escape"], does: () => desk.set({ tool: "orbit" }), says: "put the tool away", group: "Tools" },
-  { keys: ["c"], does: toggleCompare, says: "compare two variants", group: "View" },
-  { keys: ["l"], does: () => desk.set({ layer: layers[(layers.indexOf(desk.state.layer) + 1) % layers.length] }), says: "next layer", group: "View" },
-  { keys: ["h"], does: () => toggle("histogram"), says: "histogram", group: "View" },
-  { keys: ["x"], does: () => toggle("clipping"), says: "clipped pixels", group: "View" },
-  { keys: ["k"], does: toggleChecker, says: "checker behind transparency", group: "View" },
-  { keys: ["g"], does: () => toggle("guides"), says: "guides: action and title safe, thirds", group: "View" },
-  { keys: ["?"], does: showKeys, says: "this sheet", group: "Work" },
-];
+const does = {
+  toggle, toggleCompare, toggleChecker, togglePause, copyMaterial, pasteMaterial, download, showKeys,
+  undo: () => travel(() => editor.undo()), redo: () => travel(() => editor.redo()),
+  remove: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
+  openFiles: () => find("file").click(), snapshot: () => keep.snapshot(), pickTool: (tool) => desk.set({ tool }),
+  frame: () => stage.frame(), resetView: () => editor.resetView(),
+  nextLayer: () => desk.set({ layer: layers[(layers.indexOf(desk.state.layer) + 1) % layers.length] }),
+};
+const acts = commands(does);
 watchKeys(stage.keyMove, acts);
 fillSheet(find("keys"), acts);
 
 const clicks = {
-  pause: togglePause, download, compare: toggleCompare, help: showKeys,
-  undo: () => travel(() => editor.undo()), redo: () => travel(() => editor.redo()),
-  frame: () => stage.frame(), "reset-view": () => editor.resetView(), "open-file": () => find("file").click(),
+  pause: does.togglePause, download, compare: toggleCompare, help: showKeys, undo: does.undo, redo: does.redo, frame: does.frame,
+  "reset-view": does.resetView, "open-file": does.openFiles,
   "copy-material": copyMaterial, "paste-material": pasteMaterial, "reset-material": reset,
   theme: () => desk.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
 };
