@@ -103,9 +103,9 @@ export class Editor extends Store {
 
   pickScene(name) { return this.#fetch("scenes", name, (scene) => this.openScene(scene, name)); }
 
-  // `exposure`: the view's that suits the scene's own lights.
-  openScene(scene, name, exposure) {
-    this.change({ ...picked(name, scene, exposure), ...exposed(this.state, exposure) });
+  // `exposure`: the view's that suits the scene's own lights; `members` of the state come with the scene.
+  openScene(scene, name, exposure, members = {}) {
+    this.change({ ...picked(name, scene, exposure), ...exposed(this.state, exposure), ...members });
   }
 
   pickEnvironment(name) {
@@ -248,7 +248,9 @@ export class Editor extends Store {
     return chosen.material in scene.materials ? chosen : { ...picked(chosen.scene, scene).chosen };
   }
 
+  // The streams are given sizes of their own, which are not those of the output.
   #own({ width, height, ...settings }) {
-    return settings;
+    const own = this.state.settings;
+    return own.width ? { ...settings, width: own.width, height: own.height } : settings;
   }
 }

@@ -3,29 +3,32 @@
 import { readKey } from "./key.js";
 import { renderUrl } from "./api.js";
 import { writeExr } from "./exr.js";
+import { KEY, pngWith, recipeText } from "./recipe.js";
 
 const CHANNELS = {
   color: ["R", "G", "B", "A"], albedo: ["albedo.R", "albedo.G", "albedo.B"], normal: ["normal.X", "normal.Y", "normal.Z"],
   depth: ["depth.Z"], variance: ["variance.R", "variance.G", "variance.B"], shape_id: ["shape_id.I"], material_id: ["material_id.I"],
 };
 
-export async function png(stream, bits) {
-  const { header, bytes } = await stream.capture({ format: "png", bits, aov: "color" });
-  return { blob: new Blob([bytes], { type: header.mime }), header };
+// `madeFrom(scene, samples, {aov, bits})` gives the metadata of a picture.
+export async function png(stream, bits, madeFrom) {
+  const { header, bytes, scene } = await stream.capture({ format: "png", bits, aov: "color" });
+  return { blob: await pngWith(bytes, madeFrom(scene, header.samples, { aov: "color", bits })), header };
 }
 
 // Every layer that the server knows, as they are now: no sample is taken again.
-export async function exr(stream, aovs, document) {
+export async function exr(stream, aovs, madeFrom) {
   const known = aovs.filter((name) => CHANNELS[name]);
   const layers = [];
   let header = null;
+  let scene = null;
   for (const aov of known) {
-    const { header: own, bytes } = await stream.capture({ format: "rgba32f", aov });
-    if (header && (own.width !== header.width || own.height !== header.height)) throw new Error("The picture changed on the way.");
-    header = own;
+    const { header: own, bytes, scene: shown } = await stream.capture({ format: "rgba32f", aov });
+    if (header && (own.generation !== header.generation)) throw new Error("The picture changed on the way. Try again.");
+    [header, scene] = [own, shown];
     layers.push({ names: CHANNELS[aov], floats: new Float32Array(bytes) });
   }
-  return { blob: await writeExr(layers, header.width, header.height, JSON.stringify(document)), header };
+  return { blob: await writeExr(layers, header.width, header.height, { [KEY]: recipeText(madeFrom(scene, header.samples, { aov: "all" })) }), header };
 }
 
 const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;

@@ -17,13 +17,13 @@ function attribute(name, type, bytes) {
   return [...text(name), ...text(type), ...int32(bytes.length), ...bytes];
 }
 
-function header(channels, width, height, comments) {
+function header(channels, width, height, texts) {
   const box = int32(0, 0, width - 1, height - 1);
   const list = [...channels.flatMap(({ name }) => [...text(name), ...int32(FLOAT), 0, 0, 0, 0, ...int32(1, 1)]), 0];
-  const note = [...new TextEncoder().encode(comments)];
+  const note = (value) => [...new TextEncoder().encode(value)];
   return [
     ...int32(20000630, 2),
-    ...attribute("channels", "chlist", list), ...attribute("comments", "string", note),
+    ...attribute("channels", "chlist", list), ...Object.entries(texts).flatMap(([name, value]) => attribute(name, "string", note(value))),
     ...attribute("compression", "compression", [ZIP]), ...attribute("dataWindow", "box2i", box),
     ...attribute("displayWindow", "box2i", box), ...attribute("lineOrder", "lineOrder", [0]),
     ...attribute("pixelAspectRatio", "float", float32(1)), ...attribute("screenWindowCenter", "v2f", float32(0, 0)),
@@ -47,8 +47,9 @@ async function deflated(bytes) {
   return new Uint8Array(await new Response(stream).arrayBuffer());
 }
 
-// `layers`: [{names: ["R", "G", "B", "A"], floats}] with four floats a pixel, row 0 at the top; a Blob.
-export async function writeExr(layers, width, height, comments) {
+// `layers`: [{names: ["R", "G", "B", "A"], floats}] with four floats a pixel, row 0 at the top; `texts` become
+// attributes; a Blob.
+export async function writeExr(layers, width, height, texts) {
   const channels = layers
     .flatMap(({ names, floats }) => names.map((name, offset) => ({ name, floats, offset })))
     .sort((a, b) => (a.name < b.name ? -1 : 1));
@@ -66,7 +67,7 @@ export async function writeExr(layers, width, height, comments) {
     const packed = await deflated(predicted(raw));
     blocks.push({ top, bytes: packed.length < raw.length ? packed : raw }); // what does not shrink stays as it is
   }
-  const head = new Uint8Array(header(channels, width, height, comments));
+  const head = new Uint8Array(header(channels, width, height, texts));
   const offsets = new BigUint64Array(blocks.length);
   let place = head.length + 8 * blocks.length;
   blocks.forEach(({ bytes }, i) => {

@@ -7,6 +7,7 @@ import { axes } from "./camera.js";
 import { isUnderNoSky, studio } from "./lighting.js";
 import { PLAIN, fresh } from "./materials.js";
 import { pointer } from "./patch.js";
+import { readRecipe } from "./recipe.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 import { pictured } from "./textures.js";
@@ -24,9 +25,9 @@ const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, 
 
 export class Importer {
   // `acts` is the editor; `messages` tells; `picked(x, y)` gives the shape under a point of the page, or null;
-  // `thumbnails` are those of textures.
-  constructor({ schema, acts, messages, picked, thumbnails }) {
-    Object.assign(this, { schema: schema.scene, acts, messages, picked, thumbnails });
+  // `reopen(recipe, title)` opens what a picture was made from; `thumbnails` are those of textures.
+  constructor({ schema, acts, messages, picked, reopen, thumbnails }) {
+    Object.assign(this, { schema: schema.scene, acts, messages, picked, reopen, thumbnails });
     this.takesTextures = schema.scene.properties.textures !== undefined;
   }
 
@@ -49,6 +50,8 @@ export class Importer {
     const kind = sort(file);
     if (!kind) throw new Error(`Sunbox reads ${[...new Set(Object.keys(ENDINGS))].join(", ")}.`);
     if (kind === "json") return this.openJson(await file.text(), stem(file));
+    const recipe = await readRecipe(file);
+    if (recipe) return this.reopen(recipe, stem(file));
     const info = await this.upload(file);
     if (info.kind === "scene") return this.#openScene(info, file);
     if (info.kind === "mesh") return this.#addMesh(info, file);

@@ -16,6 +16,7 @@ import { Announcer, Messages } from "./messages.js";
 import { DISPLAY, Panel } from "./panel.js";
 import { defaults, materialModels } from "./schema.js";
 import { essence, linkTo, revived } from "./share.js";
+import { pictureRecipes } from "./picture-recipe.js";
 import { Preparing } from "./preparing.js";
 import { detailWords, fieldTitles, problemText } from "./problem-text.js";
 import { Stage, viewOf } from "./stage.js";
@@ -65,6 +66,10 @@ if (left) editor.amend(left.state);
 
 const displayDefaults = defaults(schema.view, schema.view, DISPLAY);
 const layers = schema.view.properties.aov.enum;
+
+const recipes = pictureRecipes({
+  schema, acts: editor, info: () => info, size: () => size(), view: () => shownView(), viewDefaults: displayDefaults,
+});
 
 let info = null;
 let isPaused = false;
@@ -159,7 +164,9 @@ const stage = new Stage({
 });
 const thumbnails = new Thumbnails(() => isConnected && ended === painted && !isPaused);
 const textureThumbnails = new TextureThumbnails();
-const importer = new Importer({ schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y), thumbnails: textureThumbnails });
+const importer = new Importer({
+  schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y), reopen: recipes.reopen, thumbnails: textureThumbnails,
+});
 editor.takeTexture = (place, file) => importer.texture(place, file);
 editor.frame = (thing) => stage.frame(thing);
 editor.framed = (around) => stage.framed(around);
@@ -186,8 +193,8 @@ const keep = new Keep(find("page-keep"), {
     },
     link: () => linkTo(editor.state),
     command: () => exporting.curl(editor.state.scene, exporting.exactSettings({ ...editor.state.settings, ...size() }, header?.samples ?? 1), shownView()),
-    png: (bits) => exporting.png(stream, bits),
-    exr: () => exporting.exr(stream, layers, { scene: editor.state.scene, settings: { ...editor.state.settings, ...size() } }),
+    png: (bits) => exporting.png(stream, bits, recipes.madeFrom),
+    exr: () => exporting.exr(stream, layers, recipes.madeFrom),
     complain, announce: (text) => announcer.say(text),
   },
 });
@@ -260,7 +267,7 @@ async function download() {
   const button = find("download");
   button.disabled = true;
   try {
-    const { blob, header: taken } = await exporting.png(stream, 8);
+    const { blob, header: taken } = await exporting.png(stream, 8, recipes.madeFrom);
     saveAs(blob, `sunbox-${editor.state.chosen.scene || "scene"}-${taken.samples}.png`);
   } catch (error) {
     complain(error);

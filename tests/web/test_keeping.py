@@ -13,6 +13,7 @@ import OpenImageIO as oiio
 from PIL import Image
 from playwright.sync_api import BrowserContext
 
+from service.images import read_metadata
 from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.test_picture import overlay
@@ -61,6 +62,35 @@ def test_files_hold_the_picture(editor: Editor, tmp_path: Path) -> None:
     subprocess.run(command, check=True, timeout=60)
     again = np.asarray(Image.open(tmp_path / "again.png").convert("RGB"), int)
     assert np.array_equal(again, flat)
+
+
+def test_a_picture_carries_its_document_and_brings_it_back(editor: Editor, server: Server) -> None:
+    editor.page.click("#material-presets [data-name=gold]")
+    finish(editor, 5)
+    gold = editor.settled()
+    editor.tab("keep")
+    own = editor.shot("#download")
+    made = read_metadata(own)
+    assert made is not None and made["samples"] == 5 and made["view"]["bits"] == 8
+    answer = server.http.post("/v1/render", json={key: made[key] for key in ("scene", "settings")})
+    assert read_metadata(answer.content) == made, "the same metadata as the server's"
+    with Image.open(io.BytesIO(own)) as mine, Image.open(io.BytesIO(answer.content)) as theirs:
+        assert mine.tobytes() == theirs.tobytes()
+    layers = editor.shot("text=EXR, all layers")
+    assert (read_metadata(layers) or {})["view"]["aov"] == "all"
+
+    for name, data in {"mine.png": own, "curl.png": answer.content, "layers.exr": layers}.items():
+        editor.tab("material")
+        editor.page.click("#material-presets [data-name=chalk]")
+        editor.wait_for_change(gold)
+        editor.drop("#stage", {name: data})
+        editor.wait("gold", lambda: not editor.differs(gold, 8))
+        assert editor.page.is_hidden("[data-field=base_color] .texture")
+        editor.wait("its samples", lambda: editor.text("#state") == "Done" and editor.samples() == 5)
+    plain = io.BytesIO()
+    Image.new("RGB", (8, 8), (0, 200, 0)).save(plain, "PNG")
+    editor.drop("#stage", {"plain.png": plain.getvalue()})
+    editor.wait("a texture", lambda: editor.page.is_visible("[data-field=base_color] .texture"))
 
 
 def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: BrowserContext) -> None:
