@@ -57,6 +57,13 @@ export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
 export const renderPicture = async (scene, settings, signal) =>
   (await ask("POST", "render?format=png", { ...json({ scene, settings }), signal })).blob();
 
+// A render as a job of the server's: {id, ...}; how far it is, asked for until it ends or `wait` seconds passed; its
+// picture so far.
+export const submitRender = async (scene, settings) => (await ask("POST", "renders", json({ scene, settings }))).json();
+export const renderStatus = (id, wait) => get(`renders/${id}?${new URLSearchParams({ wait })}`);
+export const renderImage = async (id, query) => (await ask("GET", `renders/${id}/image?${new URLSearchParams(query)}`)).blob();
+export const cancelRender = (id) => ask("DELETE", `renders/${id}`);
+
 export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;
 
 // Uploads a file: what the server says of it, {id, kind, ...}. `progress(share)` is told how much has gone.

@@ -13,6 +13,7 @@ import { Keep } from "./keep.js";
 import { askForKey } from "./key.js";
 import { fillSheet, watchKeys } from "./keys.js";
 import { Announcer, Messages } from "./messages.js";
+import { Output, contained, forecastSize } from "./output.js";
 import { DISPLAY, Panel } from "./panel.js";
 import { defaults, materialModels } from "./schema.js";
 import { essence, linkTo, revived } from "./share.js";
@@ -202,14 +203,25 @@ const keep = new Keep(find("page-keep"), {
 const limit = () => editor.state.settings.max_samples ?? knobs.max_samples ?? null;
 const shownView = () => ({ ...displayDefaults, ...editor.state.view });
 
-const showPrices = () => panel.showQualities(info.quality, editor.state.settings, header);
+const output = new Output(find("output"), {
+  schema, acts: editor, order: () => ({ scene: editor.state.scene, settings: editor.state.settings }), view: shownView, complain,
+  say: (text) => announcer.say(text),
+});
+
+function showPrices() {
+  const { settings } = editor.state;
+  panel.showQualities(info.quality, settings, header);
+  output.show(settings, size(), (wanted) => forecastSize(wanted, limit(), header));
+}
 
 // Transparency shows where the scene asks for it, or the person does.
 const isCheckered = () => desk.state.checker ?? editor.state.scene.environment?.background === false;
 
 function size() {
   const area = Math.min(info.renderer?.software === false ? AREA.hardware : AREA.software, info.limits.max_pixels);
-  const box = root.getBoundingClientRect();
+  const { width, height } = editor.state.settings;
+  const stageBox = root.getBoundingClientRect();
+  const box = width && height ? contained(stageBox, { width, height }) : stageBox;
   if (!editor.sceneB) return pictureSize(box, window.devicePixelRatio, area);
   return pictureSize(comparison.fit(box), window.devicePixelRatio, area / 2); // two variants share what one may cost
 }

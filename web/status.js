@@ -8,14 +8,15 @@ export class Status {
   #places = {};
 
   constructor(root) {
-    for (const name of ["samples", "rate", "noise", "elapsed", "left", "progress", "preview", "state"]) {
+    for (const name of ["samples", "rate", "noise", "elapsed", "left", "progress", "preview", "state", "size"]) {
       this.#places[name] = root.querySelector(`#${name}`);
     }
   }
 
   // A frame's header; `limit` is the number of samples at which the picture is ready, or null.
-  frame({ samples, noise, elapsed_s, eta_s, scale }, limit) {
+  frame({ samples, noise, elapsed_s, eta_s, scale, width, height }, limit) {
     const places = this.#places;
+    places.size.textContent = `${Math.round(width / scale)}\u202f×\u202f${Math.round(height / scale)}`;
     places.samples.textContent = limit ? `${count(samples)} / ${count(limit)}` : count(samples);
     const rate = samples / elapsed_s;
     places.rate.textContent = Number.isFinite(rate) ? Number(rate.toPrecision(2)) : NOTHING;
@@ -29,7 +30,7 @@ export class Status {
 
   // The readings of a picture that is no longer wanted are nobody's.
   blank() {
-    for (const name of ["samples", "rate", "noise", "elapsed", "left"]) this.#places[name].textContent = NOTHING;
+    for (const name of ["samples", "rate", "noise", "elapsed", "left", "size"]) this.#places[name].textContent = NOTHING;
     this.#places.progress.value = 0;
     this.#places.preview.hidden = true;
   }

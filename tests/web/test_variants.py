@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import io
 import math
 import re
 
 import numpy as np
+import pytest
+from PIL import Image
 
 from tests.web.conftest import Editor
+from tests.web.test_keeping import finish
 from tests.web.test_picture import overlay, point
 
 
@@ -21,7 +25,7 @@ def test_a_b(editor: Editor) -> None:
     editor.settled()
     editor.page.click("#compare")
     editor.wait("equal variants", lambda: metric(editor) < 3)
-    editor.page.select_option("#comparison select", "blinn_phong")
+    editor.page.select_option("#comparison select[aria-label^=Turn]", "blinn_phong")
     editor.wait("a difference", lambda: metric(editor) > 4)
     assert editor.text("#messages") == "", "the other model was taken"
     # Left of the divider there is A, right of it B.
@@ -50,6 +54,34 @@ def test_a_b(editor: Editor) -> None:
     assert editor.page.is_hidden("#comparison") and editor.page.is_hidden("#picture-b")
     editor.page.keyboard.press("Control+z")
     assert editor.page.is_visible("#comparison"), "comparing is undone like everything"
+
+
+def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
+    finish(editor, 4)
+    editor.page.click("#compare")
+    editor.page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
+    labels = editor.page.locator(".variant")
+    editor.wait("both", lambda: labels.all_inner_texts() == ["A · Principled · 4 samples", "B · Diffuse · 4 samples"])
+    editor.wait("the end", lambda: editor.text("#state") == "Done" and metric(editor) > 0)
+    editor.tab("keep")
+    saved = np.asarray(Image.open(io.BytesIO(editor.shot("#download"))).convert("RGB"), int)
+    a, b = (overlay(editor, canvas)[..., :3].astype(int) for canvas in ("picture", "picture-b"))
+    assert np.array_equal(a, saved), "no JPEG lies between"
+    rmse = 100 * float(np.sqrt(((a - b) ** 2).mean())) / 255
+    editor.wait("the measure", lambda: abs(metric(editor) - rmse) < 0.006)
+
+    editor.page.click("#comparison [data-value=difference]")
+    editor.wait("its picture", lambda: overlay(editor, "difference")[..., :3].max() > 0)
+    for gain in (4, 1, 16):
+        editor.page.select_option("#comparison [aria-label^='How much']", str(gain))
+        wanted = np.minimum(gain * np.abs(a - b), 255)
+        editor.wait("the gain", lambda w=wanted: np.array_equal(overlay(editor, "difference")[..., :3], w))
+
+    whole = editor.page.evaluate("stage.clientWidth / stage.clientHeight")
+    editor.page.click("#comparison [data-value=beside]")
+    aspect = "document.getElementById('picture').width / document.getElementById('picture').height"
+    editor.wait("half the size", lambda: editor.page.evaluate("picture.width") < 0.9 * a.shape[1])
+    assert editor.page.evaluate(aspect) == pytest.approx(whole, rel=0.02), "all of the view stays"
 
 
 def test_every_model_is_taken(editor: Editor) -> None:
