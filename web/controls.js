@@ -29,7 +29,7 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     commit();
   };
   const step = (steps) => {
-    const from = parseNumber(box.value, unit) ?? latest ?? field.initial ?? field.soft.min ?? 0;
+    const from = parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
     const to = Number((from + steps * field.step).toPrecision(12));
     const { min, max, open } = field;
     if (to < min || to > max || to <= open.min || to >= open.max) return;
@@ -40,7 +40,7 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
   };
   const box = element("input", {
     type: "text", id, class: "entry number", autocomplete: "off", spellcheck: "false",
-    inputmode: field.min >= 0 ? "decimal" : undefined, placeholder: UNSET,
+    inputmode: field.min >= 0 ? "decimal" : undefined,
     oninput: () => { box.dataset.dirty = "yes"; },
     onblur: clean,
     onkeydown: (event) => {
@@ -56,8 +56,9 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     onkeyup: ({ key }) => { if (key === "ArrowUp" || key === "ArrowDown") commit(); },
     onchange: take,
   });
-  const show = (value) => {
+  const show = (value, effective) => {
     latest = value ?? null;
+    box.placeholder = effective === undefined ? (field.absent ?? UNSET) : compact(effective);
     if (isBeingEdited(box)) return;
     box.value = latest === null ? "" : compact(latest);
     box.title = latest === null || box.value === String(latest) ? "" : String(latest);
@@ -78,10 +79,15 @@ function track(field, id, { input, commit }) {
     onchange: commit,
   });
   slideByTouch(range, { input: (value) => input(inside(value)), commit });
-  const show = (value) => {
-    range.value = String(value ?? min);
+  // A slider without a value stands, as a ghost, where the one is that holds; without either it has no thumb.
+  const show = (value, effective) => {
+    const known = value ?? effective ?? null;
+    range.classList.toggle("ghost", (value ?? null) === null);
+    range.classList.toggle("unset", known === null);
+    range.value = String(known ?? min);
     range.style.setProperty("--fill", String((range.valueAsNumber - min) / (max - min)));
-    const words = (value ?? null) === null ? "not set" : `${compact(value)} ${unitText(field.unit)}`.trim();
+    const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
+    const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
     range.setAttribute("aria-valuetext", words);
   };
   return { element: range, show };
@@ -93,9 +99,9 @@ function slider(field, id, events) {
   entry.element.setAttribute("aria-label", `${field.title}, number`);
   return {
     element: element("div", { class: "slider" }, range.element, entry.element),
-    show(value) {
-      range.show(value);
-      entry.show(value);
+    show(value, effective) {
+      range.show(value, effective);
+      entry.show(value, effective);
     },
   };
 }
@@ -154,7 +160,7 @@ function color(field, id, { input, commit, refuse, restore }) {
   });
   const text = element("input", {
     type: "text", class: "entry", spellcheck: "false", autocomplete: "off",
-    "aria-label": `${field.title}, #rrggbb or three linear numbers`, placeholder: UNSET,
+    "aria-label": `${field.title}, #rrggbb or three linear numbers`, placeholder: field.absent ?? UNSET,
     oninput: () => { text.dataset.dirty = "yes"; },
     onblur: () => { delete text.dataset.dirty; },
     onkeydown: (event) => {

@@ -6,6 +6,7 @@ import { control } from "./controls.js";
 import { element, freshId } from "./dom.js";
 import { acceptFiles } from "./files.js";
 import { equal, isObject } from "./patch.js";
+import { followed } from "./schema.js";
 import { describe } from "./tooltip.js";
 import { unitText } from "./words.js";
 
@@ -54,7 +55,8 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
   if (hint) describe(node, label, field.hint);
   return {
     element: node, mark,
-    show(value, initial = field.initial) {
+    // `effective`: what holds where neither the document nor the schema has a value.
+    show(value, initial = field.initial, effective = undefined) {
       latest = value ?? initial;
       const textured = isTexture(latest);
       if (image) {
@@ -62,7 +64,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
         image.show(latest);
         under?.show(latest);
       }
-      if (trouble.hidden && !textured) widget.show(latest); // else what was refused stays in sight
+      if (trouble.hidden && !textured) widget.show(latest, effective); // else what was refused stays in sight
       reset.hidden = textured || field.required || value === undefined || isSame(field, value, initial);
     },
   };
@@ -78,7 +80,12 @@ export function schemaForm(fields, acts) {
     element: element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
     // `initials` stand in for the schema's defaults where these depend on something else.
     show(values, initials = {}) {
-      for (const [name, each] of rows) each.show(values[name], initials[name]);
+      for (const [name, each] of rows) {
+        const field = fields.find((one) => one.name === name);
+        const leader = field.follows?.field;
+        const lead = values[leader] ?? fields.find((one) => one.name === leader)?.initial;
+        each.show(values[name], initials[name], followed(field, lead));
+      }
     },
     // Says at a field what is wrong with it; false where this form has no such field.
     mark(name, text) {

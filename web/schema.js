@@ -87,6 +87,8 @@ function field(schema, name, raw, required) {
     step: step(soft.min, soft.max, whole && !color),
     whole,
     initial: top.default ?? undefined,
+    absent: bound(nodes, "x-absent"),
+    follows: bound(nodes, "x-follows"),
   };
 }
 
@@ -96,6 +98,15 @@ export function fields(schema, owner) {
   return Object.entries(properties)
     .map(([name, raw]) => field(schema, name, raw, required.includes(name)))
     .filter((found) => found !== null);
+}
+
+// The value that a field without one follows from another, or undefined: that one may be a texture.
+export function followed({ follows }, value) {
+  if (!follows || typeof value !== "number") return undefined;
+  const { points } = follows;
+  const to = Math.max(1, points.findIndex(([x]) => x >= value));
+  const [[x0, y0], [x1, y1]] = [points[to - 1], points[to]];
+  return Number((y0 + ((y1 - y0) * (value - x0)) / (x1 - x0)).toPrecision(3));
 }
 
 // What the schema says where a document is silent, for all or some of a model's members.

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Literal
 
 from pydantic import Field
@@ -52,6 +53,7 @@ class _Surface(Model):
             "Where given, an alpha of at least this counts as 1, any other as 0.",
             unit="",
             widget="slider",
+            absent="off",
         ),
     ] = None
     normal_map: Annotated[
@@ -233,6 +235,17 @@ class BlinnPhongMaterial(_Surface):
     ] = (0.0, 0.0, 0.0)
 
 
+def index_of_specular(specular: float) -> float:
+    """The index of refraction whose reflectance head-on is 0.08 `specular`, as `surface.glsl` has it."""
+    r = math.sqrt(0.08 * specular)
+    return (1 + r) / (1 - r)
+
+
+def roughness_of_gloss(gloss: float) -> float:
+    """The coat's roughness for its gloss: the square root of alpha, which goes from 0.1 to 0.001 as in `disney`."""
+    return math.sqrt(0.1 + (0.001 - 0.1) * gloss)
+
+
 class PrincipledMaterial(DisneyMaterial):
     """The production model: reciprocal, never gains light, puts back what microfacets lose, and may be glass."""
 
@@ -254,6 +267,7 @@ class PrincipledMaterial(DisneyMaterial):
             "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
             unit="",
             widget="slider",
+            follows=("specular", index_of_specular),
         ),
     ] = None
     attenuation_color: Annotated[
@@ -274,6 +288,7 @@ class PrincipledMaterial(DisneyMaterial):
             unit="m",
             widget="slider",
             soft=5,
+            absent="clear",
         ),
     ] = None
     specular_color: Annotated[
@@ -303,6 +318,7 @@ class PrincipledMaterial(DisneyMaterial):
             "Colour of the sheen, in place of white tinted by the sheen tint.",
             unit="",
             widget="color",
+            absent="by tint",
         ),
     ] = None
     sheen_roughness: Annotated[
@@ -322,6 +338,7 @@ class PrincipledMaterial(DisneyMaterial):
             "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
             unit="",
             widget="slider",
+            follows=("clearcoat_gloss", roughness_of_gloss),
         ),
     ] = None
     clearcoat_normal_map: Annotated[
