@@ -7,11 +7,12 @@ import { axes } from "./camera.js";
 import { isUnderNoSky, studio } from "./lighting.js";
 import { PLAIN, fresh } from "./materials.js";
 import { pointer } from "./patch.js";
+import { problemText } from "./problem-text.js";
 import { readRecipe } from "./recipe.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 import { pictured } from "./textures.js";
-import { inWords, sentence } from "./words.js";
+import { inWords } from "./words.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
@@ -40,7 +41,7 @@ export class Importer {
       try {
         await this.#take(file, place);
       } catch (problem) {
-        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: sentence(problem.message) });
+        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem) });
       }
       this.messages.hide("upload");
     }
@@ -141,7 +142,7 @@ export class Importer {
     try {
       await this.#paint(place, await this.upload(file), file);
     } catch (problem) {
-      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: sentence(problem.message) });
+      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem) });
     }
     this.messages.hide("upload");
   }
