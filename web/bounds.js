@@ -43,25 +43,36 @@ function points(shape) {
 
 // {center, radius} of a cloud of points: around the middle of its box.
 export function around(cloud) {
-  const [low, high] = [Math.min, Math.max].map((pick) => cloud.reduce((a, b) => a.map((x, i) => pick(x, b[i]))));
+  const { low, high } = boxAround(cloud);
   const center = mix(low, high, 0.5);
   return { center, radius: cloud.reduce((most, p) => Math.max(most, length(subtract(p, center))), 0) };
 }
 
-// {center, radius}, or null where the document doesn't tell.
-export function ball(shape) {
+function cloudOf(shape) {
   const cloud = points(shape);
-  return cloud?.length ? around(cloud.map((point) => place(point, shape.transform))) : null;
+  return cloud?.length ? cloud.map((point) => place(point, shape.transform)) : null;
 }
 
-// How far to move a ball along a direction to get it out of a sphere or box that holds its middle; null: it's free.
-export function wayOut({ center, radius }, shapes, direction) {
-  const solid = shapes.filter(({ type }) => type === "sphere" || type === "box").map(ball)
-    .find((each) => length(subtract(each.center, center)) < each.radius);
-  if (!solid) return null;
-  const offset = subtract(solid.center, center);
-  const along = offset.reduce((sum, x, i) => sum + x * direction[i], 0);
-  return scale(direction, Math.max(0, along) + solid.radius + 1.1 * radius);
+// {center, radius}, or null where the document doesn't tell.
+export function ball(shape) {
+  const cloud = cloudOf(shape);
+  return cloud && around(cloud);
+}
+
+// {low, high} of points.
+export function boxAround(cloud) {
+  const [low, high] = [Math.min, Math.max].map((pick) => cloud.reduce((a, b) => a.map((x, i) => pick(x, b[i]))));
+  return { low, high };
+}
+
+const models = new WeakMap(); // the box around the whole model that a shape came with, while it stands as it came
+
+export const remember = (shapes, whole) => { for (const shape of shapes) models.set(shape, whole); };
+
+// {low, high}, or null where neither the document nor its file tells.
+export function box(shape) {
+  const cloud = cloudOf(shape);
+  return cloud ? boxAround(cloud) : models.get(shape) ?? null;
 }
 
 // Of several balls, the box around them.

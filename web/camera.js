@@ -64,6 +64,24 @@ export function frame({ position, target, vfov }, { center, radius }, aspect, sh
   return { position: tidy(add(center, scale(back, distance))), target: tidy(center) };
 }
 
+// Where a point is in the picture: x to the right and y down, both 0..1 within it, and z, its depth (behind the eye
+// below 0).
+export function project(camera, point, aspect) {
+  const { right, up, forward } = axes(camera);
+  const way = subtract(point, camera.position);
+  const z = dot(way, forward);
+  const tall = Math.tan(radians(camera.vfov) / 2) * z;
+  return { x: (dot(way, right) / (tall * aspect) + 1) / 2, y: (1 - dot(way, up) / tall) / 2, z };
+}
+
+// Whether a box is in the picture with all its corners.
+export function isInSight(camera, aspect, { low, high }) {
+  return Array.from({ length: 8 }, (_, i) => low.map((x, k) => ((i >> k) & 1 ? high[k] : x))).every((corner) => {
+    const { x, y, z } = project(camera, corner, aspect);
+    return z > 0 && x >= 0 && x <= 1 && y >= 0 && y <= 1;
+  });
+}
+
 // The unit direction of the ray through a place in the picture: x to the right and y down, both 0..1.
 export function ray(camera, x, y, aspect) {
   const { right, up, forward } = axes(camera);

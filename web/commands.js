@@ -14,7 +14,7 @@ export function commands(does) {
     { keys: ["c"], ctrl: true, notInText: true, does: does.copyMaterial, says: "copy the material", group: "Work" },
     { keys: ["v"], ctrl: true, notInText: true, does: does.pasteMaterial, says: "paste a material or a scene", group: "Work" },
     { keys: ["delete"], does: does.remove, says: "delete the selected thing", group: "Work" },
-    { keys: ["o"], ctrl: true, does: does.openFiles, says: "open files", group: "Work" },
+    { keys: ["o"], ctrl: true, does: does.openFiles, says: "open a model or a scene", group: "Work" },
     { keys: [" "], does: does.togglePause, says: "pause, resume", group: "Work" },
     { keys: ["p"], does: does.download, says: "the picture as a PNG", group: "Work" },
     { keys: ["n"], does: does.snapshot, says: "take a snapshot", group: "Work" },

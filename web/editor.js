@@ -60,7 +60,9 @@ export class Editor extends Store {
   }
 
   // The camera with what its document leaves out.
-  get camera() { return { ...this.#cameraDefaults, ...this.state.scene.camera }; }
+  get camera() { return this.cameraOf(this.state.scene); }
+
+  cameraOf({ camera }) { return { ...this.#cameraDefaults, ...camera }; }
 
   setCamera(members) { this.#setCamera(members, null); }
 
@@ -209,11 +211,6 @@ export class Editor extends Store {
       scene: { ...scene, [kind]: [...all, document] },
       chosen: { ...chosen, thing: pointer(kind, all.length), material: document.material ?? chosen.material },
     });
-  }
-
-  duplicate(thing) {
-    const [, kind] = thing.split("/");
-    this.add(kind, at(this.state.scene, thing));
   }
 
   // A scene keeps at least one shape.

@@ -24,7 +24,7 @@ export function acceptFiles(node, take) {
 export function browse(accept) {
   return new Promise((resolve) => {
     const input = element("input", {
-      type: "file", accept, class: "unseen", tabindex: "-1", "aria-label": "File",
+      type: "file", accept, multiple: true, class: "unseen", tabindex: "-1", "aria-label": "File",
       onchange: () => { input.remove(); resolve([...input.files]); },
       oncancel: () => { input.remove(); resolve([]); },
     });

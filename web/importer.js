@@ -2,44 +2,55 @@
 // images textures, glTF a scene, JSON what it says it is.
 
 import { fetchAssetScene, upload } from "./api.js";
-import { ball, measure, wayOut } from "./bounds.js";
-import { axes } from "./camera.js";
+import { question } from "./ask.js";
+import { measure, remember } from "./bounds.js";
+import { frame } from "./camera.js";
+import { browse } from "./files.js";
 import { isUnderNoSky, studio } from "./lighting.js";
-import { PLAIN, fresh } from "./materials.js";
+import { PLAIN } from "./materials.js";
 import { pointer } from "./patch.js";
+import { ballOf } from "./placing.js";
 import { problemText } from "./problem-text.js";
 import { readRecipe } from "./recipe.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 import { pictured } from "./textures.js";
+import { add } from "./vector.js";
 import { inWords } from "./words.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
+const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
+const FROM = [0.5, 0.4, 1]; // where a single mesh is looked at from: a little from the right and above
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
 
 const accepted = (kinds) => Object.keys(ENDINGS).filter((ending) => kinds.includes(ENDINGS[ending])).map((ending) => `.${ending}`).join(",");
-export const ACCEPT = accepted(ORDER);
+const ACCEPT = accepted(ORDER);
 export const ACCEPT_IMAGES = accepted(["image", "light"]);
 
 const sort = (file) => ENDINGS[file.name.split(".").at(-1).toLowerCase()];
 const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
 
 export class Importer {
-  // `acts` is the editor; `messages` tells; `picked(x, y)` gives the shape under a point of the page, or null;
+  // `acts` is the editor, `adder` sets things beside others; `messages` tells; `stage` knows what is seen;
   // `reopen(recipe, title)` opens what a picture was made from; `thumbnails` are those of textures.
-  constructor({ schema, acts, messages, picked, reopen, thumbnails }) {
-    Object.assign(this, { schema: schema.scene, acts, messages, picked, reopen, thumbnails });
+  constructor({ schema, acts, adder, messages, stage, reopen, thumbnails }) {
+    Object.assign(this, { schema: schema.scene, acts, adder, messages, stage, reopen, thumbnails });
     this.takesTextures = schema.scene.properties.textures !== undefined;
   }
 
-  // One after the other; `at` is where they were dropped.
-  async take(files, at = null) {
+  // Files that the person picks, one way or the other.
+  async browse(way) { await this.take(await browse(ACCEPT), { way }); }
+
+  // One after the other. `way` is "open", for models and scenes in place of this scene, or "add"; without one the
+  // person is asked about whole scenes. `at` is where files were dropped.
+  async take(files, { at = null, way = null } = {}) {
     const known = [...files].sort((a, b) => ORDER.indexOf(sort(a)) - ORDER.indexOf(sort(b)));
     // An image that comes with a mesh is for that, wherever they fell.
     const place = known.some((file) => ["mesh", "scene"].includes(sort(file))) ? null : at;
+    let next = way;
     for (const file of known) {
       try {
-        await this.#take(file, place);
+        if (await this.#take(file, place, next)) next = "add"; // the others of these files belong to it
       } catch (problem) {
         this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem) });
       }
@@ -47,29 +58,47 @@ export class Importer {
     }
   }
 
-  async #take(file, at) {
+  // Whether a scene was opened.
+  async #take(file, at, way) {
     const kind = sort(file);
     if (!kind) throw new Error(`Sunbox reads ${[...new Set(Object.keys(ENDINGS))].join(", ")}.`);
-    if (kind === "json") return this.openJson(await file.text(), stem(file));
-    const recipe = await readRecipe(file);
-    if (recipe) return this.reopen(recipe, stem(file));
+    if (kind === "json") return this.#takeJson(JSON.parse(await file.text()), file, way);
+    const recipe = way === "add" ? null : await readRecipe(file); // what is added is an image like any other
+    if (recipe) {
+      this.reopen(recipe, stem(file));
+      return true;
+    }
+    const chosen = kind === "scene" ? way ?? (await this.#ask(file)) : way;
+    if (kind === "scene" && chosen === null) return false;
     const info = await this.upload(file);
-    if (info.kind === "scene") return this.#openScene(info, file);
-    if (info.kind === "mesh") return this.#addMesh(info, file);
-    if (kind === "light") return this.acts.putEnvironment({ type: "image", asset: info.id });
+    if (info.kind === "scene") return this.#takeScene(info, file, chosen);
+    if (info.kind === "mesh") return this.#takeMesh(info, file, chosen);
+    if (kind === "light") this.acts.putEnvironment({ type: "image", asset: info.id });
+    else await this.#takeImage(info, file, at);
+    return false;
+  }
+
+  // "add", "open", or null.
+  #ask(file) {
+    return question({
+      title: `${file.name} is a whole scene`, detail: "Its things can be added beside what is here, or it is opened in place of this scene.",
+      choices: [{ label: "Add", value: "add" }, { label: "Open", value: "open" }],
+    });
+  }
+
+  async #takeImage(info, file, at) {
     const isCertain = at === null || (await this.#aim(at, file));
     this.#paint(this.#colorField(), info, file);
-    if (!isCertain) {
-      const material = inWords(this.acts.state.chosen.material);
-      this.messages.show("import", { title: `${file.name} is on ${material}.`, detail: "The picture was not ready to tell what it fell on, so the selected material took it." });
-    }
+    if (isCertain) return;
+    const material = inWords(this.acts.state.chosen.material);
+    this.messages.show("import", { title: `${file.name} is on ${material}.`, detail: "The picture was not ready to tell what it fell on, so the selected material took it." });
   }
 
   // Selects what an image fell on, if it is not the background; false where that can't be told.
   async #aim({ x, y }, file) {
     this.messages.show("upload", { title: `Finding what ${file.name} fell on`, lasting: true });
     try {
-      const shape = await this.picked(x, y);
+      const shape = await this.stage.shapeAt(x, y);
       if (shape !== null) this.acts.select(pointer("shapes", shape));
       return true;
     } catch {
@@ -82,21 +111,40 @@ export class Importer {
     return upload(file, set);
   }
 
+  async #takeJson(document, file, way) {
+    const scene = document?.scene?.shapes ? document.scene : document?.shapes && document;
+    const chosen = scene ? way ?? (await this.#ask(file)) : "open";
+    if (chosen === "add") return this.#addScene(scene, file);
+    if (chosen === "open") this.openDocument(document, stem(file));
+    return Boolean(scene) && chosen === "open";
+  }
+
   // A scene, a material or a whole page's state, by what it holds.
-  openJson(text, name) {
-    const document = JSON.parse(text);
+  openDocument(document, name) {
     if (document?.scene?.shapes) this.acts.change(revived(document));
     else if (document?.shapes) this.acts.openScene(document, name);
     else if (materialModels(this.schema)[document?.type]) this.acts.putMaterial(document);
     else throw new Error("It holds neither a scene nor a material.");
   }
 
-  async #openScene({ id, exposure, warnings = [] }, file) {
+  async #takeScene({ id, bounds, exposure, warnings = [] }, file, way) {
     const document = await fetchAssetScene(id);
+    if (way === "add") return this.#addScene(document, file, { bounds, warnings });
+    if (bounds) remember(document.shapes, { low: bounds[0], high: bounds[1] });
     this.acts.openScene(document, stem(file), exposure);
     const taken = exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
     const action = isUnderNoSky(document) && { label: "Add the studio", does: () => this.#addStudio(exposure) };
     this.#tell(file, [...taken, ...warnings], "good to know.", action);
+    return true;
+  }
+
+  // What a file says of its lights and cameras does not matter where these stay behind.
+  async #addScene(document, file, { bounds, warnings = [] } = {}) {
+    await this.adder.addScene(document, bounds ? { low: bounds[0], high: bounds[1] } : null);
+    const left = document.lights?.length ?? 0;
+    const told = left ? [`Its ${left === 1 ? "light was" : `${left} lights were`} left out, since this scene has light of its own. Open brings all.`] : [];
+    this.#tell(file, [...told, ...warnings.filter(({ pointer: about = "" }) => !STAYS.test(about))], "good to know.");
+    return false;
   }
 
   async #addStudio(exposure) {
@@ -114,21 +162,24 @@ export class Importer {
     this.messages.show("import", { title: `${file.name}: ${what}`, list, action });
   }
 
-  // In sight: the camera goes where it fills the picture, and what lies inside of something else is put beside it.
-  #addMesh({ id, bounds, warnings = [] }, file) {
-    const { state } = this.acts;
-    const material = fresh(stem(file), state.scene.materials);
-    const materials = { ...state.scene.materials, [material]: PLAIN };
-    let shape = { type: "mesh", asset: id, material };
-    let { camera } = state.scene;
-    if (bounds) {
-      measure(id, bounds);
-      const out = wayOut(ball(shape), state.scene.shapes, axes(this.acts.camera).right);
-      if (out) shape = { ...shape, transform: { translate: out.map((x) => Number(x.toPrecision(4))) } };
-      if (ball(shape).radius > 0) camera = { ...camera, ...this.acts.framed(ball(shape)) };
-    }
-    this.acts.add("shapes", shape, { materials, camera });
+  async #takeMesh({ id, bounds, warnings = [] }, file, way) {
+    measure(id, bounds);
+    const isOpened = way === "open";
+    if (isOpened) this.acts.openScene(await this.#around(id, stem(file), bounds), stem(file));
+    else await this.adder.addMesh(id, stem(file));
     this.#tell(file, warnings, "taken as it is.");
+    return isOpened;
+  }
+
+  // A scene of one mesh alone, in the studio.
+  async #around(asset, material, [low, high]) {
+    const { center, radius } = ballOf({ low, high });
+    const { vfov } = this.acts.camera;
+    const view = frame({ position: add(center, FROM), target: center, vfov }, { center, radius: radius || 1 }, this.stage.aspect);
+    return {
+      version: 1, camera: { ...view, vfov }, environment: await studio(), materials: { [material]: PLAIN },
+      shapes: [{ type: "mesh", asset, material }],
+    };
   }
 
   #colorField() {

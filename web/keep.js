@@ -139,7 +139,7 @@ export class Keep {
       element("div", { class: "row" },
         picture("PNG", () => this.acts.png(8), "png"), picture("PNG, 16 bit", () => this.acts.png(16), "png"),
         picture("EXR, all layers", () => this.acts.exr(), "exr"), json("scene"), json("material")),
-      element("p", { class: "note" }, "JSON comes back through Open file… or by dropping it on the picture."),
+      element("p", { class: "note" }, "JSON comes back by Open… in the Scene tab, or by dropping it on the picture."),
     );
   }
 

@@ -1,5 +1,6 @@
 // Wires the rest. State flows one way: control -> store -> stream -> frame -> viewport.
 
+import { Adder } from "./adding.js";
 import { boot } from "./boot.js";
 import { commands } from "./commands.js";
 import { Comparison } from "./compare.js";
@@ -8,7 +9,7 @@ import { element } from "./dom.js";
 import { Editor } from "./editor.js";
 import * as exporting from "./export.js";
 import { saveAs } from "./files.js";
-import { ACCEPT, Importer, watchDrops } from "./importer.js";
+import { Importer, watchDrops } from "./importer.js";
 import { Keep } from "./keep.js";
 import { askForKey } from "./key.js";
 import { fillSheet, watchKeys } from "./keys.js";
@@ -165,13 +166,12 @@ const stage = new Stage({
 });
 const thumbnails = new Thumbnails(() => isConnected && ended === painted && !isPaused);
 const textureThumbnails = new TextureThumbnails();
-const importer = new Importer({
-  schema, acts: editor, messages, picked: (x, y) => stage.shapeAt(x, y), reopen: recipes.reopen, thumbnails: textureThumbnails,
-});
+const adder = new Adder({ acts: editor, stage });
+const importer = new Importer({ schema, acts: editor, adder, messages, stage, reopen: recipes.reopen, thumbnails: textureThumbnails });
 editor.takeTexture = (place, file) => importer.texture(place, file);
 editor.frame = (thing) => stage.frame(thing);
-editor.framed = (around) => stage.framed(around);
-editor.radius = () => stage.radius();
+editor.addThing = (offer) => adder.add(offer);
+editor.duplicate = (thing) => adder.duplicate(thing);
 const panel = new Panel(find("panel"), {
   schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch), say: (text) => announcer.say(text),
   textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
@@ -259,6 +259,7 @@ function refresh() {
   find("paste-material").disabled = clip === null && !navigator.clipboard?.readText;
   push();
   messages.review();
+  stage.mark();
   clearTimeout(keeping);
   if (editor.canUndo || left) keeping = setTimeout(() => keepWork(essence(editor.state)), KEEP_REST_MS);
 }
@@ -306,7 +307,7 @@ function copyMaterial() {
 async function pasteMaterial() {
   try {
     const text = await navigator.clipboard?.readText().catch(() => null);
-    if (text?.trim().startsWith("{")) importer.openJson(text, "pasted");
+    if (text?.trim().startsWith("{")) importer.openDocument(JSON.parse(text), "pasted");
     else if (clip) editor.putMaterial(clip);
   } catch (error) {
     complain(error);
@@ -323,7 +324,7 @@ const does = {
   toggle, toggleCompare, toggleChecker, togglePause, copyMaterial, pasteMaterial, download, showKeys,
   undo: () => travel(() => editor.undo()), redo: () => travel(() => editor.redo()),
   remove: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
-  openFiles: () => find("file").click(), snapshot: () => keep.snapshot(), pickTool: (tool) => desk.set({ tool }),
+  openFiles: () => importer.browse("open"), snapshot: () => keep.snapshot(), pickTool: (tool) => desk.set({ tool }),
   frame: () => stage.frame(), resetView: () => editor.resetView(),
   nextLayer: () => desk.set({ layer: layers[(layers.indexOf(desk.state.layer) + 1) % layers.length] }),
 };
@@ -333,19 +334,14 @@ fillSheet(find("keys"), acts);
 
 const clicks = {
   pause: does.togglePause, download, compare: toggleCompare, help: showKeys, undo: does.undo, redo: does.redo, frame: does.frame,
-  "reset-view": does.resetView, "open-file": does.openFiles,
+  "reset-view": does.resetView, "open-file": does.openFiles, "add-file": () => importer.browse("add"),
   "copy-material": copyMaterial, "paste-material": pasteMaterial, "reset-material": reset,
   theme: () => desk.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
 };
 for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
 
-find("file").accept = ACCEPT;
-find("file").addEventListener("change", async ({ target }) => {
-  await importer.take([...target.files]);
-  target.value = "";
-});
 watchDrops(document, {
-  take: (files, at) => importer.take(files, at),
+  take: (files, at) => importer.take(files, { at }),
   tell(text) {
     find("drop").hidden = text === null;
     find("drop-hint").textContent = text ?? "";
@@ -381,7 +377,7 @@ editor.subscribe(refresh);
 let resizing = 0;
 new ResizeObserver(() => {
   clearTimeout(resizing);
-  resizing = setTimeout(() => { push(); stage.overlay(); }, RESIZE_REST_MS);
+  resizing = setTimeout(() => { push(); stage.overlay(); stage.mark(); }, RESIZE_REST_MS);
 }).observe(root);
 
 if (left?.from === "work") {

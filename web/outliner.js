@@ -16,7 +16,7 @@ const ICONS = {
   quad: "M4.5 4H15l-3.5 8H1z", mesh: "M8 1.5 14.5 14h-13zM8 5.2 4.3 12.4h7.4z",
 };
 
-function icon(name) {
+export function icon(name) {
   const svg = document.createElementNS("http://www.w3.org/2000/svg", "svg");
   const path = document.createElementNS("http://www.w3.org/2000/svg", "path");
   svg.setAttribute("viewBox", "0 0 16 16");
@@ -37,7 +37,7 @@ export function things({ environment, lights = [], shapes }) {
   return [
     { thing: "/camera", icon: "camera", title: "Camera", note: "" },
     { thing: "/environment", icon: "environment", title: "Environment", note: environment ? inWords(environment.type) : "None" },
-    ...lights.map(({ type }, i) => ({ thing: pointer("lights", i), icon: "light", title: `${title(type)} light`, note: "" })),
+    ...lights.map(({ type }, i) => ({ thing: pointer("lights", i), icon: "light", title: title(`${type} light`), note: "" })),
     ...shapes.map(({ type, material }, i) => ({ thing: pointer("shapes", i), icon: type, title: title(type), note: inWords(material) })),
   ];
 }

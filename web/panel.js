@@ -5,7 +5,6 @@ import { element } from "./dom.js";
 import { OWN, fillPicker, materialButtons } from "./library.js";
 import { MaterialPanel } from "./material-panel.js";
 import { Outliner, additions } from "./outliner.js";
-import { PLAIN, fresh } from "./materials.js";
 import { equal } from "./patch.js";
 import { fields, materialModels } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
@@ -27,8 +26,8 @@ export class Panel {
   #forms = {};
   #shape = {}; // what the exchangeable forms were made for
 
-  // `acts`: the editor, and takeTexture(place, file), frame(thing), radius(). `paint` as materialButtons wants it,
-  // `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants them.
+  // `acts`: the editor, and takeTexture(place, file), frame(thing), addThing(offer), duplicate(thing). `paint` as
+  // materialButtons wants it, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants them.
   constructor(root, { schema, library, acts, paint, say, textureActs }) {
     this.root = root;
     this.textureActs = textureActs;
@@ -73,11 +72,7 @@ export class Panel {
     add.addEventListener("change", () => {
       const offer = offers[Number(add.value)];
       add.value = "";
-      const { acts } = this;
-      const { materials } = acts.state.scene;
-      const material = fresh(offer.title.toLowerCase(), materials);
-      const own = offer.kind === "shapes" ? { materials: { ...materials, [material]: PLAIN } } : {};
-      acts.add(offer.kind, offer.make(acts.camera, acts.radius(), material), own);
+      this.acts.addThing(offer);
     });
   }
 

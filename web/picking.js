@@ -1,6 +1,6 @@
 // What lies under a place in the picture: asked of the renderer's own layers, and kept while the view stays.
 
-import { around } from "./bounds.js";
+import { around, boxAround } from "./bounds.js";
 import { ray } from "./camera.js";
 import { add, scale } from "./vector.js";
 
@@ -18,13 +18,13 @@ export class Picker {
   }
 
   // {floats, width, height, camera}: a layer of the present picture, row 0 at the top.
-  async layer(aov, scene) {
+  async layer(aov, scene, patience_ms = PATIENCE_MS) {
     if (scene.camera !== this.#camera || scene.shapes !== this.#shapes) {
       [this.#camera, this.#shapes] = [scene.camera, scene.shapes];
       this.#layers.clear();
     }
     if (!this.#layers.has(aov)) {
-      const { header, bytes, scene: shown } = await this.#stream.capture({ ...RAW, aov }, { patience_ms: PATIENCE_MS, rough: true });
+      const { header, bytes, scene: shown } = await this.#stream.capture({ ...RAW, aov }, { patience_ms, rough: true });
       const layer = { floats: new Float32Array(bytes), width: header.width, height: header.height };
       const isStale = shown?.camera !== this.#camera || shown?.shapes !== this.#shapes; // things moved meanwhile
       if (isStale || header.scale < 1) return layer;
@@ -49,20 +49,36 @@ export class Picker {
   // Along the ray, in metres; 0 where nothing is.
   depth(scene, place) { return this.#value("depth", scene, place); }
 
-  // The ball around what can be seen of a shape, or null.
-  async ball(scene, camera, shape) {
-    const [ids, depths] = [await this.layer("shape_id", scene), await this.layer("depth", scene)];
+  // What can be seen of each shape: lists of points, by its index.
+  async #clouds(scene, camera, patience_ms) {
+    const ids = await this.layer("shape_id", scene, patience_ms);
+    const depths = await this.layer("depth", scene, patience_ms);
     const { width, height } = ids;
-    const cloud = [];
+    const clouds = new Map();
+    if (depths.width !== width || depths.height !== height) return clouds; // a preview, and then a larger one
     for (let j = 0; j < height; j += 2) {
       for (let i = 0; i < width; i += 2) {
         const at = 4 * (j * width + i);
-        if (Math.round(ids.floats[at]) !== shape + 1 || !(depths.floats[at] > 0)) continue;
+        const shape = Math.round(ids.floats[at]) - 1;
+        if (shape < 0 || !(depths.floats[at] > 0)) continue;
+        if (!clouds.has(shape)) clouds.set(shape, []);
         const direction = ray(camera, (i + 0.5) / width, (j + 0.5) / height, width / height);
-        cloud.push(add(camera.position, scale(direction, depths.floats[at])));
+        clouds.get(shape).push(add(camera.position, scale(direction, depths.floats[at])));
       }
     }
-    return cloud.length ? around(cloud) : null;
+    return clouds;
+  }
+
+  // The ball around what can be seen of a shape, or null.
+  async ball(scene, camera, shape) {
+    const cloud = (await this.#clouds(scene, camera)).get(shape);
+    return cloud ? around(cloud) : null;
+  }
+
+  // The boxes around what can be seen of each shape, by its index.
+  async boxes(scene, camera, patience_ms) {
+    const clouds = await this.#clouds(scene, camera, patience_ms);
+    return new Map([...clouds].map(([shape, cloud]) => [shape, boxAround(cloud)]));
   }
 }
 

@@ -1,10 +1,11 @@
 // The picture under the hand: tools, picking, framing, focus, and what lies over it.
 
 import { isPainted } from "./aov.js";
-import { ball, together } from "./bounds.js";
+import { ball, box, together } from "./bounds.js";
 import { axes, frame, ray } from "./camera.js";
 import { watchGestures } from "./gestures.js";
 import { Inspector } from "./inspector.js";
+import { Markers } from "./markers.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
 import { Picker, drawOutline } from "./picking.js";
 import { NotReady } from "./stream.js";
@@ -20,6 +21,7 @@ const EARLY = {
 };
 
 const OUTLINE_MS = 900;
+const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what is in its way
 const OVERLAY_MS = 200; // between two histograms
 const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
 
@@ -37,6 +39,7 @@ export class Stage {
     this.inspector = new Inspector(
       { stage: this.root, sheet: find("sheet"), probe: find("probe"), crosshair: find("crosshair") }, viewport, stream,
     );
+    this.markers = new Markers(find("markers"), acts);
     this.move = {
       ...acts.moves,
       zoom: (factor, x, y) => (this.inspector.active ? this.inspector.magnify(1 / factor, x, y) : acts.moves.zoom(factor)),
@@ -75,12 +78,22 @@ export class Stage {
     this.find("clipped").hidden = !clipping;
     this.find("histogram").hidden = !histogram;
     this.overlay();
+    this.mark();
   }
 
   painted({ legend }) {
     showLegend(this.find("legend"), legend);
     this.inspector.refresh();
     this.overlay();
+    this.mark();
+  }
+
+  // Where lights and the camera's target are, while the scene is arranged.
+  mark() {
+    const { tab, tool } = this.desk.state;
+    const isOn = tab === "scene" && tool !== "inspect";
+    if (isOn) fitGuides(this.find("markers"), this.root, this.viewport.canvas);
+    this.markers.show(isOn, this.aspect);
   }
 
   // Histogram and clipping follow the picture at their own pace.
@@ -137,6 +150,15 @@ export class Stage {
     const lens = camera.aperture_radius > 0 ? {} : { aperture_radius: Number((along * LENS_SHARE).toPrecision(2)) };
     this.acts.setCamera({ focus_distance: Number(along.toPrecision(4)), ...lens });
     this.say(`Focus at ${along.toPrecision(3)} metres${lens.aperture_radius ? ", aperture opened" : ""}`);
+  }
+
+  // The box around each shape of the scene: what the document tells, else what is seen of it, else null.
+  async boxes() {
+    const { scene } = this.acts.state;
+    const known = scene.shapes.map(box);
+    if (known.every(Boolean)) return known;
+    const seen = await this.picker.boxes(scene, this.acts.camera, BRIEF_MS).catch(() => new Map());
+    return known.map((each, i) => each ?? seen.get(i) ?? null);
   }
 
   // What of the camera has to change for a ball to fill the picture.

@@ -55,9 +55,11 @@ export function changed(transform, name, value) {
 // A shape in another place, by an offset in metres.
 export function moved(shape, offset) {
   const by = (point) => tidy(add(point, offset));
+  const { matrix } = shape.transform ?? {};
+  if (matrix) return { ...shape, transform: { matrix: translated(matrix, by([matrix[3], matrix[7], matrix[11]])) } };
   if (shape.transform || shape.type === "mesh") {
-    const { translate = [0, 0, 0] } = shown(shape.transform);
-    return { ...shape, transform: changed(shape.transform, "translate", by(translate)) };
+    const { translate = [0, 0, 0] } = shape.transform ?? {};
+    return { ...shape, transform: { ...shape.transform, translate: by(translate) } };
   }
   if (shape.type === "sphere") return { ...shape, center: by(shape.center) };
   if (shape.type === "box") return { ...shape, min: by(shape.min), max: by(shape.max) };

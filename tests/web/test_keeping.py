@@ -223,8 +223,10 @@ def test_json_leaves_and_comes_back(editor: Editor) -> None:
     document = json.loads(scene)
     document["materials"]["subject"] = {"type": "diffuse", "albedo": [0, 0.6, 0]}
     editor.drop("#stage", {"green.json": json.dumps(document).encode()})
+    editor.page.click("dialog[open] [value=open]")
     editor.wait_for_change(before)
     editor.drop("#stage", {"old.json": scene})
+    editor.page.click("dialog[open] [value=open]")
     editor.wait("the old scene", lambda: not editor.differs(before, 8))
     editor.drop("#stage", {"note.txt": b"hello"})
     editor.wait("a refusal", lambda: "note.txt was not taken" in editor.text("#messages"))
@@ -257,6 +259,7 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
     editor.page.click("[data-field=base_color] .texture .forget")
     editor.wait("no texture", lambda: editor.page.is_hidden("[data-field=base_color] .texture"))
     editor.drop("#stage", {"broken.glb": b"glTF nonsense"})
+    editor.page.click("dialog[open] [value=open]")
     editor.wait("a refusal", lambda: "broken.glb was not taken" in editor.text("#messages"))
 
 

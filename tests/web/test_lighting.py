@@ -11,6 +11,7 @@ from tests.web.conftest import Editor
 def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.settled()
     editor.drop("#stage", {"lit.glb": start_up(BLENDER_LAMP).glb()})
+    editor.page.click("dialog[open] [value=open]")
     editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
     assert "exposure is -10 stops now" in editor.text("#messages") and "no sky" in editor.text("#messages")
     editor.tab("render")
@@ -36,6 +37,7 @@ def test_a_model_lit_by_blender(editor: Editor) -> None:
 def test_an_exposure_of_ones_own_stays(editor: Editor) -> None:
     editor.settled()
     editor.drop("#stage", {"lit.glb": start_up(BLENDER_LAMP).glb()})
+    editor.page.click("dialog[open] [value=open]")
     editor.tab("render")
     exposure = editor.page.locator(editor.field("exposure", "number"))
     editor.wait("the exposure of the model", lambda: exposure.input_value() == "-10")

@@ -224,3 +224,58 @@ TRIPLES = ["0.2 0.4 0.6", "0,2 0,4 0,6", "0.2, 0.4, 0.6", "0.2,0.4,0.6", "0,2; 0
 @pytest.mark.parametrize("text", TRIPLES)
 def test_colours_are_three_numbers_however_parted(page: Page, text: str) -> None:
     assert call(page, "number.js", "parseTriple", text) == [0.2, 0.4, 0.6]
+
+
+def test_a_new_thing_finds_a_place_beside_the_others(page: Page) -> None:
+    ball, crate = {"low": [-1, 0, -1], "high": [1, 2, 1]}, {"low": [1.5, 0, -1], "high": [3.5, 2, 1]}
+    new = {"low": [-0.4, 0.5, -0.4], "high": [0.4, 1.3, 0.4]}
+    assert call(page, "placing.js", "wayOut", new, [crate], [1, 0, 0]) is None, "it is in nobody's way"
+    for right in ([1, 0, 0], [-1, 0, 0], [0.6, 0, 0.8], [0.6, 0.5, 0.6]):
+        found = call(page, "placing.js", "wayOut", new, [ball, crate], right, {"stands": True})
+        low, high = (np.add(new[end], found["offset"]) for end in ("low", "high"))
+        assert low[1] == pytest.approx(0), "on the ground of the ball"
+        for other in (ball, crate):
+            assert not all(low[k] < other["high"][k] and other["low"][k] < high[k] for k in range(3)), right
+    assert found["neighbour"] == ball
+    assert call(page, "placing.js", "wayOut", new, [ball], [1, 0, 0])["offset"] == [1.48, 0, 0]
+
+
+def test_floors_and_rooms_are_in_nobodys_way(page: Page) -> None:
+    room, floor = {"low": [-9, 0, -9], "high": [9, 5, 9]}, {"low": [-5, -0.1, -5], "high": [5, 0, 5]}
+    crate = {"low": [1.5, 0, -1], "high": [3.5, 2, 1]}
+    assert call(page, "placing.js", "solids", [room, None, floor, crate], [0, 1, 8]) == [crate]
+
+
+@pytest.mark.parametrize("position", [[0.0, 1.0, 5.0], [3.0, 4.0, -2.0]])
+def test_a_point_is_seen_where_its_ray_goes(page: Page, position: list[float]) -> None:
+    camera = CAMERA | {"position": position}
+    for x, y in [(0.5, 0.5), (0.1, 0.8), (0.9, 0.25)]:
+        direction = call(page, "camera.js", "ray", camera, x, y, 1.5)
+        seen = call(page, "camera.js", "project", camera, np.add(position, np.multiply(direction, 3)).tolist(), 1.5)
+        assert (seen["x"], seen["y"]) == pytest.approx((x, y))
+        assert seen["z"] > 0
+        assert call(page, "markers.js", "spot", camera, np.add(position, direction).tolist(), 1.5)["isInside"]
+    behind = np.add(position, np.subtract(position, camera["target"])).tolist()
+    above = np.add(behind, [0, 0.5, 0]).tolist()
+    mark = call(page, "markers.js", "spot", camera, above, 1.5)
+    assert not mark["isInside"] and mark["y"] == pytest.approx(0.04), "at the upper edge"
+
+
+def test_a_scene_is_added_under_free_names(page: Page) -> None:
+    paint = {"type": "diffuse", "albedo": {"texture": "wood", "factor": 0.5}}
+    scene = {"materials": {"paint": {"type": "diffuse"}}, "textures": {"wood": {"asset": "a"}}, "shapes": []}
+    other = {
+        "materials": {"paint": paint, "paint-2": {"type": "diffuse", "normal_map": {"texture": "bumps"}}},
+        "textures": {"wood": {"asset": "b"}, "bumps": {"asset": "c"}},
+        "shapes": [
+            {"type": "mesh", "asset": "m", "material": "paint"},
+            {"type": "mesh", "asset": "n", "material": "paint-2"},
+        ],
+    }
+    taken = call(page, "merging.js", "adapted", other, scene)
+    assert taken["textures"] == {"wood-2": {"asset": "b"}, "bumps": {"asset": "c"}}
+    assert taken["materials"] == {
+        "paint-2": paint | {"albedo": {"texture": "wood-2", "factor": 0.5}},
+        "paint-3": {"type": "diffuse", "normal_map": {"texture": "bumps"}},
+    }
+    assert [shape["material"] for shape in taken["shapes"]] == ["paint-2", "paint-3"]

@@ -29,12 +29,11 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
     # A turned part of a parent that is stretched: a matrix without a form as move, turn and scale.
     inner = file.node(False, mesh=mesh, rotation=[0, 0, np.sin(np.pi / 8), np.cos(np.pi / 8)])
     file.node(scale=[1, 2, 1], translation=[0, 0, -1], children=[inner])
-    editor.settled()
     editor.drop("#stage", {"two.glb": file.glb()})
+    editor.page.click("dialog[open] [value=open]")
     editor.tab("scene")
     things = editor.page.locator("#outline-list [data-thing^='/shapes/']")
-    editor.wait("the parts", lambda: things.count() == 2)
-    before = editor.settled()
+    editor.wait("the parts", lambda: "Mesh 2" in editor.text("#outline-list"))
 
     things.nth(0).click()
     assert entries(editor, "translate") == [0.5, 1, 0]
@@ -43,10 +42,8 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
     turn = editor.page.locator("#thing-form [data-field=rotate] input").nth(1)
     turn.fill("70")
     turn.press("Tab")
-    editor.wait_for_change(before)
     focused = editor.page.evaluate("document.activeElement.getAttribute('aria-label')")
     assert focused == "Rotate, Z", "the form stays as it is while it is filled in"
-    before = editor.settled()
 
     things.nth(1).click()
     assert entries(editor, "translate") == [0, 0, -1]
@@ -55,9 +52,100 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
     move = editor.page.locator("#thing-form [data-field=translate] input").nth(0)
     move.fill("-0.8")
     move.press("Enter")
-    editor.wait_for_change(before)
-    assert editor.text("#messages") == ""
+    editor.wait("a picture", lambda: editor.page.get_attribute("#stage", "aria-busy") == "false")
+    assert editor.page.locator(".message.refusal").count() == 0
 
     first, second = (shape["transform"] for shape in document(editor)["shapes"])
     assert first == {"translate": [0.5, 1, 0], "rotate": [0, 70, 90], "scale": [2, 1, 1]}
     assert second["matrix"][3] == -0.8 and second["matrix"][11] == -1
+
+
+def test_what_is_added_or_copied_stands_beside_the_others(editor: Editor) -> None:
+    page = editor.page
+    editor.tab("scene")
+    things = page.locator("#outline-list [role=option]")
+    for i, thing in enumerate(("Sphere", "Box", "Quad", "Point light", "Sun")):
+        page.select_option("#add", label=thing)
+        editor.wait(thing, lambda count=5 + 2 * i: things.count() == count)
+        page.click("#thing-acts >> text=Duplicate")
+        editor.wait("the copy", lambda count=6 + 2 * i: things.count() == count)
+    assert "Point light 2" in editor.text("#outline-list")
+    scene = document(editor)
+    balls = [shape for shape in scene["shapes"] if shape["type"] == "sphere"]
+    boxes = [shape for shape in scene["shapes"] if shape["type"] == "box"]
+    assert len(balls) == 3 and len(boxes) == 2
+    bodies = [([x - b["radius"] for x in b["center"]], [x + b["radius"] for x in b["center"]]) for b in balls]
+    bodies += [(b["min"], b["max"]) for b in boxes]
+    for i, (low, high) in enumerate(bodies):
+        assert abs(low[1]) < 1e-3, "on the floor"
+        for other_low, other_high in bodies[:i]:
+            assert not all(low[k] < other_high[k] and other_low[k] < high[k] for k in range(3))
+    floors = [tuple(shape["origin"]) for shape in scene["shapes"] if shape["type"] == "quad"]
+    assert len(set(floors)) == 3
+    places = [str(light.get("position") or light["direction"]) for light in scene["lights"]]
+    assert len(places) == len(set(places)) == 4
+
+
+def test_a_light_is_selected_by_its_mark(editor: Editor) -> None:
+    page, mark = editor.page, "#markers .mark[data-thing='/lights/0']"
+    editor.tab("scene")
+    assert page.locator("#markers .mark").count() == 1, "the camera's target"
+    page.select_option("#add", label="Point light")
+    box, stage = page.locator(mark).bounding_box(), page.locator("#stage").bounding_box()
+    assert box and stage and box["y"] < stage["y"] + 60, "above, at the edge while it is selected"
+    page.click("#markers .mark[data-thing='/camera']")
+    assert editor.text("#thing-title") == "Camera"
+    for _ in range(14):
+        page.keyboard.press("-")
+    editor.wait("the light in the picture", lambda: page.locator(mark).count() == 1)
+    page.click(mark)
+    assert editor.text("#thing-title") == "Point light"
+    editor.tab("material")
+    assert page.is_hidden("#markers"), "nothing lies over the picture while materials are looked at"
+
+
+def model() -> bytes:
+    """A square whose material and texture have names that the first scene has, too, and a lamp."""
+    file = gltf_files.Gltf()
+    pixels = np.full((4, 4, 3), (0, 200, 0), np.uint8)
+    texture = {"baseColorTexture": {"index": file.texture(pixels)}}
+    file.of({"name": "subject", "pbrMetallicRoughness": texture})
+    lamp = {"type": "point", "color": [1, 1, 1], "intensity": 10}
+    file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [lamp]}}
+    file.tree["extensionsUsed"] = ["KHR_lights_punctual"]
+    file.node(extensions={"KHR_lights_punctual": {"light": 0}}, translation=[0, 5, 0])
+    return file.glb()
+
+
+def test_a_model_is_added_or_opened(editor: Editor) -> None:
+    page, things = editor.page, editor.page.locator("#outline-list [data-thing^='/shapes/']")
+    editor.tab("scene")
+    editor.drop("#stage", {"sail.glb": model()})
+    page.keyboard.press("Escape")
+    editor.wait("the end of the question", lambda: page.locator("dialog[open]").count() == 0)
+    assert things.count() == 2 and page.is_disabled("#undo"), "nothing was done"
+
+    editor.drop("#stage", {"sail.glb": model()})
+    page.click("dialog[open] [value=add]")
+    editor.wait("the square", lambda: things.count() == 3)
+    assert "Its light was left out" in editor.text("#messages")
+    assert "sky" not in editor.text("#messages"), "that concerns who opens it"
+    before = document(editor)
+    assert list(before["materials"]) == ["subject", "floor", "subject-2"]
+    assert before["shapes"][2]["material"] == "subject-2" and "lights" not in before
+    low = before["shapes"][2]["transform"]["translate"]
+    assert low[0] > 1.9, "beside the ball"
+    editor.wait("a picture", lambda: page.get_attribute("#stage", "aria-busy") == "false")
+    assert page.locator(".message.refusal").count() == 0
+    page.keyboard.press("Control+z")
+    assert page.is_disabled("#undo") and "textures" not in document(editor), "one step of undo"
+
+    editor.tab("scene")
+    with page.expect_file_chooser() as asked:
+        page.click("#open-file")
+    asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
+    editor.wait("the model alone", lambda: things.count() == 1)
+    with page.expect_file_chooser() as asked:
+        page.click("#add-file")
+    asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
+    editor.wait("another one", lambda: things.count() == 2)

@@ -1,0 +1,106 @@
+// Things that come into the scene: made here, copied, or from files. They stand beside what is there, and in sight.
+
+import { box, remember, together } from "./bounds.js";
+import { axes, isInSight } from "./camera.js";
+import { PLAIN, fresh } from "./materials.js";
+import { adapted } from "./merging.js";
+import { at, pointer } from "./patch.js";
+import { ballOf, solids, union, wayOut } from "./placing.js";
+import { moved } from "./transforms.js";
+import { add, cross, length, normalize, scale, subtract, turn } from "./vector.js";
+
+const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
+const SUNS_APART = Math.PI / 6; // a copied sun shines from another side
+
+// The box around a scene: by its shapes, else by what its camera has in view.
+function sizeOf({ shapes }, { position, target, vfov }) {
+  const known = shapes.filter(({ type }) => type !== "quad").map(box);
+  if (known.length && known.every(Boolean)) return union(known);
+  const reach = length(subtract(position, target)) * Math.tan((vfov * Math.PI) / 360);
+  return { low: target.map((x) => x - reach), high: target.map((x) => x + reach) };
+}
+
+export class Adder {
+  // `acts` is the editor, `stage` knows what is seen.
+  constructor({ acts, stage }) { Object.assign(this, { acts, stage }); }
+
+  // One of `additions` in outliner.js.
+  async add({ kind, title, make }) {
+    const { acts } = this;
+    const { materials } = acts.state.scene;
+    const material = fresh(title.toLowerCase(), materials);
+    const made = make(acts.camera, this.stage.radius(), material);
+    if (kind === "lights") return acts.add(kind, this.#apart(made));
+    return this.#put([made], { materials: { [material]: PLAIN }, stands: made.type !== "quad" });
+  }
+
+  async duplicate(thing) {
+    const [, kind] = thing.split("/");
+    const original = at(this.acts.state.scene, thing);
+    if (kind === "lights") return this.acts.add(kind, this.#apart(original));
+    const own = (await this.stage.boxes())[Number(thing.split("/")[2])];
+    if (own && solids([own], this.acts.camera.position).length) return this.#put([original], { around: own });
+    // A floor or a wall comes in front of itself; what can't be measured goes aside.
+    const away = original.type === "quad" ? normalize(cross(original.u, original.v)) : axes(this.acts.camera).right;
+    return this.acts.add(kind, moved(original, scale(away, this.stage.radius())));
+  }
+
+  // A light that is not where another one is.
+  #apart(light) {
+    const { lights = [] } = this.acts.state.scene;
+    const { right } = axes(this.acts.camera);
+    const isTaken = ({ position, direction }) => lights.some((each) => String(each.position) === String(position)
+      && (position !== undefined || String(each.direction) === String(direction)));
+    let placed = light;
+    for (let i = 0; i <= lights.length && isTaken(placed); i += 1) {
+      placed = placed.position
+        ? { ...placed, position: add(placed.position, scale(right, this.stage.radius())).map((x) => Number(x.toPrecision(4))) }
+        : { ...placed, direction: turn(placed.direction, [0, 1, 0], SUNS_APART).map((x) => Number(x.toPrecision(4))) };
+    }
+    return placed;
+  }
+
+  // A mesh with a material of its own.
+  addMesh(asset, name, around) {
+    const material = fresh(name, this.acts.state.scene.materials);
+    const shape = { type: "mesh", asset, material };
+    return this.#put([shape], { materials: { [material]: PLAIN }, around, stands: true, isFramed: true });
+  }
+
+  // The things of another scene; `around` is the box around them, where that is known.
+  addScene(document, around) {
+    const { shapes, ...others } = adapted(document, this.acts.state.scene);
+    return this.#put(shapes, { ...others, around: around ?? sizeOf(document, this.acts.cameraOf(document)), stands: true, isFramed: true });
+  }
+
+  // Adds shapes as one thing, with materials and textures that the scene lacks. `around` is their box where the
+  // shapes themselves don't tell; the camera goes to them where it can't see them, or is to (`isFramed`).
+  async #put(shapes, { materials = {}, textures = {}, around = null, stands = false, isFramed = false }) {
+    const own = around ?? union(shapes.map(box).filter(Boolean));
+    const boxes = await this.stage.boxes();
+    const { scene, chosen } = this.acts.state;
+    const { camera } = this.acts;
+    const bodies = boxes.filter((_, i) => scene.shapes[i]?.type !== "quad");
+    const way = own && wayOut(own, solids(bodies, camera.position), axes(camera).right, { stands });
+    const placed = way ? shapes.map((shape) => moved(shape, way.offset)) : shapes;
+    const stand = own && way ? { low: add(own.low, way.offset), high: add(own.high, way.offset) } : own;
+    if (stand) remember(placed, stand);
+    const isSeen = !stand || (!isFramed && isInSight(camera, this.stage.aspect, stand));
+    this.acts.change({
+      scene: {
+        ...scene,
+        ...(Object.keys(textures).length ? { textures: { ...scene.textures, ...textures } } : {}),
+        materials: { ...scene.materials, ...materials }, shapes: [...scene.shapes, ...placed],
+        camera: isSeen ? scene.camera : { ...scene.camera, ...this.#framed(stand, way?.neighbour) },
+      },
+      chosen: { ...chosen, thing: pointer("shapes", scene.shapes.length), material: placed[0].material },
+    });
+  }
+
+  // With the neighbour, unless the new thing would be lost beside it.
+  #framed(stand, neighbour) {
+    const [ball, other] = [stand, neighbour].map((each) => each && ballOf(each));
+    if (!(ball.radius > 0)) return {};
+    return this.stage.framed(other && other.radius < COMPANION * ball.radius ? together([ball, other]) : ball);
+  }
+}
