@@ -44,10 +44,10 @@ export class TextureSlot {
     this.canvas = element("canvas", { class: "thumb", "aria-hidden": "true" });
     this.name = element("span", { class: "name" });
     const remove = element("button", {
-      type: "button", class: "forget", "aria-label": `Remove the image from ${field.title}`, onclick: () => acts.remove(),
+      type: "button", class: "forget", "aria-label": `Remove the image from ${field.title}`, onclick: () => { acts.remove(); this.button.focus(); },
     }, "×");
-    const change = element("button", { type: "button", class: "open", title: "Another image", onclick: open }, this.canvas, this.name);
-    this.chip = element("div", { class: "texture", hidden: true }, change, remove);
+    this.change = element("button", { type: "button", class: "open", title: "Another image", onclick: open }, this.canvas, this.name);
+    this.chip = element("div", { class: "texture", hidden: true }, this.change, remove);
   }
 
   // A parameter's value.
@@ -87,8 +87,10 @@ export class TextureSlot {
     });
     if (chosen === "browse") {
       const [file] = await browse(ACCEPT_IMAGES);
-      if (file) acts.useFile(file);
+      if (file) await acts.useFile(file);
     } else if (chosen === "checker") acts.makeChecker();
     else if (chosen !== null) acts.useTexture(chosen.slice(NAMED.length));
+    // The button that asked is hidden now, if there is a texture: the keyboard goes on from the chip.
+    if (document.activeElement === document.body) this.change.focus();
   }
 }

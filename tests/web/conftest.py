@@ -102,6 +102,8 @@ class Editor:
         page.on("pageerror", lambda error: self.complaints.append(str(error)))
         page.on("request", lambda request: self.requests.append(request.url))
         page.on("websocket", lambda opened: self.requests.append(opened.url))
+        # From here on, as it takes a moment: a file picker that nobody waits for yet would be cancelled.
+        page.on("filechooser", lambda _: None)
 
     def _note(self, kind: str, text: str) -> None:
         if kind in ("error", "warning"):

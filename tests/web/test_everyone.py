@@ -37,6 +37,10 @@ def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any
     for tab in ("scene", "render", "keep", "material"):
         editor.tab(tab)
         assert findings(editor) == [], tab
+    editor.page.click("[data-field=roughness] .image")
+    assert findings(editor) == [], "what is offered as an image"
+    editor.page.keyboard.press("Escape")
+    editor.page.evaluate("document.activeElement.blur()")
     editor.page.keyboard.press("c")
     editor.page.keyboard.press("4")
     editor.wait("both", lambda: editor.page.is_visible("#comparison") and editor.page.is_visible("#probe"))

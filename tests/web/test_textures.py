@@ -143,6 +143,8 @@ def test_every_place_for_an_image_is_reached_by_keyboard(editor: Editor) -> None
         page.keyboard.press("Enter")  # the first of what is offered
     asked.value.set_files({"name": "halves.png", "mimeType": "image/png", "buffer": halves()})
     editor.wait("the normal map", lambda: page.is_visible("[data-field=normal_map] .texture"))
+    focused = "document.activeElement.closest('[data-field]')?.dataset.field"
+    editor.wait("the keyboard to go on there", lambda: page.evaluate(focused) == "normal_map")
     thumbnail = "[data-field=normal_map] .texture canvas"
     editor.wait("its picture", lambda: painted(editor, thumbnail) == [0, 220, 0, 255, 0, 0, 40, 255])
 
