@@ -105,7 +105,7 @@ def test_a_light_is_selected_by_its_mark(editor: Editor) -> None:
 
 
 def model() -> bytes:
-    """A square whose material and texture have names that the first scene has, too, and a lamp."""
+    """A square whose material has a name that the first scene has, too, with a lamp and a camera."""
     file = gltf_files.Gltf()
     pixels = np.full((4, 4, 3), (0, 200, 0), np.uint8)
     texture = {"baseColorTexture": {"index": file.texture(pixels)}}
@@ -114,6 +114,8 @@ def model() -> bytes:
     file.tree["extensions"] = {"KHR_lights_punctual": {"lights": [lamp]}}
     file.tree["extensionsUsed"] = ["KHR_lights_punctual"]
     file.node(extensions={"KHR_lights_punctual": {"light": 0}}, translation=[0, 5, 0])
+    camera = {"type": "perspective", "perspective": {"aspectRatio": 1.5, "yfov": 0.7, "znear": 0.1}}
+    file.node(camera=file.add("cameras", camera), translation=[0, 0, 5])
     return file.glb()
 
 
@@ -145,6 +147,8 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
         page.click("#open-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
     editor.wait("the model alone", lambda: things.count() == 1)
+    editor.wait("what is said of it", lambda: "sky" in editor.text("#messages"))
+    assert "wide" not in editor.text("#messages"), "the picture is as wide as the window in any case"
     with page.expect_file_chooser() as asked:
         page.click("#add-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
