@@ -27,7 +27,6 @@ class Machine:
     folder: Path
     user: int = 0
     status: int = 0  # that apt-get ends with
-    wanted: str = "1"  # MESA_25
 
     def does(self, command: str) -> subprocess.CompletedProcess[str]:
         """Runs it with the functions of .ci/packages, on a Debian 12 without a GPU."""
@@ -41,7 +40,6 @@ class Machine:
         environment = {
             **os.environ,
             **paths,
-            "MESA_25": self.wanted,
             "PATH": f"{self.folder}:{os.environ['PATH']}",
             "STATUS": str(self.status),
             "TMPDIR": str(self.folder / "temporary"),
@@ -75,12 +73,6 @@ def test_a_faster_mesa_comes_from_backports_and_leaves_no_trace(tmp_path: Path) 
     suites = ["bookworm", "bookworm-updates", "bookworm-backports"]
     assert [line.split("] ")[1] for line in sources] == [f"http://mirror/debian/ {suite} main" for suite in suites]
     assert not list((tmp_path / "temporary").iterdir())
-
-
-def test_it_is_left_alone_unless_asked_for(tmp_path: Path) -> None:
-    machine = Machine(tmp_path, wanted="")
-    done = machine.does(f"offer_faster_mesa '{OLD}'; install_mesa_25 || echo no")
-    assert done.returncode == 0 and done.stdout == "no\n" and not done.stderr and not machine.asked
 
 
 def test_offline_it_goes_on_with_the_mesa_that_is_there(tmp_path: Path) -> None:
