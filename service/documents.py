@@ -97,7 +97,7 @@ class Documents:
 
         Raises DamagedFile.
         """
-        if not self._path.exists():
+        if not self._is_there():
             return
         try:
             with self._connected() as database:
@@ -168,7 +168,7 @@ class Documents:
     @contextmanager
     def assets_in_use(self) -> Iterator[set[str]]:
         """The ids of all assets that saved documents refer to; while it lasts no document is saved."""
-        if not self._path.exists():
+        if not self._is_there():
             yield set()
             return
         with self._open() as database, database:
@@ -178,7 +178,7 @@ class Documents:
     @property
     def bytes(self) -> int:
         """What the documents take, without the log beside them, which goes when nobody has the file open."""
-        if not self._path.exists():
+        if not self._is_there():
             return 0
         with self._open() as database:
             pages, free, size = (
@@ -205,6 +205,12 @@ class Documents:
         if database.execute("PRAGMA auto_vacuum").fetchone() == (0,):
             database.execute("PRAGMA auto_vacuum = FULL")
             database.execute("VACUUM")
+
+    def _is_there(self) -> bool:
+        try:
+            return self._path.exists()
+        except PermissionError:  # of the folder; to open the file then fails, and that is reported
+            return True
 
     @contextmanager
     def _open(self) -> Iterator[sqlite3.Connection]:

@@ -7,6 +7,7 @@ client does not fetch leaves room for others.
 from __future__ import annotations
 
 import asyncio
+import errno
 import logging
 import os
 import tempfile
@@ -26,6 +27,7 @@ PIECE = 1 << 18  # bytes that are read and sent at a time
 AT_ONCE = 2  # pictures that are fetched from the renderer and written
 ROOM = 4 << 30  # bytes on the disk of pictures that are being sent; one client has at most half
 RETRY_S = 10
+READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 log = logging.getLogger(__name__)
 
@@ -139,14 +141,23 @@ class Downloads:
     def write(self, fill: Callable[[BinaryIO], None]) -> Written:
         """A file that `fill` has written. For any thread. Raises Unavailable where the disk takes no more."""
         try:
-            self._folder.mkdir(parents=True, exist_ok=True)
-            file = tempfile.TemporaryFile(dir=self._folder)  # noqa: SIM115 (`Written` has it)
+            file = self._new_file()
             fill(file)
             file.flush()
         except OSError as error:
             log.error("could not write an answer error=%s", error)
             raise Unavailable("The answer could not be written to the disk.", RETRY_S) from None
         return Written(file)
+
+    def _new_file(self) -> BinaryIO:
+        """A file without a name beside the data, or a temporary one where the data is read-only."""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            return tempfile.TemporaryFile(dir=self._folder)
+        except OSError as error:
+            if error.errno not in READ_ONLY:
+                raise
+            return tempfile.TemporaryFile()
 
     def keep(self, client: str, key: Hashable | None, written: Written) -> None:
         """Counts a picture as long as it is being sent; with `key` another request for it finds it."""

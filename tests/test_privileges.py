@@ -86,6 +86,24 @@ def test_what_root_left_behind_keeps_nobody_from_rendering(gpu: Renderer, tmp_pa
             folder.chmod(0o700)
 
 
+def test_a_data_folder_that_may_not_be_looked_into(gpu: Renderer, tmp_path: Path) -> None:
+    closed = tmp_path / "closed"
+    closed.mkdir(0)
+    try:
+        with served(tmp_path, SUNBOX_DATA_DIR=str(closed / "sunbox")) as server:
+            assert picture(server).startswith(b"\x89PNG")
+            for answer in (
+                server.http.get("/v1/documents/materials"),
+                server.http.put("/v1/documents/materials/grey", json=MATERIAL),
+                server.http.post("/v1/assets?format=obj", content=TRIANGLE),
+            ):
+                assert answer.status_code == 503, answer.text
+        log = server.log.read_text()
+        assert f"owns {closed} and" in log and "Traceback" not in log
+    finally:
+        closed.chmod(0o700)
+
+
 def test_who_may_not_use_the_gpu_is_told(tmp_path: Path) -> None:
     for name, mode in (("renderD128", 0), ("renderD129", 0o600), ("card0", 0)):
         (tmp_path / name).touch(mode)
