@@ -26,8 +26,10 @@ class Model(BaseModel):
     def _without_most_unknown_names(cls, value: Any) -> Any:
         """Leaves enough unknown names to refuse the object: pydantic makes an error of each, of a hundred thousand
         too, and lets no other thread run meanwhile."""
+        if not isinstance(value, dict) or len(value) <= MOST_MISTAKES:  # nearly always, and `model_fields` takes time
+            return value
         fields = cls.model_fields
-        if not isinstance(value, dict) or len(value) <= len(fields) + MOST_MISTAKES:
+        if len(value) <= len(fields) + MOST_MISTAKES:
             return value
         unknown = islice((name for name in value if name not in fields), MOST_MISTAKES)
         return {name: value[name] for name in fields if name in value} | {name: value[name] for name in unknown}
