@@ -1,8 +1,8 @@
 """Arrays in, images out. Knows no HTTP, no JSON, no scene document; all names not listed here are private."""
 
-from gpu.ahead import Recipe
+from gpu.analysis.path_truncation import bounced_paths, missing_light
 from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays
-from gpu.beyond import bounced_paths, missing_light
+from gpu.device.scene import Scene
 from gpu.errors import (
     CompileError,
     ContextError,
@@ -12,10 +12,11 @@ from gpu.errors import (
     SceneTooLarge,
     WrongThread,
 )
-from gpu.picture import Picture
+from gpu.footprint import picture_bytes, scene_bytes
+from gpu.picture.picture import Picture
+from gpu.picture.saved import Saved, save
+from gpu.precompile.kernel_keys import KernelKey
 from gpu.renderer import Renderer
-from gpu.saved import Saved, picture_bytes, save, scene_bytes
-from gpu.scene import Scene
 from gpu.settings import AOVS, ESTIMATORS, FILTERS, SAMPLERS, TONE_MAPS, RenderSettings
 
 __all__ = [
@@ -29,10 +30,10 @@ __all__ = [
     "ContextError",
     "EnvironmentArrays",
     "GpuError",
+    "KernelKey",
     "NothingRendered",
     "OutOfMemory",
     "Picture",
-    "Recipe",
     "RenderSettings",
     "Renderer",
     "Saved",

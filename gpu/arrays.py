@@ -9,8 +9,8 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import ShapeKind
-from gpu.record import Record
-from gpu.sky import SunDisk
+from gpu.layout.record import Record
+from gpu.tables.sky import SunDisk
 
 Vec3 = tuple[float, float, float]
 
@@ -59,7 +59,7 @@ class TextureArrays:
     """What the scene's textures are made of, and how its materials use them.
 
     `slots`: the members of `layout.Material` that any material has textured (and "normal", "coat_normal"), with the
-    slot that gives each its texel; those of `texturing.OTHER_RANGES` have slots of their own, after all others.
+    slot that gives each its texel; those of `texture_records.OTHER_RANGES` have slots of their own, after all others.
     """
 
     slots: dict[str, int]
@@ -98,8 +98,10 @@ class SceneArrays:
     triangle_uvs_1: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # of set 1
     triangle_colors: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 4), np.float16))
     lights: np.ndarray = field(default_factory=lambda: _empty(layout.Light))
-    light_tree: np.ndarray = field(default_factory=lambda: np.zeros((0, 4), np.uint32))  # as by gpu.light_tree.build
-    nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # as by gpu.bvh.thread
+    light_tree: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 4), np.uint32)
+    )  # as by gpu.accel.light_tree.build
+    nodes: np.ndarray = field(default_factory=lambda: _empty(layout.Node))  # as by gpu.accel.bvh.thread
     node_count: int = 0  # of one octant's order
     node_origin: Vec3 = (0.0, 0.0, 0.0)
     node_scale: Vec3 = (0.0, 0.0, 0.0)

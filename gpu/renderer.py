@@ -8,13 +8,13 @@ from typing import Any
 from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
+from gpu.device.scene import Scene
+from gpu.device.textures import TextureCache
 from gpu.errors import SceneTooLarge, WrongThread
-from gpu.kernels import Kernels
-from gpu.picture import Picture
-from gpu.scene import Scene
+from gpu.kernels.cache import KernelCache
+from gpu.picture.picture import Picture
+from gpu.precompile.fallback import FallbackScene
 from gpu.settings import RenderSettings
-from gpu.stopgap import Provisional
-from gpu.texels import Texels
 
 
 class Renderer:
@@ -23,8 +23,8 @@ class Renderer:
     def __init__(self, device: int | None = None) -> None:
         self._thread = threading.get_ident()
         self._context = contexts.create(device)
-        self._kernels = Kernels(self._context)
-        self._texels = Texels()
+        self._kernels = KernelCache(self._context)
+        self._texels = TextureCache()
         self._frame = self._context.buffer(reserve=layout.Frame.dtype.itemsize)
         self.info: dict[str, Any] = contexts.describe(self._context)
 
@@ -49,15 +49,15 @@ class Renderer:
         _check(arrays)
         return Scene(self._context, arrays, editing, self._texels, everything, raised)
 
-    def provisional(self, arrays: SceneArrays) -> Scene:
-        """Upload a scene to be shown with the kernel of `stopgap`, where that has a recipe for it. What other scenes
-        share with it is uploaded once.
+    def load_fallback(self, arrays: SceneArrays) -> Scene:
+        """Upload a scene to be shown with the kernel of `fallback`, where that can show it. What it shares with other
+        scenes is uploaded once.
 
         Raises SceneTooLarge, OutOfMemory.
         """
         self._own()
         _check(arrays)
-        return Provisional(self._context, arrays, self._texels)
+        return FallbackScene(self._context, arrays, self._texels)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.

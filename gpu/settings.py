@@ -14,7 +14,7 @@ AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_
 @dataclass(frozen=True)
 class RenderSettings:
     """Size in pixels; `clamp` bounds the radiance of indirect light (None: unbiased); `adaptive`: a pixel's samples
-    follow its noise (gpu/plan.py), and a picture's are their mean."""
+    follow its noise (gpu/picture/sample_plan.py), and a picture's are their mean."""
 
     width: int
     height: int

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from gpu import Renderer, SceneArrays, bindings, layout
-from gpu.bindings import Slot
-from gpu.features import FLAGS
-from gpu.layout import LightKind, LightNode, LightTreeHead
-from gpu.texels import rows
+from gpu import Renderer, SceneArrays, layout
+from gpu.device.textures import linear_texture
+from gpu.kernels.features import FLAGS
+from gpu.layout import LightKind, LightNode, LightTreeHead, bindings
+from gpu.layout.bindings import Slot
 from tests.probing import prober_of
 
 
@@ -75,7 +75,7 @@ class Picker:
     def __init__(self, gpu: Renderer, arrays: SceneArrays) -> None:
         self._prober, self._lights = prober_of(gpu), arrays.lights.copy()
         self._lights["index"] = np.arange(len(self._lights))
-        self._texture = rows(self._prober.context, arrays.light_tree, 4, "u4")
+        self._texture = linear_texture(self._prober.context, arrays.light_tree, 4, "u4")
 
     def _run(self, sample: int, count: int, asks: np.ndarray, p: Any, n: Any, through: bool) -> np.ndarray:
         self._texture.use(bindings.LIGHT_TREE_TEXTURE)

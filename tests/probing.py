@@ -9,11 +9,14 @@ from typing import Any
 
 import numpy as np
 
-from gpu import Renderer, bindings, features, filters, layout
-from gpu.bindings import Slot
-from gpu.kernels import Kernels
-from gpu.program import SHADERS
-from gpu.scene import upload_tables
+from gpu import Renderer, layout
+from gpu.device.scene import upload_tables
+from gpu.kernels import features
+from gpu.kernels.cache import KernelCache
+from gpu.kernels.source import SHADERS
+from gpu.layout import bindings
+from gpu.layout.bindings import Slot
+from gpu.picture import filters
 
 PROBES = Path(__file__).parent / "probes"
 # All flags of the production model.
@@ -39,7 +42,7 @@ class Prober:
 
     def __init__(self, renderer: Renderer) -> None:
         self.context = renderer._context
-        self._kernels = Kernels(self.context, (PROBES, SHADERS))
+        self._kernels = KernelCache(self.context, (PROBES, SHADERS))
 
     @cached_property
     def _tables(self) -> dict[int, Any]:

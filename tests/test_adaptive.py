@@ -9,10 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Picture, Renderer, RenderSettings, adaptive, save
-from gpu.bindings import Slot
-from gpu.meter import FROM
-from gpu.plan import AREA, CLASSES, DECISIONS, LEAST, MOST, Plan, pixels_of, weights_of
+from gpu import Picture, Renderer, RenderSettings, save
+from gpu.layout.bindings import Slot
+from gpu.picture import adaptive
+from gpu.picture.noise_meter import FROM
+from gpu.picture.sample_plan import AREA, CLASSES, DECISIONS, LEAST, MOST, SamplePlan, pixels_of, weights_of
 from service.cli import main
 from tests.rendering import Images, document, picture
 from tests.serving import SCENE, SMALL, Client, Server
@@ -41,7 +42,7 @@ def test_a_plan_rises_to_its_mean() -> None:
     rng = np.random.default_rng(3)
     pixels = pixels_of(44, 37)
     had = rng.integers(4, 12, pixels.shape).astype(np.uint32)
-    plan = Plan(pixels, had, weights_of(rng.random(pixels.shape) ** 8, pixels))
+    plan = SamplePlan(pixels, had, weights_of(rng.random(pixels.shape) ** 8, pixels))
     before = had
     for samples in (8, 9, 11, 20, 21, 64, 500):
         wanted = plan.at(samples)
@@ -51,7 +52,7 @@ def test_a_plan_rises_to_its_mean() -> None:
         before = wanted
     shares = plan.at(5000) / (5000 * plan.weights)
     assert shares == pytest.approx(np.broadcast_to(shares.mean((0, 1)), shares.shape), rel=0.01)
-    assert Plan(pixels).at(7).min() == Plan(pixels).at(7).max() == 7
+    assert SamplePlan(pixels).at(7).min() == SamplePlan(pixels).at(7).max() == 7
 
 
 def test_no_class_is_planned_by_itself() -> None:

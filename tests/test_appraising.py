@@ -13,7 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Recipe, Renderer, RenderSettings, features
+from gpu import KernelKey, Renderer, RenderSettings
+from gpu.kernels import features
 from service.cli import main
 from service.rendering.engine import Engine
 from service.rendering.messages import Appraise, Appraised, Done, StopRule, Update
@@ -38,16 +39,16 @@ class Elsewhere:
     """A compiler that has a kernel when it is told so."""
 
     def __init__(self) -> None:
-        self.asked: list[Recipe] = []
+        self.asked: list[KernelKey] = []
         self.told: Any = None
         self.there = False
 
-    def waits(self, recipe: Recipe, told: Any) -> bool:
+    def waits(self, recipe: KernelKey, told: Any) -> bool:
         self.asked.append(recipe)
         self.told = told
         return not self.there
 
-    def has(self, recipe: Recipe) -> bool:
+    def has(self, recipe: KernelKey) -> bool:
         return self.there
 
     def forget(self, told: Any) -> None:

@@ -7,7 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, program
+from gpu import Renderer
+from gpu.kernels import source
 from tests.probing import prober_of
 from tests.rendering import Images, document, picture
 from tests.test_sampling import _draw
@@ -47,7 +48,7 @@ def test_it_shows_the_same_picture(gpu: Renderer, ball: dict[str, Any]) -> None:
 
 def pictures(gpu: Renderer, scene: dict[str, Any], samples: int, **settings: Any) -> tuple[np.ndarray, np.ndarray]:
     """As it is, and by a renderer whose lights are asked once."""
-    read = program._read
+    read = source._read
 
     def changed(name: str, folders: Any) -> str:
         text = read(name, folders)
@@ -55,7 +56,7 @@ def pictures(gpu: Renderer, scene: dict[str, Any], samples: int, **settings: Any
         return text.replace("&& surface_is_broad(s)", "&& false")
 
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(program, "_read", changed)
+        patch.setattr(source, "_read", changed)
         once = picture(Renderer(), scene, samples, SKY, **settings).read()[..., :3]
     return picture(gpu, scene, samples, SKY, **settings).read()[..., :3], once
 

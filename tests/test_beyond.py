@@ -41,7 +41,7 @@ def test_inside_a_glowing_sphere(gpu: Renderer, albedo: float) -> None:
 
 
 def test_more_bounces_than_the_deepest_are_the_measure(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("gpu.beyond.DEEPEST", 5)
+    monkeypatch.setattr("gpu.analysis.path_truncation.DEEPEST", 5)
     material = {"type": "diffuse", "albedo": 0.5, "emission": 2, "emission_sides": "both"}
     sphere = {"type": "sphere", "center": [0, 0, 0], "radius": 9, "material": "m"}
     found = shares(gpu, document([sphere], {"m": material}), estimator="bsdf", roulette_depth=100)

@@ -5,7 +5,7 @@ import itertools
 import numpy as np
 import pytest
 
-from gpu import bvh, bvh_grow
+from gpu.accel import bvh, bvh_build
 from gpu.errors import SceneTooLarge
 from gpu.layout import (
     LEAF_BIT,
@@ -223,7 +223,7 @@ def cost(tree, nodes):
     area = x * y + y * z + z * x
     link = nodes["link"][: tree.count].astype(np.int64)
     inside = np.where(link & LEAF_BIT, ((link >> LEAF_COUNT_SHIFT) & 15) + 1, 0)
-    return float((area * (bvh_grow.NODE_COST + inside)).sum() / area[0])
+    return float((area * (bvh_build.NODE_COST + inside)).sum() / area[0])
 
 
 def median_cost(low, high, leaf_size=4):
@@ -235,11 +235,11 @@ def median_cost(low, high, leaf_size=4):
 
     def below(ids):
         if len(ids) <= leaf_size:
-            return area(ids) * (bvh_grow.NODE_COST + len(ids))
+            return area(ids) * (bvh_build.NODE_COST + len(ids))
         middle = low[ids] + high[ids]
         ids = ids[np.argsort(middle[:, np.argmax(np.ptp(middle, axis=0))], kind="stable")]
         half = len(ids) // 2
-        return area(ids) * bvh_grow.NODE_COST + below(ids[:half]) + below(ids[half:])
+        return area(ids) * bvh_build.NODE_COST + below(ids[:half]) + below(ids[half:])
 
     everything = np.arange(len(low))
     return below(everything) / area(everything)

@@ -14,8 +14,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Recipe, Renderer, RenderSettings, features
-from gpu.ahead import common, recipe
+from gpu import KernelKey, Renderer, RenderSettings
+from gpu.kernels import features
+from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.pack import pack
 from service.rendering.engine import Engine
 from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
@@ -32,13 +33,14 @@ LINEAR = View(encoding="linear")
 
 AHEAD = """
 import sys
-from gpu import features
-from gpu.ahead import ENTRY, GUIDES, Ahead, common, recipe
+from gpu.kernels import features
+from gpu.precompile.kernel_keys import ENTRY, GUIDES, common_keys, kernel_key
+from gpu.precompile.precompiler import Precompiler
 from tests.test_compiling import SETTINGS, arrays_of
 a, settings = arrays_of(sys.argv[1]), SETTINGS[sys.argv[1]]
-ahead = Ahead()
-recipes = [recipe(a, settings, features.flags(a), entry) for entry in (ENTRY, GUIDES)]
-print(all([ahead.compile(each)[1] for each in [*recipes, *common()]]))
+precompiler = Precompiler()
+keys = [kernel_key(a, settings, features.flags(a), entry) for entry in (ENTRY, GUIDES)]
+print(all([precompiler.compile(each)[1] for each in [*keys, *common_keys()]]))
 """
 RENDERER = """
 import sys
@@ -249,10 +251,10 @@ class Instant:
     process_id = None
 
     def __init__(self) -> None:
-        self.asked: list[Recipe] = []
+        self.asked: list[KernelKey] = []
         self.answers = 0
 
-    def ask(self, recipe: Recipe) -> None:
+    def ask(self, recipe: KernelKey) -> None:
         self.asked.append(recipe)
 
     def hear(self) -> Compiled:
@@ -268,12 +270,12 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
     for _ in range(2):
         compiler, helper = Compiler(gpu.info, None, lambda: True, spare=True), Instant()
         compiler._helper = helper  # type: ignore[assignment]
-        compiler.prepare(common())
+        compiler.prepare(common_keys())
         while compiler.left_s is not None:
             compiler.hear()
-        assert all(compiler.has(recipe) for recipe in common())
+        assert all(compiler.has(recipe) for recipe in common_keys())
         asked.append(helper.asked)
-    assert asked == [common(), []] and len(common()) == 15
+    assert asked == [common_keys(), []] and len(common_keys()) == 15
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -296,7 +298,7 @@ def test_the_renderer_finds_all_of_it(gpu: Renderer, cold: Path, name: str) -> N
 
 def test_a_kernel_outlives_the_renderer_that_wanted_it(gpu: Renderer, arrays: Any, cold: Path) -> None:
     """Else a machine so slow that renderers are killed before a kernel is there would never have it."""
-    wanted = recipe(arrays, RenderSettings(**COLD), features.flags(arrays))
+    wanted = kernel_key(arrays, RenderSettings(**COLD), features.flags(arrays))
     record = records() / wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
 
     async def test(engine: Engine) -> None:

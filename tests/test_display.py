@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import TONE_MAPS, NothingRendered, Picture, Renderer, RenderSettings
-from gpu.display import encode, srgb
+from gpu.picture.display import encode, srgb
 from service.pack import pack
 from service.scene import parse_scene
 from tests.rendering import Images, document, picture

@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import energy
-from gpu.energy_fit import between, fitted, raised
-from gpu.energy_quadrature import albedos
-from gpu.energy_tables import AXES
+from gpu.tables import energy
+from gpu.tables.build.energy_fit import between, fitted, raised
+from gpu.tables.build.energy_quadrature import albedos
+from gpu.tables.build.energy_tables import AXES
 
 
 def test_shapes_and_ranges() -> None:

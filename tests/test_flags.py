@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
-from gpu.ahead import recipe, touched_recipes
+from gpu.analysis.kernel_cost import kernel_cost
 from gpu.arrays import SceneArrays
-from gpu.features import FLAGS, LEAST_ROUGHNESS, flags, grown
-from gpu.price import kernel_price
-from gpu.program import SHADERS
-from gpu.view import open_share
+from gpu.kernels.features import FLAGS, LEAST_ROUGHNESS, flags, grown
+from gpu.kernels.source import SHADERS
+from gpu.kernels.visibility import background_share
+from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
 from service.pack import Packed, pack
 from service.scene import parse_scene
 from tests.extremes.scenes import LONG, ball, icosphere, quad
@@ -134,10 +134,10 @@ def test_how_much_of_the_view_is_open(gpu: Renderer, radius: float) -> None:
     camera = {"position": [1, 2, 4], "target": [0.2, 0, 0], "vfov": 40}
     arrays = pack(parse_scene(document([ball("m", radius=radius)], camera=camera)), IMAGES).arrays
     seen = _seen(gpu, RenderSettings(64, 64, 1, filter="box"), arrays)
-    share = open_share(arrays)
+    share = background_share(arrays)
     assert share == pytest.approx(1 - seen[..., 3].mean(), abs=0.02)
     assert ("HAS_OPEN_VIEW" in flags(arrays)) == (share >= 0.4)
-    assert open_share(pack(parse_scene(lit(ball("m", radius=radius), FLOOR)), IMAGES).arrays) == 0
+    assert background_share(pack(parse_scene(lit(ball("m", radius=radius), FLOOR)), IMAGES).arrays) == 0
 
 
 @pytest.mark.parametrize("name", SCENES if LONG else ["CLEARCOAT", "MIRRORS"])
@@ -202,13 +202,13 @@ def test_the_first_touch_of_a_slider_is_foreseen(shape: Doc, more: Doc) -> None:
     """And whoever touched it already gets nothing compiled for that."""
     plastic, settings = {"type": "principled", "roughness": 0.3}, RenderSettings(48, 32)
     before, after = (pack(parse_scene(made_of({**plastic, **m}, shape)), IMAGES).arrays for m in ({}, more))
-    wanted = recipe(after, settings, grown(flags(before, True), after))
-    assert wanted in touched_recipes(before, settings)
-    assert wanted not in touched_recipes(after, settings)
-    assert touched_recipes(_packed("DISNEY").arrays, settings) == []
+    wanted = kernel_key(after, settings, grown(flags(before, True), after))
+    assert wanted in keys_after_edit(before, settings)
+    assert wanted not in keys_after_edit(after, settings)
+    assert keys_after_edit(_packed("DISNEY").arrays, settings) == []
 
 
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:
-    price = kernel_price(gpu, _packed("CLEARCOAT").arrays)
+    price = kernel_cost(gpu, _packed("CLEARCOAT").arrays)
     assert {"clearcoat", "disney", "spheres"} <= set(price.raised) and "bvh" in price.spared
     assert price.saving > 0.3  # .9 was measured

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, features
-from gpu.program import Source
+from gpu import Renderer, RenderSettings
+from gpu.kernels import features
+from gpu.kernels.source import KernelSource
 from service.pack import instances, pack
 from service.scene import parse_scene
 from tests import documents
@@ -166,7 +167,7 @@ def test_kernels_of_other_scenes_have_nothing_of_it() -> None:
     """Of what a kernel is compiled from, without the flag, no line knows of instances."""
     flags = frozenset(features.FLAGS) - {"HAS_INSTANCES"}
     for entry in ("pathtrace.comp", "guides.comp"):
-        text = Source(entry, features.defines(flags)).text.replace("#define HAS_INSTANCES 0\n", "")
+        text = KernelSource(entry, features.defines(flags)).text.replace("#define HAS_INSTANCES 0\n", "")
         assert re.search("instance", text, re.IGNORECASE)
         assert not re.search("instance|node_first", _without_instances(text), re.IGNORECASE)
 

@@ -8,8 +8,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, kernels
-from gpu.kernels import Kernels
+from gpu import Renderer, RenderSettings
+from gpu.kernels import cache
+from gpu.kernels.cache import KernelCache
 from service.rendering.worker import compiler
 from tests.test_compiling import arrays_of
 
@@ -21,19 +22,19 @@ void main() { b[0] = WHICH; }
 
 
 @pytest.fixture
-def few(gpu: Renderer, tmp_path: Path) -> Iterator[Kernels]:
+def few(gpu: Renderer, tmp_path: Path) -> Iterator[KernelCache]:
     (tmp_path / "a.comp").write_text(TEXT)
-    made = Kernels(gpu._context, (tmp_path,), most=3, longest_s=100.0)
+    made = KernelCache(gpu._context, (tmp_path,), most=3, longest_s=100.0)
     yield made
     made.release()
 
 
-def get(few: Kernels, which: int) -> tuple[object, bool]:
+def get(few: KernelCache, which: int) -> tuple[object, bool]:
     """The kernel, and whether it had to be compiled."""
     return few.get("a.comp", {"WHICH": which}), few.last_compile_ms > 0
 
 
-def test_the_longest_unused_goes_first(few: Kernels) -> None:
+def test_the_longest_unused_goes_first(few: KernelCache) -> None:
     for which in (1, 2, 3):
         assert get(few, which)[1]
     assert not get(few, 1)[1] and get(few, 4)[1]
@@ -41,7 +42,7 @@ def test_the_longest_unused_goes_first(few: Kernels) -> None:
     assert not get(few, 1)[1] and not get(few, 3)[1] and get(few, 2)[1]
 
 
-def test_what_is_held_stays(gpu: Renderer, few: Kernels) -> None:
+def test_what_is_held_stays(gpu: Renderer, few: KernelCache) -> None:
     held = [get(few, which)[0] for which in range(5) if few.hold(get(few, which)[0]) is None]
     for which in range(100, 120):
         get(few, which)
@@ -57,9 +58,9 @@ def test_what_is_held_stays(gpu: Renderer, few: Kernels) -> None:
     assert len(few) == 3 + 1 and get(few, 0) == (held[0], False)  # which somebody else still has
 
 
-def test_age_ends_what_nobody_holds(few: Kernels, monkeypatch: pytest.MonkeyPatch) -> None:
-    now = kernels.time.monotonic()
-    monkeypatch.setattr(kernels.time, "monotonic", lambda: now)
+def test_age_ends_what_nobody_holds(few: KernelCache, monkeypatch: pytest.MonkeyPatch) -> None:
+    now = cache.time.monotonic()
+    monkeypatch.setattr(cache.time, "monotonic", lambda: now)
     assert few.tidy() is None
     few.hold(get(few, 1)[0])
     assert few.tidy() is None

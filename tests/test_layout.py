@@ -5,12 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import Renderer, bindings, glsl, layout
-from gpu.bindings import COUNTED
-from gpu.features import COUNTS, FEW, FLAGS, defines
-from gpu.layout import BUFFERS
-from gpu.record import LayoutError, Record, f32, vec3
-from gpu.texels import rows
+from gpu import Renderer, layout
+from gpu.device.textures import linear_texture
+from gpu.kernels import layout_glsl
+from gpu.kernels.features import COUNTS, FEW, FLAGS, defines
+from gpu.layout import BUFFERS, bindings
+from gpu.layout.bindings import COUNTED
+from gpu.layout.record import LayoutError, Record, f32, vec3
 
 
 @pytest.mark.parametrize("name", [*BUFFERS, "instance"])
@@ -36,12 +37,12 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
     known |= {f"{name.upper()}_COUNT": count} if block else {}
     head = "\n".join(f"#define {k} {v}" for k, v in known.items())
     kernel = gpu._context.compute_shader(
-        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{glsl.text()}\n"
+        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout_glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
         f"void main() {{\n    uint i = gl_GlobalInvocationID.x;\n    if (i >= {count}u) return;\n"
         f"    {record.__name__} r = {name}_load(i);\n" + "\n".join(lines) + "\n}\n"
     )
-    data = rows(gpu._context, words, 4, "u4") if slot is None else gpu._context.buffer(words.tobytes())
+    data = linear_texture(gpu._context, words, 4, "u4") if slot is None else gpu._context.buffer(words.tobytes())
     echo = gpu._context.buffer(reserve=4 * count * out_words)
     if slot is None:
         data.use(bindings.INSTANCES_TEXTURE)
@@ -70,7 +71,7 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
             expected.append(words[record.offsets[member] + k])
     head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset({"HAS_INSTANCES"})).items())
     kernel = gpu._context.compute_shader(
-        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{glsl.text()}\n"
+        f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout_glsl.text()}\n"
         "layout(std430, binding = 15) writeonly buffer echo_buffer { uint echo[]; };\n"
         "void main() {\n    if (gl_GlobalInvocationID.x > 0u) return;\n" + "\n".join(lines) + "\n}\n"
     )

@@ -187,7 +187,7 @@ def test_all_estimators_converge_to_the_same_picture(gpu: Renderer) -> None:
 
 @pytest.mark.parametrize("filter_name", FILTERS)
 def test_the_cut_into_slices_does_not_show(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, filter_name: str) -> None:
-    from gpu import tiles as module
+    from gpu.picture import tiles as module
 
     pictures = []
     for slice_s, pass_s, budget in ((1.0, 1.0, 600.0), (1e-5, 1e-4, 1e-4), (1e-3, 5.0, 1e-3)):
@@ -205,7 +205,7 @@ def test_the_cut_into_slices_does_not_show(gpu: Renderer, monkeypatch: pytest.Mo
 
 
 def test_flags_change_no_pixel_beyond_rounding(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
-    from gpu import features
+    from gpu.kernels import features
 
     exact = render(gpu, _showcase(), 16, max_bounces=3, roulette_depth=99)
     everything = frozenset(features.FLAGS)

@@ -8,8 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, SceneArrays, layout, light_tree
-from gpu.features import flags
+from gpu import Renderer, SceneArrays, layout
+from gpu.accel import light_tree
+from gpu.kernels.features import flags
 from gpu.layout import LightKind
 from service.pack import PackCache, bounded, pack
 from service.scene import parse_scene

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import ESTIMATORS, Renderer
-from gpu.bindings import Slot
+from gpu.layout.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests import stats

@@ -8,15 +8,15 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.bindings import Slot
-from gpu.features import EDITED
-from gpu.layout import Model
+from gpu.kernels.features import EDITED
+from gpu.layout import MaterialModel
+from gpu.layout.bindings import Slot
 from tests import baseline, disney, stats
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 
-D, METAL_ROUGH, BLINN_PHONG = Model.DISNEY, Model.METAL_ROUGH, Model.BLINN_PHONG
+D, METAL_ROUGH, BLINN_PHONG = MaterialModel.DISNEY, MaterialModel.METAL_ROUGH, MaterialModel.BLINN_PHONG
 ROWS = {
-    "diffuse": materials(model=Model.DIFFUSE, base_color=(0.8, 0.5, 0.1)),
+    "diffuse": materials(model=MaterialModel.DIFFUSE, base_color=(0.8, 0.5, 0.1)),
     "disney default": materials(model=D),
     "retro-reflective": materials(model=D, roughness=1, specular=0, base_color=(0.9, 0.2, 0.4)),
     "subsurface": materials(model=D, subsurface=1, roughness=0.8),
@@ -42,7 +42,7 @@ ROWS = {
     "blinn-phong mirror": materials(model=BLINN_PHONG, base_color=0, phong_specular=1, shininess=1e6),
 }  # fmt: skip
 RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] != BLINN_PHONG]
-P = Model.PRINCIPLED
+P = MaterialModel.PRINCIPLED
 GLASS = {"model": P, "transmission": 1, "base_color": (1, 0.8, 0.6)}
 PRINCIPLED = {
     "plastic": materials(model=P, roughness=0.3),

@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.bindings import Slot
 from gpu.layout import METER_REPLICATES
-from gpu.meter import FROM, around, draw, inclusion, squared_error
+from gpu.layout.bindings import Slot
+from gpu.picture.noise_meter import FROM, around, draw, inclusion, squared_error
 from service import presets
 from tests.rendering import Images, document, picture
 

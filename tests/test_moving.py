@@ -7,8 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, SceneArrays, ahead, features
+from gpu import Renderer, RenderSettings, SceneArrays
+from gpu.kernels import features
 from gpu.layout import Instance, Node
+from gpu.precompile import kernel_keys
 from service.pack import PackCache, instances, moved, moves, pack
 from service.scene import parse_scene
 from tests.test_instances import IMAGES, two
@@ -115,12 +117,12 @@ def test_a_small_mesh_that_moves_stays_among_the_others(monkeypatch: pytest.Monk
 
 def test_the_kernel_that_a_move_will_need_is_foreseen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(instances, "WORTH", 10**9)
-    for module in (moves, ahead):
+    for module in (moves, kernel_keys):
         monkeypatch.setattr(module, "HEAVY", 1280)
     cache, settings = PackCache(), RenderSettings(48, 32)
     still, elsewhere = arrays_of(scene(), cache), arrays_of(scene(place=2.0), cache)
     assert len(elsewhere.instances) == 2
-    foreseen = ahead.moved_recipe(still, settings)
-    assert foreseen == ahead.recipe(elsewhere, settings, features.flags(elsewhere, editing=True))
-    assert ahead.moved_recipe(elsewhere, settings) is None
-    assert ahead.moved_recipe(arrays_of({**scene(), "shapes": [BALL]}, cache), settings) is None
+    foreseen = kernel_keys.key_after_move(still, settings)
+    assert foreseen == kernel_keys.kernel_key(elsewhere, settings, features.flags(elsewhere, editing=True))
+    assert kernel_keys.key_after_move(elsewhere, settings) is None
+    assert kernel_keys.key_after_move(arrays_of({**scene(), "shapes": [BALL]}, cache), settings) is None

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import layout
-from gpu.layout import Model
+from gpu.layout import MaterialModel
 from service.pack import CacheBudget, PackCache, pack_camera, pack_materials
 from service.scene import parse_scene
 from tests.documents import (
@@ -49,18 +49,18 @@ def test_camera_looks_as_a_photographer_would():
 
 
 REQUIRED = {
-    Model.DIFFUSE: {"albedo": 0.25},
-    Model.METAL_ROUGH: {"base_color": 0.25, "metallic": 0.5, "roughness": 0.75},
-    Model.BLINN_PHONG: {"diffuse": 0.25, "specular": 0.5, "shininess": 7},
+    MaterialModel.DIFFUSE: {"albedo": 0.25},
+    MaterialModel.METAL_ROUGH: {"base_color": 0.25, "metallic": 0.5, "roughness": 0.75},
+    MaterialModel.BLINN_PHONG: {"diffuse": 0.25, "specular": 0.5, "shininess": 7},
 }
 MEMBERS = {
-    (Model.DIFFUSE, "albedo"): "base_color",
-    (Model.BLINN_PHONG, "diffuse"): "base_color",
-    (Model.BLINN_PHONG, "specular"): "phong_specular",
+    (MaterialModel.DIFFUSE, "albedo"): "base_color",
+    (MaterialModel.BLINN_PHONG, "diffuse"): "base_color",
+    (MaterialModel.BLINN_PHONG, "specular"): "phong_specular",
 }
 
 
-@pytest.mark.parametrize("model", Model)
+@pytest.mark.parametrize("model", MaterialModel)
 def test_every_number_of_a_material_has_its_place(model):
     required = REQUIRED.get(model, {})
     plain = parse_scene({**document(), "materials": {"m": {"type": model.name.lower(), **required}}})

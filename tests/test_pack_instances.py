@@ -123,7 +123,7 @@ def test_triangles_without_area_are_counted_for_each() -> None:
 
 
 def test_what_moves_leaves_the_models_as_they_are(monkeypatch: pytest.MonkeyPatch) -> None:
-    from gpu import bvh
+    from gpu.accel import bvh
 
     grown = []
     build = bvh.build

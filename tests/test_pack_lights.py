@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from gpu import layout
-from gpu.features import counts, flags
+from gpu.kernels.features import counts, flags
 from gpu.layout import LightKind, ShapeKind
 from service.pack import bounded
 from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere

@@ -9,8 +9,8 @@ import pytest
 
 from gpu import Renderer, RenderSettings
 from gpu.arrays import SceneArrays
-from gpu.pinned import LEAST, Pinned, pin
-from gpu.scene import Scene
+from gpu.device.pinned import LEAST, Pinned, pin
+from gpu.device.scene import Scene
 from service.pack import pack
 from service.scene import parse_scene
 

@@ -6,9 +6,10 @@ from pathlib import Path
 
 import pytest
 
-from gpu import CompileError, Renderer, features
-from gpu.kernels import Kernels
-from gpu.program import SHADERS, Source
+from gpu import CompileError, Renderer
+from gpu.kernels import features
+from gpu.kernels.cache import KernelCache
+from gpu.kernels.source import SHADERS, KernelSource
 
 
 def _folder(tmp_path: Path, **files: str) -> tuple[Path, ...]:
@@ -21,25 +22,25 @@ def test_includes_happen_once(tmp_path: Path) -> None:
     folders = _folder(
         tmp_path, a_comp='#include "b.glsl"\n#include "c.glsl"\n', b_glsl='#include "c.glsl"\nB\n', c_glsl="C\n"
     )
-    lines = Source("a.comp", {}, folders).text.splitlines()
+    lines = KernelSource("a.comp", {}, folders).text.splitlines()
     assert [line for line in lines if not line.startswith("#")] == ["C", "B"]
 
 
 def test_an_unknown_flag_is_refused(tmp_path: Path) -> None:
     folders = _folder(tmp_path, a_comp="#if HAS_NOTHING\n#endif\n")
     with pytest.raises(CompileError, match=r"a\.comp:1: #if asks for HAS_NOTHING"):
-        Source("a.comp", {"HAS_THING": 1}, folders)
+        KernelSource("a.comp", {"HAS_THING": 1}, folders)
 
 
 def test_an_include_inside_a_condition_is_refused(tmp_path: Path) -> None:
     folders = _folder(tmp_path, a_comp='#if HAS_A\n#include "c.glsl"\n#endif\n', c_glsl="C\n")
     with pytest.raises(CompileError, match=r"a\.comp:2"):
-        Source("a.comp", {"HAS_A": 0}, folders)
+        KernelSource("a.comp", {"HAS_A": 0}, folders)
 
 
 def test_a_missing_file_is_named(tmp_path: Path) -> None:
     with pytest.raises(CompileError, match=r"gone\.glsl"):
-        Source("a.comp", {}, _folder(tmp_path, a_comp='#include "gone.glsl"\n'))
+        KernelSource("a.comp", {}, _folder(tmp_path, a_comp='#include "gone.glsl"\n'))
 
 
 def test_the_drivers_errors_name_file_and_line(gpu: Renderer, tmp_path: Path) -> None:
@@ -49,7 +50,7 @@ def test_the_drivers_errors_name_file_and_line(gpu: Renderer, tmp_path: Path) ->
         b_glsl="float f() {\n    return undefined_name;\n}\n",
     )
     with pytest.raises(CompileError, match=r"b\.glsl:2"):
-        Kernels(gpu._context, folders).get("a.comp", {})
+        KernelCache(gpu._context, folders).get("a.comp", {})
 
 
 def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
@@ -57,5 +58,5 @@ def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
     assert [flag for flag in features.FLAGS if flag not in text] == []
     everything = features.defines(frozenset(features.FLAGS))
     for entry in ("pathtrace.comp", "guides.comp"):
-        Source(entry, everything)  # raises where a name in #if is not defined
-    Source("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0, "LINE": 1024})
+        KernelSource(entry, everything)  # raises where a name in #if is not defined
+    KernelSource("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0, "LINE": 1024})

@@ -7,7 +7,8 @@ import pytest
 from scipy import stats as scipy_stats
 from scipy.stats import qmc
 
-from gpu import FILTERS, Renderer, filters, layout
+from gpu import FILTERS, Renderer, layout
+from gpu.picture import filters
 from tests import stats
 from tests.probing import Prober, prober_of
 

@@ -10,7 +10,7 @@ import pytest
 
 from gpu import OutOfMemory, Picture, Renderer, RenderSettings, picture_bytes, save, scene_bytes
 from gpu import context as contexts
-from gpu import saved as saving
+from gpu.picture import saved as saving
 from service.pack import pack
 from service.scene import parse_scene
 from tests.rendering import Images, document, picture

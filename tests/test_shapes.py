@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, Scene, layout
-from gpu.bindings import Slot
+from gpu.layout.bindings import Slot
 from service.pack import pack
 from service.scene import parse_scene
 from tests.probing import prober_of

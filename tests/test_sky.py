@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import ESTIMATORS, Renderer, distribution, sky
-from gpu.bindings import Slot
+from gpu import ESTIMATORS, Renderer
 from gpu.layout import Frame, LightKind
+from gpu.layout.bindings import Slot
+from gpu.tables import alias_table, sky
 from service.pack import pack
 from service.pack.cache import PackCache
 from service.problems import InvalidDocument
@@ -110,7 +111,7 @@ def test_cube_texels_are_where_the_table_puts_them(gpu: Renderer, prober: Prober
 
 @pytest.mark.parametrize("n", [1, 2, 7, 1024])
 def test_solid_angles_of_a_face_are_a_sixth_of_the_sphere(n: int) -> None:
-    solid = distribution.cube_solid_angles(n)
+    solid = alias_table.cube_solid_angles(n)
     assert solid.sum() == pytest.approx(4 * np.pi / 6, rel=1e-9)
     assert solid.min() > 0
     middle = (np.arange(n) + 0.5) / n * 2 - 1
@@ -123,15 +124,15 @@ def test_cube_tables_draw_by_footprint_and_every_lit_neighbour() -> None:
     n = 4
     texels = np.zeros((2 * n, 3 * n, 3), np.float32)
     texels[n + 1, n] = 1  # left column of pz: bilinear lookup does not reach py
-    density, table = distribution.cube_tables(texels)
+    density, table = alias_table.cube_tables(texels)
     lit = np.zeros((2 * n, 3 * n), bool)
     lit[n : n + 3, n : n + 2] = True
     assert np.array_equal(density > 0, lit)
     assert density.sum() * (2 / n) ** 2 == pytest.approx(1, rel=1e-6)
     corners = {(int(c) & 0xFFFF, int(c) >> 16) for c in table["corner"]}
     assert corners == {(x, y) for y, x in np.argwhere(lit)}
-    black, _ = distribution.cube_tables(np.zeros_like(texels))
-    solid = np.tile(distribution.cube_solid_angles(n), (2, 3))
+    black, _ = alias_table.cube_tables(np.zeros_like(texels))
+    solid = np.tile(alias_table.cube_solid_angles(n), (2, 3))
     np.testing.assert_allclose(black * (2 / n) ** 2, solid / (4 * np.pi), rtol=0.01)  # in whole cells
 
 

@@ -11,8 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, features, stopgap
-from gpu.price import full_kernel
+from gpu import Renderer, RenderSettings
+from gpu.analysis.kernel_cost import full_kernel
+from gpu.kernels import features
+from gpu.precompile import fallback
 from service.pack import pack
 from service.rendering.engine import Engine
 from service.rendering.messages import Frame, Loaded, Pause, StopRule, Update, View, Want
@@ -33,13 +35,13 @@ def arrays_of(scene: dict[str, Any], images: Any = None) -> Any:
     return pack(parse_scene(scene), images or Shelf()).arrays
 
 
-KNOWN = {name: arrays for name in SCENES if stopgap.recipe(arrays := arrays_of(SCENES[name], IMAGES), SMALL)}
+KNOWN = {name: arrays for name in SCENES if fallback.kernel_key(arrays := arrays_of(SCENES[name], IMAGES), SMALL)}
 
 
 def test_one_kernel_for_all_that_it_knows() -> None:
     raised = frozenset[str]().union(*(features.flags(arrays) for arrays in KNOWN.values()))
-    assert raised == stopgap.flags(), "each flag is in some scene here"
-    found = {stopgap.recipe(arrays, SMALL) for arrays in KNOWN.values()}
+    assert raised == fallback.flags(), "each flag is in some scene here"
+    found = {fallback.kernel_key(arrays, SMALL) for arrays in KNOWN.values()}
     sides = {dict((unit, side) for unit, _, _, *side in recipe.textures)[0][0] for recipe in found if recipe}
     assert len(found) == len(sides) <= 2, "one for environments of each kind"
 
@@ -47,7 +49,7 @@ def test_one_kernel_for_all_that_it_knows() -> None:
 @pytest.mark.parametrize("name", KNOWN)
 def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
     pictures = []
-    for scene in (gpu.load(KNOWN[name]), gpu.provisional(KNOWN[name])):
+    for scene in (gpu.load(KNOWN[name]), gpu.load_fallback(KNOWN[name])):
         picture = gpu.picture(scene, SMALL)
         picture.trace(60.0, 8)
         pictures.append(picture.read())
@@ -58,7 +60,7 @@ def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
 
 
 def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:
-    scene = gpu.provisional(KNOWN["PRINCIPLED"])
+    scene = gpu.load_fallback(KNOWN["PRINCIPLED"])
     means = []
     for clamp in (None, 1e6, 1e-3):
         picture = gpu.picture(scene, RenderSettings(24, 16, max_bounces=3, clamp=clamp))
@@ -70,21 +72,21 @@ def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:
 
 
 def test_what_it_does_not_know() -> None:
-    assert stopgap.recipe(arrays_of(SCENES["CHECKERS"], IMAGES), SMALL) is None
+    assert fallback.kernel_key(arrays_of(SCENES["CHECKERS"], IMAGES), SMALL) is None
     known = KNOWN["SPHERES"]
     for other in ({"estimator": "light"}, {"sampler": "independent"}):
-        assert stopgap.recipe(known, RenderSettings(24, 16, **other)) is None
+        assert fallback.kernel_key(known, RenderSettings(24, 16, **other)) is None
     adaptive = RenderSettings(24, 16, adaptive=True)
-    assert stopgap.recipe(known, adaptive) is not None and not stopgap.settings_for(adaptive).adaptive  # type: ignore[union-attr]
-    assert full_kernel(known, SMALL) != stopgap.recipe(known, SMALL)
+    assert fallback.kernel_key(known, adaptive) is not None and not fallback.settings_for(adaptive).adaptive  # type: ignore[union-attr]
+    assert full_kernel(known, SMALL) != fallback.kernel_key(known, SMALL)
 
 
 def test_what_an_edit_tells_it() -> None:
     scene = {**SCENE, "environment": {"type": "constant", "radiance": 0.5}}
     arrays = arrays_of(scene)
-    assert stopgap.edits(arrays, arrays) is not None
-    assert stopgap.edits(arrays, arrays_of(scene)) is None, "other arrays, perhaps other shapes"
-    assert stopgap.edits(arrays, arrays_of(SCENE)) is None
+    assert fallback.edits(arrays, arrays) is not None
+    assert fallback.edits(arrays, arrays_of(scene)) is None, "other arrays, perhaps other shapes"
+    assert fallback.edits(arrays, arrays_of(SCENE)) is None
 
 
 async def shown(engine: Engine, ears: Ears, task: int, generation: int) -> list[Frame | Loaded]:
@@ -109,7 +111,7 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
 ) -> None:
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
     arrays = arrays_of(SCENE)
-    wanted = stopgap.recipe(arrays, RenderSettings(**SIZE))
+    wanted = fallback.kernel_key(arrays, RenderSettings(**SIZE))
     assert wanted is not None
     record = records() / wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, layout
-from gpu.features import flags
+from gpu.kernels.features import flags
 from service.assets import AssetStore, MeshData
 from service.pack import pack
 from service.pack.normals import decode

@@ -9,10 +9,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, features, layout, texturing
-from gpu.bindings import Slot
-from gpu.kernels import Kernels
-from gpu.program import SHADERS, Source
+from gpu import Renderer, RenderSettings, layout
+from gpu.kernels import features
+from gpu.kernels.cache import KernelCache
+from gpu.kernels.source import SHADERS, KernelSource
+from gpu.layout import texture_records
+from gpu.layout.bindings import Slot
 from service.pack import pack, pack_materials, repacked
 from service.problems import InvalidDocument
 from service.rendering.change import Change, change
@@ -113,7 +115,7 @@ def test_texels_are_filtered_as_the_contract_says(gpu: Renderer, texture: dict[s
         scene = scene_of({"t": texture}, {"emission": {"texture": "t", **reference}}, MESH)
         loaded = gpu.load(pack(parse_scene(scene), Shelf(**IMAGES)).arrays)
         defines = loaded.defines(RenderSettings(8, 8))
-        kernels = Kernels(gpu._context, (PROBES, SHADERS))
+        kernels = KernelCache(gpu._context, (PROBES, SHADERS))
         kernel = kernels.get("texture.comp", defines)
         ask, answer = gpu._context.buffer(asks.tobytes()), gpu._context.buffer(reserve=asks.nbytes)
         loaded.bind()
@@ -310,14 +312,14 @@ def test_members_share_a_look_where_they_can() -> None:
                      textures={"c": {"asset": "rgb"}, "t": {"asset": "rgba"}})  # fmt: skip
     slots = pack(parse_scene(scene), Images(**IMAGES)).arrays.textures.slots
     assert slots == {"base_color": 0, "roughness": 1, "metallic": 1}
-    assert set(texturing.TEXTURABLE) <= set(layout.Material.members)
+    assert set(texture_records.TEXTURABLE) <= set(layout.Material.members)
 
 
 def preprocessed(entry: str, defines: dict[str, object]) -> str:
     """What the driver compiles: the text without what conditions leave out."""
     known, out, taken = dict(defines), [], [True]
     done = [True]  # whether a branch of the conditional was taken
-    for line in Source(entry, defines).text.splitlines():
+    for line in KernelSource(entry, defines).text.splitlines():
         word, _, rest = line.strip().partition(" ")
         if word in ("#if", "#elif"):
             words = {name: str(value).rstrip("u") for name, value in known.items()}

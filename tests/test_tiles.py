@@ -7,7 +7,7 @@ import pytest
 
 from gpu import Renderer
 from gpu import context as contexts
-from gpu.tiles import BAND, LEAST_A_PASS, SLICE_S, Tiles
+from gpu.picture.tiles import BAND, LEAST_A_PASS, SLICE_S, Tiles
 from tests.extremes.scenes import everything
 from tests.rendering import picture
 

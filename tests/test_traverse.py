@@ -33,7 +33,7 @@ def crowd():
 def test_the_tree_finds_what_the_loops_find(gpu: Renderer, monkeypatch) -> None:
     seen = []
     for few, whole in ((0, 4096), (0, 0), (1, 4096), (10**6, 4096)):  # in treelets, too, and with some in the loop
-        monkeypatch.setattr("gpu.bvh.WHOLE", whole)
+        monkeypatch.setattr("gpu.accel.bvh.WHOLE", whole)
         monkeypatch.setattr(tree, "LARGE_SHARE", 1e-5 if few == 1 else 1.0)
         monkeypatch.setattr(tree, "LINEAR", dict.fromkeys(tree.LINEAR, few))
         monkeypatch.setattr("service.pack.geometry.LINEAR", tree.LINEAR)

@@ -9,7 +9,8 @@ from collections.abc import Callable
 import numpy as np
 import trimesh
 
-from gpu import Renderer, RenderSettings, bvh
+from gpu import Renderer, RenderSettings
+from gpu.accel import bvh
 from gpu.layout import ShapeKind
 from service.assets import MeshData
 from service.bench import timing

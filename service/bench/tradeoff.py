@@ -16,7 +16,8 @@ from typing import Any
 
 import numpy as np
 
-from gpu import Renderer, RenderSettings, denoise, meter
+from gpu import Renderer, RenderSettings, denoise
+from gpu.picture import noise_meter
 from service.bench import machine, pareto
 from service.bench.tradeoff_scenes import Case, TradeoffAssets, cases
 from service.pack import pack
@@ -189,12 +190,12 @@ class Bench:
 
 @contextmanager
 def _meter(running: bool) -> Iterator[None]:
-    before = meter.FROM
-    meter.FROM = before if running else 1 << 30
+    before = noise_meter.FROM
+    noise_meter.FROM = before if running else 1 << 30
     try:
         yield
     finally:
-        meter.FROM = before
+        noise_meter.FROM = before
 
 
 def _relative(difference: np.ndarray, reference: np.ndarray) -> float:

@@ -13,12 +13,12 @@ MANY = 4
 APART = 4.0  # radii between the middles of fewer lights that are in more than one place
 LASTING = 4096  # lights whose tree is worth keeping beside geometries: it takes some ms
 
-Grown = tuple[np.ndarray, np.ndarray, float]  # as by `gpu.light_tree.build`
+Grown = tuple[np.ndarray, np.ndarray, float]  # as by `gpu.accel.light_tree.build`
 _FLAT = np.array([0.0, 0.0, 1.0])
 
 
 class Bounds:
-    """Arrays over n lights, as `gpu.light_tree.build` takes them."""
+    """Arrays over n lights, as `gpu.accel.light_tree.build` takes them."""
 
     def __init__(self, n: int) -> None:
         self.low, self.high = np.zeros((n, 3)), np.zeros((n, 3))
@@ -111,12 +111,12 @@ def tree(
     lights: np.ndarray, power: np.ndarray, share: float, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray,
     reach: float, cache: PackCache | None,
 ) -> Grown | None:  # fmt: skip
-    """As `gpu.light_tree.build`, of `layout.Light` records (n,) with their `power` (n,), W of luminance; None where a
+    """As `light_tree.build`, of `layout.Light` records (n,) with their `power` (n,), W of luminance; None where a
     tree would not pay."""
     b = bounds(lights, shapes, sides)
     if not worth(b):
         return None
-    from gpu.light_tree import build  # here, as it loads numba
+    from gpu.accel.light_tree import build  # here, as it loads numba
 
     given = (b.low, b.high, b.radius, b.axis, b.normals, b.beyond, power / b.solid_angle)
 

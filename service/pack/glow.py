@@ -6,8 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from gpu import texturing
-from gpu.layout import LightKind, ShapeKind
+from gpu.layout import LightKind, ShapeKind, texture_records
 from service.pack.geometry import Geometry
 from service.pack.textures import Texels, Use, record_of, values_of
 from service.scene.texture import CheckerTexture
@@ -57,7 +56,7 @@ def glow(materials: np.ndarray, uses: Sequence[Use], texels: Texels, built: Geom
 def _levels(use: Use, texels: Texels) -> tuple[np.ndarray, float]:
     """(mean (3,), greatest) of what a texture gives a radiance."""
     pixels = _pixels(use, texels)
-    low, high = texturing.TEXTURABLE[use.member]
+    low, high = texture_records.TEXTURABLE[use.member]
     total, greatest = np.zeros(3), 0.0
     for rows in np.array_split(pixels, max(1, pixels.shape[0] // 256)):  # floats of a part of it at a time
         values = np.clip(values_of(use, rows), low, high)
@@ -75,7 +74,7 @@ def _triangles(use: Use, texels: Texels, built: Geometry, mean: np.ndarray, shin
         return
     corners = uvs[built.lights["index"][mine]].astype(np.float64)
     total = np.zeros((len(mine), 3))
-    low, high = texturing.TEXTURABLE["emission"]
+    low, high = texture_records.TEXTURABLE["emission"]
     for b1, b2 in PLACES:
         uv = (1 - b1 - b2) * corners[:, 0] + b1 * corners[:, 1] + b2 * corners[:, 2]
         total += np.clip(values_of(use, nearest(use, texels, uv)), low, high)

@@ -8,8 +8,8 @@ from collections.abc import Callable, Sequence
 import numpy as np
 
 from gpu import layout
-from gpu.distribution import LUMINANCE, alias_table
 from gpu.layout import LightKind, ShapeKind
+from gpu.tables.alias_table import LUMINANCE, alias_table
 from service.scene.light import DirectionalLight, Light, PointLight, SpotLight
 
 SHINING = {
@@ -29,7 +29,7 @@ LEAST_RIM = 1e-6
 # Radians: a disk narrower than this is a point, as float32 directions have no digits for a place on it.
 LEAST_DISK = 1e-6
 
-# Bounded lights (n,), their power (n,) and their share of all picks -> as `gpu.light_tree.build`; None: no tree
+# Bounded lights (n,), their power (n,) and their share of all picks -> as `gpu.accel.light_tree.build`; None: no tree
 Grow = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, float] | None]
 
 

@@ -97,7 +97,7 @@ def model(key: Hashable, mesh: PlacedMesh) -> Model | None:
 
     Raises SceneTooLarge.
     """
-    from gpu import bvh  # loads numba
+    from gpu.accel import bvh  # loads numba
 
     center = (mesh.vertices.min(axis=0, initial=np.inf) + mesh.vertices.max(axis=0, initial=-np.inf)) / 2
     triangles, boxes = survey([mesh], center)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu import layout
-from gpu.record import Record
+from gpu.layout.record import Record
 from service.pack.placed import Placed, Solids
 
 VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin, and over the smallest shape

@@ -9,14 +9,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from gpu.distribution import (
-    LUMINANCE,
-    cube_solid_angles,
-    cube_tables,
-    environment_tables,
-    solid_angles,
-)
-from gpu.sky import SunDisk, bake, sun_disk
+from gpu.tables.alias_table import LUMINANCE, cube_solid_angles, cube_tables, environment_tables, solid_angles
+from gpu.tables.sky import SunDisk, bake, sun_disk
 from service.assets import Assets, ImageData
 from service.pack.cache import lasting
 from service.problems import AssetError, FieldError, InvalidDocument

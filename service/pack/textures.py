@@ -9,7 +9,8 @@ from typing import Protocol
 
 import numpy as np
 
-from gpu import TextureArrays, texturing
+from gpu import TextureArrays
+from gpu.layout import texture_records
 from service.assets import Assets, ImageData
 from service.assets.parts import linear
 from service.pack.cache import PackCache, lasting
@@ -214,7 +215,7 @@ def _slots(uses: list[Use]) -> dict[str, int]:
     taken: dict[str, dict[int, tuple[str, bool]]] = {}
     for use in uses:
         taken.setdefault(use.member, {})[use.material] = use.look
-    surface = [name for name in (*texturing.SURFACE_RANGES, *texturing.NORMALS) if name in taken]
+    surface = [name for name in (*texture_records.SURFACE_RANGES, *texture_records.NORMALS) if name in taken]
     slots: dict[str, int] = {}
     held: list[dict[int, tuple[str, bool]]] = []
     for name in surface:
@@ -224,7 +225,7 @@ def _slots(uses: list[Use]) -> dict[str, int]:
         if slots[name] == len(held):
             held.append({})
         held[slots[name]] |= mine
-    for name in texturing.OTHER_RANGES:
+    for name in texture_records.OTHER_RANGES:
         if name in taken:
             slots[name] = len(held)
             held.append(taken[name])
@@ -234,7 +235,7 @@ def _slots(uses: list[Use]) -> dict[str, int]:
 def _words(materials: int, uses: list[Use], slots: dict[str, int], texels: Texels) -> np.ndarray:
     """(materials, n) uint32: the slots filled in, the uses still empty."""
     count = max(slots.values()) + 1
-    records = np.zeros((materials, count), texturing.TextureSlot.dtype)
+    records = np.zeros((materials, count), texture_records.TextureSlot.dtype)
     for slot in range(count):
         mine = [use for use in uses if slots[use.member] == slot]
         for use in mine:
@@ -242,26 +243,26 @@ def _words(materials: int, uses: list[Use], slots: dict[str, int], texels: Texel
         # A look that no material asked for still is a look: somewhere in the texels, and raising no other flag.
         without = [m for m in range(materials) if all(use.material != m for use in mine)]
         records[without, slot] = records[mine[0].material, slot]
-    slot_words = count * texturing.TextureSlot.words
-    words = np.zeros((materials, slot_words + len(slots) * texturing.TextureUse.words), np.uint32)
+    slot_words = count * texture_records.TextureSlot.words
+    words = np.zeros((materials, slot_words + len(slots) * texture_records.TextureUse.words), np.uint32)
     words[:, :slot_words] = records.view(np.uint32).reshape(materials, -1)
     return words
 
 
 def record_of(use: Use, texels: Texels) -> np.ndarray:
-    record = np.zeros((), texturing.TextureSlot.dtype)
+    record = np.zeros((), texture_records.TextureSlot.dtype)
     texture = use.texture
     if isinstance(texture, CheckerTexture):
         record["width"] = record["height"] = 1
-        record["flags"] = texturing.SLOT_CHECKER
+        record["flags"] = texture_records.SLOT_CHECKER
         record["turn"] = (texture.scale[0], 0, 0, texture.scale[1])
         record["color_a"], record["color_b"] = texture.a, texture.b
         return record
     first, image = texels.places[use.kept]
-    flags = {"repeat": 0, "clamp": texturing.SLOT_CLAMP, "mirror": texturing.SLOT_MIRROR}[texture.wrap]
-    flags |= texturing.SLOT_SRGB if use.srgb else 0
-    flags |= 0 if image.is_8bit else texturing.SLOT_FLOATS
-    flags |= texturing.SLOT_UV_1 if texture.uv == 1 else 0
+    flags = {"repeat": 0, "clamp": texture_records.SLOT_CLAMP, "mirror": texture_records.SLOT_MIRROR}[texture.wrap]
+    flags |= texture_records.SLOT_SRGB if use.srgb else 0
+    flags |= 0 if image.is_8bit else texture_records.SLOT_FLOATS
+    flags |= texture_records.SLOT_UV_1 if texture.uv == 1 else 0
     angle = math.radians(math.fmod(texture.rotation, 360.0))
     c, s = math.cos(angle), math.sin(angle)
     record["first"], record["flags"] = first, flags
@@ -273,8 +274,8 @@ def record_of(use: Use, texels: Texels) -> np.ndarray:
 
 def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
     """Factors and channels into the uses of `words`: what an edit of a material may change of them."""
-    first = (max(slots.values()) + 1) * texturing.TextureSlot.words
-    records = words[:, first:].copy().view(texturing.TextureUse.dtype)
+    first = (max(slots.values()) + 1) * texture_records.TextureSlot.words
+    records = words[:, first:].copy().view(texture_records.TextureUse.dtype)
     records[:] = 0
     places = {member: i for i, member in enumerate(slots)}
     for i, material in enumerate(scene.materials.values()):
@@ -286,8 +287,8 @@ def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
 
 def _channel(reference: Reference) -> int:
     if isinstance(reference, NormalTexture) or reference.channel is None:
-        return texturing.CHANNEL_COLOR
-    return texturing.CHANNEL_R + "rgba".index(reference.channel)
+        return texture_records.CHANNEL_COLOR
+    return texture_records.CHANNEL_R + "rgba".index(reference.channel)
 
 
 def _factor(reference: Reference) -> tuple[float, float, float]:
@@ -311,8 +312,8 @@ def values_of(use: Use, pixels: np.ndarray) -> np.ndarray:
             linear[..., :3] = LINEAR[pixels[..., :3]]
         pixels = linear
     channel = _channel(use.reference)
-    if channel != texturing.CHANNEL_COLOR:
-        pixels = pixels[..., [min(channel - texturing.CHANNEL_R, pixels.shape[-1] - 1)]]
+    if channel != texture_records.CHANNEL_COLOR:
+        pixels = pixels[..., [min(channel - texture_records.CHANNEL_R, pixels.shape[-1] - 1)]]
     return np.asarray(pixels[..., :3] * np.array(_factor(use.reference), np.float32))
 
 
@@ -331,7 +332,7 @@ def _warnings(uses: list[Use], texels: Texels) -> Iterator[str]:
             if own != along:
                 yield f"{use.pointer}: reads uv set {own}, but runs along set {along}, that of the normal map"
             continue
-        low, high = texturing.TEXTURABLE[use.member]
+        low, high = texture_records.TEXTURABLE[use.member]
         pixels: np.ndarray
         if isinstance(use.texture, CheckerTexture):
             pixels = np.array([[use.texture.a, use.texture.b]], np.float32)

@@ -89,7 +89,7 @@ def plant(
 
     Raises InvalidDocument.
     """
-    from gpu import bvh  # loads numba: only a scene that needs a tree waits for it
+    from gpu.accel import bvh  # loads numba: only a scene that needs a tree waits for it
 
     small = {kind: np.delete(np.arange(len(low), dtype=np.uint32), large[kind]) for kind, (low, _) in bounds.items()}
     counts = [len(places) for places in small.values()]

@@ -45,7 +45,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
     """`layout.Material` records in the order of the document's names, unused ones included."""
     records = np.zeros(len(scene.materials), layout.Material.dtype)
     for record, material in zip(records, scene.materials.values(), strict=True):
-        record["model"] = layout.Model[material.type.upper()]
+        record["model"] = layout.MaterialModel[material.type.upper()]
         for name in type(material).model_fields:
             if name == "emission_sides":
                 record[name] = SIDES[material.emission_sides]

@@ -8,13 +8,13 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.bindings import Slot
-from gpu.features import EDITED
-from gpu.layout import Model
+from gpu.kernels.features import EDITED
+from gpu.layout import MaterialModel
+from gpu.layout.bindings import Slot
 from tests import baseline, disney
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 
-D, P, G, B = Model.DISNEY, Model.PRINCIPLED, Model.METAL_ROUGH, Model.BLINN_PHONG
+D, P, G, B = MaterialModel.DISNEY, MaterialModel.PRINCIPLED, MaterialModel.METAL_ROUGH, MaterialModel.BLINN_PHONG
 GLASS = {"model": P, "transmission": 1, "base_color": 1}
 ROUGHNESSES = (0, 1e-4, 0.0099, 0.01, 0.0101, 1)
 ROWS = {

@@ -9,13 +9,13 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gpu import GpuError
-from gpu.price import full_kernel, price_steps
+from gpu.analysis.kernel_cost import full_kernel, kernel_cost_steps
 from service.rendering.messages import Appraised, FromRenderer
 from service.rendering.worker.compiler import Compiler
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
-    from gpu.price import PriceSteps
+    from gpu.analysis.kernel_cost import KernelCostSteps
 
 SLICE_S = 0.015  # how long who comes may have to wait
 NO_KERNEL = (
@@ -36,7 +36,7 @@ class Appraising:
         self._renderer, self._compiler = renderer, compiler
         self._asked = self._compiling = False
         self._compile_ms = 0.0  # what it took elsewhere
-        self._steps: PriceSteps | None = None
+        self._steps: KernelCostSteps | None = None
 
     @property
     def due(self) -> bool:
@@ -60,7 +60,7 @@ class Appraising:
             return
         try:
             if self._steps is None and not self._waits(picture):
-                self._steps = price_steps(self._renderer, picture.scene, picture.settings, SLICE_S)
+                self._steps = kernel_cost_steps(self._renderer, picture.scene, picture.settings, SLICE_S)
             if self._steps is not None:
                 next(self._steps)
         except StopIteration as end:

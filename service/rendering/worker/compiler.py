@@ -17,7 +17,7 @@ from service.rendering.worker.helper import Helper
 from service.spell import Spell
 
 if TYPE_CHECKING:
-    from gpu import Recipe
+    from gpu import KernelKey
 
 TRIES = 3  # misfortunes in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
@@ -42,7 +42,7 @@ class Compiled:
 
 @dataclass
 class _Order:
-    recipe: Recipe
+    recipe: KernelKey
     told: set[Told] = field(default_factory=set)
 
 
@@ -68,8 +68,8 @@ class Compiler:
         self._limit_s = SPARE_LIMIT_S if spare else LIMIT_S
         self._able = _has_cache()
         self._records = records()
-        self._known: set[Recipe] = set()  # what needs no helper any more, or was not helped
-        self._met: set[Recipe] = set()
+        self._known: set[KernelKey] = set()  # what needs no helper any more, or was not helped
+        self._met: set[KernelKey] = set()
         self._orders: list[_Order] = []  # the first is under way
         self._until = 0.0
         self._spell: Spell | None = None  # of the order under way
@@ -85,11 +85,11 @@ class Compiler:
         """How long it makes sense to wait for that."""
         return max(0.0, self._until - time.monotonic()) if self._orders else None
 
-    def knows(self, recipe: Recipe) -> bool:
+    def knows(self, recipe: KernelKey) -> bool:
         """Whether nobody need wait for it any more."""
         return recipe in self._known
 
-    def waits(self, recipe: Recipe, told: Told, alone: bool = False) -> bool:
+    def waits(self, recipe: KernelKey, told: Told, alone: bool = False) -> bool:
         """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
         it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop, as
         where nobody else is there, unless there is something to do meanwhile (`alone`).
@@ -111,12 +111,12 @@ class Compiler:
         order.told.add(told)
         return True
 
-    def prepare(self, recipes: list[Recipe]) -> None:
+    def prepare(self, recipes: list[KernelKey]) -> None:
         """Has them compiled, those that no renderer here has met yet, though nobody waits."""
         for recipe in recipes:
             self.waits(recipe, _nobody)
 
-    def met(self, recipe: Recipe) -> None:
+    def met(self, recipe: KernelKey) -> None:
         """The renderer has this kernel: the driver's disk cache too."""
         if recipe in self._met:
             return
@@ -128,14 +128,14 @@ class Compiler:
         self._met.add(recipe)
         self._record(recipe)
 
-    def has(self, recipe: Recipe) -> bool:
+    def has(self, recipe: KernelKey) -> bool:
         """Whether it loads at once."""
         return recipe in self._met or self._is_recorded(recipe)
 
-    def _is_recorded(self, recipe: Recipe) -> bool:
+    def _is_recorded(self, recipe: KernelKey) -> bool:
         return self._able and os.path.exists(self._records / recipe.digest(self._driver))
 
-    def _record(self, recipe: Recipe) -> None:
+    def _record(self, recipe: KernelKey) -> None:
         """It is in the driver's disk cache."""
         if self._able:
             try:

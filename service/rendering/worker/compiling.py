@@ -45,12 +45,12 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not (end_with(arguments.parent) if arguments.lifeline is None else end_with_pipe(arguments.lifeline)):
         return 0
-    from gpu.ahead import Ahead
     from gpu.errors import GpuError
+    from gpu.precompile.precompiler import Precompiler
 
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
-            ahead = Ahead(arguments.device)
+            ahead = Precompiler(arguments.device)
             while select.select([end], [], [], SPARE_IDLE_S if arguments.spare else IDLE_S)[0]:
                 recipe = link.receive(end, wait=True)
                 record = records() / recipe.digest(arguments.driver)

@@ -6,12 +6,14 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from gpu import RenderSettings, ahead, features, picture_bytes, save, scene_bytes
+from gpu import RenderSettings, picture_bytes, save, scene_bytes
+from gpu.kernels import features
+from gpu.precompile import kernel_keys
 from service.rendering.messages import Update
 from service.rendering.worker.ladder import Ladder
 
 if TYPE_CHECKING:
-    from gpu import Recipe, Renderer, Saved, Scene, SceneArrays
+    from gpu import KernelKey, Renderer, Saved, Scene, SceneArrays
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ class Wanted:
 
     arrays: SceneArrays
     settings: RenderSettings
-    recipe: Recipe
+    recipe: KernelKey
 
 
 def wanted_of(
@@ -130,6 +132,6 @@ def wanted_of(
     else:
         return None
     if edits or update.scene is None:
-        arrays = ahead.edited(arrays, edits)
+        arrays = kernel_keys.apply_edit(arrays, edits)
         raised = features.grown(raised, arrays) if editing else features.flags(arrays)
-    return Wanted(arrays, settings, ahead.recipe(arrays, settings, raised))
+    return Wanted(arrays, settings, kernel_keys.kernel_key(arrays, settings, raised))

@@ -9,7 +9,8 @@ import time
 from collections import defaultdict
 from collections.abc import Callable, Iterator
 
-from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge, ahead
+from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
+from gpu.precompile import kernel_keys
 from service.rendering import link
 from service.rendering.messages import (
     Appraise,
@@ -69,7 +70,7 @@ class Loop:
     def run(self) -> None:
         """Until the server is gone: raises link.Closed. Sleeps on its sockets when there is nothing to do."""
         busy = False
-        self._spare.prepare(ahead.common())
+        self._spare.prepare(kernel_keys.common_keys())
         while True:
             for message in coalesced(self._pending(wait=not busy)):
                 self._take(message)

@@ -7,8 +7,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import ahead, picture_bytes
+from gpu import picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
+from gpu.precompile import kernel_keys
 from service.rendering.messages import Frame, FromRenderer, Image, Read, View, Want
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.course import Course
@@ -194,7 +195,7 @@ class Showing:
         if self._compiler is None or picture.guided_yet:
             return False
         scene = picture.scene
-        wanted = ahead.recipe(scene.arrays, picture.settings, scene.flags, ahead.GUIDES)
+        wanted = kernel_keys.kernel_key(scene.arrays, picture.settings, scene.flags, kernel_keys.GUIDES)
         self._compiling = self._compiler.waits(wanted, self._hear_compiled)
         if not self._compiling:
             self._compiler.met(wanted)  # in a moment

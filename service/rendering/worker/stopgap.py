@@ -1,4 +1,4 @@
-"""First looks at what waits for its kernel, by one that is slower and there already (gpu/stopgap.py).
+"""First looks at what waits for its kernel, by one that is slower and there already (gpu/precompile/fallback.py).
 
 They are small, so that the picture by its own kernel, which begins anew, is larger whenever it comes.
 """
@@ -10,7 +10,8 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gpu import GpuError, OutOfMemory, scene_bytes, stopgap
+from gpu import GpuError, OutOfMemory, scene_bytes
+from gpu.precompile import fallback
 from service.rendering.messages import Frame, FromRenderer, Progress, Want
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.holding import Wanted
@@ -60,7 +61,7 @@ class Stopgap:
 
     def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> None:
         """Has the kernel compiled, some time, that edits of these will need."""
-        recipe = stopgap.recipe(arrays, settings)
+        recipe = fallback.kernel_key(arrays, settings)
         if recipe is not None and self._spare is not None:
             self._spare.prepare([recipe])
 
@@ -68,22 +69,22 @@ class Stopgap:
         """Whether there would be anything to see at once."""
         if self._spare is None or min(wanted.settings.width, wanted.settings.height) * LARGEST < SMALLEST_SIDE:
             return False
-        recipe = stopgap.recipe(wanted.arrays, wanted.settings)
+        recipe = fallback.kernel_key(wanted.arrays, wanted.settings)
         return recipe is not None and self._spare.has(recipe) and scene_bytes(wanted.arrays) <= MOST_BYTES
 
     def begin(self, wanted: Wanted, generation: int) -> None:
         """Begins with what `can` be shown; where it can't after all, there is nothing to see."""
-        settings = stopgap.settings_for(wanted.settings)
-        recipe = stopgap.recipe(wanted.arrays, wanted.settings)
+        settings = fallback.settings_for(wanted.settings)
+        recipe = fallback.kernel_key(wanted.arrays, wanted.settings)
         assert settings is not None and recipe is not None and self._spare is not None
         self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
         try:
-            edits = None if self._scene is None else stopgap.edits(self._scene.arrays, wanted.arrays)
+            edits = None if self._scene is None else fallback.edits(self._scene.arrays, wanted.arrays)
             if self._scene is not None and edits is not None:
                 self._scene.edit(**edits)
             else:
                 self.release()
-                self._scene = self._renderer.provisional(wanted.arrays)
+                self._scene = self._renderer.load_fallback(wanted.arrays)
             if self._ladder is not None:
                 self._ladder.release()
             self._ladder = Ladder(self._renderer, self._scene, settings, full=False)

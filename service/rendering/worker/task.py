@@ -7,7 +7,8 @@ from collections.abc import Callable
 from math import inf
 from typing import TYPE_CHECKING
 
-from gpu import GpuError, OutOfMemory, RenderSettings, ahead
+from gpu import GpuError, OutOfMemory, RenderSettings
+from gpu.precompile import kernel_keys
 from service.rendering.messages import (
     Checkpoint,
     Done,
@@ -260,8 +261,8 @@ class Task:
         """Has compiled, in spare time, what moving a large mesh would need, and the first touch of some sliders."""
         if self._spare is not None and self._course.interactive:
             arrays = self._held.full.scene.arrays
-            moved = ahead.moved_recipe(arrays, settings)
-            self._spare.prepare([*([moved] if moved else []), *ahead.touched_recipes(arrays, settings)])
+            moved = kernel_keys.key_after_move(arrays, settings)
+            self._spare.prepare([*([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)])
             self._stopgap.prepare(arrays, settings)
 
     def evict(self) -> None:

@@ -1,0 +1,123 @@
+"""Bounded lights -> a tree of `layout.LightNode` records, by which they are picked where they matter. Without GL.
+
+[Conty Estevez & Kulla 2018; Pharr, Jakob, Humphreys 2023, section 12.6.3]. A node holds the place, the directions
+and the intensity of its lights; its importance at a point bounds what it may give there. Random numbers go down the
+tree as an interval of whole numbers that each pair cuts in two, so that a light is picked exactly as often as its
+probability says.
+
+Importing this loads numba (half a second), so import it where a tree is needed.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpu import layout
+from gpu.accel import light_tree_build
+from gpu.accel.light_tree_build import AXIS, BEYOND, INTENSITY, NORMALS, RADIUS, WIDTH
+from gpu.layout import LightNode, LightTreeHead
+
+# Share of the picks that goes to the tree's lights alike, or half of it: what the tree knows nothing of, walls, must
+# not keep a light from being picked at all.
+EVEN = 0.05
+STEPS = 65535  # of the grid that nodes' places are on
+PIECE = 1 << 14  # pairs packed at once, within the processor's cache
+WIDEST = 2.0**27  # steps that a node's radius is told to
+FARTHEST = 2.0**38  # steps from one end of the scene to the other: squares times intensities stay inside float32
+
+
+def build(
+    low: np.ndarray, high: np.ndarray, radius: np.ndarray, axis: np.ndarray, normals: np.ndarray, beyond: np.ndarray,
+    intensity: np.ndarray, share: float, reach: float,
+) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
+    """(words (2 n, 4) uint32: a head and the pairs of nodes; trails (n,) uint32; the even part of each light's
+    probability).
+
+    For n >= 2 lights: boxes `low`, `high` (n, 3) and the `radius` (n,) of a ball around each one's middle; its
+    normals lie about the unit `axis` (n, 3) within the angle whose cosine is `normals` (n,), and light leaves at up
+    to the one whose cosine is `beyond` (n,), >= 0, from a normal; `intensity` (n,) >= 0, of any unit. The tree's
+    lights are the first n, picked with probability `share` all together. `reach`: how far the scene's points are
+    apart at most.
+    """
+    n = len(low)
+    if n < 2:
+        raise ValueError(f"{n} lights: a tree is of two or more")  # compiled loops would write past their arrays
+    lights = np.empty((n, WIDTH), np.float64)
+    lights[:, 0:3], lights[:, 3:6], lights[:, AXIS : AXIS + 3] = low, high, axis
+    lights[:, NORMALS], lights[:, BEYOND], lights[:, RADIUS] = normals, beyond, radius
+    lights[:, INTENSITY] = intensity / (intensity.max() or 1.0)
+    children, trails = np.empty((n - 1, 2), np.int64), np.empty(n, np.uint32)
+    light_tree_build.grow(lights, np.arange(n), children, trails)
+    bounds = np.empty((n - 1, 2, WIDTH), np.float64)
+    light_tree_build.bound(lights, children, bounds)
+    head = np.zeros(1, LightTreeHead.dtype)
+    near = layout.LIGHT_CODES if share >= 1 else round(share * layout.LIGHT_CODES)
+    shift = max(int(np.floor(np.log2(EVEN * near / n))), 0)
+    head["near"], head["even"], head["even_shift"], head["far_first"] = near, n << shift, shift, n
+    origin, step = _grid(lights, reach)
+    head["origin"], head["inverse_step"] = origin, 1 / step
+    words = np.empty((2 * n, 4), np.uint32)
+    words[:2] = head.view(np.uint32).reshape(2, 4)
+    for first in range(0, n - 1, PIECE):
+        some = slice(first, first + PIECE)
+        words[2 + 2 * first : 2 + 2 * (first + PIECE)] = _packed(bounds[some], children[some], origin, step)
+    return words, trails, 2.0**shift / layout.LIGHT_CODES
+
+
+def _grid(lights: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
+    """Origin (3,) and step, exact in float32, of a grid that holds all middles."""
+    middle = 0.5 * (lights[:, 0:3] + lights[:, 3:6])
+    low, high = middle.min(axis=0), middle.max(axis=0)
+    # Not finer than float32 knows the places, nor so fine that a scene's other end is beyond what float32 squares.
+    finest = max(float(np.abs(middle).max()) * 2.0**-22, reach / FARTHEST, float(lights[:, RADIUS].max()) / WIDEST)
+    step = float(np.float32(max(float((high - low).max()) / (STEPS - 4), finest)))
+    return (low - 2 * step).astype(np.float32).astype(np.float64), step
+
+
+def _packed(bounds: np.ndarray, children: np.ndarray, origin: np.ndarray, step: float) -> np.ndarray:
+    """(2 (n - 1), 4) uint32: `layout.LightNode` records, rounded so that they still hold what they held."""
+    nodes = np.zeros(children.shape, LightNode.dtype)
+    place = (0.5 * (bounds[..., 0:3] + bounds[..., 3:6]) - origin) / step
+    grid = np.clip(np.rint(place), 0, STEPS)
+    away = np.linalg.norm(place - grid, axis=-1)
+    # A tenth of a step, and some: float32 in the shader.
+    radius = _upwards(bounds[..., RADIUS] / step * (1 + 1e-5) + away + 0.1)
+    axis, turned = _octahedral(bounds[..., AXIS : AXIS + 3])
+    half = 0.5 * (np.arccos(np.clip(bounds[..., NORMALS], -1, 1)) + turned)
+    normals = np.minimum(np.ceil(255 * np.sin(np.minimum(half, 0.5 * np.pi)) + 1e-6), 255)
+    beyond = np.minimum(np.ceil(31 * np.sin(0.5 * np.arccos(bounds[..., BEYOND])) * np.sqrt(2) - 1e-9), 31)
+    x, y, z = np.moveaxis(grid.astype(np.uint32), -1, 0)
+    nodes["place"] = x | y << 16
+    nodes["reach"] = z | radius << 16 | normals.astype(np.uint32) << 24
+    nodes["shine"] = axis | beyond.astype(np.uint32) << 16 | _brightness(bounds[..., INTENSITY]) << 21
+    nodes["link"] = np.where(children < 0, layout.LEAF_BIT | ~children, children + 1).astype(np.uint32)
+    return nodes.view(np.uint32).reshape(-1, 4)
+
+
+def _upwards(radius: np.ndarray) -> np.ndarray:
+    """8 bits: 5 of an exponent from 2^-4, 3 of a mantissa; the next number that is not less."""
+    bits = np.asarray(radius, np.float32).view(np.uint32).astype(np.int64) - (123 << 23)
+    return np.asarray(np.clip(-(-bits >> 20), 0, 255), np.uint32)
+
+
+def _brightness(intensity: np.ndarray) -> np.ndarray:
+    """11 bits: 7 of an exponent from 2^-87, 4 of a mantissa, rounded; what is fainter counts as 2^-87."""
+    bits = np.asarray(intensity, np.float32).view(np.uint32).astype(np.int64) - (40 << 23)
+    return np.asarray(np.clip((bits + (1 << 18)) >> 19, 0, 2047), np.uint32)
+
+
+def _octahedral(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """(2 x 8 bits, the angle from the axis to what they stand for), as octahedral coordinates."""
+    e = axis / np.abs(axis).sum(axis=-1, keepdims=True)
+    folded = (1 - np.abs(e[..., 1::-1])) * np.where(e[..., :2] >= 0, 1, -1)
+    uv = np.where(e[..., 2:] < 0, folded, e[..., :2])
+    q = np.clip(np.rint(uv * 127 + 127), 0, 254)
+    back = (q - 127) / 127
+    z = 1 - np.abs(back).sum(axis=-1)
+    fold = np.maximum(-z, 0)[..., None] * np.where(back >= 0, 1, -1)
+    w = np.concatenate([back - fold, z[..., None]], axis=-1)
+    w /= np.linalg.norm(w, axis=-1, keepdims=True)
+    across = np.linalg.norm(np.cross(w, axis), axis=-1)
+    angle = np.arctan2(across, (w * axis).sum(axis=-1))
+    bits = q.astype(np.uint32)
+    return bits[..., 0] | bits[..., 1] << 8, angle

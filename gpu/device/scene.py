@@ -1,0 +1,301 @@
+"""A scene on the device: its buffers, its flags, and the numbers that change without an upload."""
+
+from __future__ import annotations
+
+import logging
+import math
+from collections.abc import Mapping
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from gpu import context as contexts
+from gpu import layout
+from gpu.arrays import CameraArrays, SceneArrays
+from gpu.device import buffers
+from gpu.device.textures import KINDS, TextureCache, linear_texture, placeholder
+from gpu.errors import OutOfMemory
+from gpu.kernels import features
+from gpu.layout import LightKind, bindings
+from gpu.layout.bindings import Slot
+from gpu.settings import RenderSettings
+from gpu.tables import energy
+
+log = logging.getLogger(__name__)
+
+_BLOCKS = {layout.BUFFERS[name][1]: block for name, block in bindings.COUNTED.items()}
+_BLOCK_MAX = 16384  # bytes that every driver gives a uniform block; of longer buffers kernels see the first records
+
+
+RADIANCE_MAX = 1e20  # what a texel times the environment's scale may reach
+
+
+def upload_tables(context: Any) -> dict[int, Any]:
+    """The tables of `energy` as textures, by unit, linear and clamped: their first axes are folded into the third.
+
+    The index of stretched lobes goes with the second: 2 048 layers are all that a driver need have.
+    """
+    out = {}
+    for name, unit in bindings.ENERGY_TEXTURES.items():
+        table = getattr(energy.tables(), name)
+        if name == "stretched":
+            etas, aspects, steps, azimuths, cosines, _ = table.shape
+            table = np.moveaxis(table, 0, 2).reshape(aspects * steps, etas * azimuths, cosines, -1)
+        channels = 1 if name == "sheen" else table.shape[-1]
+        height, width = table.shape[-3:-1] if channels > 1 else table.shape[-2:]
+        size = (width, height, table.size // (width * height * channels))
+        texture = context.texture3d(size, channels, np.ascontiguousarray(table), dtype="f4")
+        texture.filter = (context.LINEAR, context.LINEAR)
+        texture.repeat_x = texture.repeat_y = texture.repeat_z = False
+        out[unit] = texture
+    return out
+
+
+def _words(flags: frozenset[str]) -> tuple[str, ...]:
+    return tuple(sorted(flag.removeprefix("HAS_").lower() for flag in flags))
+
+
+class Scene:
+    """Uploaded arrays. Made by `Renderer.load`; several pictures may be taken of one scene."""
+
+    def __init__(
+        self,
+        context: Any,
+        arrays: SceneArrays,
+        editing: bool,
+        texels: TextureCache,
+        everything: bool = False,
+        raised: frozenset[str] = frozenset(),
+    ) -> None:
+        self._context = context
+        self._shared = texels
+        self._editing = editing
+        self._everything = everything
+        self._raised = raised
+        self.arrays = arrays
+        self._raise_flags()
+        self._buffers: dict[Slot, Any] = {}
+        self._details: dict[int, Any] = {}  # textures by unit
+        self._images: dict[int, Any] = {}  # those of images, perhaps shared
+        self._key = ""  # under which they are
+        self.uploaded = 0  # bytes, since shapes first moved
+        try:
+            self._upload_all()
+        except OutOfMemory:
+            for thing in (*self._buffers.values(), *self._details.values()):
+                thing.release()
+            raise
+        self._tables = upload_tables(context) if "HAS_PRINCIPLED_LOBES" in self._raised else {}
+        count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
+        log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
+
+    def _upload_all(self) -> None:
+        for slot in buffers.BUFFERS:
+            self._buffers[slot] = buffers.shared(self._context, slot, self.arrays)
+        self._buffers[Slot.MATERIALS] = buffers.upload(self._context, self._materials())
+        self._upload_details()
+        self._texels, cells = self._upload_environment()
+        self._buffers[Slot.ENVIRONMENT_CELLS] = buffers.upload(self._context, cells)
+
+    def _materials(self) -> np.ndarray:
+        """Bytes of all materials, each followed by its slots and uses of textures."""
+        records = np.ascontiguousarray(self.arrays.materials)
+        words = records.view(np.uint32).reshape(len(records), layout.Material.words)
+        if self.arrays.textures is not None:
+            words = np.concatenate([words, self.arrays.textures.words], axis=1)
+        return words
+
+    def _upload_details(self) -> None:
+        """Textures of the images' texels and of what triangles have at their corners, each only where it is asked."""
+        a = self.arrays
+        colors = a.corner_colors if "HAS_VERTEX_COLORS" in self._raised else a.triangle_colors
+        asked = {
+            bindings.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
+            bindings.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
+            bindings.COLORS_TEXTURE: (colors, 4, "f2"),
+            bindings.INSTANCES_TEXTURE: (a.instances, 4, "u4"),
+        }
+        for unit, (values, channels, dtype) in asked.items():
+            if len(values):
+                self._details[unit] = linear_texture(self._context, values, channels, dtype)
+        if "HAS_LIGHT_TREE" in self._raised:
+            self._details[bindings.LIGHT_TREE_TEXTURE] = linear_texture(self._context, a.light_words, 4, "u4")
+        if a.textures is not None:
+            if a.textures.key:
+                self._images, self._key = self._shared.take(a.textures.key, self._upload_images), a.textures.key
+            else:
+                self._images = self._upload_images()
+        if self._everything:  # its kernels look everywhere: at what was bound for another scene, if at nothing else
+            missing = KINDS.keys() - self._details.keys() - self._images.keys()
+            self._details |= {unit: placeholder(self._context, unit) for unit in missing}
+
+    def _upload_images(self) -> dict[int, Any]:
+        textures = self.arrays.textures
+        assert textures is not None
+        asked = {bindings.BYTES_TEXTURE: (textures.texels, "f1"), bindings.FLOATS_TEXTURE: (textures.floats, "f4")}
+        return {
+            u: linear_texture(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)
+        }
+
+    def _raise_flags(self) -> None:
+        self._looped = features.looped(self.arrays)
+        if self._everything:
+            self._raised = features.everything()
+        elif self._editing and self._raised:
+            self._raised = features.grown(self._raised, self.arrays)
+        else:
+            self._raised = features.flags(self.arrays, self._editing)
+
+    def _upload_environment(self) -> tuple[Any, np.ndarray]:
+        e = self.arrays.environment
+        texels = np.zeros((1, 1, 4), np.float32)
+        self._scale_max = RADIANCE_MAX
+        cells = np.zeros(0, layout.EnvironmentCell.dtype)
+        if e is not None:
+            texels = np.dstack([e.texels, e.probability]).astype(np.float32)
+            cells = e.cells
+            peak = float(e.texels.max()) + (max(e.sun.radiance) if e.sun is not None else 0.0)
+            self._scale_max = RADIANCE_MAX / max(peak, 1.0)
+        height, width = texels.shape[:2]
+        texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
+        texture.filter = (self._context.NEAREST, self._context.NEAREST)
+        return texture, cells
+
+    def defines(self, settings: RenderSettings) -> dict[str, object]:
+        """What its kernels are compiled with."""
+        return features.defines(self._raised, settings, features.counts(self.arrays))
+
+    @property
+    def flags(self) -> frozenset[str]:
+        return self._raised
+
+    @property
+    def features(self) -> tuple[str, ...]:
+        """What its kernels are compiled for, in words: "bvh", "sun_disks"."""
+        return _words(self._raised)
+
+    @property
+    def spared(self) -> tuple[str, ...]:
+        """The features that they are not compiled for."""
+        return _words(frozenset(features.FLAGS) - self._raised)
+
+    def edit(
+        self,
+        camera: CameraArrays | None = None,
+        materials: np.ndarray | None = None,
+        texture_words: np.ndarray | None = None,
+        environment: tuple[float, float] | None = None,
+        moved: Mapping[str, Any] | None = None,
+    ) -> None:
+        """Replace the camera, the materials' bytes (as many as before), what they have of textures
+        (`TextureArrays.words`), the environment's (rotation, scale); `moved`: members of the arrays that tell where
+        shapes stand, with the scene's tree and the lights, as many as before. The tree may change where there are
+        instances.
+
+        Uploads nothing else. Pictures of this scene must be reset by the caller. Raises OutOfMemory, and nothing has
+        changed then.
+        """
+        contexts.use(self._context)
+        changes: dict[str, Any] = {}
+        if camera is not None:
+            changes["camera"] = camera
+        if materials is not None:
+            if len(materials) != len(self.arrays.materials):
+                raise ValueError(f"{len(materials)} materials for a scene of {len(self.arrays.materials)}")
+            changes["materials"] = materials
+        if texture_words is not None and self.arrays.textures is not None:
+            changes["textures"] = replace(self.arrays.textures, words=texture_words)
+        if environment is not None and self.arrays.environment is not None:
+            rotation, scale = environment
+            changes["environment"] = replace(self.arrays.environment, rotation=rotation, scale=scale)
+        if moved is not None:
+            arrays = replace(self.arrays, **moved)
+            self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
+            self.arrays = arrays
+        self.arrays = replace(self.arrays, **changes)
+        if len(self.arrays.materials) and changes.keys() & {"materials", "textures"}:
+            self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
+        self._raise_flags()
+        if "HAS_PRINCIPLED_LOBES" in self._raised and not self._tables:
+            self._tables = upload_tables(self._context)
+
+    def bind(self) -> None:
+        """Bind every buffer of the scene to its slot."""
+        for slot, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(int(slot))
+            if slot in _BLOCKS:
+                buffer.bind_to_uniform_block(_BLOCKS[slot], size=min(buffer.size, _BLOCK_MAX))
+        self._texels.use(bindings.ENVIRONMENT_TEXTURE)
+        for unit, texture in (*self._tables.items(), *self._details.items(), *self._images.items()):
+            texture.use(unit)
+
+    def write_frame(self, frame: np.ndarray) -> None:
+        """Fill the scene's part of a `layout.Frame` record."""
+        a, c = self.arrays, self.arrays.camera
+        frame["camera_position"] = c.position
+        frame["camera_right"] = c.right
+        frame["camera_up"] = c.up
+        frame["camera_forward"] = c.forward
+        frame["tan_half_vfov"] = c.tan_half_vfov
+        frame["aperture_radius"] = c.aperture_radius
+        frame["focus_distance"] = c.focus_distance
+        frame["node_origin"] = a.node_origin
+        frame["node_scale"] = a.node_scale
+        frame["node_count"] = a.node_count
+        frame["node_first"], frame["instance_shift"] = len(a.instance_nodes), a.instance_shift
+        frame["light_count"] = len(a.lights)
+        for member, count in self._looped.items():
+            frame[member] = count
+        suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
+        frame["sun_first"], frame["sun_count"] = suns.min(initial=len(a.lights)), len(suns)
+        frame["moment_scale"] = 1.0 / a.radiance_scale
+        frame["environment_turn"] = (1.0, 0.0)
+        if a.environment is not None:
+            e = a.environment
+            frame["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
+            frame["environment_scale"] = min(e.scale, self._scale_max)
+            frame["environment_background"] = e.background
+            frame["environment_cube"] = e.cube
+            if e.sun is not None:
+                frame["environment_sun"] = e.sun.direction
+                frame["environment_sun_cap"] = e.sun.cap
+                frame["environment_sun_radiance"] = e.sun.radiance
+                frame["environment_sun_share"] = e.sun_share
+            frame["environment_probability"] = a.lights["probability"][
+                a.lights["kind"] == LightKind.ENVIRONMENT
+            ].sum()
+
+    def release(self) -> None:
+        contexts.use(self._context)
+        for buffer in self._buffers.values():
+            buffer.release()
+        self._texels.release()
+        own = [] if self._key else self._images.values()
+        for texture in (*self._tables.values(), *self._details.values(), *own):
+            texture.release()
+        if self._key:
+            self._shared.give_back(self._key)
+
+
+class Everything(Scene):
+    """A scene that is on the device, with every flag raised: to compare kernels with. Released before that one."""
+
+    def __init__(self, scene: Scene) -> None:
+        self.__dict__.update(scene.__dict__)
+        self._everything = True
+        self._raise_flags()
+        missing = KINDS.keys() - self._details.keys() - self._images.keys()
+        self._own = {unit: placeholder(self._context, unit) for unit in missing}
+        if bindings.COLORS_TEXTURE in missing and len(self.arrays.triangles):
+            self._own[bindings.COLORS_TEXTURE].release()
+            self._own[bindings.COLORS_TEXTURE] = linear_texture(self._context, self.arrays.corner_colors, 4, "f2")
+        self._details = self._details | self._own
+        if not self._tables:
+            self._tables = upload_tables(self._context)
+            self._own |= self._tables
+
+    def release(self) -> None:
+        contexts.use(self._context)
+        for texture in self._own.values():
+            texture.release()

@@ -1,0 +1,107 @@
+"""Textures that hold numbers in a row: texels of images, coordinates of triangles; and those that scenes share."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gpu.errors import OutOfMemory
+from gpu.layout import bindings
+
+BYTES = {"f1": 1, "f2": 2, "f4": 4, "u4": 4}
+KINDS = {  # channels and dtype, by texture unit
+    bindings.UVS_TEXTURES[0]: (2, "f4"),
+    bindings.UVS_TEXTURES[1]: (2, "f4"),
+    bindings.COLORS_TEXTURE: (4, "f2"),
+    bindings.BYTES_TEXTURE: (4, "f1"),
+    bindings.FLOATS_TEXTURE: (4, "f4"),
+    bindings.LIGHT_TREE_TEXTURE: (4, "u4"),
+    bindings.INSTANCES_TEXTURE: (4, "u4"),
+}
+
+
+def linear_texture(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
+    """A texture of `bindings.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
+    flat = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
+    pitch = bindings.TEXELS_A_ROW * channels * BYTES[dtype]
+    height, rest = divmod(len(flat), pitch)
+    size = (bindings.TEXELS_A_ROW, height + (rest > 0))
+    context.error  # noqa: B018  # an older one is not this texture's
+    try:
+        texture = context.texture(size, channels, dtype=dtype)
+    except Exception as error:  # moderngl.Error is not importable without its binary parts
+        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures") from error
+    if context.error == "GL_OUT_OF_MEMORY":
+        texture.release()
+        raise OutOfMemory(f"the device has no {size[1] * pitch / 2**20:.0f} MiB left for textures")
+    if height:
+        texture.write(flat[: height * pitch], viewport=(0, 0, bindings.TEXELS_A_ROW, height))
+    if rest:
+        last = np.zeros(pitch, np.uint8)
+        last[:rest] = flat[height * pitch :]
+        texture.write(last, viewport=(0, height, bindings.TEXELS_A_ROW, 1))
+    texture.filter = (context.NEAREST, context.NEAREST)
+    return texture
+
+
+def update_range(texture: Any, values: np.ndarray, part: slice) -> int:
+    """Write a part of the values that `linear_texture` made a texture of: 32-bit numbers, four to a texel.
+
+    Returns the bytes written."""
+    words = np.ascontiguousarray(values[part]).view(np.uint32).reshape(-1, 4)
+    texel = part.start * (values.itemsize // 16)
+    sent = words.nbytes
+    while len(words):
+        x, y = texel % bindings.TEXELS_A_ROW, texel // bindings.TEXELS_A_ROW
+        count = min(len(words), bindings.TEXELS_A_ROW - x)
+        texture.write(np.ascontiguousarray(words[:count]), viewport=(x, y, count, 1))
+        words, texel = words[count:], texel + count
+    return sent
+
+
+def placeholder(context: Any, unit: int) -> Any:
+    """A texture of one texel, as something has to be bound there."""
+    channels, dtype = KINDS[unit]
+    texture = context.texture((1, 1), channels, bytes(channels * BYTES[dtype]), alignment=1, dtype=dtype)
+    texture.filter = (context.NEAREST, context.NEAREST)
+    return texture
+
+
+@dataclass
+class _Shared:
+    textures: dict[int, Any]
+    users: int
+
+
+class TextureCache:
+    """Images on the device by `TextureArrays.key`. The last that a scene gave back stays, for the scene's next
+    version: an edit that packs a scene anew does not upload its images again.
+    """
+
+    def __init__(self) -> None:
+        self._held: dict[str, _Shared] = {}
+
+    def take(self, key: str, make: Callable[[], dict[int, Any]]) -> dict[int, Any]:
+        """Textures by unit; to be given back."""
+        held = self._held.get(key)
+        if held is None:
+            held = self._held[key] = _Shared(make(), 0)
+        held.users += 1
+        return held.textures
+
+    def give_back(self, key: str) -> None:
+        self._held[key].users -= 1
+        if self._held[key].users == 0:
+            for other in [k for k, held in self._held.items() if held.users == 0 and k != key]:
+                self._release(other)
+
+    def release(self) -> None:
+        for key in list(self._held):
+            self._release(key)
+
+    def _release(self, key: str) -> None:
+        for texture in self._held.pop(key).textures.values():
+            texture.release()

@@ -1,0 +1,24 @@
+"""How many bytes of the device's memory a scene and a picture take, about."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpu.settings import RenderSettings
+
+# A pixel's bytes: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more, and a uvec2.
+PIXEL_BYTES, GUIDED_PIXEL_BYTES = 48, 88
+PICTURE_BYTES = 1 << 20  # the noise meter's buffers and what is small
+
+
+def scene_bytes(scene: object) -> int:
+    """About what a SceneArrays takes on the device."""
+    parts = [scene, *(getattr(scene, name, None) for name in ("environment", "textures"))]
+    arrays = [array for part in parts if part is not None for array in vars(part).values()]
+    return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
+
+
+def picture_bytes(settings: RenderSettings, guided: bool = False) -> int:
+    """About what a picture takes on the device, with the AOVs of the first hit or without."""
+    pixel_bytes = (GUIDED_PIXEL_BYTES if guided else PIXEL_BYTES) + (1 if settings.adaptive else 0)  # the plan
+    return settings.width * settings.height * pixel_bytes + PICTURE_BYTES

@@ -1,0 +1,10 @@
+"""From a scene to compiled kernels: which code it needs, the shader text with that code, the compiled result.
+
+features        the table of flags: which code a scene needs
+visibility      the share of a picture that shows nothing, by which a kernel is chosen
+layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
+textures_glsl   how materials read textures, as GLSL
+instances_glsl  records of instances as GLSL
+source          shader text with its includes and flags; errors by file and line
+cache           compiled kernels, with a bound on how many are in memory
+"""

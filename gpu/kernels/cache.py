@@ -1,0 +1,121 @@
+"""Compiled kernels, kept while pictures hold them, and for a while longer: the driver's disk cache is some ms away.
+
+On llvmpipe a kernel takes 7 MB. Whoever may send documents may ask for thousands of them.
+"""
+
+from __future__ import annotations
+
+import ctypes
+import logging
+import time
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from gpu import context as contexts
+from gpu.errors import CompileError
+from gpu.kernels.source import SHADERS, KernelSource
+
+log = logging.getLogger(__name__)
+
+MOST = 16  # kept though nobody holds them: some show pictures, the others trace them
+LONGEST_S = 600.0  # ... and not used for so long
+
+_Key = tuple[str, tuple[tuple[str, object], ...]]
+
+
+@dataclass
+class _Kept:
+    kernel: Any
+    used_at: float = 0.0  # by the monotonic clock
+    holders: int = 0
+
+
+class KernelCache:
+    """By entry and defines; `compile_ms` of the last one is in `last_compile_ms`."""
+
+    def __init__(
+        self, context: Any, folders: Sequence[Path] = (SHADERS,), most: int = MOST, longest_s: float = LONGEST_S
+    ) -> None:
+        self._context = context
+        self._folders = folders
+        self._most, self._longest_s = most, longest_s
+        self._cache: dict[_Key, _Kept] = {}
+        self.last_compile_ms = 0.0
+        self.evicted = 0
+
+    def __len__(self) -> int:
+        return len(self._cache)
+
+    def get(self, entry: str, defines: Mapping[str, object]) -> Any:
+        """The kernel `entry` (a file of shaders/) with these defines, good until the next call; held, until it
+        is let go. Raises CompileError naming file and line."""
+        key = (entry, tuple(sorted(defines.items())))
+        self.last_compile_ms = 0.0
+        if key not in self._cache:
+            kernel = self._compile(entry, defines)
+            self._evict(len(self._free) + 1 - self._most)
+            self._cache[key] = _Kept(kernel)
+        kept = self._cache[key]
+        kept.used_at = time.monotonic()
+        return kept.kernel
+
+    def hold(self, kernel: Any) -> None:
+        """Keeps it from being evicted."""
+        self._of(kernel).holders += 1
+
+    def let_go(self, kernel: Any) -> None:
+        kept = self._of(kernel)
+        kept.holders -= 1
+        kept.used_at = time.monotonic()
+        self._evict(len(self._free) - self._most)
+
+    def tidy(self) -> float | None:
+        """Evicts those that nobody has used for long; in how many seconds the next one is due."""
+        now = time.monotonic()
+        old = sum(now - self._cache[key].used_at >= self._longest_s for key in self._free)
+        if old:
+            self._evict(old)
+            _trim()
+        ages = [now - self._cache[key].used_at for key in self._free]
+        return max(0.0, self._longest_s - max(ages)) if ages else None
+
+    @property
+    def _free(self) -> list[_Key]:
+        """Those that nobody holds, the longest unused first."""
+        free = [key for key, kept in self._cache.items() if not kept.holders]
+        return sorted(free, key=lambda key: self._cache[key].used_at)
+
+    def _of(self, kernel: Any) -> _Kept:
+        return next(kept for kept in self._cache.values() if kept.kernel is kernel)
+
+    def _evict(self, count: int) -> None:
+        for key in self._free[: max(0, count)]:
+            contexts.use(self._context)
+            self._cache.pop(key).kernel.release()
+            self.evicted += 1
+
+    def _compile(self, entry: str, defines: Mapping[str, object]) -> Any:
+        source = KernelSource(entry, defines, self._folders)
+        start = time.perf_counter()
+        try:
+            kernel = self._context.compute_shader(source.text)
+        except Exception as error:  # moderngl.Error is not importable without its binary parts
+            raise CompileError(f"{entry}: {source.explain(str(error))}") from error
+        self.last_compile_ms = (time.perf_counter() - start) * 1e3
+        on = sorted(name[4:].lower() for name, value in defines.items() if name.startswith("HAS_") and value)
+        log.info("compiled %s flags=%s ms=%.0f", entry, "+".join(on) or "none", self.last_compile_ms)
+        return kernel
+
+    def release(self) -> None:
+        for kept in self._cache.values():
+            kept.kernel.release()
+        self._cache.clear()
+
+
+def _trim() -> None:
+    """What was freed goes back to the system: glibc keeps the many small pieces of 40 kernels, 300 MB, for itself."""
+    with suppress(AttributeError, OSError):  # another C library
+        ctypes.CDLL(None).malloc_trim(0)

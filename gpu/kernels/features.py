@@ -1,0 +1,290 @@
+"""Which code a scene needs: a table, flag -> question about the arrays.
+
+A flag only removes code that the scene cannot reach; choices that change pixels are settings (`defines`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+
+import numpy as np
+
+from gpu import layout
+from gpu.arrays import SceneArrays
+from gpu.kernels import textures_glsl
+from gpu.kernels.visibility import background_share
+from gpu.layout import LightKind, MaterialModel, ShapeKind, texture_records
+from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
+
+FILTER_TABLE_SIZE = 512
+LEAST_ROUGHNESS = 0.01  # as in surface.glsl
+OPEN = 0.4  # of the picture shows nothing: then a loop of its own for that spares more than it takes
+
+
+def _looped(scene: SceneArrays, kind: ShapeKind, records: str) -> int:
+    """How many shapes of a kind stand in the kernel's loop: they come first among their records."""
+    return scene.large.get(kind, 0) if kind in scene.bvh_kinds else len(getattr(scene, records))
+
+
+def _linear(kind: ShapeKind, records: str) -> Callable[[SceneArrays], bool]:
+    return lambda s: _looped(s, kind, records) > 0
+
+
+def _tree(kind: ShapeKind) -> Callable[[SceneArrays], bool]:
+    return lambda s: kind in s.bvh_kinds
+
+
+def _light(kind: LightKind) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((s.lights["kind"] == kind).any())
+
+
+def _hidden(records: np.ndarray) -> bool:
+    return bool((records["shape"] & np.uint32(layout.HIDDEN)).any())
+
+
+def _model(model: MaterialModel) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((s.materials["model"] == model).any())
+
+
+def _disney(member: str) -> Callable[[SceneArrays], bool]:
+    models = (MaterialModel.DISNEY, MaterialModel.PRINCIPLED)
+    return lambda s: bool((np.isin(s.materials["model"], models) & (s.materials[member] > 0)).any())
+
+
+def _transmits(materials: np.ndarray) -> np.ndarray:
+    m = materials
+    out: np.ndarray = (m["model"] == MaterialModel.PRINCIPLED) & (m["transmission"] > 0) & (m["metallic"] < 1)
+    return out
+
+
+def _mirrors(materials: np.ndarray) -> np.ndarray:
+    """Those that only mirror or refract, by their own numbers: textures may make more of others, or less."""
+    m = materials
+    whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
+    bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
+    out: np.ndarray = (m["model"] == MaterialModel.PRINCIPLED) & (m["roughness"] < LEAST_ROUGHNESS) & whole & bare
+    return out
+
+
+def _spreads(s: SceneArrays) -> bool:
+    """Whether some `principled` does more than mirror and refract, or no glass is there for which that is spared."""
+    m = s.materials
+    given = m["model"] == MaterialModel.PRINCIPLED
+    sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
+    spared = (sure & _transmits(m)).any() and not _mapped(s, "normal", "coat_normal")
+    return bool(given.any() and (not spared or (given & ~sure).any()))
+
+
+def _slot_flags(scene: SceneArrays) -> np.ndarray:
+    """The flags of all slots in use."""
+    if scene.textures is None:
+        return np.zeros(0, np.uint32)
+    count = max(scene.textures.slots.values(), default=-1) + 1
+    words = scene.textures.words[:, : count * texture_records.TextureSlot.words]
+    out: np.ndarray = np.ascontiguousarray(words).view(texture_records.TextureSlot.dtype)
+    return out["flags"][out["width"] > 0]
+
+
+def _slot(flag: int, kind: int = 0) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((_slot_flags(s) & (flag | kind) == flag).any())
+
+
+def _mapped(s: SceneArrays, *names: str) -> bool:
+    return s.textures is not None and any(name in s.textures.slots for name in names)
+
+
+def _coat_apart(s: SceneArrays) -> bool:
+    """Whether some coat's normal is not that of what is under it."""
+    if s.textures is None or not _mapped(s, "normal", "coat_normal"):
+        return False
+    names = list(s.textures.slots)
+    first = (max(s.textures.slots.values()) + 1) * texture_records.TextureSlot.words
+    uses = np.ascontiguousarray(s.textures.words[:, first:]).view(texture_records.TextureUse.dtype)
+    mapped = [
+        uses["channel"][:, names.index(n)] != texture_records.CHANNEL_NONE
+        for n in texture_records.NORMALS
+        if n in names
+    ]
+    coated = (s.materials["model"] == MaterialModel.PRINCIPLED) & (s.materials["clearcoat"] > 0)
+    return bool((np.any(mapped, axis=0) & coated).any())
+
+
+def _thin(s: SceneArrays) -> bool:
+    return bool((s.triangle_colors[..., 3] < 1).any())
+
+
+def _veiled(s: SceneArrays) -> bool:
+    """Whether what shines, or its opacity, changes over a shape."""
+    shines = (s.materials["emission"] > 0).any(axis=1)
+    given = s.materials[shines]
+    textured = (given[name] == np.float32(layout.TEXTURED) for name in ("emission", "opacity"))
+    return any(bool(values.any()) for values in textured) or (len(given) > 0 and _thin(s))
+
+
+FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
+    "HAS_SPHERES": _linear(ShapeKind.SPHERE, "spheres"),
+    "HAS_VAST_SPHERES": lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any()),
+    "HAS_QUADS": _linear(ShapeKind.QUAD, "quads"),
+    "HAS_BOXES": _linear(ShapeKind.BOX, "boxes"),
+    "HAS_ELLIPSOIDS": _linear(ShapeKind.ELLIPSOID, "ellipsoids"),
+    "HAS_TRIANGLES": _linear(ShapeKind.TRIANGLE, "triangles"),
+    "HAS_BVH": lambda s: bool(s.bvh_kinds),
+    "HAS_BVH_SPHERES": _tree(ShapeKind.SPHERE),
+    "HAS_BVH_QUADS": _tree(ShapeKind.QUAD),
+    "HAS_BVH_BOXES": _tree(ShapeKind.BOX),
+    "HAS_BVH_ELLIPSOIDS": _tree(ShapeKind.ELLIPSOID),
+    "HAS_BVH_TRIANGLES": _tree(ShapeKind.TRIANGLE),
+    "HAS_INSTANCES": lambda s: len(s.instances) > 0,
+    "HAS_SINGLE_SIDED": lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any()),
+    "HAS_SMOOTH_NORMALS": lambda s: len(s.triangle_normals) > 0,
+    "HAS_TANGENTS": lambda s: s.tangents,
+    "HAS_HIDDEN_SHAPES": lambda s: any(_hidden(getattr(s, records)) for records in (*COUNTS.values(), "instances")),
+    "HAS_OPACITY": lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s),
+    "HAS_TEXTURES": lambda s: s.textures is not None or len(s.triangle_colors) > 0,
+    "HAS_BYTE_TEXELS": _slot(0, texture_records.SLOT_FLOATS | texture_records.SLOT_CHECKER),
+    "HAS_FLOAT_TEXELS": _slot(texture_records.SLOT_FLOATS, texture_records.SLOT_CHECKER),
+    "HAS_SRGB_TEXELS": _slot(texture_records.SLOT_SRGB),
+    "HAS_CHECKERS": _slot(texture_records.SLOT_CHECKER),
+    "HAS_UVS": lambda s: len(s.triangle_uvs) > 0,
+    "HAS_UVS_1": lambda s: len(s.triangle_uvs_1) > 0,
+    "HAS_VERTEX_COLORS": lambda s: len(s.triangle_colors) > 0,
+    "HAS_NORMAL_MAPS": lambda s: _mapped(s, "normal", "coat_normal"),
+    "HAS_COAT_NORMALS": _coat_apart,
+    "HAS_TEXTURED_LIGHTS": _veiled,
+    "HAS_EMISSION": lambda s: bool((s.materials["emission"] > 0).any()),
+    "HAS_EMISSION_BOTH": lambda s: bool(
+        ((s.materials["emission"] > 0).any(axis=1) & (s.materials["emission_sides"] == 2)).any()
+    ),
+    "HAS_LIGHTS": lambda s: len(s.lights) > 0,
+    "HAS_MANY_LIGHTS": lambda s: len(s.lights) > 1,
+    "HAS_LIGHT_TREE": lambda s: len(s.light_tree) > 0,
+    "HAS_POINT_LIGHTS": _light(LightKind.POINT),
+    "HAS_SPOT_LIGHTS": _light(LightKind.SPOT),
+    "HAS_DIRECTIONAL_LIGHTS": _light(LightKind.DIRECTIONAL),
+    "HAS_SUN_DISKS": lambda s: bool(((s.lights["kind"] == LightKind.DIRECTIONAL) & (s.lights["spread"] > 0)).any()),
+    "HAS_SPHERE_LIGHTS": _light(LightKind.SPHERE),
+    "HAS_QUAD_LIGHTS": _light(LightKind.QUAD),
+    "HAS_TRIANGLE_LIGHTS": _light(LightKind.TRIANGLE),
+    "HAS_ELLIPSOID_LIGHTS": _light(LightKind.ELLIPSOID),
+    "HAS_ENVIRONMENT": lambda s: s.environment is not None,
+    "HAS_ENVIRONMENT_IMAGE": lambda s: (
+        s.environment is not None and s.environment.texels.size > 3 and not s.environment.cube
+    ),
+    "HAS_ENVIRONMENT_CUBE": lambda s: s.environment is not None and s.environment.cube,
+    "HAS_SUN": lambda s: s.environment is not None and s.environment.sun is not None,
+    "HAS_OPEN_VIEW": lambda s: background_share(s) >= OPEN,
+    "HAS_APERTURE": lambda s: s.camera.aperture_radius > 0,
+    "HAS_DISNEY": _model(MaterialModel.DISNEY),
+    "HAS_SUBSURFACE": _disney("subsurface"),
+    "HAS_SHEEN": _disney("sheen"),
+    "HAS_ANISOTROPIC": _disney("anisotropic"),
+    "HAS_CLEARCOAT": _disney("clearcoat"),
+    "HAS_METAL_ROUGH": _model(MaterialModel.METAL_ROUGH),
+    "HAS_BLINN_PHONG": _model(MaterialModel.BLINN_PHONG),
+    "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
+    "HAS_PRINCIPLED": _model(MaterialModel.PRINCIPLED),
+    "HAS_PRINCIPLED_LOBES": _spreads,
+    "HAS_TRANSMISSION": lambda s: bool(_transmits(s.materials).any()),
+    "HAS_MIRRORS": lambda s: bool((_transmits(s.materials) & _mirrors(s.materials)).any()),
+    "HAS_ATTENUATION": lambda s: bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any()),
+}
+
+# What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
+# ever waits for a compiler. `principled` leaves out what costs more than it saves: stretched highlights double its
+# time and clear bodies add a fifth; the first touch of such a slider compiles once.
+_OPAQUE = ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")
+EDITED = {
+    "HAS_DISNEY": _OPAQUE,
+    "HAS_PRINCIPLED": ("HAS_PRINCIPLED_LOBES", "HAS_SUBSURFACE", "HAS_SHEEN", "HAS_CLEARCOAT"),
+    "HAS_BLINN_PHONG": ("HAS_AMBIENT",),
+}
+
+
+def everything() -> frozenset[str]:
+    """Every flag there is."""
+    return frozenset(FLAGS)
+
+
+def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
+    """The flags that `scene` raises; with `editing`, also those that an edit of its materials could."""
+    raised = {name for name, asks in FLAGS.items() if asks(scene)}
+    if editing:
+        raised |= {more for name in raised & set(EDITED) for more in EDITED[name]}
+    return frozenset(raised)
+
+
+# What spares work and changes no picture: an edit that could do with it is not worth waiting for a compiler.
+_SPARING = frozenset({"HAS_MIRRORS", "HAS_OPEN_VIEW"})
+
+
+def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:
+    """The flags of a scene under edit, after one: those that it had, and what it needs now."""
+    return raised | (flags(scene, True) - _SPARING)
+
+
+# Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
+# varying index. 0: too many to be worth it, or met through the tree.
+COUNTS: dict[str, str] = {
+    "SPHERE_COUNT": "spheres",
+    "QUAD_COUNT": "quads",
+    "BOX_COUNT": "boxes",
+    "ELLIPSOID_COUNT": "ellipsoids",
+    "TRIANGLE_COUNT": "triangles",
+}
+FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
+_FEW_MAX = 64
+_BLOCK_BYTES = 16384  # what every driver gives a uniform block
+PICK_MAX = 2
+
+
+def _loop(name: str) -> str:
+    """The define of how often a loop over shapes runs, beside that of how many of them stand in it."""
+    return name.replace("_COUNT", "_LOOP")
+
+
+def looped(scene: SceneArrays) -> dict[str, int]:
+    """How many shapes of each kind stand in the kernel's loops, by the members of `layout.Frame` that tell so."""
+    kinds = zip(COUNTS.values(), ShapeKind, strict=False)
+    return {f"looped_{records}": _looped(scene, kind, records) for records, kind in kinds}
+
+
+def told_loops() -> dict[str, object]:
+    """For a kernel that learns those numbers from the frame."""
+    return {_loop(name): f"frame.looped_{records}" for name, records in COUNTS.items()}
+
+
+def counts(scene: SceneArrays) -> dict[str, object]:
+    """How many shapes of each kind stand in the kernel's loops, how many materials and lights, where few; and where
+    textures belong."""
+    kinds = zip(COUNTS.items(), ShapeKind, strict=False)  # instances are never looped over
+    out: dict[str, object] = {name: _looped(scene, kind, records) for (name, records), kind in kinds}
+    out |= {_loop(name): n for name, n in out.items()}
+    few = {name: len(getattr(scene, records)) for name, records in FEW.items()}
+    slots = {} if scene.textures is None else scene.textures.slots
+    room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * textures_glsl.groups(slots))
+    most = {"MATERIAL_COUNT": min(_FEW_MAX, room), "LIGHT_COUNT": _FEW_MAX}
+    out |= {name: n if n <= most[name] else 0 for name, n in few.items()}
+    return {**out, **textures_glsl.defines(slots), "QUAD_LAMP": _quad_lamp(scene)}
+
+
+def _quad_lamp(scene: SceneArrays) -> int:
+    """The index of the only emitting quad, where there is one and it stands in the kernel's loop; else -1."""
+    lamps = np.flatnonzero(scene.quads["light"] != layout.NONE)
+    return int(lamps[0]) if len(lamps) == 1 and lamps[0] < _looped(scene, ShapeKind.QUAD, "quads") else -1
+
+
+def defines(
+    raised: frozenset[str], settings: RenderSettings | None = None, shapes: Mapping[str, object] | None = None
+) -> dict[str, object]:
+    """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
+    out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
+    out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
+    out |= {"QUAD_LAMP": -1} | textures_glsl.defines({}) | dict(shapes or {})
+    out["PICK_MAX"] = PICK_MAX
+    out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
+    out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}
+    out["HAS_CLAMP"] = int(settings is not None and settings.clamp is not None)
+    out["ADAPTIVE"] = int(settings is not None and settings.adaptive)
+    out["ESTIMATOR"] = ESTIMATORS.index(settings.estimator) if settings else 0
+    out["SAMPLER"] = SAMPLERS.index(settings.sampler) if settings else 0
+    return out

@@ -1,0 +1,31 @@
+"""Records of instances as GLSL, all of it guarded by HAS_INSTANCES: a texture's texels, nine to a record."""
+
+from __future__ import annotations
+
+from gpu import layout
+from gpu.kernels import textures_glsl
+from gpu.layout import Instance, ShapeKind, bindings
+
+FRAME = ("node_first", "instance_shift")  # the last members of `layout.Frame`, which only these kernels have
+GROUPS = Instance.words // 4
+
+
+def text() -> str:
+    """The struct, its loader, and the number of an instance in the id of a hit."""
+    members = " ".join(f"{kind.glsl} {name};" for name, kind in Instance.members.items())
+    words = "\n".join(
+        f"    uint a{k} = i * {GROUPS}u + {k}u;\n"
+        f"    uvec4 w{k} = texelFetch(instance_texels, ivec2(a{k} & {bindings.TEXELS_A_ROW - 1}u,"
+        f" a{k} / {bindings.TEXELS_A_ROW}u), 0);"
+        for k in range(GROUPS)
+    )
+    return f"""#if HAS_INSTANCES
+const uint SHAPE_INSTANCE = {int(ShapeKind.INSTANCE)}u;
+const uint INSTANCED = {layout.INSTANCED}u;
+struct Instance {{ {members} }};
+layout(binding = {bindings.INSTANCES_TEXTURE}) uniform usampler2D instance_texels;
+Instance instance_load(uint i) {{
+{words}
+    return Instance({textures_glsl.unpacked(Instance, 4)});
+}}
+#endif"""

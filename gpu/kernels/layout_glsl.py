@@ -1,0 +1,151 @@
+"""Records as GLSL: structs, buffers with their loaders, constants. Shaders include it as `layout.glsl`."""
+
+from __future__ import annotations
+
+from gpu import layout
+from gpu.kernels import instances_glsl, textures_glsl
+from gpu.layout import Frame, LightKind, MaterialModel, ShapeKind, bindings
+from gpu.layout.bindings import Slot
+from gpu.layout.record import Record
+from gpu.tables import energy
+
+
+def _struct(record: type[Record]) -> str:
+    body = " ".join(f"{k.glsl} {name};" for name, k in record.members.items())
+    return f"struct {record.__name__} {{ {body} }};"
+
+
+def _loader(name: str, record: type[Record], slot: Slot) -> str:
+    """The buffer of a record and its `NAME_load(i)`.
+
+    A buffer of which kernels know the count is a uniform block: llvmpipe loads those once for all lanes where the
+    index is constant, as in unrolled loops, and storage buffers lane by lane wherever control flow has diverged.
+    A kind of which the first stand in a loop and the others in the tree has both, and `NAME_tree_load(i)` for any.
+    """
+    storage = _storage(name, record, slot, "words")
+    if name not in bindings.COUNTED:
+        return "\n".join([storage, _load(name, record, "load", "words")])
+    count, stride = f"{name.upper()}_COUNT", _stride(name, record)
+    block = f"layout(std140, binding = {bindings.COUNTED[name]}) uniform {name}_block"
+    lines = [
+        f"#if {count} > 0",
+        f"{block} {{ uvec4 {name}_words[{count} * {stride}]; }};",
+        "#else",
+        storage,
+        "#endif",
+        _load(name, record, "load", "words"),
+    ]
+    if name in _SHAPES:
+        lines += [
+            f"#if {_split(name)}",
+            _storage(name, record, slot, "stored"),
+            _load(name, record, "tree_load", "stored"),
+            "#else",
+            f"#define {name}_tree_load {name}_load",
+            "#endif",
+        ]
+    return "\n".join(lines)
+
+
+_SHAPES = frozenset(kind.name.lower() for kind in ShapeKind if kind != ShapeKind.INSTANCE)
+
+
+def _split(name: str) -> str:
+    """Whether a kernel's loop holds some shapes of a kind and its tree the others."""
+    return f"{name.upper()}_COUNT > 0 && HAS_BVH_{layout.BUFFERS[name][1].name}"
+
+
+def _stride(name: str, record: type[Record]) -> str:
+    if name == "material":
+        return "MATERIAL_GROUPS"  # textures follow a material's numbers
+    return f"{record.words // (4 if record.words % 4 == 0 else 2)}u"
+
+
+def _storage(name: str, record: type[Record], slot: Slot, words: str) -> str:
+    group = 4 if record.words % 4 == 0 else 2
+    return f"layout(std430, binding = {int(slot)}) readonly buffer {name}_buffer {{ uvec{group} {name}_{words}[]; }};"
+
+
+def _load(name: str, record: type[Record], function: str, words: str) -> str:
+    group = 4 if record.words % 4 == 0 else 2
+    stride = _stride(name, record)
+    lines = [f"{record.__name__} {name}_{function}(uint i) {{"]
+    for k in range(record.words // group):
+        lines.append(f"    uvec{group} w{k} = {name}_{words}[i * {stride} + {k}u];")
+    lines.append(f"    return {record.__name__}({textures_glsl.unpacked(record, group)});\n}}")
+    return "\n".join(lines)
+
+
+def _picker(name: str, record: type[Record]) -> str:
+    """`NAME_pick(i)`: as `_load`, but where there are very few, chosen among loads at constant places."""
+    count = f"{name.upper()}_COUNT"
+    tree = f"#if {_split(name)}\n    return {name}_tree_load(i);\n#elif" if name in _SHAPES else "#if"
+    return f"""
+{record.__name__} {name}_pick(uint i) {{
+{tree} {count} == 0 || {count} > PICK_MAX
+    return {name}_load(i);
+#else
+    {record.__name__} r = {name}_load(0u);
+    for (uint k = 1u; k < uint({count}); k++) {{
+        {record.__name__} other = {name}_load(k);
+        if (i == k) r = other;
+    }}
+    return r;
+#endif
+}}"""
+
+
+def _constants() -> str:
+    out = []
+    for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", MaterialModel)):
+        out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
+    out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
+    out += [f"#define FRAME_BLOCK {bindings.FRAME_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
+    for name in (
+        "NONE",
+        "SINGLE_SIDED",
+        "HIDDEN",
+        "NORMALS_SMOOTH",
+        "NORMALS_LEFT",
+        "TANGENT_SHIFT",
+        "TANGENT_BITS",
+        "TANGENT_STEPS",
+        "LEAF_BIT",
+        "LEAF_KIND_SHIFT",
+        "LEAF_COUNT_SHIFT",
+        "LEAF_FIRST_MASK",
+        "TREELET_BIT",
+        "TREELET_MAX_NODES",
+        "LIGHT_CODES",
+        "METER_REPLICATES",
+    ):
+        out.append(f"const uint {name} = {getattr(layout, name)}u;")
+    out.append(f"#define LIGHT_TREE_TEXTURE {bindings.LIGHT_TREE_TEXTURE}")
+    out.append(f"const uint LIGHT_TREE_ROW = {bindings.TEXELS_A_ROW}u;")
+    out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in bindings.ENERGY_TEXTURES.items()]
+    sizes = ("ETAS", "ASPECTS", "STEPS", "AZIMUTHS", "COSINES")
+    out += [f"#define ENERGY_{name} {size}" for name, size in zip(sizes, energy.STRETCHED_SHAPE, strict=True)]
+    for name in ("LEAST_ASPECT", "LARGEST_ETA", "AZIMUTH_POWER", "LEAST_SHEEN_ROUGHNESS"):
+        out.append(f"const float ENERGY_{name} = {getattr(energy, name)!r};")
+    return "\n".join(out)
+
+
+def text() -> str:
+    """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `frame`."""
+    structs = [_struct(r) for r in dict.fromkeys(r for r, _ in layout.BUFFERS.values())]
+    loaders = [_loader(name, r, slot) for name, (r, slot) in layout.BUFFERS.items()]
+    loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
+    nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
+    parts = [_constants(), *structs, *loaders, nodes, _frame(), instances_glsl.text(), textures_glsl.text()]
+    return "\n".join(parts) + "\n"
+
+
+def _frame() -> str:
+    members = {name: f"{kind.glsl} {name};" for name, kind in Frame.members.items()}
+    last = " ".join(members.pop(name) for name in instances_glsl.FRAME)
+    body = " ".join(members.values())
+    return f"""layout(std140, binding = {bindings.FRAME_BLOCK}) uniform frame_block {{ {body}
+#if HAS_INSTANCES
+{last}
+#endif
+}} frame;"""

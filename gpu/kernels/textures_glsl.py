@@ -1,0 +1,131 @@
+"""How materials read textures, as GLSL: their slots and uses, and which member of a material gets which texel.
+
+A kernel knows by its defines which members are textured in its scene: for each one TEXTURE_MEMBER, the slot that its
+texel comes from, or -1, and TEXTURE_MEMBER_USE, its place among the uses. Slots and uses follow each material's own
+numbers in the same buffer, so that they arrive the same way: at constant places where materials are few.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from gpu import layout
+from gpu.layout import bindings, texture_records
+from gpu.layout.record import Record
+from gpu.layout.texture_records import TextureSlot, TextureUse
+
+BASE = layout.Material.words // 4  # groups of four words of a material without textures
+SLOT_GROUPS, USE_GROUPS = TextureSlot.words // 4, TextureUse.words // 4
+ALL = (*texture_records.TEXTURABLE, *texture_records.NORMALS)
+
+
+def unpacked(record: type[Record], group: int) -> str:
+    """The members of a record, taken from the words w0, w1, ... of `group` numbers each."""
+    values = []
+    for member, kind in record.members.items():
+        at = record.offsets[member]
+        swizzle = "xyzw"[at % group : at % group + kind.words]
+        word = f"w{at // group}.{swizzle}"
+        values.append(word if kind.base is np.uint32 else f"uintBitsToFloat({word})")
+    return ", ".join(values)
+
+
+def defines(slots: dict[str, int]) -> dict[str, object]:
+    """Of a scene whose textured members get their texels from these slots; see `arrays.TextureArrays`."""
+    count = max(slots.values(), default=-1) + 1
+    out: dict[str, object] = {f"TEXTURE_{name.upper()}": slots.get(name, -1) for name in ALL}
+    out |= {f"TEXTURE_{name.upper()}_USE": f"{i}u" for i, name in enumerate(slots)}
+    surface = [slot for name, slot in slots.items() if name not in texture_records.OTHER_RANGES]
+    out["TEXTURE_SLOTS"] = count
+    out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
+    out["MATERIAL_GROUPS"] = f"{BASE + groups(slots)}u"
+    return out
+
+
+def groups(slots: dict[str, int]) -> int:
+    """Groups of four words that follow each material."""
+    return (max(slots.values(), default=-1) + 1) * SLOT_GROUPS + len(slots) * USE_GROUPS
+
+
+def _reader(record: type[Record], name: str, first: str, size: int) -> str:
+    """`NAME_load(i, k)`: the k-th of material i; `NAME_pick(i, k)`: without a varying index where there are few."""
+    words = "\n".join(
+        f"    uvec4 w{j} = material_words[i * MATERIAL_GROUPS + {first} + {size}u * k + {j}u];" for j in range(size)
+    )
+    return f"""{record.__name__} {name}_load(uint i, uint k) {{
+{words}
+    return {record.__name__}({unpacked(record, 4)});
+}}
+{record.__name__} {name}_pick(uint i, uint k) {{
+#if MATERIAL_COUNT == 0 || MATERIAL_COUNT > PICK_MAX
+    return {name}_load(i, k);
+#else
+    {record.__name__} r = {name}_load(0u, k);
+    for (uint j = 1u; j < uint(MATERIAL_COUNT); j++) {{
+        {record.__name__} other = {name}_load(j, k);
+        if (i == j) r = other;
+    }}
+    return r;
+#endif
+}}"""
+
+
+def _use(name: str, low: float, high: float, texel: str, target: str) -> str:
+    kind = layout.Material.members[name].glsl
+    flag = f"TEXTURE_{name.upper()}"
+    return f"""#if {flag} >= 0
+    texture_use_{kind}(texture_use_pick(i, {flag}_USE), {texel.format(flag)}, {low!r}, {high!r}, {target});
+#endif"""
+
+
+def text() -> str:
+    """Structs and functions, all of it guarded by HAS_TEXTURES."""
+    surface = "\n".join(
+        _use(name, *bounds, "texels[{}]", f"m.{name}") for name, bounds in texture_records.SURFACE_RANGES.items()
+    )
+    others = "\n".join(
+        f"void texture_use_{name}(uint i, vec4 texel, inout {layout.Material.members[name].glsl} x) {{\n"
+        f"{_use(name, *bounds, 'texel', 'x')}\n}}"
+        for name, bounds in texture_records.OTHER_RANGES.items()
+    )
+    structs = "\n".join(
+        f"struct {r.__name__} {{ {' '.join(f'{k.glsl} {n};' for n, k in r.members.items())} }};"
+        for r in (TextureSlot, TextureUse)
+    )
+    names = [n for n in vars(texture_records) if n.startswith(("SLOT_", "CHANNEL_"))]
+    constants = "\n".join(f"const uint TEXTURE_{n} = {getattr(texture_records, n)}u;" for n in names)
+    units = {
+        "BYTES": bindings.BYTES_TEXTURE,
+        "FLOATS": bindings.FLOATS_TEXTURE,
+        "UVS": bindings.UVS_TEXTURES[0],
+        "UVS_1": bindings.UVS_TEXTURES[1],
+        "COLORS": bindings.COLORS_TEXTURE,
+    }
+    defined = "\n".join(f"#define TEXTURE_{name}_UNIT {unit}" for name, unit in units.items())
+    return f"""#if HAS_TEXTURES
+{defined}
+{constants}
+const uint TEXTURE_ROW = {bindings.TEXELS_A_ROW}u;
+{structs}
+{_reader(TextureSlot, "texture_slot", f"{BASE}u", SLOT_GROUPS)}
+{_reader(TextureUse, "texture_use", f"{BASE}u + {SLOT_GROUPS}u * uint(TEXTURE_SLOTS)", USE_GROUPS)}
+
+void texture_use_float(TextureUse use, vec4 texel, float low, float high, inout float x) {{
+    vec4 one = mix(vec4(0.0), vec4(1.0), equal(uvec4(use.channel), TEXTURE_CHANNEL_R + uvec4(0u, 1u, 2u, 3u)));
+    if (use.channel != TEXTURE_CHANNEL_NONE) x = clamp(dot(texel, one) * use.factor.x, low, high);
+}}
+
+void texture_use_vec3(TextureUse use, vec4 texel, float low, float high, inout vec3 x) {{
+    vec4 one = mix(vec4(0.0), vec4(1.0), equal(uvec4(use.channel), TEXTURE_CHANNEL_R + uvec4(0u, 1u, 2u, 3u)));
+    vec3 c = use.channel == TEXTURE_CHANNEL_COLOR ? texel.rgb : vec3(dot(texel, one));
+    if (use.channel != TEXTURE_CHANNEL_NONE) x = clamp(c * use.factor, low, high);
+}}
+
+// The members that a surface is made from, given the texels of its slots.
+void texture_members(uint i, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout Material m) {{
+{surface}
+}}
+
+{others}
+#endif
+"""

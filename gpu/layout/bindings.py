@@ -1,0 +1,40 @@
+"""Where kernels find what they read and write: binding points of buffers and blocks, and texture units."""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+
+class Slot(IntEnum):
+    """Binding points of the storage buffers."""
+
+    MATERIALS = 0
+    SPHERES = 1
+    QUADS = 2
+    BOXES = 3
+    ELLIPSOIDS = 4
+    TRIANGLES = 5
+    TRIANGLE_NORMALS = 6
+    NODES = 7
+    LIGHTS = 8
+    ENVIRONMENT_CELLS = 9
+    SUM = 10
+    COMPENSATION = 11
+    MOMENTS = 12
+    ALBEDO = 13
+    NORMAL = 14
+    OUTPUT = 15
+
+
+FRAME_BLOCK = 0  # uniform blocks
+FILTER_BLOCK = 1
+# Buffers with a NAME_COUNT that kernels are compiled for: uniform blocks where it is above 0. Binding points
+COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}
+ENVIRONMENT_TEXTURE = 0  # texture units
+BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
+UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
+COLORS_TEXTURE = 12
+LIGHT_TREE_TEXTURE = 13
+INSTANCES_TEXTURE = 14  # records: all storage buffers are taken
+ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.tables.energy
+TEXELS_A_ROW = 8192  # of the textures that hold texels and coordinates, one after the other

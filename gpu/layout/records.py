@@ -1,0 +1,290 @@
+"""The bytes that the host and the shaders share, declared once.
+
+Each record yields a numpy dtype and, in `kernels/layout_glsl.py`, a struct, a buffer and a loader; `texture_records`
+declares those of textures, `bindings` the places where kernels find it all. Shaders get all of it through
+`#include "layout.glsl"`, which exists only in memory. Buffers are arrays of 32-bit words in groups of four (or two):
+llvmpipe fetches a uvec4 for the price of one float, so a record is read with as few fetches as it has groups.
+"""
+
+from __future__ import annotations
+
+from enum import IntEnum
+
+from gpu.layout.bindings import Slot
+from gpu.layout.record import Record, f32, u32, uvec2, vec2, vec3, vec4
+
+NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
+NOT_VAST = 3.4e38
+ABSENT = -1.0  # a material's number that was not given
+TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises what it may need
+SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
+HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
+# In TriangleNormals.bits: the corners' normals are interpolated; v grows to the right of u, seen from outside; and
+# from TANGENT_SHIFT on three codes of TANGENT_BITS each, 0 of none: 1 + the tangent's angle in the plane of its
+# corner's normal, in steps. A step is .35 degrees, less than a normal map of 8 bits tells apart; right angles are
+# whole numbers of them.
+NORMALS_SMOOTH, NORMALS_LEFT = 1, 2
+TANGENT_SHIFT, TANGENT_BITS, TANGENT_STEPS = 2, 10, 1020
+
+
+class ShapeKind(IntEnum):
+    SPHERE = 0
+    QUAD = 1
+    BOX = 2
+    ELLIPSOID = 3
+    TRIANGLE = 4
+    INSTANCE = 5  # of triangles that have a tree of their own; never in a loop
+
+
+class LightKind(IntEnum):
+    """Those from SPHERE on are shapes, which emit by their material."""
+
+    POINT = 0
+    ENVIRONMENT = 1
+    SPOT = 2
+    DIRECTIONAL = 3
+    SPHERE = 4
+    QUAD = 5
+    TRIANGLE = 6
+    ELLIPSOID = 7
+
+
+class MaterialModel(IntEnum):
+    DIFFUSE = 0
+    DISNEY = 1
+    PRINCIPLED = 2
+    METAL_ROUGH = 3
+    BLINN_PHONG = 4
+
+
+class Material(Record):
+    slot = Slot.MATERIALS
+    base_color: vec3  # linear Rec.709 reflectance, each channel in [0, 1]; diffuse's albedo
+    roughness: f32  # perceptual, [0, 1]
+    emission: vec3  # radiance, W / (m^2 sr) per channel
+    metallic: f32
+    model: u32  # Model
+    subsurface: f32
+    specular: f32
+    specular_tint: f32
+    anisotropic: f32
+    sheen: f32
+    sheen_tint: f32
+    clearcoat: f32
+    clearcoat_gloss: f32
+    opacity: f32  # the chance that a ray meets the surface
+    emission_sides: u32  # 1: the outward side emits; 2: both do
+    sheen_roughness: f32
+    phong_specular: vec3  # blinn_phong; its diffuse is base_color
+    shininess: f32  # exponent, >= 0
+    ambient: vec3  # radiance added wherever a path meets the surface
+    transmission: f32
+    attenuation_color: vec3  # what is left of light after attenuation_distance inside
+    attenuation_distance: f32  # ABSENT: clear
+    specular_color: vec3
+    clearcoat_roughness: f32  # ABSENT: from clearcoat_gloss
+    sheen_color: vec3  # ABSENT: from sheen_tint
+    anisotropic_rotation: f32  # degrees
+    ior: f32  # inside over outside; ABSENT: from `specular`
+    cutoff: f32  # an opacity of at least this counts as 1, any other as 0; ABSENT: it is a chance
+
+
+class Sphere(Record):
+    slot = Slot.SPHERES
+    center: vec3
+    radius: f32
+    rotation: vec4  # quaternion (x, y, z, w), world from object: where the poles and the meridian are
+    material: u32
+    light: u32  # its place among the lights, or NONE
+    shape: u32  # index in the scene document
+    power: f32  # |center|^2 - radius^2 in float64, where the surface of a vast ball passes the origin; else NOT_VAST
+
+
+class Quad(Record):
+    slot = Slot.QUADS
+    origin: vec3
+    material: u32
+    normal: vec3  # unit, outward: along cross(u, v), against it where a transform mirrors
+    light: u32
+    dual_u: vec3  # unit, across v in the plane: dot(p - origin, dual_u) is 0..u_length inside
+    u_length: f32  # between those two sides: |u| of a rectangle
+    dual_v: vec3
+    v_length: f32
+    u: vec3
+    area: f32
+    v: vec3
+    shape: u32
+
+
+class Solid(Record):
+    """A unit sphere (ellipsoid) or the cube [-1, 1]^3 (box) under an affine map: object = rows (world - center)."""
+
+    center: vec3
+    material: u32
+    row_x: vec3  # rows of object_from_world
+    light: u32
+    row_y: vec3
+    shape: u32
+    row_z: vec3
+
+
+class Triangle(Record):
+    slot = Slot.TRIANGLES
+    v0: vec3
+    material: u32
+    v1: vec3
+    light: u32
+    v2: vec3
+    shape: u32  # index in the scene document, with SINGLE_SIDED
+
+
+class Instance(Record):
+    """Triangles with a tree of their own under an affine map: object = rows (world - center).
+
+    Their normals and what they have at their corners are where theirs are; material, shape and its bits are here.
+    """
+
+    row_x: vec3  # rows of object_from_world
+    first: u32  # triangle; the leaves count from there
+    row_y: vec3
+    shape: u32  # index in the scene document, with HIDDEN
+    row_z: vec3
+    side: f32  # -1 where the map mirrors, else 1
+    center: vec3
+    material: u32
+    node_origin: vec3  # object position of grid coordinate 0
+    node_first: u32  # of its tree's nodes, whose links count from there
+    node_scale: vec3
+    node_count: u32  # of one octant's order of the top
+    axis_x: vec3  # columns of world_from_object
+    axis_z_x: f32
+    axis_y: vec3
+    axis_z_y: f32
+    error: vec3  # in units of a rounding: what the maps lose of a place on the way out and back
+    axis_z_z: f32
+
+
+class TriangleNormals(Record):
+    slot = Slot.TRIANGLE_NORMALS
+    n0: u32  # octahedral, 2 x 16 bits snorm (packSnorm2x16)
+    n1: u32
+    n2: u32
+    bits: u32  # NORMALS_*, TANGENT_*
+
+
+class Node(Record):
+    """One box of the threaded tree, quantised to 16 bits a side, rounded outwards."""
+
+    slot = Slot.NODES
+    x: u32  # low half: lower bound; high half: upper bound, in units of the grid
+    y: u32
+    z: u32
+    link: u32  # inner: index to go on at when the box is missed. Leaf: see LEAF_*; treelet: see TREELET_*
+
+
+class Light(Record):
+    slot = Slot.LIGHTS
+    position: vec3  # point lights and spots
+    kind: u32  # LightKind
+    intensity: vec3  # W/sr, points and spots; directional: radiance of the disk, or irradiance; 0 for shapes
+    index: u32  # into the array of the shape's kind
+    probability: f32  # of being picked; of a light in the tree: the part that does not go by the tree
+    threshold: f32  # alias table: keep this light where u < threshold
+    alias: u32  # else take that one; of a light in the tree: bit k says which child leads to it at depth k
+    material: u32
+    direction: vec3  # the way the light travels; a spot's is scaled, see spot.glsl
+    spread: f32  # spot: see spot.glsl; directional: 1 - cos of the disk's half angle, 0: no disk
+
+
+class LightTreeHead(Record):
+    """The first words of the lights' tree: how the numbers 0 .. LIGHT_CODES - 1 are dealt out, and its grid."""
+
+    near: u32  # below: the tree's lights; from there on those at infinity, by their alias table
+    even: u32  # below: the tree's lights alike; from there to `near` down the tree
+    even_shift: u32  # the power of two of numbers that each then has
+    far_first: u32  # the first light that is not in the tree
+    origin: vec3  # world position of grid coordinate 0
+    inverse_step: f32  # grid steps a metre
+
+
+class LightNode(Record):
+    """Bounds of some lights; the two children of a node stand side by side, the pair k at 2 k and 2 k + 1."""
+
+    place: u32  # middle of a ball around them, in grid steps: x, y << 16
+    reach: u32  # z; the ball's radius << 16; sine of half the angle of the normals' cone << 24, of 255
+    # The cone's axis, octahedral 2 x 8 bits; sine of half the angle from a normal at which light leaves << 16, of 31
+    # for a right one; intensity << 21
+    shine: u32
+    link: u32  # the pair of its children; a light: LEAF_BIT | its index
+
+
+class EnvironmentCell(Record):
+    """One of many drawn with equal chances: see `cells`."""
+
+    slot = Slot.ENVIRONMENT_CELLS
+    corner: u32  # of its block: x, y << 16, in texels
+    size: u32  # of its block: width, height << 16
+    first: u32  # the first of the block's cells ...
+    count: u32  # ... and how many there are
+
+
+class Frame(Record):
+    """Uniforms of one dispatch."""
+
+    camera_position: vec3
+    aperture_radius: f32
+    camera_right: vec3
+    focus_distance: f32
+    camera_up: vec3
+    tan_half_vfov: f32
+    camera_forward: vec3
+    environment_scale: f32
+    environment_turn: vec2  # cosine, sine of the rotation
+    resolution: uvec2  # of the whole picture
+    tile_origin: uvec2
+    tile_size: uvec2
+    sample_first: u32
+    sample_count: u32
+    max_bounces: u32
+    roulette_depth: u32
+    node_origin: vec3  # world position of grid coordinate 0
+    seed: u32
+    node_scale: vec3  # world size of one grid step
+    node_count: u32  # of one octant's order of the top
+    light_count: u32
+    replicate: u32  # 0: the picture's own scramble of the sampler; 1: the noise meter's, from the first one on
+    clamp_radiance: f32  # of indirect light; infinite: off
+    environment_probability: f32  # of picking the environment among the lights
+    moment_scale: f32  # second moments are of radiance times this
+    environment_background: u32
+    slot_width: u32  # of a row of the accumulators: the picture's, or the noise meter's
+    environment_cube: u32  # 1: its texture holds the six faces of a cube
+    environment_sun: vec3  # unit, towards the sun's middle, before the environment's rotation
+    environment_sun_cap: f32  # 1 - cos of its angular radius
+    environment_sun_radiance: vec3
+    environment_sun_share: f32  # of the environment's samples
+    slot_first: u32  # the pixel at the beginning of the bound part of the accumulators
+    sun_first: u32  # among the lights: directional ones with a disk stand side by side
+    sun_count: u32
+    looped_spheres: u32  # how many stand in the kernel's loop, for one that was not compiled for their number
+    looped_quads: u32
+    looped_boxes: u32
+    looped_ellipsoids: u32
+    looped_triangles: u32
+    node_first: u32  # of the tree's nodes: those of instances lie before
+    instance_shift: u32  # of an instance's number in an id, above its triangle's
+
+
+METER_REPLICATES = 8  # more than the noise meter takes of a pixel; which one it is, in so many parts of its place's x
+
+BUFFERS: dict[str, tuple[type[Record], Slot]] = {
+    "material": (Material, Slot.MATERIALS),
+    "sphere": (Sphere, Slot.SPHERES),
+    "quad": (Quad, Slot.QUADS),
+    "box": (Solid, Slot.BOXES),
+    "ellipsoid": (Solid, Slot.ELLIPSOIDS),
+    "triangle": (Triangle, Slot.TRIANGLES),
+    "triangle_normals": (TriangleNormals, Slot.TRIANGLE_NORMALS),
+    "light": (Light, Slot.LIGHTS),
+    "environment_cell": (EnvironmentCell, Slot.ENVIRONMENT_CELLS),
+}

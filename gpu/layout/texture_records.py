@@ -1,0 +1,52 @@
+"""The bytes of textures as materials use them, and which numbers of a material they may give.
+
+`records` declares the rest. Slots and uses follow each material's own numbers in the same buffer.
+"""
+
+from __future__ import annotations
+
+from gpu.layout.record import Record, f32, u32, vec3, vec4
+
+SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
+CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a
+
+# The numbers of a material that a texture may give, with their ranges: those a surface is made from, with which the
+# normals are asked for, and those that a path asks for elsewhere.
+UNIT, LARGE = (0.0, 1.0), (0.0, 1e20)
+SURFACE_RANGES: dict[str, tuple[float, float]] = {
+    name: UNIT
+    for name in (
+        "base_color", "roughness", "metallic", "subsurface", "specular", "specular_tint", "anisotropic", "sheen",
+        "sheen_tint", "clearcoat", "clearcoat_gloss", "sheen_roughness", "phong_specular", "transmission",
+        "attenuation_color", "specular_color", "clearcoat_roughness", "sheen_color",
+    )
+} | {
+    "shininess": LARGE,
+    "attenuation_distance": (1e-45, 1e9),
+    "anisotropic_rotation": (-1e9, 1e9),
+    "ior": (1.0, 4.0),
+}  # fmt: skip
+NORMALS = ("normal", "coat_normal")
+OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "cutoff": UNIT, "ambient": LARGE}
+TEXTURABLE = {**SURFACE_RANGES, **OTHER_RANGES}
+
+
+class TextureSlot(Record):
+    """A texture as one material uses it. uv' = turn (u, v) + offset."""
+
+    first: u32  # its first texel among those of its kind
+    width: u32
+    height: u32
+    flags: u32  # SLOT_*
+    turn: vec4  # 2 x 2, row by row
+    color_a: vec3  # of a checker
+    offset_u: f32
+    color_b: vec3
+    offset_v: f32
+
+
+class TextureUse(Record):
+    """How a texel becomes a member of a material: that channel (or all three), times the factor."""
+
+    factor: vec3  # of a normal map x is its strength
+    channel: u32  # CHANNEL_*

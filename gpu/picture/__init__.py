@@ -1,0 +1,13 @@
+"""One picture in the making: its samples are added slice by slice, and it can be read at any time.
+
+picture      its accumulators, the passes over them, and reading
+tiles        how a pass is cut, by the measured cost of each band of rows
+adaptive     passes over the areas of a sample plan
+sample_plan  how many samples each part of a picture gets
+noise_meter  a picture's error, from a second, independent estimate of a share of its pixels
+first_hit    AOVs of the first hit
+resolve      accumulators to what a display takes, on the device
+display      AOVs as pictures for the eye
+filters      pixel filters as inverse distributions
+saved        a picture's state off the device
+"""

@@ -1,0 +1,48 @@
+"""Accumulators to what a display takes, on the device."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gpu import context as contexts
+from gpu.kernels import features
+from gpu.kernels.cache import KernelCache
+from gpu.layout.bindings import Slot
+
+_LINE = 1024  # pixels that resolve.comp takes for a row
+
+
+def defines(tone_map: str, dtype: str) -> dict[str, object]:
+    """What resolve.comp is compiled with."""
+    out = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve"}
+    return out | {"OUTPUT_FLOAT": int(dtype == "f4"), "LINE": _LINE}
+
+
+def resolve(
+    context: Any,
+    kernels: KernelCache,
+    sources: dict[Slot, Any],
+    most: int,
+    exposure: float,
+    tone_map: str,
+    dtype: str,
+) -> np.ndarray:
+    """(n, 4) exposed, tone-mapped, sRGB: uint8, or float32 with dtype "f4". `sources`: SUM, and MOMENTS for the
+    counts; no more than `most` pixels of them are bound at once."""
+    floats = dtype == "f4"
+    kernel = kernels.get("resolve.comp", defines(tone_map, dtype))
+    kernel["exposure"].value = 2.0**exposure
+    pixels, parts = sources[Slot.SUM].size // 16, []
+    for first in range(0, pixels, most):
+        count = min(most, pixels - first)
+        output = contexts.allocate(context, (16 if floats else 4) * count)
+        for slot in (Slot.SUM, Slot.MOMENTS):
+            sources[slot].bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
+        output.bind_to_storage_buffer(int(Slot.OUTPUT))
+        kernel["count"].value = count
+        kernel.run(_LINE // 8, -(-count // (8 * _LINE)))
+        parts.append(output.read())
+        output.release()
+    return np.frombuffer(b"".join(parts), np.float32 if floats else np.uint8).reshape(pixels, 4)

@@ -1,0 +1,99 @@
+"""How many samples each part of a picture gets: more where there is more noise, and none of the mean is bent by it.
+
+The squared error of a picture, the sum of variance / samples over its pixels, is least for a given number of samples
+when each pixel's is in proportion to its standard deviation [Neyman 1934]; of points that are spread evenly, whose
+variance falls faster than that, to a lesser power. A picture is planned in areas of 8 x 8 pixels, which err alike,
+and in each by four classes of rows, y mod 4. Whoever decides a pixel's samples by what those samples say stops too
+early where they missed the light, and comes out too dark. So a class is planned by what the next one saw, and never
+by itself; what that one saw was planned by the one after it. With three decisions the circle of four does not close:
+no sample has a say in how many its own pixel gets, and the mean is unbiased.
+
+Runs without GL.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+AREA = 8  # pixels a side: a work group
+CLASSES = 4  # of rows: a row of eight pixels is what llvmpipe works on at once
+DECISIONS = (8, 32, 128)  # mean samples of a pixel at which it is decided anew; no more than CLASSES - 1
+LEAST, MOST = 1 / 8, 32.0  # of the mean: the least finds light that few paths find, the most bounds a pass
+_EXPONENT = (
+    0.4  # of the variance: 1 / (1 + p) is least where a pixel's squared error falls with samples^-p; Sobol's 1.5
+)
+_NEAR = 0.7  # weight of an area itself; its neighbours share the rest, for few samples tell little of one area
+_COUNTED = 1 << 24  # samples of a pixel, the most that float32 counts
+
+WORDS = np.dtype(
+    [("counts", np.uint32, CLASSES), ("weights", np.float32, CLASSES)]
+)  # of an area, as kept on the device
+
+
+def pixels_of(width: int, height: int) -> np.ndarray:
+    """(rows, columns, CLASSES) of areas: how many of the picture's pixels are of that area and class."""
+    across = np.minimum(AREA, width - AREA * np.arange(-(-width // AREA)))
+    y = np.arange(height)
+    down = np.zeros((-(-height // AREA), CLASSES), np.int64)
+    np.add.at(down, (y // AREA, y % CLASSES), 1)
+    return np.asarray(down[:, None, :] * across[None, :, None])
+
+
+def weights_of(variances: np.ndarray, pixels: np.ndarray) -> np.ndarray:
+    """What each class's samples shall be in proportion to, float32, (rows, columns, CLASSES) as all: `variances` of a
+    sample, summed over the pixels of an area and class, and how many `pixels` those are."""
+    out = np.ones(pixels.shape)
+    if not np.isfinite(variances).all():  # beyond float32: nothing is known of what errs more
+        return out.astype(np.float32)
+    for own in range(CLASSES):
+        seen = (own + 1) % CLASSES
+        sums, members = _spread(variances[..., seen]), _spread(pixels[..., seen].astype(float))
+        weights = np.divide(sums, members, out=np.zeros_like(sums), where=members > 0) ** _EXPONENT
+        mine = pixels[..., own]
+        mean = (weights * mine).sum() / max(mine.sum(), 1)
+        if mean > 0:
+            out[..., own] = np.clip(weights / mean, LEAST, MOST)
+    return out.astype(np.float32)
+
+
+def _spread(values: np.ndarray) -> np.ndarray:
+    """Each area's own value and its eight neighbours', weighed."""
+    padded = np.pad(values.astype(float), 1)
+    rows, columns = values.shape
+    around = sum(padded[dy : dy + rows, dx : dx + columns] for dy in range(3) for dx in range(3))
+    return np.asarray(_NEAR * values + (1 - _NEAR) / 8 * (around - values))
+
+
+class SamplePlan:
+    """From `counts` samples on, in proportion to `weights` as far as no pixel gives back what it has."""
+
+    def __init__(
+        self, pixels: np.ndarray, counts: np.ndarray | None = None, weights: np.ndarray | None = None
+    ) -> None:
+        self._pixels = pixels
+        self.counts = np.zeros(pixels.shape, np.uint32) if counts is None else counts
+        self.weights = np.ones(pixels.shape, np.float32) if weights is None else weights
+        self._classes = [self._cumulated(k) for k in range(CLASSES)]
+
+    def _cumulated(self, own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Of a class, in the order in which its areas begin to get samples: the level where each does, and then the
+        samples of all that have not begun, and the weight of those that have."""
+        members, weights = self._pixels[..., own].ravel(), self.weights[..., own].ravel().astype(float)
+        counts = self.counts[..., own].ravel().astype(float)
+        levels = counts / weights
+        order = np.argsort(levels, kind="stable")
+        begun = np.cumsum((members * weights)[order])
+        had = (members * counts)[order]
+        return levels[order], had.sum() - np.cumsum(had), begun
+
+    def at(self, samples: int) -> np.ndarray:
+        """(rows, columns, CLASSES) uint32: each pixel's samples where their mean is `samples`. Rises with it."""
+        out = self.counts.copy()
+        for own, (levels, resting, begun) in enumerate(self._classes):
+            wanted = float(samples) * self._pixels[..., own].sum()
+            k = int(np.searchsorted(resting + begun * levels, wanted, side="right")) - 1
+            if k >= 0 and begun[k] > 0:
+                level = (wanted - resting[k]) / begun[k]
+                share = np.floor(level * self.weights[..., own].astype(float) + 0.5)
+                out[..., own] = np.maximum(out[..., own], np.minimum(share, _COUNTED).astype(np.uint32))
+        return out

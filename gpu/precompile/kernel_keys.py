@@ -1,0 +1,131 @@
+"""Which kernels a scene needs, as keys: everything that the machine code depends on, but for the driver."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from hashlib import sha256
+from typing import Any
+
+import numpy as np
+
+from gpu import layout
+from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
+from gpu.device.textures import BYTES, KINDS
+from gpu.kernels import features
+from gpu.kernels.source import KernelSource
+from gpu.layout import ShapeKind, bindings
+from gpu.picture import noise_meter, resolve
+from gpu.settings import TONE_MAPS, RenderSettings
+
+ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others: `common_keys`
+
+
+@dataclass(frozen=True)
+class KernelKey:
+    """All that the machine code of a picture's kernel depends on, but the driver.
+
+    `textures` are (unit, channels, dtype, width, height): code for sides that are powers of two differs, their
+    length does not matter, so that they are given as 1 or 3.
+    """
+
+    defines: tuple[tuple[str, object], ...]
+    textures: tuple[tuple[int, int, str, int, int], ...]
+    entry: str = ENTRY
+
+    @property
+    def text(self) -> str:
+        return KernelSource(self.entry, dict(self.defines)).text
+
+    def digest(self, driver: str) -> str:
+        return sha256(repr((driver, self.text, self.textures)).encode()).hexdigest()[:32]
+
+
+def kernel_key(
+    arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str], entry: str = ENTRY
+) -> KernelKey:
+    """What a picture of `arrays` needs compiled where these flags are raised: its kernel, or that of its GUIDES."""
+    defines = features.defines(raised, settings, features.counts(arrays))
+    return KernelKey(tuple(defines.items()), _textures(arrays, raised), entry)
+
+
+def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey | None:
+    """What a stream will need when it first moves a large mesh of this scene; None where it has none, or instances.
+    A guess where there are small meshes beside it, some of which may stand in the kernel's loop.
+    """
+    if len(arrays.instances):
+        return None
+    owners = arrays.triangles["shape"] & np.uint32(~(layout.SINGLE_SIDED | layout.HIDDEN) & layout.NONE)
+    counts, lamps = np.bincount(owners), np.bincount(owners, arrays.triangles["light"] != layout.NONE)
+    if not ((counts >= HEAVY) & (lamps == 0)).any():
+        return None
+    small = ((counts > 0) & ((counts < SHAREABLE) | (lamps > 0))).any()
+    kinds = arrays.bvh_kinds | {ShapeKind.TRIANGLE, ShapeKind.INSTANCE}
+    large = {**arrays.large, ShapeKind.TRIANGLE: arrays.large.get(ShapeKind.TRIANGLE, 0) if small else 0}
+    one = np.zeros(1, layout.Instance.dtype)
+    apart = replace(arrays, instances=one, bvh_kinds=kinds, large=large)
+    return kernel_key(apart, settings, features.flags(apart, True))
+
+
+def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[KernelKey]:
+    """What a stream will need when it first touches a slider of `principled` that is not compiled in with the others.
+    A guess for meshes, of which only those of the material that is stretched get tangents.
+    """
+    has = features.flags(arrays, True)
+    if "HAS_PRINCIPLED" not in has:
+        return []
+    along = {"HAS_TANGENTS"} if "HAS_SMOOTH_NORMALS" in has else set()
+    clear, stretched = {"HAS_TRANSMISSION"}, {"HAS_ANISOTROPIC", *along}
+    asked = {has | clear, has | stretched, has | clear | stretched} - {has}
+    return [kernel_key(arrays, settings, raised) for raised in sorted(asked, key=len)]
+
+
+def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:
+    """The same with every flag raised, for a `scene.Everything`, which has something bound to every texture unit."""
+    own = kernel_key(arrays, settings, features.everything())
+    bound = {unit for unit, *_ in own.textures}
+    bare = ((unit, channels, dtype, 1, 1) for unit, (channels, dtype) in KINDS.items() if unit not in bound)
+    return replace(own, textures=(*own.textures, *bare))
+
+
+def common_keys() -> list[KernelKey]:
+    """The kernels of any scene: what a picture is shown with, and what the noise meter and `adaptive` ask of it."""
+    shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
+    metered = [("meter.comp", noise_meter.defines(weigh)) for weigh in (0, 1)]
+    entries = [*shown, *metered, ("areas.comp", features.defines(frozenset()))]
+    return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
+
+
+def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, str, int, int], ...]:
+    height, width = (1, 1) if a.environment is None else a.environment.texels.shape[:2]
+    out = [(bindings.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
+    rows = [
+        (bindings.UVS_TEXTURES[0], a.triangle_uvs, 2, "f4"),
+        (bindings.UVS_TEXTURES[1], a.triangle_uvs_1, 2, "f4"),
+        (bindings.COLORS_TEXTURE, a.corner_colors if "HAS_VERTEX_COLORS" in raised else a.triangle_colors, 4, "f2"),
+        (bindings.INSTANCES_TEXTURE, a.instances, 4, "u4"),
+    ]
+    if a.textures is not None:
+        rows += [(bindings.BYTES_TEXTURE, a.textures.texels, 4, "f1")]
+        rows += [(bindings.FLOATS_TEXTURE, a.textures.floats, 4, "f4")]
+    if "HAS_LIGHT_TREE" in raised:
+        rows += [(bindings.LIGHT_TREE_TEXTURE, a.light_words, 4, "u4")]
+    for unit, values, channels, dtype in rows:
+        if len(values):
+            height = -(-values.nbytes // (bindings.TEXELS_A_ROW * channels * BYTES[dtype]))
+            out.append((unit, channels, dtype, _side(bindings.TEXELS_A_ROW), _side(height)))
+    return tuple(out)
+
+
+def _side(length: int) -> int:
+    return 1 if length & (length - 1) == 0 else 3
+
+
+def apply_edit(arrays: SceneArrays, edits: dict[str, Any]) -> SceneArrays:
+    """The arrays after `Scene.edit` of these."""
+    changes: dict[str, Any] = {name: edits[name] for name in ("camera", "materials") if name in edits}
+    if "environment" in edits and arrays.environment is not None:
+        rotation, scale = edits["environment"]
+        changes["environment"] = replace(arrays.environment, rotation=rotation, scale=scale)
+    if "texture_words" in edits and arrays.textures is not None:
+        changes["textures"] = replace(arrays.textures, words=edits["texture_words"])
+    return replace(arrays, **changes, **edits.get("moved", {}))

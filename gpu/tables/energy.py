@@ -1,0 +1,95 @@
+"""Tables of how much light the lobes of `principled` send back, for the terms that put back what they lose.
+
+`gpu.tables.build.energy_tables` computes them into `energy.npz`. Runs without GL. The kernels' side is
+`shaders/energy.glsl`.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import lru_cache
+from pathlib import Path
+
+import numpy as np
+
+FILE = Path(__file__).with_name("energy.npz")
+
+MU_COUNT = 40  # cosines, as squares of equal steps
+ETA_COUNT = 25  # indices 1..4; (eta - 1) / (eta + 1) as squares of equal steps
+ALBEDO_SHAPE = (ETA_COUNT, 40, MU_COUNT)  # eta, roughness, cosine
+STRETCHED_SHAPE = (16, 9, 19, 14, 18)  # eta, aspect, roughness, azimuth, cosine
+MEAN_SHAPE = (2 * ETA_COUNT - 1, 1 + STRETCHED_SHAPE[1], 2 * ALBEDO_SHAPE[1] - 1)  # eta, round and aspect, roughness
+AZIMUTH_POWER = 0.8  # azimuths from the short axis, as this power of equal steps: denser there
+SHEEN_SHAPE = (16, MU_COUNT)  # sheen roughness, cosine
+LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1; aspects in the tables are equal ratios apart
+LARGEST_ETA = 4.0
+LEAST_SHEEN_ROUGHNESS = 0.27  # below, the sheen's masking lets it send back more than it receives
+_X_END = (LARGEST_ETA - 1) / (LARGEST_ETA + 1)
+
+
+@dataclass(frozen=True)
+class Tables:
+    """Shares of the light from a direction, float32.
+
+    `albedo` (eta, roughness, mu, 4): reflected with Fresnel 1; with eta's, never too low; lost where glass is
+    entered; lost where it is left. `stretched` (eta, aspect, roughness, azimuth, mu, 4): the same of stretched lobes,
+    though seldom a little too low.
+    `mean` (eta, round lobes and each aspect of stretched, roughness, 4): their cosine-weighted means; of what is
+    lost divided by how much more is lost in truth, as `energy_tables` says. `sheen` (roughness, mu): the same.
+    """
+
+    albedo: np.ndarray
+    stretched: np.ndarray
+    mean: np.ndarray
+    sheen: np.ndarray
+
+
+def mu_nodes(count: int = MU_COUNT) -> np.ndarray:
+    return np.linspace(0, 1, count) ** 2
+
+
+def roughness_nodes(count: int = ALBEDO_SHAPE[1]) -> np.ndarray:
+    """Denser where lobes are narrow."""
+    return np.linspace(0, 1, count) ** 1.5
+
+
+def eta_at(x: np.ndarray) -> np.ndarray:
+    """The index at a place 0..1 along the tables' axis: even steps of about the cosine at which all is reflected."""
+    y = x**2 * _X_END
+    return np.asarray((1 + y) / (1 - y))
+
+
+def eta_nodes(count: int = ETA_COUNT) -> np.ndarray:
+    return eta_at(np.linspace(0, 1, count))
+
+
+def sheen_nodes(count: int = SHEEN_SHAPE[0]) -> np.ndarray:
+    return np.linspace(LEAST_SHEEN_ROUGHNESS, 1, count)
+
+
+# Of uint16, modulo 65536: of smooth tables they are small and pack well. Along azimuth and cosine.
+_SMOOTH = (3, 4)
+
+
+def differences(table: np.ndarray) -> np.ndarray:
+    for axis in _SMOOTH:
+        table = np.diff(table, axis=axis, prepend=table.dtype.type(0))
+    return table
+
+
+def _summed(table: np.ndarray) -> np.ndarray:
+    for axis in _SMOOTH:
+        table = np.cumsum(table, axis=axis, dtype=table.dtype)
+    return table
+
+
+@lru_cache(maxsize=1)
+def tables() -> Tables:
+    """The tables that travel with the package."""
+    with np.load(FILE) as kept:
+        found = {n: _summed(v) if n == "stretched" else v for n, v in kept.items()}
+    found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in found.items()}
+    # What is reflected with Fresnel 1 is the same for every index: kept once.
+    one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)
+    found["stretched"] = np.concatenate([one[..., None], found["stretched"]], -1)
+    return Tables(**found)
