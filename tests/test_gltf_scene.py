@@ -11,7 +11,8 @@ import pytest
 
 from service.assets import AssetStore, MeshData, importing
 from service.assets.importing import Imported
-from service.pack import instances, pack
+from service.pack import pack
+from service.pack.geometry import instances
 from service.problems import AssetError
 from service.scene import parse_scene
 from tests.gltf_files import QUAD, QUAD_FACES, QUAD_UVS, Gltf

@@ -11,7 +11,8 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
-from service.pack import instances, pack
+from service.pack import pack
+from service.pack.geometry import instances
 from service.scene import parse_scene
 from tests import documents
 from tests.extremes.scenes import LONG, icosphere, moved, quad, rows

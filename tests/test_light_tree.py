@@ -12,7 +12,8 @@ from gpu import Renderer, SceneArrays, layout
 from gpu.accel import light_tree
 from gpu.kernels.features import flags
 from gpu.layout import LightKind
-from service.pack import PackCache, bounded, pack
+from service.pack import PackCache, pack
+from service.pack.lights import light_bounds
 from service.scene import parse_scene
 from tests import stats
 from tests.extremes.scenes import Seen, everything, scaled
@@ -218,7 +219,7 @@ def test_nodes_hold_what_is_under_them() -> None:
 
 
 def test_one_light_is_no_tree(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bounded, "worth", lambda _: True)
+    monkeypatch.setattr(light_bounds, "worth", lambda _: True)
     with pytest.raises(ValueError, match="1 lights"):
         _packed(document([], MATERIALS, lights=[{"type": "point", "position": [0, 1, 0], "intensity": 1}]))
 
@@ -254,7 +255,7 @@ def _both(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, scene: Doc, **settings
     """By the tree, and by the table of powers that small scenes have."""
     seen = []
     for worth in (True, False):
-        monkeypatch.setattr(bounded, "worth", lambda _, worth=worth: worth)
+        monkeypatch.setattr(light_bounds, "worth", lambda _, worth=worth: worth)
         seen.append(
             Seen(gpu, scene, **{"samples": 128, "sampler": "independent", "width": 48, "height": 32, **settings})
         )

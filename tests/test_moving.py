@@ -11,7 +11,9 @@ from gpu import Renderer, RenderSettings, SceneArrays
 from gpu.kernels import features
 from gpu.layout import Instance, Node
 from gpu.precompile import kernel_keys
-from service.pack import PackCache, instances, moved, moves, pack
+from service.pack import PackCache, pack, scene_delta
+from service.pack.edits import moved_meshes
+from service.pack.geometry import instances
 from service.scene import parse_scene
 from tests.test_instances import IMAGES, two
 
@@ -49,7 +51,7 @@ def test_what_moves_is_uploaded_and_nothing_else(gpu: Renderer, changes: dict[st
     cache = PackCache()
     old, new = (arrays_of(scene(**given), cache) for given in ({}, changes))
     assert len(new.instances) == 2
-    difference = moved(old, new)
+    difference = scene_delta(old, new)
     assert difference is not None
     loaded, fresh = gpu.load(old), gpu.load(new)
     loaded.edit(moved=difference)
@@ -76,13 +78,13 @@ def test_what_moves_is_uploaded_and_nothing_else(gpu: Renderer, changes: dict[st
 )
 def test_what_else_differs_is_another_scene(other: Doc) -> None:
     cache = PackCache()
-    assert moved(arrays_of(scene(), cache), arrays_of(other, cache)) is None
+    assert scene_delta(arrays_of(scene(), cache), arrays_of(other, cache)) is None
 
 
 def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
     cache = PackCache()
     old, new = (arrays_of(scene(), cache) for _ in range(2))
-    difference = moved(old, new)
+    difference = scene_delta(old, new)
     assert difference is not None
     loaded = gpu.load(old)
     loaded.edit(moved=difference)
@@ -93,16 +95,16 @@ def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
 def test_a_large_mesh_that_a_stream_moves_becomes_an_instance(monkeypatch: pytest.MonkeyPatch) -> None:
     """From the first move on, with all others that are large; not before, and not where nothing is kept."""
     monkeypatch.setattr(instances, "WORTH", 10**9)
-    monkeypatch.setattr(moves, "HEAVY", 1280)
+    monkeypatch.setattr(moved_meshes, "HEAVY", 1280)
     cache, first = PackCache(), scene()
     assert not len(arrays_of(first, cache).instances)
     assert not len(arrays_of(scene(ball=1), cache).instances)
     turned = arrays_of(scene(place=1.4, ball=1), cache)
     assert len(turned.instances) == 2 and len(turned.triangles) == 1280
     again = arrays_of(scene(place=1.5, ball=1, material={**MATTE, "albedo": 0.3}), cache)
-    assert moved(turned, again) is not None and again.triangles is turned.triangles
+    assert scene_delta(turned, again) is not None and again.triangles is turned.triangles
     back = arrays_of(first, cache)
-    assert len(back.instances) == 2 and moved(again, back) is not None
+    assert len(back.instances) == 2 and scene_delta(again, back) is not None
     assert not len(pack(parse_scene(scene(place=1.4)), IMAGES).arrays.instances)
     assert not len(arrays_of({**first, "shapes": first["shapes"][2:]}, cache).instances)
     assert not len(arrays_of(first, cache).instances)
@@ -117,7 +119,7 @@ def test_a_small_mesh_that_moves_stays_among_the_others(monkeypatch: pytest.Monk
 
 def test_the_kernel_that_a_move_will_need_is_foreseen(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(instances, "WORTH", 10**9)
-    for module in (moves, kernel_keys):
+    for module in (moved_meshes, kernel_keys):
         monkeypatch.setattr(module, "HEAVY", 1280)
     cache, settings = PackCache(), RenderSettings(48, 32)
     still, elsewhere = arrays_of(scene(), cache), arrays_of(scene(place=2.0), cache)

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.pack import PackCache, geometry, pack, tree
+from service.pack import PackCache, pack
+from service.pack.geometry import assemble, scene_bvh
 from service.scene import parse_scene
 from tests.rendering import Images, document
 
@@ -57,7 +58,7 @@ def test_what_moves_beside_a_mesh_leaves_its_tree(
     monkeypatch: pytest.MonkeyPatch, first: dict[str, Any], change: dict[str, Any], planted: int
 ) -> None:
     calls = []
-    monkeypatch.setattr(geometry, "plant", lambda *given: calls.append(given) or tree.plant(*given))
+    monkeypatch.setattr(assemble, "plant", lambda *given: calls.append(given) or scene_bvh.build_scene_bvh(*given))
     cache = PackCache()
     assert_same(pack(parse_scene(first), Images(), cache), pack(parse_scene(first), Images()))
     calls.clear()

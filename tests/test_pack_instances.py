@@ -10,7 +10,8 @@ import pytest
 from gpu import scene_bytes
 from gpu.layout import ShapeKind
 from service.assets import MeshData
-from service.pack import PackCache, instances, pack
+from service.pack import PackCache, pack
+from service.pack.geometry import instances
 from service.scene import parse_scene
 from tests.documents import MIRRORED, Few, Shelf, document, matrix_of, mesh, packed, refused, sphere
 from tests.extremes.scenes import icosphere

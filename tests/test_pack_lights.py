@@ -8,7 +8,7 @@ import pytest
 from gpu import layout
 from gpu.kernels.features import counts, flags
 from gpu.layout import LightKind, ShapeKind
-from service.pack import bounded
+from service.pack.lights import light_bounds
 from tests.documents import GREY, LAMP, Shelf, box, mesh, packed, picture, quad, sphere
 
 MANY = {
@@ -135,7 +135,7 @@ def test_lights_are_picked_as_their_records_say(by_power):
 @pytest.fixture
 def by_power(monkeypatch):
     """As if all lights were in one place, where there is no tree of them."""
-    monkeypatch.setattr(bounded, "worth", lambda _: False)
+    monkeypatch.setattr(light_bounds, "worth", lambda _: False)
 
 
 def pick(*shapes, **fields):

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from service.pack.chunks import CHUNK
-from service.pack.normals import corner_normals, encode
+from service.pack.geometry.parallel import CHUNK
+from service.pack.geometry.vertex_normals import corner_normals, encode
 from tests.documents import CUBE, GREY, MIRRORED, matrix_of, mesh, packed, sphere
 
 
@@ -80,7 +80,7 @@ def test_computed_normals_add_up_in_the_faces_order(monkeypatch):
         for job in jobs:
             take(job, make(job))
 
-    monkeypatch.setattr("service.pack.normals.in_order", one_by_one)
+    monkeypatch.setattr("service.pack.geometry.vertex_normals.in_order", one_by_one)
     np.testing.assert_array_equal(threaded, corner_normals(points, faces)[0])
     twice, again = corner_normals(np.tile(points, (2, 1)), faces + 1000 * (np.arange(len(faces))[:, None] % 2))
     assert len(twice) == len(points)

@@ -13,7 +13,7 @@ from gpu.layout import Frame, LightKind
 from gpu.layout.bindings import Slot
 from gpu.tables import alias_table, sky
 from service.pack import pack
-from service.pack.cache import PackCache
+from service.pack.edits.cache import PackCache
 from service.problems import InvalidDocument
 from service.scene import parse_scene
 from tests import stats

@@ -12,8 +12,8 @@ from gpu import Renderer, layout
 from gpu.kernels.features import flags
 from service.assets import AssetStore, MeshData
 from service.pack import pack
-from service.pack.normals import decode
-from service.pack.tangents import codes
+from service.pack.geometry.tangents import codes
+from service.pack.geometry.vertex_normals import decode
 from service.rendering.change import change
 from service.scene import parse_scene
 from tests.documents import Shelf, matrix_of

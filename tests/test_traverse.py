@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from gpu import Renderer, RenderSettings
-from service.pack import pack, tree
+from service.pack import pack
+from service.pack.geometry import scene_bvh
 from service.scene import parse_scene
 from tests.documents import Shelf, box, document, mesh, quad, sphere
 
@@ -34,9 +35,9 @@ def test_the_tree_finds_what_the_loops_find(gpu: Renderer, monkeypatch) -> None:
     seen = []
     for few, whole in ((0, 4096), (0, 0), (1, 4096), (10**6, 4096)):  # in treelets, too, and with some in the loop
         monkeypatch.setattr("gpu.accel.bvh.WHOLE", whole)
-        monkeypatch.setattr(tree, "LARGE_SHARE", 1e-5 if few == 1 else 1.0)
-        monkeypatch.setattr(tree, "LINEAR", dict.fromkeys(tree.LINEAR, few))
-        monkeypatch.setattr("service.pack.geometry.LINEAR", tree.LINEAR)
+        monkeypatch.setattr(scene_bvh, "LARGE_SHARE", 1e-5 if few == 1 else 1.0)
+        monkeypatch.setattr(scene_bvh, "LINEAR", dict.fromkeys(scene_bvh.LINEAR, few))
+        monkeypatch.setattr("service.pack.geometry.assemble.LINEAR", scene_bvh.LINEAR)
         arrays = pack(parse_scene(crowd()), Shelf()).arrays
         assert len(arrays.bvh_kinds) == (0 if few > 1 else 5)
         assert any(arrays.large.values()) == (few == 1)

@@ -12,16 +12,17 @@ import numpy as np
 from gpu import EnvironmentArrays, SceneArrays
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets
-from service.pack import lights
-from service.pack.bounded import Grown, tree
-from service.pack.cache import PackCache, content, lasting
-from service.pack.geometry import Geometry, geometry
-from service.pack.glow import dark, glow
-from service.pack.models import shift
-from service.pack.placing import triangles
-from service.pack.sky import Sky, make_sky, sky_key
-from service.pack.textures import pack_textures, reads
-from service.pack.values import pack_camera, pack_materials, pack_turn
+from service.pack.edits.cache import PackCache, content, lasting
+from service.pack.geometry.assemble import Geometry, assemble
+from service.pack.geometry.shared_meshes import shift
+from service.pack.geometry.world import triangles
+from service.pack.lights import lights
+from service.pack.lights.environment import PackedEnvironment, environment_key, pack_environment
+from service.pack.lights.light_bounds import Grown, grow_light_tree
+from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.textured_emission import dark, mean_emission
+from service.pack.textures.uses import required_charts
+from service.pack.textures.words import pack_textures
 from service.scene import Scene
 from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
@@ -71,14 +72,14 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         )  # fmt: skip
         if scale > 0:  # what it sends through a disk around the scene
             sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
-    standing, standing_power = lights.standing(scene.lights, built.origin, built.radius)
-    emission, brightest = glow(materials, uses, texels, built)
+    standing, standing_power = lights.analytic_lights(scene.lights, built.origin, built.radius)
+    emission, brightest = mean_emission(materials, uses, texels, built)
     built_sides = lights.sides(built.lights, materials)
     area_power = np.pi * built.areas * lights.luminance(emission) * built_sides
 
     def grow(near: np.ndarray, power: np.ndarray, share: float) -> Grown | None:
         sides = np.concatenate([built_sides, np.ones(len(near) - len(built_sides), built_sides.dtype)])
-        return tree(near, power, share, built.shapes, sides, 2 * built.radius, cache)
+        return grow_light_tree(near, power, share, built.shapes, sides, 2 * built.radius, cache)
 
     weighed, light_tree = lights.weigh(
         np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power, grow
@@ -128,9 +129,9 @@ def _geometry(
     used = {shape.material for shape in scene.shapes}
     shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
     room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
-    read = reads(scene)
+    read = required_charts(scene)
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
-        return geometry(scene.shapes, names, shining, assets, room, read)
+        return assemble(scene.shapes, names, shining, assets, room, read)
     contents = tuple(map(content, scene.shapes))
     apart = cache.moves.apart(scene.shapes, contents, lambda shape: triangles(shape, assets))
     shared = tuple(names), room, tuple(read.items()), apart
@@ -141,12 +142,12 @@ def _geometry(
 
     def make() -> Geometry:
         kept = cache.gather(Geometry)
-        return geometry(scene.shapes, names, shining, assets, room, read, mesh_key, contents, kept, apart)
+        return assemble(scene.shapes, names, shining, assets, room, read, mesh_key, contents, kept, apart)
 
     return cache.get(("geometry", contents, shining, *shared), make)
 
 
-def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> Sky:
-    key = sky_key(environment)
-    make = partial(make_sky, environment, assets)
+def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> PackedEnvironment:
+    key = environment_key(environment)
+    make = partial(pack_environment, environment, assets)
     return make() if cache is None or key is None else cache.get(key, make)

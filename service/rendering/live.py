@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from service.pack import PackCache, moved, pack_camera, pack_materials, pack_turn, repacked
+from service.pack import PackCache, pack_camera, pack_materials, pack_turn, repacked, scene_delta
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.rendering import protocol
@@ -155,7 +155,7 @@ class Live:
         touched = change(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
             arrays = self._reader.pack(new.scene, self._cache).arrays
-            elsewhere = None if old is None else moved(self._arrays, arrays)
+            elsewhere = None if old is None else scene_delta(self._arrays, arrays)
             self._arrays, lit = arrays, arrays.environment
             if old is None or elsewhere is None:
                 return replace(update, scene=arrays)

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.pack.origin import LOST, VAST
+from service.pack.geometry.rebase import LOST, VAST
 from tests.extremes.scenes import Seen, ball, everything, icosphere, moved, packed, quad, rows, scaled
 
 

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.pack import instances
+from service.pack.geometry import instances
 from tests.extremes.scenes import Seen, ball, icosphere, packed, placed, quad, rows
 from tests.rendering import document
 from tests.test_shapes import _matrix, _trace

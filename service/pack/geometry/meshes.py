@@ -9,9 +9,9 @@ from functools import partial
 import numpy as np
 
 from gpu import layout
-from service.pack.chunks import chunks, in_threads
-from service.pack.normals import corner_normals, encode
-from service.pack.tangents import Tangents, codes, tangents
+from service.pack.geometry.parallel import chunks, in_threads
+from service.pack.geometry.tangents import Tangents, codes, tangents
+from service.pack.geometry.vertex_normals import corner_normals, encode
 
 # Sine of an angle below which a triangle's area is rounding noise in float32, whatever its size.
 FLAT = 4 * float(np.finfo(np.float32).eps)

@@ -12,7 +12,7 @@ import numpy as np
 from gpu.tables.alias_table import LUMINANCE, cube_solid_angles, cube_tables, environment_tables, solid_angles
 from gpu.tables.sky import SunDisk, bake, sun_disk
 from service.assets import Assets, ImageData
-from service.pack.cache import lasting
+from service.pack.edits.cache import lasting
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.color import LINEAR_OF_BYTE
 from service.scene.environment import (
@@ -31,7 +31,7 @@ SUN_SHARE = (0.1, 0.9)  # bounds on the sun's part of the samples: a mirror look
 
 
 @dataclass(frozen=True)
-class Sky:
+class PackedEnvironment:
     """All that does not depend on rotation, scale and background."""
 
     texels: np.ndarray  # (h, w, 3) float32
@@ -45,8 +45,8 @@ class Sky:
     sun_share: float = 0.0
 
 
-def sky_key(environment: Environment) -> Hashable:
-    """Equal where `make_sky` makes equal skies; None where nothing is gained or a file may change."""
+def environment_key(environment: Environment) -> Hashable:
+    """Equal where `pack_environment` makes equal skies; None where nothing is gained or a file may change."""
     if isinstance(environment, ImageEnvironment):
         return ("image", environment.asset) if lasting(environment.asset) else None
     if isinstance(environment, CubemapEnvironment):
@@ -58,10 +58,10 @@ def sky_key(environment: Environment) -> Hashable:
     return None
 
 
-def make_sky(environment: Environment, assets: Assets) -> Sky:
+def pack_environment(environment: Environment, assets: Assets) -> PackedEnvironment:
     """Raises InvalidDocument."""
     if isinstance(environment, ConstantEnvironment):
-        return _sky(np.array(environment.radiance, np.float32).reshape(1, 1, 3), ())
+        return _packed(np.array(environment.radiance, np.float32).reshape(1, 1, 3), ())
     if isinstance(environment, CubemapEnvironment):
         return _cube(environment.assets, assets)
     if isinstance(environment, SkyEnvironment):
@@ -70,7 +70,7 @@ def make_sky(environment: Environment, assets: Assets) -> Sky:
     height, width = image.pixels.shape[:2]
     if max(height, width) > LARGEST_SIDE:
         raise _refused("/environment/asset", f"is {width} x {height}; at most {LARGEST_SIDE} a side")
-    return _sky(*_clamped(image, "/environment/asset"))
+    return _packed(*_clamped(image, "/environment/asset"))
 
 
 def _image(reference: str, assets: Assets, pointer: str) -> ImageData:
@@ -84,7 +84,7 @@ def _refused(pointer: str, detail: str) -> InvalidDocument:
     return InvalidDocument([FieldError(pointer, detail)])
 
 
-def _cube(faces: CubeFaces, assets: Assets) -> Sky:
+def _cube(faces: CubeFaces, assets: Assets) -> PackedEnvironment:
     pointers = {name: f"/environment/assets/{name}" for name in CubeFaces.model_fields}
     images = {name: _image(getattr(faces, name), assets, pointer) for name, pointer in pointers.items()}
     sizes = {name: image.pixels.shape[:2] for name, image in images.items()}
@@ -105,13 +105,13 @@ def _cube(faces: CubeFaces, assets: Assets) -> Sky:
     solid = np.tile(cube_solid_angles(wanted), (2, 3))
     irradiance = float(((texels @ LUMINANCE) * solid).sum())
     peak = min(float(texels.max()), BRIGHTEST)
-    return Sky(texels, probability, cells, irradiance, peak, sum(warnings, ()), cube=True)
+    return PackedEnvironment(texels, probability, cells, irradiance, peak, sum(warnings, ()), cube=True)
 
 
-def _clear(environment: SkyEnvironment) -> Sky:
+def _clear(environment: SkyEnvironment) -> PackedEnvironment:
     elevation = math.radians(environment.sun_elevation)
     texels = bake(elevation, environment.turbidity, environment.ground_albedo, environment.sun)
-    dome = _sky(texels, ())
+    dome = _packed(texels, ())
     if not environment.sun:
         return dome
     sun = sun_disk(elevation, environment.turbidity)
@@ -122,7 +122,7 @@ def _clear(environment: SkyEnvironment) -> Sky:
     total = dome.irradiance + strength
     share = min(max(strength / total, low), high)
     peak = dome.peak + max(sun.radiance)
-    return Sky(dome.texels, dome.probability, dome.cells, total, peak, sun=sun, sun_share=share)
+    return PackedEnvironment(dome.texels, dome.probability, dome.cells, total, peak, sun=sun, sun_share=share)
 
 
 def _linear(image: ImageData) -> np.ndarray:
@@ -146,10 +146,10 @@ def _clamped(image: ImageData, pointer: str) -> tuple[np.ndarray, tuple[str, ...
     return texels, (*warnings, *(f"{pointer}: {warning}" for warning in image.warnings))
 
 
-def _sky(texels: np.ndarray, warnings: tuple[str, ...]) -> Sky:
+def _packed(texels: np.ndarray, warnings: tuple[str, ...]) -> PackedEnvironment:
     texels = np.ascontiguousarray(texels, np.float32)
     probability, cells = environment_tables(texels)
     height, width = texels.shape[:2]
     rows = (texels @ LUMINANCE).sum(axis=1, dtype=np.float64)
     irradiance = float(rows @ solid_angles(height, width))
-    return Sky(texels, probability, cells, irradiance, min(float(texels.max()), BRIGHTEST), warnings)
+    return PackedEnvironment(texels, probability, cells, irradiance, min(float(texels.max()), BRIGHTEST), warnings)

@@ -7,8 +7,10 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu.layout import LightKind, ShapeKind, texture_records
-from service.pack.geometry import Geometry
-from service.pack.textures import Texels, Use, record_of, values_of
+from service.pack.geometry.assemble import Geometry
+from service.pack.textures.images import PackedTexels
+from service.pack.textures.uses import TextureReference
+from service.pack.textures.words import record_of, values_of
 from service.scene.texture import CheckerTexture
 
 # Barycentric places at which a triangle's emission is looked at: the middles of its 16 quarters' quarters.
@@ -20,7 +22,7 @@ PLACES = np.array(
 LEAST = 0.02  # of the whole texture's mean: what a triangle is taken to shine with where the places found nothing
 
 
-def dark(uses: Sequence[Use], texels: Texels) -> list[int]:
+def dark(uses: Sequence[TextureReference], texels: PackedTexels) -> list[int]:
     """Materials whose emission is a black texture: lamps without a power that they could be picked by."""
     return [
         use.material
@@ -29,14 +31,16 @@ def dark(uses: Sequence[Use], texels: Texels) -> list[int]:
     ]
 
 
-def _pixels(use: Use, texels: Texels) -> np.ndarray:
+def _pixels(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     """(height, width, channels) of an image, or of a checker its two fields."""
     if isinstance(use.texture, CheckerTexture):
         return np.array([[use.texture.a, use.texture.b]], np.float32)
     return texels.places[use.kept][1].pixels
 
 
-def glow(materials: np.ndarray, uses: Sequence[Use], texels: Texels, built: Geometry) -> tuple[np.ndarray, float]:
+def mean_emission(
+    materials: np.ndarray, uses: Sequence[TextureReference], texels: PackedTexels, built: Geometry
+) -> tuple[np.ndarray, float]:
     """(mean emission of each light of `built` (n, 3), the greatest radiance of any emission or ambient)."""
     emission, used = materials["emission"].astype(np.float64), built.lights["material"]
     peak = max(float(emission[used].max(initial=0.0)), float(materials["ambient"].max(initial=0.0)))
@@ -53,7 +57,7 @@ def glow(materials: np.ndarray, uses: Sequence[Use], texels: Texels, built: Geom
     return shining, peak
 
 
-def _levels(use: Use, texels: Texels) -> tuple[np.ndarray, float]:
+def _levels(use: TextureReference, texels: PackedTexels) -> tuple[np.ndarray, float]:
     """(mean (3,), greatest) of what a texture gives a radiance."""
     pixels = _pixels(use, texels)
     low, high = texture_records.TEXTURABLE[use.member]
@@ -65,7 +69,9 @@ def _levels(use: Use, texels: Texels) -> tuple[np.ndarray, float]:
     return total / (pixels.shape[0] * pixels.shape[1]), greatest
 
 
-def _triangles(use: Use, texels: Texels, built: Geometry, mean: np.ndarray, shining: np.ndarray) -> None:
+def _triangles(
+    use: TextureReference, texels: PackedTexels, built: Geometry, mean: np.ndarray, shining: np.ndarray
+) -> None:
     """Writes each emitting triangle's own mean: most of a textured mesh may be dark."""
     mine = np.flatnonzero((built.lights["kind"] == LightKind.TRIANGLE) & (built.lights["material"] == use.material))
     second = not isinstance(use.texture, CheckerTexture) and use.texture.uv == 1
@@ -81,7 +87,7 @@ def _triangles(use: Use, texels: Texels, built: Geometry, mean: np.ndarray, shin
     shining[mine] = np.maximum(total / len(PLACES), LEAST * mean)
 
 
-def nearest(use: Use, texels: Texels, uv: np.ndarray) -> np.ndarray:
+def nearest(use: TextureReference, texels: PackedTexels, uv: np.ndarray) -> np.ndarray:
     """(n, channels) of the texels nearest to (n, 2) coordinates."""
     record = record_of(use, texels)
     turn = record["turn"].astype(np.float64).reshape(2, 2)

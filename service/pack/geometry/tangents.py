@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu import layout
-from service.pack.chunks import chunks
-from service.pack.normals import add_up, decode, same
+from service.pack.geometry.parallel import chunks
+from service.pack.geometry.vertex_normals import add_up, decode, same
 
 
 @dataclass(frozen=True)

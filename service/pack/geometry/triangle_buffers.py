@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from gpu.layout import Node, Triangle, TriangleNormals
-from service.pack.meshes import Triangles
-from service.pack.models import Model
+from service.pack.geometry.meshes import Triangles
+from service.pack.geometry.shared_meshes import SharedMesh
 from service.shared import Shelf
 
 
 @dataclass(frozen=True)
-class Details:
+class TriangleBuffers:
     """What triangles have, in final order, those of the models last, and the models' nodes."""
 
     triangles: np.ndarray
@@ -31,9 +31,9 @@ class Details:
         return self.triangles, self.normals, self.uvs, self.uvs_1, self.colors, self.nodes
 
 
-def written(
-    triangles: Triangles, places: np.ndarray | None, shared: Sequence[Model]
-) -> tuple[Details, tuple[Model, ...]]:
+def write_triangles(
+    triangles: Triangles, places: np.ndarray | None, shared: Sequence[SharedMesh]
+) -> tuple[TriangleBuffers, tuple[SharedMesh, ...]]:
     """All of it on one shelf, which is what the models are kept on from now on."""
     own = len(triangles)
     count, node_count = own + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
@@ -52,7 +52,7 @@ def written(
     for name, values in corners.items():
         if len(values):
             triangles.write_corners(name, places, values[:own])
-    kept, node = list[Model](), 0
+    kept, node = list[SharedMesh](), 0
     for each in shared:
         part = slice(own, own + each.count)
         nodes[node : node + len(each.nodes)] = each.nodes
@@ -60,7 +60,9 @@ def written(
         own, node = part.stop, node + len(at)
         written = each.write(out[part], normals[part], {name: values[part] for name, values in corners.items()})
         kept.append(replace(written, nodes=at))
-    return Details(out, normals, tangents, corners["uvs"], corners["uvs_1"], corners["colors"], nodes), tuple(kept)
+    return TriangleBuffers(out, normals, tangents, corners["uvs"], corners["uvs_1"], corners["colors"], nodes), tuple(
+        kept
+    )
 
 
 CORNERS = {"uvs": 2, "uvs_1": 2, "colors": 4}  # what triangles have there: how many numbers
@@ -70,5 +72,5 @@ def _at_corner(name: str) -> np.dtype[Any]:
     return np.dtype(np.float16 if name == "colors" else np.float32)
 
 
-def _some_have(name: str, triangles: Triangles, shared: Sequence[Model]) -> bool:
+def _some_have(name: str, triangles: Triangles, shared: Sequence[SharedMesh]) -> bool:
     return triangles.have(name) or any(each.has(name) for each in shared)

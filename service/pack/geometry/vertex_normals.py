@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.pack.chunks import chunks, in_order, in_threads
+from service.pack.geometry.parallel import chunks, in_order, in_threads
 
 
 def encode(normals: np.ndarray) -> np.ndarray:

@@ -11,7 +11,7 @@ from typing import Any, TypeVar
 
 import numpy as np
 
-from service.pack.moves import Moves
+from service.pack.edits.moved_meshes import MovedMeshes
 from service.scene.shape import MeshShape, Shape
 
 T = TypeVar("T")
@@ -45,7 +45,7 @@ class PackCache:
         self._budget.join(self)
         self._kept: OrderedDict[Hashable, tuple[Any, int]] = OrderedDict()
         self._lock = threading.Lock()
-        self.moves = Moves()
+        self.moves = MovedMeshes()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
         """What was made for an equal key, or else `make()`, which runs outside the lock."""

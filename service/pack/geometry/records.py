@@ -8,14 +8,14 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout.record import Record
-from service.pack.placed import Placed, Solids
+from service.pack.geometry.analytic import AnalyticShapes, Solids
 
 VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin, and over the smallest shape
 
 Bounds = tuple[np.ndarray, np.ndarray]  # (n, 3) each, float64
 
 
-def spheres(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+def spheres(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     records = _records(layout.Sphere, placed.spheres_used)
     if not len(records):
         return records, _no_bounds()
@@ -37,7 +37,7 @@ def only_vast(spheres: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
         spheres["power"] = np.where(spheres["radius"] > VAST * least, spheres["power"], layout.NOT_VAST)
 
 
-def quads(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+def quads(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     records = _records(layout.Quad, placed.quads_used)
     if not len(records):
         return records, _no_bounds()
@@ -58,11 +58,11 @@ def quads(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     return records, (corners4.min(axis=0), corners4.max(axis=0))
 
 
-def boxes(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+def boxes(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     return _solids(placed.boxes, origin, np.ones(3))
 
 
-def ellipsoids(placed: Placed, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
+def ellipsoids(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:
     return _solids(placed.ellipsoids, origin, None)
 
 

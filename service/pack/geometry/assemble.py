@@ -11,18 +11,19 @@ import numpy as np
 from gpu import layout
 from gpu.layout import Node, ShapeKind
 from service.assets import Assets
-from service.pack import instances, lights, meshes, records
-from service.pack.details import Details, written
-from service.pack.models import Model
-from service.pack.origin import choose
-from service.pack.origin import warnings as lost
-from service.pack.placed import Placed
-from service.pack.placing import World, place, place_analytic
-from service.pack.records import Bounds
-from service.pack.textures import Reads
-from service.pack.tree import LINEAR, plant, stand_out
-from service.pack.values import vec3
-from service.pack.warnings import counted
+from service.pack.geometry import instances, meshes, records
+from service.pack.geometry.analytic import AnalyticShapes
+from service.pack.geometry.rebase import choose_origin
+from service.pack.geometry.rebase import warnings as lost
+from service.pack.geometry.records import Bounds
+from service.pack.geometry.scene_bvh import LINEAR, build_scene_bvh, stand_out
+from service.pack.geometry.shared_meshes import SharedMesh
+from service.pack.geometry.triangle_buffers import TriangleBuffers, write_triangles
+from service.pack.geometry.warnings import counted
+from service.pack.geometry.world import World, place, place_analytic
+from service.pack.lights import lights
+from service.pack.parameters import vec3
+from service.pack.textures.uses import RequiredCharts
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
 from service.shared import LEAST, Shelf, trim
@@ -61,7 +62,7 @@ class Geometry:
     large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
     instances: np.ndarray
     instance_nodes: np.ndarray
-    models: tuple[Model, ...]  # that the instances show, in the order of their triangles
+    models: tuple[SharedMesh, ...]  # that the instances show, in the order of their triangles
     flats: Hashable  # equal where all other triangles are; None: of nothing that can be compared, or that shines
     origin: Vec3
     radius: float  # of a ball around everything; 1 where there is nothing
@@ -69,15 +70,15 @@ class Geometry:
     warnings: tuple[str, ...]
 
     @property
-    def details(self) -> Details:
+    def details(self) -> TriangleBuffers:
         corners = self.triangle_uvs, self.triangle_uvs_1, self.triangle_colors
         own = self.shapes[ShapeKind.TRIANGLE], self.triangle_normals, self.tangents
-        return Details(*own, *corners, self.instance_nodes)
+        return TriangleBuffers(*own, *corners, self.instance_nodes)
 
 
-def geometry(
+def assemble(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    reads: Mapping[str, Reads], key: Hashable = None, contents: Sequence[Hashable] | None = None,
+    reads: Mapping[str, RequiredCharts], key: Hashable = None, contents: Sequence[Hashable] | None = None,
     kept: Sequence[Geometry] = (), apart: bool = False,
 ) -> Geometry:  # fmt: skip
     """`names`: the materials in order; `emissive`: those that shine; `reads`: what they read of their shapes;
@@ -94,11 +95,11 @@ def geometry(
                 return same
     known = {each.key: each for earlier in kept for each in earlier.models}
     every = place(shapes, names, emissive, assets, max_triangles, reads, known, apart)
-    shared: Sequence[Model] = every.models
+    shared: Sequence[SharedMesh] = every.models
     analytic = _analytic(every.placed, np.zeros(3))
     own = _mesh_extents(every, key)
     low, high, owners, exact = _extents(analytic, own)
-    origin, radius = choose(low, high)
+    origin, radius = choose_origin(low, high)
     if origin.any():
         analytic = _analytic(every.placed, origin)
     records.only_vast(analytic[ShapeKind.SPHERE][0], low, high)
@@ -116,7 +117,7 @@ def geometry(
     node_count = 0
     if bounds:
         standing = stand_out(bounds)
-        nodes, node_count, order, node_origin, node_scale = plant(bounds, standing)
+        nodes, node_count, order, node_origin, node_scale = build_scene_bvh(bounds, standing)
     kinds, large = frozenset(bounds), {kind: len(places) for kind, places in standing.items()}
     if len(placed):  # triangles are met through trees, though perhaps not through the scene's
         large.setdefault(ShapeKind.TRIANGLE, len(triangles))
@@ -128,7 +129,7 @@ def geometry(
     flats = _flats(every, origin, names, reads, emissive, contents)
     again = _same_triangles(flats, shared, kept) if ShapeKind.TRIANGLE not in order else None
     if again is None:
-        details, shared = written(triangles, places, shared)
+        details, shared = write_triangles(triangles, places, shared)
     else:
         details, shared = again.details, again.models
     shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes, placed)))
@@ -156,7 +157,7 @@ def geometry(
 
 def _among_other_shapes(
     earlier: Geometry, shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str],
-    reads: Mapping[str, Reads],
+    reads: Mapping[str, RequiredCharts],
 ) -> Geometry | None:  # fmt: skip
     """The meshes of `earlier` with what else there is now; None where that touches them."""
     if earlier.bvh_kinds - {ShapeKind.TRIANGLE, ShapeKind.INSTANCE}:
@@ -164,7 +165,7 @@ def _among_other_shapes(
     placed = place_analytic(shapes, names, emissive, reads)
     analytic = _analytic(placed, np.zeros(3))
     low, high, owners, exact = _extents(analytic, earlier.meshes)
-    origin, radius = choose(low, high)
+    origin, radius = choose_origin(low, high)
     if vec3(origin) != earlier.origin or any(len(array) > LINEAR[kind] for kind, (array, _) in analytic.items()):
         return None
     if origin.any():
@@ -181,8 +182,8 @@ def _among_other_shapes(
 
 
 def _flats(
-    every: World, origin: np.ndarray, names: Sequence[str], reads: Mapping[str, Reads], emissive: Collection[str],
-    contents: Sequence[Hashable] | None,
+    every: World, origin: np.ndarray, names: Sequence[str], reads: Mapping[str, RequiredCharts],
+    emissive: Collection[str], contents: Sequence[Hashable] | None,
 ) -> Hashable:  # fmt: skip
     if contents is None or any(names[mesh.material] in emissive for mesh in every.meshes):
         return None
@@ -190,7 +191,7 @@ def _flats(
     return own, vec3(origin) if own else None, tuple(names), tuple(reads.items())
 
 
-def _same_triangles(flats: Hashable, shared: Sequence[Model], kept: Sequence[Geometry]) -> Geometry | None:
+def _same_triangles(flats: Hashable, shared: Sequence[SharedMesh], kept: Sequence[Geometry]) -> Geometry | None:
     """The newest of `kept` with the same triangles in the same places."""
     for earlier in reversed(kept):
         same = len(earlier.models) == len(shared) and all(map(operator.is_, earlier.models, shared))
@@ -203,7 +204,7 @@ def _others(found: dict[ShapeKind, np.ndarray], placed: np.ndarray) -> tuple[np.
     return *(array for kind, array in found.items() if kind != ShapeKind.TRIANGLE), placed
 
 
-def _vanished(placed: Placed) -> list[str]:
+def _vanished(placed: AnalyticShapes) -> list[str]:
     return [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
 
 
@@ -229,7 +230,7 @@ def _hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
             array["shape"] |= np.where(hidden[index], layout.HIDDEN, 0).astype(np.uint32)
 
 
-def _analytic(placed: Placed, origin: np.ndarray) -> dict[ShapeKind, tuple[np.ndarray, Bounds]]:
+def _analytic(placed: AnalyticShapes, origin: np.ndarray) -> dict[ShapeKind, tuple[np.ndarray, Bounds]]:
     return {
         ShapeKind.SPHERE: records.spheres(placed, origin),
         ShapeKind.QUAD: records.quads(placed, origin),

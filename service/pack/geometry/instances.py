@@ -12,8 +12,8 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import SHAREABLE
 from service.assets import MeshData
-from service.pack.models import MOST_SEEN, Model, shift
-from service.pack.textures import Reads
+from service.pack.geometry.shared_meshes import MOST_SEEN, SharedMesh, shift
+from service.pack.textures.uses import RequiredCharts
 from service.problems import FieldError, InvalidDocument
 from service.scene.shape import MeshShape
 
@@ -27,29 +27,29 @@ AREAS = 1e-18, 1e18
 
 
 @dataclass(frozen=True)
-class Wanted:
+class MeshRequest:
     """A mesh of the document, before it is known whether it shares its triangles."""
 
     shape: MeshShape
     data: MeshData
     matrix: np.ndarray | None
     used: tuple[int, int]  # material, shape
-    read: Reads  # by its material
+    read: RequiredCharts  # by its material
     shines: bool
 
 
 @dataclass(frozen=True)
-class Standing:
+class Instance:
     """A shape that shows a model: world = axes (model) + center, float64; `box` (6,) is around it there."""
 
-    model: Model
+    model: SharedMesh
     used: tuple[int, int]
     axes: np.ndarray
     center: np.ndarray
     box: np.ndarray
 
 
-def keys(wanted: Sequence[Wanted], apart: bool = False) -> list[Hashable | None]:
+def keys(wanted: Sequence[MeshRequest], apart: bool = False) -> list[Hashable | None]:
     """Of each mesh what is equal where its triangles are; None where they shall be the scene's own, as nobody shares
     them or that is not worth it. `apart`: all that are large enough shall move without the others.
     """
@@ -68,14 +68,14 @@ def keys(wanted: Sequence[Wanted], apart: bool = False) -> list[Hashable | None]
     return [key if spared >= WORTH and key in shared else None for key in found]
 
 
-def _size(each: Wanted) -> tuple[Hashable, ...]:
+def _size(each: MeshRequest) -> tuple[Hashable, ...]:
     """What is quickly found out of that key."""
     shape = each.shape
     same = shape.asset, shape.smooth, shape.double_sided, bool(each.read.uv_sets), 1 in each.read.uv_sets
     return *same, each.read.tangents, len(each.data.vertices), len(each.data.faces)
 
 
-def _content(each: Wanted, digests: dict[int, Hashable]) -> Hashable:
+def _content(each: MeshRequest, digests: dict[int, Hashable]) -> Hashable:
     shape = each.shape
     if shape.asset is not None:
         return None
@@ -88,7 +88,7 @@ def _content(each: Wanted, digests: dict[int, Hashable]) -> Hashable:
     return digests[id(shape)]
 
 
-def stand(model: Model, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -> list[Standing | None]:
+def stand(model: SharedMesh, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -> list[Instance | None]:
     """Of shapes under these transforms (n, 4, 4); None where float32 can't take a ray through one and back."""
     axes = matrices[:, :3, :3]
     lengths = np.linalg.svd(axes, compute_uv=False)
@@ -102,10 +102,10 @@ def stand(model: Model, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -
     half = (high - low) / 2 @ np.abs(axes).transpose(0, 2, 1)
     boxes = np.concatenate([(middle - half).min(axis=1), (middle + half).max(axis=1)], axis=1)
     rows = zip(fits, used, axes, centers, boxes, strict=True)
-    return [Standing(model, *row) if fit else None for fit, *row in rows]
+    return [Instance(model, *row) if fit else None for fit, *row in rows]
 
 
-def records(standing: Sequence[Standing], models: Sequence[Model], origin: np.ndarray, first: int) -> np.ndarray:
+def records(standing: Sequence[Instance], models: Sequence[SharedMesh], origin: np.ndarray, first: int) -> np.ndarray:
     """`layout.Instance` of each; the models' triangles begin at `first`, in this order, and so do their nodes at 0.
 
     Raises InvalidDocument.

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from gpu.layout import LightKind, ShapeKind
-from service.pack.cache import PackCache, digest
+from service.pack.edits.cache import PackCache, digest
 
 MANY = 4
 APART = 4.0  # radii between the middles of fewer lights that are in more than one place
@@ -17,7 +17,7 @@ Grown = tuple[np.ndarray, np.ndarray, float]  # as by `gpu.accel.light_tree.buil
 _FLAT = np.array([0.0, 0.0, 1.0])
 
 
-class Bounds:
+class LightBounds:
     """Arrays over n lights, as `gpu.accel.light_tree.build` takes them."""
 
     def __init__(self, n: int) -> None:
@@ -32,9 +32,9 @@ class Bounds:
         self.low[mine], self.high[mine], self.radius[mine] = low, high, radius
 
 
-def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray) -> Bounds:
+def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray) -> LightBounds:
     """Of `layout.Light` records of bounded lights (n,); `sides` (n,): how many of a flat one's send light."""
-    out = Bounds(len(lights))
+    out = LightBounds(len(lights))
     kinds = lights["kind"]
 
     def of(kind: LightKind, shape: ShapeKind | None = None) -> tuple[np.ndarray, np.ndarray]:
@@ -59,7 +59,7 @@ def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np
     return out
 
 
-def _flats(out: Bounds, mine: np.ndarray, corners: np.ndarray, across: np.ndarray, sides: np.ndarray) -> None:
+def _flats(out: LightBounds, mine: np.ndarray, corners: np.ndarray, across: np.ndarray, sides: np.ndarray) -> None:
     """`corners` (n, k, 3), `across` (n, 3) along the outward normals."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     away = np.linalg.norm(corners - 0.5 * (low + high)[:, None], axis=2).max(axis=1)
@@ -74,7 +74,7 @@ def _flats(out: Bounds, mine: np.ndarray, corners: np.ndarray, across: np.ndarra
     out.solid_angle[mine] = np.pi * sides[mine]
 
 
-def _ellipsoids(out: Bounds, mine: np.ndarray, solids: np.ndarray) -> None:
+def _ellipsoids(out: LightBounds, mine: np.ndarray, solids: np.ndarray) -> None:
     rows = np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(np.float64)
     axes = np.linalg.inv(rows) if len(rows) else rows  # columns: half axes
     half = np.linalg.norm(axes, axis=2)
@@ -83,7 +83,7 @@ def _ellipsoids(out: Bounds, mine: np.ndarray, solids: np.ndarray) -> None:
     out.set_box(mine, center - half, center + half, longest)
 
 
-def _spots(out: Bounds, mine: np.ndarray, spots: np.ndarray) -> None:
+def _spots(out: LightBounds, mine: np.ndarray, spots: np.ndarray) -> None:
     """What spot.glsl has of the two angles: 1 / (2 rim) as the square of the direction, outer / rim."""
     out.set_box(mine, spots["position"], spots["position"], np.zeros(len(mine)))
     direction = spots["direction"].astype(np.float64)
@@ -98,7 +98,7 @@ def _spots(out: Bounds, mine: np.ndarray, spots: np.ndarray) -> None:
     out.solid_angle[mine] = np.pi * (inner + outer)
 
 
-def worth(b: Bounds) -> bool:
+def worth(b: LightBounds) -> bool:
     """Whether a tree pays: a sample then costs 1.1 to 1.4 times as much. Two lamps some metres apart gain 1.4 to 2.9
     by it, error by time, all of that counted; the two triangles of a rectangle gain nothing."""
     middles = 0.5 * (b.low + b.high)
@@ -107,7 +107,7 @@ def worth(b: Bounds) -> bool:
     return bool(np.linalg.norm(np.ptp(middles, axis=0)) > APART * b.radius.max())
 
 
-def tree(
+def grow_light_tree(
     lights: np.ndarray, power: np.ndarray, share: float, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray,
     reach: float, cache: PackCache | None,
 ) -> Grown | None:  # fmt: skip

@@ -12,7 +12,7 @@ TRANSFORM = FIELDS.index("transform")
 STILL = [FIELDS.index(name) for name in FIELDS if name not in ("transform", "material", "visible_to_camera")]
 
 
-class Moves:
+class MovedMeshes:
     """What one stream has moved. One call at a time."""
 
     def __init__(self) -> None:

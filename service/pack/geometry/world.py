@@ -10,12 +10,12 @@ import numpy as np
 from gpu import SceneTooLarge
 from service.assets import Assets, MeshData
 from service.assets.oddities import oddities
-from service.pack import instances, meshes
-from service.pack.instances import Standing, Wanted
-from service.pack.meshes import Chart, PlacedMesh
-from service.pack.models import Model, blank, model
-from service.pack.placed import Placed, check_reach
-from service.pack.textures import Reads
+from service.pack.geometry import instances, meshes
+from service.pack.geometry.analytic import AnalyticShapes, check_reach
+from service.pack.geometry.instances import Instance, MeshRequest
+from service.pack.geometry.meshes import Chart, PlacedMesh
+from service.pack.geometry.shared_meshes import SharedMesh, blank, shared_mesh
+from service.pack.textures.uses import RequiredCharts
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
@@ -25,19 +25,19 @@ from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereSha
 class World:
     """The shapes of a scene in the world."""
 
-    placed: Placed = field(default_factory=Placed)
+    placed: AnalyticShapes = field(default_factory=AnalyticShapes)
     meshes: list[PlacedMesh] = field(default_factory=list)
-    standing: list[Standing] = field(default_factory=list)  # meshes that share their triangles
+    standing: list[Instance] = field(default_factory=list)  # meshes that share their triangles
     odd: list[tuple[int, str]] = field(default_factory=list)  # warnings about meshes, each with its shape's number
 
     @property
-    def models(self) -> list[Model]:
+    def models(self) -> list[SharedMesh]:
         return list({id(each.model): each.model for each in self.standing}.values())
 
 
 def place(
     shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    reads: Mapping[str, Reads], known: Mapping[Hashable, Model] | None = None, apart: bool = False,
+    reads: Mapping[str, RequiredCharts], known: Mapping[Hashable, SharedMesh] | None = None, apart: bool = False,
 ) -> World:  # fmt: skip
     """`names` and `emissive` are materials, `reads` what these read of them; `known`: models that need not be made
     again; `apart`: large meshes shall move without the others.
@@ -46,15 +46,15 @@ def place(
     """
     out = World(place_analytic(shapes, names, emissive, reads))
     materials, files = {name: i for i, name in enumerate(names)}, dict[str, MeshData]()
-    wanted = list[Wanted]()
+    wanted = list[MeshRequest]()
     for i, shape in enumerate(shapes):
         if isinstance(shape, MeshShape):
             data = _data(shape, i, assets, files)
             out.odd += [(i, warning) for warning in data.warnings]
-            read = reads.get(shape.material, Reads())
+            read = reads.get(shape.material, RequiredCharts())
             _check_charts(i, shape, data, read.uv_sets)
             used, matrix = (materials[shape.material], i), _matrix(shape)
-            wanted.append(Wanted(shape, data, matrix, used, read, shape.material in emissive))
+            wanted.append(MeshRequest(shape, data, matrix, used, read, shape.material in emissive))
     standing, room = _standing(wanted, known or {}, apart, max_triangles)
     for each, stands in zip(wanted, standing, strict=True):
         if stands is not None:
@@ -70,10 +70,10 @@ def place(
 
 
 def _standing(
-    wanted: Sequence[Wanted], known: Mapping[Hashable, Model], apart: bool, room: int
-) -> tuple[list[Standing | None], int]:
+    wanted: Sequence[MeshRequest], known: Mapping[Hashable, SharedMesh], apart: bool, room: int
+) -> tuple[list[Instance | None], int]:
     """Those that stand as instances, and for how many triangles there is room beside their models."""
-    out: list[Standing | None] = [None] * len(wanted)
+    out: list[Instance | None] = [None] * len(wanted)
     groups = dict[Hashable, list[int]]()
     for i, key in enumerate(instances.keys(wanted, apart)):
         if key is not None:
@@ -93,15 +93,15 @@ def _standing(
 
 
 def place_analytic(
-    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], reads: Mapping[str, Reads]
-) -> Placed:
+    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], reads: Mapping[str, RequiredCharts]
+) -> AnalyticShapes:
     """All shapes but meshes. Raises InvalidDocument."""
-    materials, placed = {name: i for i, name in enumerate(names)}, Placed()
+    materials, placed = {name: i for i, name in enumerate(names)}, AnalyticShapes()
     for i, shape in enumerate(shapes):
         if isinstance(shape, MeshShape):
             continue
         matrix, used = _matrix(shape), (materials[shape.material], i)
-        if 1 in reads.get(shape.material, Reads()).uv_sets:
+        if 1 in reads.get(shape.material, RequiredCharts()).uv_sets:
             raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
         match shape:
             case SphereShape():
@@ -117,7 +117,7 @@ def _matrix(shape: Shape) -> np.ndarray | None:
     return None if shape.transform is None else shape.transform.matrix4()
 
 
-def _mesh(each: Wanted, matrix: np.ndarray | None) -> PlacedMesh:
+def _mesh(each: MeshRequest, matrix: np.ndarray | None) -> PlacedMesh:
     data, shape, read = each.data, each.shape, each.read
     return meshes.place(
         data.vertices, data.faces, data.normals, shape.smooth, matrix, not shape.double_sided, each.used,
@@ -127,20 +127,20 @@ def _mesh(each: Wanted, matrix: np.ndarray | None) -> PlacedMesh:
     )  # fmt: skip
 
 
-def _model(key: Hashable, each: Wanted) -> Model | None:
+def _model(key: Hashable, each: MeshRequest) -> SharedMesh | None:
     try:
-        return model(key, blank(_mesh(each, None)))
+        return shared_mesh(key, blank(_mesh(each, None)))
     except SceneTooLarge as error:
         raise InvalidDocument([FieldError(f"/shapes/{each.used[1]}", str(error))]) from None
 
 
-def _check_room(each: Wanted, room: int) -> None:
+def _check_room(each: MeshRequest, room: int) -> None:
     if len(each.data.faces) > room:
         detail = f"has {len(each.data.faces)} triangles; this server has room for {room} more in a scene"
         raise InvalidDocument([FieldError(f"/shapes/{each.used[1]}", detail)])
 
 
-def _check_reach(standing: Standing, each: Wanted) -> None:
+def _check_reach(standing: Instance, each: MeshRequest) -> None:
     """By the boxes of its parts where they suffice."""
     reach = float(np.abs(standing.box).max())
     if reach > LARGEST:

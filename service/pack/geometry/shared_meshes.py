@@ -9,14 +9,14 @@ import numpy as np
 
 from gpu import layout
 from gpu.layout import ShapeKind
-from service.pack.meshes import PlacedMesh, Triangles, survey
+from service.pack.geometry.meshes import PlacedMesh, Triangles, survey
 from service.scene.numbers import Vec3
 
 PARTS = 128  # boxes that a model is seen as when a box around it is asked for, under any transform
 
 
 @dataclass(frozen=True)
-class Written:
+class WrittenTriangles:
     """Finished arrays, in the order of the tree's leaves; what no triangle has is None."""
 
     triangles: np.ndarray
@@ -27,7 +27,7 @@ class Written:
 
 
 @dataclass(frozen=True)
-class Fresh:
+class UnwrittenTriangles:
     """Triangles that have not been written anywhere yet; `places`: where each goes."""
 
     triangles: Triangles
@@ -35,10 +35,10 @@ class Fresh:
 
 
 @dataclass(frozen=True)
-class Model:
+class SharedMesh:
     key: Hashable
     center: np.ndarray  # (3,) float64: of the mesh's own coordinates, what is 0 here
-    source: Written | Fresh
+    source: WrittenTriangles | UnwrittenTriangles
     count: int
     degenerate: int  # triangles that were skipped
     nodes: np.ndarray
@@ -56,21 +56,27 @@ class Model:
 
     @property
     def any_smooth(self) -> bool:
-        return self.source.any_smooth if isinstance(self.source, Written) else self.source.triangles.any_smooth
+        return (
+            self.source.any_smooth if isinstance(self.source, WrittenTriangles) else self.source.triangles.any_smooth
+        )
 
     @property
     def any_tangents(self) -> bool:
-        return self.source.any_tangents if isinstance(self.source, Written) else self.source.triangles.any_tangents
+        return (
+            self.source.any_tangents
+            if isinstance(self.source, WrittenTriangles)
+            else self.source.triangles.any_tangents
+        )
 
     def has(self, name: str) -> bool:
-        if isinstance(self.source, Written):
+        if isinstance(self.source, WrittenTriangles):
             return name in self.source.corners
         return self.source.triangles.have(name)
 
-    def write(self, triangles: np.ndarray, normals: np.ndarray, corners: dict[str, np.ndarray]) -> Model:
+    def write(self, triangles: np.ndarray, normals: np.ndarray, corners: dict[str, np.ndarray]) -> SharedMesh:
         """Fills its part of the scene's arrays, those of zero length left out; the model as it is kept there."""
         source = self.source
-        if isinstance(source, Written):
+        if isinstance(source, WrittenTriangles):
             triangles[...] = source.triangles
             if source.normals is not None:
                 normals[...] = source.normals
@@ -88,10 +94,10 @@ class Model:
                     source.triangles.write_corners(name, source.places, values)
         own = {name: values for name, values in corners.items() if self.has(name)}
         bits = self.any_smooth, self.any_tangents
-        return replace(self, source=Written(triangles, normals if any(bits) else None, *bits, own))
+        return replace(self, source=WrittenTriangles(triangles, normals if any(bits) else None, *bits, own))
 
 
-def model(key: Hashable, mesh: PlacedMesh) -> Model | None:
+def shared_mesh(key: Hashable, mesh: PlacedMesh) -> SharedMesh | None:
     """The mesh with its tree; None where no triangle has an area. `mesh` is of material 0 and shape 0, in its own
     coordinates.
 
@@ -113,9 +119,10 @@ def model(key: Hashable, mesh: PlacedMesh) -> Model | None:
     low = np.minimum.reduceat(ordered[:, :3], starts, axis=0)
     high = np.maximum.reduceat(ordered[:, 3:], starts, axis=0)
     areas = triangles.doubled_areas()
-    return Model(
-        key, center, Fresh(triangles, places), len(triangles), sum(triangles.degenerate.values()), nodes, node_count,
-        tree.origin, tree.scale, np.concatenate([low, high], axis=1), float(areas.min()), float(areas.max()),
+    return SharedMesh(
+        key, center, UnwrittenTriangles(triangles, places), len(triangles), sum(triangles.degenerate.values()),
+        nodes, node_count, tree.origin, tree.scale, np.concatenate([low, high], axis=1), float(areas.min()),
+        float(areas.max()),
     )  # fmt: skip
 
 
@@ -124,7 +131,7 @@ def blank(mesh: PlacedMesh) -> PlacedMesh:
     return replace(mesh, material=0, shape=0)
 
 
-def shift(models: Sequence[Model]) -> int:
+def shift(models: Sequence[SharedMesh]) -> int:
     """Bits for the number of a triangle in any of them: `SceneArrays.instance_shift`."""
     return max(((each.count - 1).bit_length() for each in models), default=0)
 

@@ -90,7 +90,7 @@ def _ellipsoid_area(solids: np.ndarray) -> np.ndarray:
     return np.asarray(4 * np.pi * (((a * b) ** p + (a * c) ** p + (b * c) ** p) / 3) ** (1 / p))
 
 
-def standing(lights: Sequence[Light], origin: Sequence[float], radius: float) -> tuple[np.ndarray, np.ndarray]:
+def analytic_lights(lights: Sequence[Light], origin: Sequence[float], radius: float) -> tuple[np.ndarray, np.ndarray]:
     """`layout.Light` records of the lights that are no shapes and shine, suns with a disk last; and their power, W of
     luminance: of a directional light what it sends through a disk of `radius` around the scene.
     """

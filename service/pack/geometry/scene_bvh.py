@@ -6,8 +6,8 @@ import numpy as np
 
 from gpu import SceneTooLarge
 from gpu.layout import ShapeKind
-from service.pack.chunks import chunks, in_threads
-from service.pack.records import Bounds
+from service.pack.geometry.parallel import chunks, in_threads
+from service.pack.geometry.records import Bounds
 from service.problems import FieldError, InvalidDocument
 from service.scene.numbers import Vec3
 
@@ -81,7 +81,7 @@ def _areas(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return areas
 
 
-def plant(
+def build_scene_bvh(
     bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.ndarray]
 ) -> tuple[np.ndarray, int, dict[ShapeKind, np.ndarray], Vec3, Vec3]:
     """(nodes, nodes of one octant, each kind's order: the `large` ones, then the leaves'; grid origin and scale).
@@ -117,7 +117,7 @@ def plant(
     return nodes, count, order, tree.origin, tree.scale
 
 
-def warm() -> None:
+def warm_builder() -> None:
     """Loads numba and the builder's compiled code, or compiles it: half a second, or several, of the first mesh."""
     low = np.arange(3.0 * (LINEAR[ShapeKind.TRIANGLE] + 1), dtype=np.float32).reshape(-1, 3)
-    plant({ShapeKind.TRIANGLE: (low, low + 1)}, {ShapeKind.TRIANGLE: np.zeros(0, np.intp)})
+    build_scene_bvh({ShapeKind.TRIANGLE: (low, low + 1)}, {ShapeKind.TRIANGLE: np.zeros(0, np.intp)})

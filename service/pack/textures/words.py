@@ -4,21 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass, field
-from typing import Protocol
 
 import numpy as np
 
 from gpu import TextureArrays
 from gpu.layout import texture_records
 from service.assets import Assets, ImageData
-from service.assets.parts import linear
-from service.pack.cache import PackCache, lasting
-from service.pack.values import member_of
-from service.problems import AssetError, FieldError, InvalidDocument
+from service.pack.edits.cache import PackCache, lasting
+from service.pack.parameters import member_of
+from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
+from service.pack.textures.uses import TextureReference, check_channels, uses_of
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
-from service.scene.material import Material, stretches
 from service.scene.mistakes import escaped
 from service.scene.texture import (
     CheckerTexture,
@@ -31,90 +28,18 @@ from service.scene.texture import (
 )
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
-DECODED = " decoded"  # after an asset's reference
-MAX_TEXELS = 2**27  # what two textures of the device hold, 16384 rows each
-
-
-class TexelLimits(Protocol):
-    @property
-    def max_texels(self) -> int: ...
-
-
-@dataclass(frozen=True)
-class Use:
-    """One reference: `material` is an index, `pointer` leads to the reference."""
-
-    material: int
-    member: str
-    reference: Reference
-    texture: ImageTexture | CheckerTexture
-    srgb: bool  # bytes that the kernel decodes
-    pointer: str
-    decoded: bool = False  # floats that are said to be sRGB
-
-    @property
-    def kept(self) -> str:
-        """Under which the texels of an image are found."""
-        assert isinstance(self.texture, ImageTexture)
-        return self.texture.asset + (DECODED if self.decoded else "")
-
-    @property
-    def look(self) -> tuple[str, bool]:
-        """Equal where one look at the texture serves both."""
-        return self.reference.texture, self.srgb
-
-
-@dataclass(frozen=True)
-class Texels:
-    """All images of a scene; `places`: `Use.kept` -> (first texel among those of its kind, image)."""
-
-    texels: np.ndarray
-    floats: np.ndarray
-    places: dict[str, tuple[int, ImageData]] = field(default_factory=dict)
-
-
-@dataclass(frozen=True)
-class Reads:
-    """What a material reads of its shapes: sets of texture coordinates, and the one that its tangents run along."""
-
-    uv_sets: frozenset[int] = frozenset()
-    tangents: int | None = None  # None: it needs none
-
-
-def reads(scene: Scene) -> dict[str, Reads]:
-    """Of the materials that read anything."""
-    out = {}
-    for name, material in scene.materials.items():
-        sets = {key: _uv_set(scene, reference) for key, reference in references(material).items()}
-        found = Reads(frozenset(sets.values()), _tangent_set(material, sets))
-        if found != Reads():
-            out[name] = found
-    return out
-
-
-def _uv_set(scene: Scene, reference: Reference) -> int:
-    texture = scene.textures[reference.texture]
-    return texture.uv if isinstance(texture, ImageTexture) else 0
-
-
-def _tangent_set(material: Material, sets: Mapping[str, int]) -> int | None:
-    """That of its normal map, or else of its coat's; the first where it only stretches highlights."""
-    for name in ("normal_map", "clearcoat_normal_map"):
-        if name in sets:
-            return sets[name]
-    return 0 if stretches(material) else None
 
 
 def pack_textures(
     scene: Scene, assets: Assets, cache: PackCache | None, limits: TexelLimits | None
-) -> tuple[TextureArrays | None, list[Use], Texels, list[str]]:
+) -> tuple[TextureArrays | None, list[TextureReference], PackedTexels, list[str]]:
     """The renderer's arrays or None, what they serve, and warnings. Raises InvalidDocument."""
-    images = _images(scene, assets)
-    uses = list(_uses(scene, images))
-    _check_channels(uses, images)
+    images = images_of(scene, assets)
+    uses = list(uses_of(scene, images))
+    check_channels(uses, images)
     used = {use.kept: use.texture.asset for use in uses if isinstance(use.texture, ImageTexture)}
     wanted = {use.texture.asset: use.reference.texture for use in uses if isinstance(use.texture, ImageTexture)}
-    texels = _texels({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, cache, limits)
+    texels = lay_out({kept: (wanted[asset], images[asset]) for kept, asset in used.items()}, cache, limits)
     if not uses:
         return None, uses, texels, []
     slots = _slots(uses)
@@ -126,91 +51,7 @@ def pack_textures(
     return arrays, uses, texels, [*_told(wanted, images), *_warnings(uses, texels)]
 
 
-def _images(scene: Scene, assets: Assets) -> dict[str, ImageData]:
-    """By asset: of all textures, used or not, so that none is wrong unnoticed."""
-    out: dict[str, ImageData] = {}
-    errors = []
-    for name, texture in scene.textures.items():
-        if isinstance(texture, ImageTexture) and texture.asset not in out:
-            try:
-                out[texture.asset] = assets.image(texture.asset)
-            except AssetError as error:
-                errors.append(FieldError(f"/textures/{escaped(name)}/asset", error.detail))
-    if errors:
-        raise InvalidDocument(errors)
-    return out
-
-
-def _uses(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[Use]:
-    for i, (name, material) in enumerate(scene.materials.items()):
-        for key, reference in references(material).items():
-            texture = scene.textures[reference.texture]
-            srgb = is_8bit = False
-            if isinstance(texture, ImageTexture):
-                is_8bit = images[texture.asset].is_8bit
-                assumed = is_8bit and isinstance(reference, ColorTexture)
-                srgb = assumed if texture.color_space is None else texture.color_space == "srgb"
-            pointer = f"/materials/{escaped(name)}/{key}"
-            member = member_of(material, key)
-            yield Use(i, member, reference, texture, srgb and is_8bit, pointer, srgb and not is_8bit)
-
-
-def _check_channels(uses: list[Use], images: Mapping[str, ImageData]) -> None:
-    errors = []
-    for use in uses:
-        name = use.reference.texture
-        channels = images[use.texture.asset].pixels.shape[2] if isinstance(use.texture, ImageTexture) else 3
-        if isinstance(use.reference, NormalTexture):
-            if channels < 3:
-                detail = f"a normal map has red, green and blue; {name!r} is grey"
-                errors.append(FieldError(f"{use.pointer}/texture", detail))
-        elif use.reference.channel == "a" and channels < 4:
-            detail = f"texture {name!r} has no alpha: it has {'one channel' if channels == 1 else 'r, g and b'}"
-            errors.append(FieldError(f"{use.pointer}/channel", detail))
-    if errors:
-        raise InvalidDocument(errors)
-
-
-def _texels(wanted: dict[str, tuple[str, ImageData]], cache: PackCache | None, limits: TexelLimits | None) -> Texels:
-    room = MAX_TEXELS if limits is None else min(limits.max_texels, MAX_TEXELS)
-    for name, image in wanted.values():
-        height, width = image.pixels.shape[:2]
-        if width * height > room:
-            detail = f"has {width} x {height} texels; this server has room for {room} more in a scene"
-            raise InvalidDocument([FieldError(f"/textures/{escaped(name)}/asset", detail)])
-        room -= width * height
-    images = {kept: image for kept, (_, image) in wanted.items()}
-    if cache is None or not images or not all(map(lasting, images)):
-        return _laid(images)
-    return cache.get(("texels", tuple(images)), lambda: _laid(images))
-
-
-def _laid(images: dict[str, ImageData]) -> Texels:
-    places: dict[str, tuple[int, ImageData]] = {}
-    ends = {True: 0, False: 0}
-    for kept, image in images.items():
-        places[kept] = ends[image.is_8bit], _decoded(image) if kept.endswith(DECODED) else image
-        ends[image.is_8bit] += image.pixels.shape[0] * image.pixels.shape[1]
-    out: dict[bool, np.ndarray] = {
-        True: np.empty((ends[True], 4), np.uint8),
-        False: np.empty((ends[False], 4), np.float32),
-    }
-    for first, image in places.values():
-        height, width, channels = image.pixels.shape
-        part = out[image.is_8bit][first : first + width * height].reshape(height, width, 4)
-        part[..., :3] = image.pixels[..., :3]  # a grey one three times
-        part[..., 3] = image.pixels[..., 3] if channels == 4 else 255 if image.is_8bit else 1
-    return Texels(out[True], out[False], places)
-
-
-def _decoded(image: ImageData) -> ImageData:
-    """Linear floats of sRGB ones, such as a PNG of 16 bits has; its alpha as it is."""
-    pixels = np.array(image.pixels, np.float32)
-    pixels[..., :3] = linear(pixels[..., :3])
-    return ImageData(pixels)
-
-
-def _slots(uses: list[Use]) -> dict[str, int]:
+def _slots(uses: list[TextureReference]) -> dict[str, int]:
     """Member -> slot. Members share one where no material would have to look at two textures for it."""
     taken: dict[str, dict[int, tuple[str, bool]]] = {}
     for use in uses:
@@ -232,7 +73,7 @@ def _slots(uses: list[Use]) -> dict[str, int]:
     return slots
 
 
-def _words(materials: int, uses: list[Use], slots: dict[str, int], texels: Texels) -> np.ndarray:
+def _words(materials: int, uses: list[TextureReference], slots: dict[str, int], texels: PackedTexels) -> np.ndarray:
     """(materials, n) uint32: the slots filled in, the uses still empty."""
     count = max(slots.values()) + 1
     records = np.zeros((materials, count), texture_records.TextureSlot.dtype)
@@ -249,7 +90,7 @@ def _words(materials: int, uses: list[Use], slots: dict[str, int], texels: Texel
     return words
 
 
-def record_of(use: Use, texels: Texels) -> np.ndarray:
+def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
     record = np.zeros((), texture_records.TextureSlot.dtype)
     texture = use.texture
     if isinstance(texture, CheckerTexture):
@@ -304,7 +145,7 @@ def repacked(textures: TextureArrays, scene: Scene) -> np.ndarray:
     return words
 
 
-def values_of(use: Use, pixels: np.ndarray) -> np.ndarray:
+def values_of(use: TextureReference, pixels: np.ndarray) -> np.ndarray:
     """(..., 3) float32: what texels (..., channels), bytes or floats, give a colour, before its range."""
     if pixels.dtype == np.uint8:
         linear = pixels.astype(np.float32) / np.float32(255)
@@ -323,7 +164,7 @@ def _told(wanted: Mapping[str, str], images: Mapping[str, ImageData]) -> Iterato
         yield from (f"/textures/{escaped(name)}/asset: {warning}" for warning in images[asset].warnings)
 
 
-def _warnings(uses: list[Use], texels: Texels) -> Iterator[str]:
+def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[str]:
     charts = {use.material: getattr(use.texture, "uv", 0) for use in uses if use.member == "normal"}
     for use in uses:
         if isinstance(use.reference, NormalTexture):

@@ -19,7 +19,7 @@ EDITED = ("camera", "materials")  # as many as before; see Scene.edit
 SMALL = 1 << 20  # bytes that are compared; of more it is asked whether they are the very same
 
 
-def moved(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
+def scene_delta(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
     """What `Scene.edit` takes for this; None where it is not enough."""
     if len(old.materials) != len(new.materials) or bool(len(old.light_tree)) != bool(len(new.light_tree)):
         return None

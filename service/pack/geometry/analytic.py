@@ -44,7 +44,7 @@ class Solids:
 
 
 @dataclass
-class Placed:
+class AnalyticShapes:
     """The analytic shapes of a scene, by kind, in the document's order. `used` holds (material, shape) indices."""
 
     spheres: list[tuple[Vec3, float, Quaternion]] = field(default_factory=list)

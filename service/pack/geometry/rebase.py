@@ -21,7 +21,7 @@ VAST = 2.0**17
 Bounds = tuple[np.ndarray, np.ndarray]
 
 
-def choose(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, float]:
+def choose_origin(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, float]:
     """(origin, radius of a ball around everything) of boxes (n, 3), one for each shape.
 
     The origin is 0 unless everything lies far from it, or small shapes do: most scenes keep their numbers.

@@ -1,0 +1,17 @@
+"""Shapes -> records, triangles and the tree over them, relative to an origin near the camera.
+
+assemble          the whole, and what of earlier geometries serves again
+world             the document's shapes in world space: analytic ones, meshes and instances, in float64
+analytic          spheres, quads, boxes and ellipsoids in world space
+meshes            meshes in world space, and their triangles as records
+vertex_normals    smooth normals at the corners, and their codes
+tangents          the directions that a material's highlights and normal maps run along
+shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
+instances         which meshes are shared, and the records of the shapes that show them
+scene_bvh         the tree over everything, or lists of what is few
+records           analytic shapes -> records with their bounds
+triangle_buffers  the finished arrays of all triangles, in shared memory
+rebase            the origin that float32 coordinates are relative to
+parallel          work over many rows, in threads
+warnings          equal warnings about many shapes as one with a count
+"""

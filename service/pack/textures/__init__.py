@@ -1,0 +1,6 @@
+"""Textures -> texels, and which number of which material reads which of them.
+
+uses    the references of materials to textures, and the charts that they need
+images  images -> texels one after another
+words   the whole, as the words that kernels read behind each material
+"""

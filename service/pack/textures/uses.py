@@ -1,0 +1,109 @@
+"""Which numbers of which materials read which textures, and which charts they need for that."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+
+from service.assets import ImageData
+from service.pack.parameters import member_of
+from service.problems import FieldError, InvalidDocument
+from service.scene import Scene
+from service.scene.material import Material, stretches
+from service.scene.mistakes import escaped
+from service.scene.texture import (
+    CheckerTexture,
+    ColorTexture,
+    ImageTexture,
+    NormalTexture,
+    Reference,
+    references,
+)
+
+DECODED = " decoded"  # after an asset's reference
+
+
+@dataclass(frozen=True)
+class TextureReference:
+    """One reference: `material` is an index, `pointer` leads to the reference."""
+
+    material: int
+    member: str
+    reference: Reference
+    texture: ImageTexture | CheckerTexture
+    srgb: bool  # bytes that the kernel decodes
+    pointer: str
+    decoded: bool = False  # floats that are said to be sRGB
+
+    @property
+    def kept(self) -> str:
+        """Under which the texels of an image are found."""
+        assert isinstance(self.texture, ImageTexture)
+        return self.texture.asset + (DECODED if self.decoded else "")
+
+    @property
+    def look(self) -> tuple[str, bool]:
+        """Equal where one look at the texture serves both."""
+        return self.reference.texture, self.srgb
+
+
+@dataclass(frozen=True)
+class RequiredCharts:
+    """What a material reads of its shapes: sets of texture coordinates, and the one that its tangents run along."""
+
+    uv_sets: frozenset[int] = frozenset()
+    tangents: int | None = None  # None: it needs none
+
+
+def required_charts(scene: Scene) -> dict[str, RequiredCharts]:
+    """Of the materials that read anything."""
+    out = {}
+    for name, material in scene.materials.items():
+        sets = {key: _uv_set(scene, reference) for key, reference in references(material).items()}
+        found = RequiredCharts(frozenset(sets.values()), _tangent_set(material, sets))
+        if found != RequiredCharts():
+            out[name] = found
+    return out
+
+
+def _uv_set(scene: Scene, reference: Reference) -> int:
+    texture = scene.textures[reference.texture]
+    return texture.uv if isinstance(texture, ImageTexture) else 0
+
+
+def _tangent_set(material: Material, sets: Mapping[str, int]) -> int | None:
+    """That of its normal map, or else of its coat's; the first where it only stretches highlights."""
+    for name in ("normal_map", "clearcoat_normal_map"):
+        if name in sets:
+            return sets[name]
+    return 0 if stretches(material) else None
+
+
+def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureReference]:
+    for i, (name, material) in enumerate(scene.materials.items()):
+        for key, reference in references(material).items():
+            texture = scene.textures[reference.texture]
+            srgb = is_8bit = False
+            if isinstance(texture, ImageTexture):
+                is_8bit = images[texture.asset].is_8bit
+                assumed = is_8bit and isinstance(reference, ColorTexture)
+                srgb = assumed if texture.color_space is None else texture.color_space == "srgb"
+            pointer = f"/materials/{escaped(name)}/{key}"
+            member = member_of(material, key)
+            yield TextureReference(i, member, reference, texture, srgb and is_8bit, pointer, srgb and not is_8bit)
+
+
+def check_channels(uses: list[TextureReference], images: Mapping[str, ImageData]) -> None:
+    errors = []
+    for use in uses:
+        name = use.reference.texture
+        channels = images[use.texture.asset].pixels.shape[2] if isinstance(use.texture, ImageTexture) else 3
+        if isinstance(use.reference, NormalTexture):
+            if channels < 3:
+                detail = f"a normal map has red, green and blue; {name!r} is grey"
+                errors.append(FieldError(f"{use.pointer}/texture", detail))
+        elif use.reference.channel == "a" and channels < 4:
+            detail = f"texture {name!r} has no alpha: it has {'one channel' if channels == 1 else 'r, g and b'}"
+            errors.append(FieldError(f"{use.pointer}/channel", detail))
+    if errors:
+        raise InvalidDocument(errors)
