@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore, MeshData
-from service.assets.sniff import sniff
+from service.assets.formats import sniff
 from tests import asset_files as make
 from tests.asset_files import OBJ, TRIANGLE
 

@@ -15,9 +15,9 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore, FileAssets, MeshData
-from service.assets.data import AssetLimits
-from service.assets.loader import Loader
-from service.assets.sniff import sniff
+from service.assets.cache import ParsedCache
+from service.assets.formats import sniff
+from service.assets.types import AssetLimits
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 from tests import asset_files as make
 from tests.asset_files import OBJ, TRIANGLE
@@ -141,7 +141,7 @@ def test_a_full_disk_leaves_nothing(tmp_path: Path, monkeypatch: pytest.MonkeyPa
 
 def test_what_is_kept_stays_below_its_bound() -> None:
     parsed = MeshData(np.zeros((10, 3)), np.zeros((0, 3), np.int32), None)  # 240 bytes
-    loader = Loader(AssetLimits(cache_bytes=500))
+    loader = ParsedCache(AssetLimits(cache_bytes=500))
     calls: list[str] = []
 
     def parse(key: str) -> MeshData:
@@ -154,7 +154,7 @@ def test_what_is_kept_stays_below_its_bound() -> None:
 
 
 def test_a_file_that_many_want_is_parsed_once() -> None:
-    loader = Loader(AssetLimits())
+    loader = ParsedCache(AssetLimits())
     parsed = MeshData(np.zeros((1, 3)), np.zeros((1, 3), np.int32), None)
     began, go_on = threading.Event(), threading.Event()
     calls, found = [], []

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.assets.data import AssetLimits, SceneFile
 from service.assets.errors import ParseError
-from service.assets.gltf.scene import read_scene
-from service.assets.sniff import sniff
+from service.assets.formats import sniff
+from service.assets.gltf.importer import read_scene
+from service.assets.types import AssetLimits, SceneFile
 from service.cli import main
 from tests.gltf_files import QUAD, Gltf
 

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore
-from service.assets.importing import Imported
+from service.assets.scene_import import Imported
 from service.pack import pack
 from service.scene import parse_scene
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf

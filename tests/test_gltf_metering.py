@@ -11,8 +11,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from service.assets.data import AssetLimits, SceneFile
-from service.assets.gltf.scene import read_scene
+from service.assets.gltf.importer import read_scene
+from service.assets.types import AssetLimits, SceneFile
 from service.cli import main
 from service.images import read_metadata
 from tests.gltf_files import QUAD, Gltf

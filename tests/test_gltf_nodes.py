@@ -7,9 +7,9 @@ import time
 import numpy as np
 import pytest
 
-from service.assets.data import AssetLimits
 from service.assets.errors import ParseError
-from service.assets.gltf.scene import read_scene
+from service.assets.gltf.importer import read_scene
+from service.assets.types import AssetLimits
 from tests.gltf_files import Gltf
 
 LIMITS = AssetLimits()

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.assets import AssetStore, MeshData, importing
-from service.assets.importing import Imported
+from service.assets import AssetStore, MeshData, scene_import
+from service.assets.scene_import import Imported
 from service.pack import pack
 from service.pack.geometry import instances
 from service.problems import AssetError
@@ -331,12 +331,12 @@ def test_what_an_older_importer_made_is_made_anew(store: AssetStore, monkeypatch
     """Its warnings and its exposure would be those of then."""
     file = Gltf()
     file.node(mesh=file.mesh(), name="imported twice")
-    monkeypatch.setattr(importing, "IMPORTER", importing.IMPORTER - 1)
+    monkeypatch.setattr(scene_import, "IMPORTER", scene_import.IMPORTER - 1)
     info = store.add(file.glb())
     monkeypatch.undo()
     made: list[str] = []
     parse = store.loader.sandbox.parse_scene
     monkeypatch.setattr(store.loader.sandbox, "parse_scene", lambda *given: made.append(info.id) or parse(*given))
-    assert store.scene(info.id).importer == importing.IMPORTER and len(made) == 1
+    assert store.scene(info.id).importer == scene_import.IMPORTER and len(made) == 1
     store.add(file.glb())
     assert len(made) == 1

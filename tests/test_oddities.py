@@ -7,8 +7,8 @@ import re
 import numpy as np
 import pytest
 
-from service.assets import oddities as oddities_module
-from service.assets.oddities import oddities
+from service.assets.readers import mesh_checks as oddities_module
+from service.assets.readers.mesh_checks import mesh_warnings
 
 POINTS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 CUBE = np.array(
@@ -45,5 +45,5 @@ def test_oddities(
     vertices: np.ndarray, faces: np.ndarray, told: list[str], share: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr(oddities_module, "SHARE", share)
-    found = oddities(vertices, np.ascontiguousarray(faces))
+    found = mesh_warnings(vertices, np.ascontiguousarray(faces))
     assert len(found) == len(told) and all(re.search(a, b) for a, b in zip(told, found, strict=True)), found

@@ -16,11 +16,12 @@ import numpy as np
 import pytest
 
 from service import spell
-from service.assets import ImageData, MeshData, sandbox
-from service.assets.data import AssetLimits
+from service.assets import ImageData, MeshData
 from service.assets.errors import ParseError
-from service.assets.sandbox import Sandbox
-from service.assets.wire import adopt, memory, publish
+from service.assets.sandbox import sandbox
+from service.assets.sandbox.sandbox import Sandbox
+from service.assets.sandbox.wire import adopt, memory, publish
+from service.assets.types import AssetLimits
 from tests.asset_files import OBJ, TRIANGLE, exr
 
 
@@ -87,9 +88,9 @@ def test_warming_loads_the_libraries(box: Sandbox) -> None:
 
 
 def test_a_child_starts_without_what_only_the_service_needs() -> None:
-    script = "import sys, service.assets.child; print(*sys.modules)"
+    script = "import sys, service.assets.sandbox.child; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
-    assert "service.assets.child" in loaded
+    assert "service.assets.sandbox.child" in loaded
     assert not {"pydantic", "service.scene", "service.config", "gpu"} & set(loaded)
 
 
@@ -204,8 +205,8 @@ def test_children_end_with_a_parent_that_is_killed(busy: bool, tmp_path: Path) -
     (tmp_path / "endless.obj").write_bytes(endless())
     program = (
         "import sys, time\n"
-        "from service.assets.sandbox import Sandbox\n"
-        "from service.assets.data import AssetLimits\n"
+        "from service.assets.sandbox.sandbox import Sandbox\n"
+        "from service.assets.types import AssetLimits\n"
         "box = Sandbox(AssetLimits())\n"
         f"box.parse('obj', {OBJ!r})\n"
         "print(box._idle[0].process.pid, flush=True)\n"

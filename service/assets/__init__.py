@@ -1,7 +1,23 @@
-"""Meshes and images that scenes refer to: uploaded ones by the hash of their bytes, files beside a scene by path."""
+"""Meshes and images that scenes refer to: uploaded ones by the hash of their bytes, files beside a scene by path.
 
-from service.assets.data import AssetInfo, AssetLimits, Assets, ImageData, MeshData
-from service.assets.files import FileAssets
+types         what assets are: meshes, images, scene files, limits, and the protocol that packing asks
+errors        ParseError, which readers raise
+formats       the formats, and how a file's is recognised
+source        the bytes of an upload, in memory or in a file
+store         uploaded assets
+describe      what is said of an asset
+folder        the files of the store, each written whole or not at all
+integrity     whether the bytes on the disk still match their hash
+cache         parsed assets in memory
+local_files   assets that are files beside a scene
+scene_import  a glTF file -> a document whose references are assets
+sandbox       the child process that parses
+readers       readers of single formats
+gltf          the reader of glTF
+"""
+
+from service.assets.local_files import FileAssets
 from service.assets.store import AssetStore
+from service.assets.types import AssetInfo, AssetLimits, Assets, ImageData, MeshData
 
 __all__ = ["AssetInfo", "AssetLimits", "AssetStore", "Assets", "FileAssets", "ImageData", "MeshData"]

@@ -8,7 +8,7 @@ import os
 import shutil
 from typing import BinaryIO
 
-from service.assets.sniff import sniff
+from service.assets.formats import sniff
 
 Source = bytes | memoryview | BinaryIO  # a file has been written in full
 

@@ -11,16 +11,15 @@ from dataclasses import asdict, replace
 from pathlib import Path
 from typing import BinaryIO, Protocol
 
-import numpy as np
-
-from service.assets.data import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
+from service.assets.cache import Parsed, ParsedCache, as_image, as_mesh, refused
+from service.assets.describe import describe
 from service.assets.errors import ParseError
 from service.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
-from service.assets.importing import Imported, take_apart
+from service.assets.formats import KINDS, sniff
 from service.assets.integrity import Integrity, damaged
-from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
-from service.assets.sniff import KINDS, sniff
+from service.assets.scene_import import Imported, take_apart
 from service.assets.source import Source, digest, format_of, handed, length
+from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 
 log = logging.getLogger(__name__)
@@ -67,7 +66,7 @@ class AssetStore:
         builtin: Callable[[], dict[str, bytes]] | None = None,
         room: Room = lambda size: nullcontext(),
     ) -> None:
-        self.loader = Loader(_limits(config))
+        self.loader = ParsedCache(_limits(config))
         self._files = AssetFolder(root / "assets")
         self._integrity = Integrity(self._files)
         self._builtin = builtin
@@ -256,7 +255,7 @@ class AssetStore:
 
     def _described(self, id: str, format: str, data: Source) -> AssetInfo:
         """Of a mesh or an image. Raises AssetError."""
-        return _describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data)))
+        return describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data)))
 
     def _is_whole(self, info: AssetInfo) -> bool:
         """Whether nothing that was stored of an asset is damaged or gone, the parts of a scene included."""
@@ -307,21 +306,3 @@ def _limits(config: HasLimits | None) -> AssetLimits:
 def _format(data: bytes) -> str:
     """Of one of our own assets: its bytes tell."""
     return sniff(data) or "obj"
-
-
-def _describe(id: str, format: str, size: int, parsed: Parsed) -> AssetInfo:
-    warnings = [{"pointer": "", "detail": text} for text in parsed.warnings] or None
-    if isinstance(parsed, ImageData):
-        height, width, channels = parsed.pixels.shape
-        size_ = {"width": width, "height": height, "channels": channels}
-        return AssetInfo(id, KINDS[format], format, size, **size_, warnings=warnings)
-    counts = {"vertices": len(parsed.vertices), "triangles": len(parsed.faces)}
-    return AssetInfo(id, KINDS[format], format, size, **counts, bounds=_bounds(parsed), warnings=warnings)
-
-
-def _bounds(mesh: MeshData) -> list[list[float]]:
-    """Corners of the box around its triangles; a vertex of none does not count."""
-    used = np.zeros(len(mesh.vertices), bool)
-    used[mesh.faces] = True
-    corners = mesh.vertices[used]
-    return [corners.min(axis=0).tolist(), corners.max(axis=0).tolist()]

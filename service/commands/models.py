@@ -10,13 +10,13 @@ from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 from service.assets.errors import ParseError
-from service.assets.gltf.file import load
+from service.assets.gltf.document import load
 from service.commands import BadInput
 from service.problems import AssetError
 
 if TYPE_CHECKING:
     from service.assets import AssetStore, FileAssets
-    from service.assets.importing import Imported
+    from service.assets.scene_import import Imported
 
 
 def is_model(path: Path, data: bytes) -> bool:

@@ -15,7 +15,7 @@ from fastapi.responses import JSONResponse
 
 from service import presets
 from service.assets import AssetInfo
-from service.assets.importing import Imported
+from service.assets.scene_import import Imported
 from service.downloads import FileAnswer
 from service.rendering.threads import storing
 from service.routes import answers

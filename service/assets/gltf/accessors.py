@@ -7,16 +7,16 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import ParseError
+from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.extensions import remedy
-from service.assets.gltf.file import Array, GltfFile
-from service.assets.gltf.place import Place, shown
+from service.assets.gltf.json_view import JsonView, shown
 
 COMPONENTS = {5120: "<i1", 5121: "<u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
 WHOLE = (5121, 5123, 5125)
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}
 
 
-def read(file: GltfFile, source: Place, name: str, *types: str) -> Array:
+def read(file: GltfDocument, source: JsonView, name: str, *types: str) -> Array:
     """(count, width) of the accessor that `source` refers to as `name`: as stored, or float32 where normalised."""
     place = file.follow(source, name, "accessors")
     type_, component = place.text("type"), place.whole("componentType")
@@ -42,7 +42,7 @@ def read(file: GltfFile, source: Place, name: str, *types: str) -> Array:
     return normalised(values) if place.flag("normalized") else values
 
 
-def indices(file: GltfFile, source: Place, name: str = "indices") -> Array:
+def indices(file: GltfDocument, source: JsonView, name: str = "indices") -> Array:
     """(count,) whole numbers."""
     place = file.follow(source, name, "accessors")
     if place.value.get("componentType") not in WHOLE:
@@ -58,7 +58,7 @@ def normalised(values: Array) -> Array:
     return fractions
 
 
-def _replaced(file: GltfFile, values: Array, sparse: Place) -> Array:
+def _replaced(file: GltfDocument, values: Array, sparse: JsonView) -> Array:
     count, place = sparse.whole("count", low=1), sparse.need("indices")
     component = place.whole("componentType")
     if component not in WHOLE:
@@ -71,7 +71,7 @@ def _replaced(file: GltfFile, values: Array, sparse: Place) -> Array:
     return values
 
 
-def _strided(file: GltfFile, source: Place, dtype: np.dtype[Any], count: int, width: int) -> Array:
+def _strided(file: GltfDocument, source: JsonView, dtype: np.dtype[Any], count: int, width: int) -> Array:
     data, view = file.view(source)
     start, row = source.whole("byteOffset", 0), dtype.itemsize * width
     stride = view.whole("byteStride", row)

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 
 from service.assets.gltf.accessors import normalised
-from service.assets.gltf.file import Array, GltfFile
-from service.assets.gltf.place import Place
-from service.assets.polygons import Longs
+from service.assets.gltf.document import Array, GltfDocument
+from service.assets.gltf.json_view import JsonView
+from service.assets.readers.polygons import Longs
 
 
-def decode(file: GltfFile, extension: Place, attributes: Place) -> tuple[dict[str, Array], Longs]:
+def decode(file: GltfDocument, extension: JsonView, attributes: JsonView) -> tuple[dict[str, Array], Longs]:
     """Rows by the name of the attribute, and triangles (m, 3). The library raises ValueError on nonsense."""
     import DracoPy
 

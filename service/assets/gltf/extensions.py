@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from typing import Any
 
 from service.assets.errors import ParseError
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place, escaped, shown
+from service.assets.gltf.json_view import JsonView, escaped, shown
+from service.assets.gltf.warnings import Warnings
 
 READ = {
     "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",
@@ -36,7 +36,7 @@ DEEPEST = 32  # levels of the file that are looked through; a sound file has abo
 Path = tuple[Any, ...]  # (name, path of the parent); () is the root: written out only where it is needed
 
 
-def check_required(root: Place) -> None:
+def check_required(root: JsonView) -> None:
     """Raises ParseError where a file can't be shown without an extension that is not read."""
     for k, name in enumerate(root.array("extensionsRequired")):
         if name not in READ | UNSEEN:
@@ -50,7 +50,7 @@ def remedy(names: Any) -> str:
     return f"; {known[0]} writes the model without it" if known else ""
 
 
-def note_unsupported(root: Place, notes: Notes) -> None:
+def note_unsupported(root: JsonView, notes: Warnings) -> None:
     """Notes each extension that would change the picture, and each required one that would not."""
     for k, name in enumerate(root.array("extensionsRequired")):
         if name in UNSEEN:

@@ -15,8 +15,8 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import Doubles
 from service.assets.gltf.rays import Hit, Placed, Scene
+from service.assets.types import Doubles
 
 GRID = 12  # rays along each side of the picture
 MIDDLE_GREY = 0.18

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import Doubles
 from service.assets.errors import ParseError
 from service.assets.gltf.accessors import read
-from service.assets.gltf.file import GltfFile
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place, shown
+from service.assets.gltf.document import GltfDocument
+from service.assets.gltf.json_view import JsonView, shown
+from service.assets.gltf.warnings import Warnings
+from service.assets.types import Doubles
 
 MOST_INSTANCES = 100_000  # shapes in a document; beyond, the document itself is the burden
 IDENTITY = tuple(np.eye(4).reshape(-1).tolist())
@@ -21,13 +21,13 @@ IDENTITY = tuple(np.eye(4).reshape(-1).tolist())
 
 @dataclass(frozen=True)
 class Node:
-    place: Place
+    place: JsonView
     index: int
     world: Doubles  # (4, 4)
 
 
 class Nodes:
-    def __init__(self, file: GltfFile, notes: Notes) -> None:
+    def __init__(self, file: GltfDocument, notes: Warnings) -> None:
         self._file, self._notes = file, notes
         self._all = file.root.array("nodes")
 
@@ -45,9 +45,9 @@ class Nodes:
             worlds[k] = local if parent < 0 else worlds[parent] @ local
         return list(map(Node, places, indices, worlds))
 
-    def _walk(self) -> tuple[list[Place], list[int], list[int]]:
+    def _walk(self) -> tuple[list[JsonView], list[int], list[int]]:
         """The nodes that are shown, their numbers in the file, and where in the list their parents are (-1: none)."""
-        places: list[Place] = []
+        places: list[JsonView] = []
         indices: list[int] = []
         parents: list[int] = []
         seen: set[int] = set()
@@ -94,7 +94,7 @@ class Nodes:
     def parents(self) -> dict[int, int]:
         found = {}
         for k in range(len(self._all)):
-            place = Place(self._all[k], f"/nodes/{k}")
+            place = JsonView(self._all[k], f"/nodes/{k}")
             found.update({child: k for child in place.array("children") if type(child) is int})
         return found
 
@@ -106,7 +106,7 @@ class Nodes:
         return [(one, f"{scene.at('nodes')}/{k}") for k, one in enumerate(scene.array("nodes"))]
 
 
-def local_matrices(places: list[Place]) -> Doubles:
+def local_matrices(places: list[JsonView]) -> Doubles:
     """(n, 4, 4): each node's matrix, given by columns, or T R S. In one go: numpy takes 100 us for a node alone."""
     translations = np.array([place.numbers("translation", (0.0, 0.0, 0.0)) for place in places]).reshape(-1, 3)
     rotations = np.array([place.numbers("rotation", (0.0, 0.0, 0.0, 1.0)) for place in places]).reshape(-1, 4)
@@ -137,7 +137,7 @@ def trs(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
     return matrix
 
 
-def instances(file: GltfFile, node: Node) -> Doubles:
+def instances(file: GltfDocument, node: Node) -> Doubles:
     """(k, 4, 4): the world matrices of a node's mesh, its own or those of EXT_mesh_gpu_instancing."""
     extension = node.place.extension("EXT_mesh_gpu_instancing")
     if extension is None:

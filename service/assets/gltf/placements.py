@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles, Indices
 from service.assets.errors import ParseError
-from service.assets.gltf.file import Array
+from service.assets.gltf.document import Array
 from service.assets.gltf.nodes import Node
-from service.assets.gltf.notes import Notes
 from service.assets.gltf.rays import Placed
-from service.assets.parts import MAX_COORDINATE
+from service.assets.gltf.warnings import Warnings
+from service.assets.readers.raw_mesh import MAX_COORDINATE
+from service.assets.types import Doubles, Indices
 
 MOST_SHAPES = 100_000  # beyond, the document itself is the burden
 LEAST_VOLUME = 1e-7  # of the axes at length one: what service.scene.transform takes for invertible
@@ -55,7 +55,7 @@ class Placements:
         self._nodes += [node] * len(worlds)
         self._matrices.extend(worlds)
 
-    def shapes(self, notes: Notes) -> list[dict[str, Any]]:
+    def shapes(self, notes: Warnings) -> list[dict[str, Any]]:
         """A shape for each; one whose matrix has no inverse is left out, and noted."""
         stands, moves = self._stands.tolist(), (self._worlds != np.eye(4)).any(axis=(1, 2)).tolist()
         matrices = self._worlds.reshape(-1, 16).tolist()

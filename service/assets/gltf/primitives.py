@@ -7,12 +7,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from service.assets.data import Doubles, Floats, Indices
 from service.assets.gltf import accessors, draco
-from service.assets.gltf.file import Array, GltfFile
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place
-from service.assets.polygons import Longs
+from service.assets.gltf.document import Array, GltfDocument
+from service.assets.gltf.json_view import JsonView
+from service.assets.gltf.warnings import Warnings
+from service.assets.readers.polygons import Longs
+from service.assets.types import Doubles, Floats, Indices
 
 MODES = ("POINTS", "LINES", "LINE_LOOP", "LINE_STRIP", "TRIANGLES", "TRIANGLE_STRIP", "TRIANGLE_FAN")
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -94,7 +94,7 @@ def turned(tangents: Array, linear: Doubles, mirrored: bool | np.bool_) -> Array
     return np.concatenate([along, tangents[:, 3:] * (-1.0 if mirrored else 1.0)], axis=1)
 
 
-def read_primitive(file: GltfFile, place: Place, notes: Notes) -> Primitive | None:
+def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Primitive | None:
     """None, and noted, where it has no area: points and lines."""
     mode, attributes = place.whole("mode", TRIANGLES), place.need("attributes")
     if mode >= len(MODES):
@@ -139,7 +139,7 @@ TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXC
          "COLOR": ("VEC3", "VEC4"), "JOINTS": ("VEC4",), "WEIGHTS": ("VEC4",)}  # fmt: skip
 
 
-def _rows(file: GltfFile, attributes: Place, packed: dict[str, Array], notes: Notes) -> dict[str, Array]:
+def _rows(file: GltfDocument, attributes: JsonView, packed: dict[str, Array], notes: Warnings) -> dict[str, Array]:
     """What is used of the attributes, `packed` ones taken from there."""
     found = {}
     for name in attributes.value:
@@ -175,7 +175,7 @@ def _unit(rows: Array) -> Floats:
     return accessors.normalised(rows).astype(np.float32, copy=False)
 
 
-def _triangles(mode: int, indices: Longs, vertices: int, place: Place, notes: Notes) -> Longs:
+def _triangles(mode: int, indices: Longs, vertices: int, place: JsonView, notes: Warnings) -> Longs:
     if len(indices) and not 0 <= indices.min() <= indices.max() < vertices:
         raise place.error("indices", f"refer to vertex {indices.max()}; there are {vertices}")
     k = np.arange(max(len(indices) - 2, 0))

@@ -11,7 +11,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from service.assets.data import Doubles, Indices
+from service.assets.types import Doubles, Indices
 
 MOST_PLACED = 2048  # parts in the world: the largest ones
 MOST_TRIANGLES = 1 << 18  # of all parts together

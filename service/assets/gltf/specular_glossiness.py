@@ -10,21 +10,21 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from service.assets.data import Floats
-from service.assets.gltf.baked import pixels, png
-from service.assets.gltf.place import Place
+from service.assets.gltf.json_view import JsonView
+from service.assets.gltf.texture_bake import pixels, png
 from service.assets.gltf.textures import factor
-from service.assets.parts import linear
+from service.assets.readers.raw_mesh import linear
+from service.assets.types import Floats
 
 if TYPE_CHECKING:
-    from service.assets.gltf.materials import Reading
+    from service.assets.gltf.material_reader import MaterialReader
 
 F0 = 0.04
 LARGEST = 4096  # texels a side of what is computed
 CHUNK = 1 << 18  # texels at once: float copies of a whole image take gigabytes
 
 
-def converted(read: Reading, place: Place) -> dict[str, Any]:
+def converted(read: MaterialReader, place: JsonView) -> dict[str, Any]:
     diffuse = read.share(place, "diffuseFactor", (1.0,) * 4)
     specular = read.share(place, "specularFactor", (1.0, 1.0, 1.0))
     glossiness = place.number("glossinessFactor", 1, 0, 1)
@@ -62,7 +62,7 @@ def _brightness(color: Floats) -> Floats:
     return squares
 
 
-def _textured(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> dict[str, Any]:
+def _textured(read: MaterialReader, place: JsonView, factors: tuple[Any, Any, float]) -> dict[str, Any]:
     """Two images of our own in the place of the file's: colour with alpha, and metallic (blue) with roughness."""
     textures = read.textures
     names = ("diffuseTexture", "specularGlossinessTexture")
@@ -90,7 +90,7 @@ def _textured(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> d
     }
 
 
-def _bake(read: Reading, place: Place, factors: tuple[Any, Any, float]) -> list[bytes]:
+def _bake(read: MaterialReader, place: JsonView, factors: tuple[Any, Any, float]) -> list[bytes]:
     from PIL import Image
 
     found = [pixels(read.textures, place.object(name)) for name in ("diffuseTexture", "specularGlossinessTexture")]

@@ -12,12 +12,12 @@ from typing import Any, Literal
 import numpy as np
 
 from service.assets.errors import ParseError
+from service.assets.formats import sniff
+from service.assets.gltf.document import GltfDocument
 from service.assets.gltf.extensions import remedy
-from service.assets.gltf.file import GltfFile
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place, number
+from service.assets.gltf.json_view import JsonView, number
 from service.assets.gltf.primitives import UV_SETS
-from service.assets.sniff import sniff
+from service.assets.gltf.warnings import Warnings
 
 ColorSpace = Literal["srgb", "linear"]
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
@@ -31,8 +31,8 @@ Chart = tuple[np.ndarray, np.ndarray]  # the least and the greatest coordinates 
 class Textures:
     """`keep` takes an image's bytes and place, and gives the reference that the document holds."""
 
-    file: GltfFile
-    notes: Notes
+    file: GltfDocument
+    notes: Warnings
     keep: Callable[[bytes, str], str]
     documents: dict[str, dict[str, Any]] = field(default_factory=dict)
     made: dict[tuple[str, str], list[Any]] = field(default_factory=dict)  # references to images of our own, and more
@@ -40,7 +40,7 @@ class Textures:
     _kept: dict[str, str] = field(default_factory=dict)
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
-    def use(self, info: Place | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
+    def use(self, info: JsonView | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
         """The name of a texture; None, and noted, where it can't be used. `charts`: the uv sets of the mesh."""
         if info is None:
             return None
@@ -76,7 +76,7 @@ class Textures:
         samplers = self.file.root.objects("samplers")
         return any(one.value.get("wrapS", 10497) != one.value.get("wrapT", 10497) for one in samplers)
 
-    def add(self, image: str, settings: dict[str, Any], named: Place) -> str:
+    def add(self, image: str, settings: dict[str, Any], named: JsonView) -> str:
         """The name of a texture with these settings; the same ones get the same name."""
         key = image, repr(sorted(settings.items()))
         if key not in self._names:
@@ -84,7 +84,7 @@ class Textures:
             self.documents[self._names[key]] = {"asset": image, **settings}
         return self._names[key]
 
-    def source(self, texture: Place) -> Place | None:
+    def source(self, texture: JsonView) -> JsonView | None:
         """The texture's image. None, and noted, where it is in a format that is not read."""
         webp = texture.extension("EXT_texture_webp")
         for owner in (webp, texture):
@@ -98,7 +98,7 @@ class Textures:
         )
         return None
 
-    def image(self, texture: Place) -> str | None:
+    def image(self, texture: JsonView) -> str | None:
         """The reference to a texture's image."""
         place = self.source(texture)
         if place is None:
@@ -111,7 +111,7 @@ class Textures:
             self._kept[place.pointer] = self.keep(data, place.pointer)
         return self._kept[place.pointer]
 
-    def channels(self, info: Place) -> str:
+    def channels(self, info: JsonView) -> str:
         """Which of "L" (grey), "RGB" and "A" the image of a texture has; "" where there is none that is read."""
         place = self.source(self.file.follow(info, "index", "textures"))
         if place is None:
@@ -120,7 +120,7 @@ class Textures:
             self._channels[place.pointer] = _channels(self.file.image(place), place)
         return self._channels[place.pointer]
 
-    def _wrap(self, texture: Place, reach: tuple[bool, bool]) -> str:
+    def _wrap(self, texture: JsonView, reach: tuple[bool, bool]) -> str:
         """The way that both axes take: where these differ that of the one along which the mesh leaves the image."""
         if "sampler" not in texture:
             return "repeat"
@@ -145,7 +145,7 @@ class Textures:
             )
         return found[0]
 
-    def _placing(self, info: Place) -> dict[str, Any]:
+    def _placing(self, info: JsonView) -> dict[str, Any]:
         """Scale, rotation, offset and uv set of a texture info, where they are not the defaults.
 
         glTF's v points down, ours up: with F(u, v) = (u, 1 - v), uv' = o + R S uv becomes F(o + R S F(uv)), whose
@@ -170,7 +170,7 @@ class Textures:
         defaults = {"scale": [1, 1], "rotation": 0, "offset": [0, 0], "uv": 0}
         return {name: value for name, value in placing.items() if value != defaults[name]}
 
-    def _name(self, texture: Place) -> str:
+    def _name(self, texture: JsonView) -> str:
         source = self.source(texture)
         named = (source.text("name") if source else "") or texture.text("name")
         return unique(named or texture.pointer[1:].replace("/", " "), self.documents)
@@ -187,7 +187,7 @@ def _reach(chart: Chart, placing: dict[str, Any]) -> tuple[bool, bool]:
     return bool(beyond[0]), bool(beyond[1])
 
 
-def _channels(data: bytes, place: Place) -> str:
+def _channels(data: bytes, place: JsonView) -> str:
     """From the image's header."""
     from PIL import Image
 

@@ -9,7 +9,7 @@ import numpy as np
 
 from gpu import SceneTooLarge
 from service.assets import Assets, MeshData
-from service.assets.oddities import oddities
+from service.assets.readers.mesh_checks import mesh_warnings
 from service.pack.geometry import instances, meshes
 from service.pack.geometry.analytic import AnalyticShapes, check_reach
 from service.pack.geometry.instances import Instance, MeshRequest
@@ -159,7 +159,7 @@ def _check_charts(number: int, shape: MeshShape, data: MeshData, sets: frozenset
 def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshData]) -> MeshData:
     if shape.asset is None:
         assert shape.vertices is not None and shape.faces is not None
-        odd = tuple(oddities(shape.vertices, shape.faces))
+        odd = tuple(mesh_warnings(shape.vertices, shape.faces))
         return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors, odd)
     try:
         if shape.asset not in files:

@@ -8,7 +8,7 @@ from typing import Protocol
 import numpy as np
 
 from service.assets import Assets, ImageData
-from service.assets.parts import linear
+from service.assets.readers.raw_mesh import linear
 from service.pack.edits.cache import PackCache, lasting
 from service.pack.textures.uses import DECODED
 from service.problems import AssetError, FieldError, InvalidDocument

@@ -13,7 +13,7 @@ NUMBERS = {int, float}  # true is none
 LARGEST, BRIGHTEST = 1e9, 1e20  # the contract's ranges of lengths and of radiometric values
 
 
-class Place:
+class JsonView:
     """Everything read through it has the type that was asked for. Raises ParseError."""
 
     def __init__(self, value: Any, pointer: str) -> None:
@@ -31,10 +31,10 @@ class Place:
     def error(self, name: str | int, detail: str) -> ParseError:
         return ParseError(detail, self.at(name))
 
-    def object(self, name: str) -> Place | None:
-        return Place(self.value[name], self.at(name)) if name in self.value else None
+    def object(self, name: str) -> JsonView | None:
+        return JsonView(self.value[name], self.at(name)) if name in self.value else None
 
-    def need(self, name: str) -> Place:
+    def need(self, name: str) -> JsonView:
         found = self.object(name)
         if found is None:
             raise self.error(name, "is missing")
@@ -46,11 +46,11 @@ class Place:
             raise self.error(name, f"must be an array, not {shown(found)}")
         return found
 
-    def objects(self, name: str) -> Iterator[Place]:
+    def objects(self, name: str) -> Iterator[JsonView]:
         for k, one in enumerate(self.array(name)):
-            yield Place(one, f"{self.at(name)}/{k}")
+            yield JsonView(one, f"{self.at(name)}/{k}")
 
-    def extension(self, name: str) -> Place | None:
+    def extension(self, name: str) -> JsonView | None:
         held = self.object("extensions")
         return held.object(name) if held else None
 

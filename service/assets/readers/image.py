@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import AssetLimits, Floats, ImageData
 from service.assets.errors import ParseError
+from service.assets.types import AssetLimits, Floats, ImageData
 from service.images.metadata import exr_attributes
 
 PILLOW = {"png": "PNG", "jpeg": "JPEG", "webp": "WEBP"}

@@ -4,7 +4,7 @@ import re
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
 from mmap import mmap
 
-from service.assets.data import Kind
+from service.assets.types import Kind
 
 KINDS: dict[str, Kind] = {
     "obj": "mesh",

@@ -4,19 +4,19 @@ from __future__ import annotations
 
 import numpy as np
 
-from service.assets.data import AssetLimits
 from service.assets.errors import ParseError
-from service.assets.gltf.file import Array, GltfFile
+from service.assets.gltf.deform import Skin, morphed, weights
+from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.nodes import Nodes, instances
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.pose import Skin, morphed, weights
 from service.assets.gltf.primitives import UV_SETS, Primitive, read_primitive
-from service.assets.parts import Parts
+from service.assets.gltf.warnings import Warnings
+from service.assets.readers.raw_mesh import RawMesh
+from service.assets.types import AssetLimits
 
 
-def read_whole(data: bytes | memoryview, limits: AssetLimits) -> Parts:
+def read_merged(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
     """Raises ParseError."""
-    file, notes = GltfFile(data, limits), Notes()
+    file, notes = GltfDocument(data, limits), Warnings()
     nodes, read, parts, triangles = Nodes(file, notes), dict[str, Primitive | None](), list[Primitive](), 0
     for node in nodes.shown:
         if "mesh" not in node.place:
@@ -41,13 +41,13 @@ def read_whole(data: bytes | memoryview, limits: AssetLimits) -> Parts:
     return _joined(parts, [f"{note['pointer']}: {note['detail']}" for note in notes.document()])
 
 
-def _joined(parts: list[Primitive], warnings: list[str]) -> Parts:
+def _joined(parts: list[Primitive], warnings: list[str]) -> RawMesh:
     first = np.cumsum([0, *(len(p.vertices) for p in parts)])
     uvs = [_rows([p.uvs[k] for p in parts], parts, 2) for k in range(UV_SETS)]
     for rows in uvs:
         if rows is not None:
             rows[:, 1] = 1 - rows[:, 1]  # glTF's v points down
-    return Parts(
+    return RawMesh(
         np.concatenate([p.vertices for p in parts]),
         np.concatenate([p.faces + np.int64(at) for p, at in zip(parts, first, strict=False)]),
         _rows([p.normals for p in parts], parts, 3),

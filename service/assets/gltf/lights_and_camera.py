@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import Doubles
-from service.assets.gltf.file import GltfFile
+from service.assets.gltf.document import GltfDocument
+from service.assets.gltf.json_view import JsonView, shown
 from service.assets.gltf.nodes import Node
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place, shown
+from service.assets.gltf.warnings import Warnings
+from service.assets.types import Doubles
 
 Bounds = tuple[Doubles, Doubles]
 FRAMED_VFOV = 35.0  # degrees
@@ -20,7 +20,7 @@ MARGIN = 1.06
 INSTEAD = "a perspective camera that shows the whole scene is used instead"
 
 
-def lights(file: GltfFile, nodes: list[Node], notes: Notes) -> list[dict[str, Any]]:
+def lights(file: GltfDocument, nodes: list[Node], notes: Warnings) -> list[dict[str, Any]]:
     """KHR_lights_punctual: a candela is taken as a watt per steradian, a lux as a watt per square metre."""
     found = []
     for node in nodes:
@@ -32,11 +32,11 @@ def lights(file: GltfFile, nodes: list[Node], notes: Notes) -> list[dict[str, An
         index = used.whole("light")
         if held is None or index >= len(listed):
             raise used.error("light", f"refers to light {index} of {len(listed)}")
-        found.append(_light(Place(listed[index], f"{held.at('lights')}/{index}"), node, notes))
+        found.append(_light(JsonView(listed[index], f"{held.at('lights')}/{index}"), node, notes))
     return found
 
 
-def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
+def _light(place: JsonView, node: Node, notes: Warnings) -> dict[str, Any]:
     kind = place.text("type")
     power = place.radiance("color", (1.0, 1.0, 1.0), place.number("intensity", 1, 0))
     position, direction = node.world[:3, 3].tolist(), _axis(node, 2, -1)
@@ -48,7 +48,7 @@ def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
         return {"type": "point", "position": position, "intensity": power}
     if kind != "spot":
         raise place.error("type", f"must be point, spot or directional, not {kind[:40]!r}")
-    spot = place.object("spot") or Place({}, place.at("spot"))
+    spot = place.object("spot") or JsonView({}, place.at("spot"))
     inner = spot.number("innerConeAngle", 0, 0, math.pi / 2)
     outer = spot.number("outerConeAngle", math.pi / 4, inner, math.pi / 2 + 1e-6)
     notes.add(spot.pointer, "the edge of the cone fades as a smoothstep of the cosine, not as its square")
@@ -62,7 +62,9 @@ def _light(place: Place, node: Node, notes: Notes) -> dict[str, Any]:
     }
 
 
-def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> tuple[dict[str, Any], float | None]:
+def camera(
+    file: GltfDocument, nodes: list[Node], bounds: Bounds, notes: Warnings
+) -> tuple[dict[str, Any], float | None]:
     """The first camera of the scene, or a framed one where none has a perspective; and, where the camera says it, the
     width of its picture over the height."""
     chosen: dict[str, Any] | None = None
@@ -85,7 +87,7 @@ def camera(file: GltfFile, nodes: list[Node], bounds: Bounds, notes: Notes) -> t
     return chosen or framed(bounds), aspect
 
 
-def _perspective(place: Place, node: Node, bounds: Bounds) -> dict[str, Any]:
+def _perspective(place: JsonView, node: Node, bounds: Bounds) -> dict[str, Any]:
     position, forward = node.world[:3, 3], np.array(_axis(node, 2, -1))
     # As far as what it looks at, so that turning about the target turns about the model.
     distance = float((sum(bounds) / 2 - position) @ forward)

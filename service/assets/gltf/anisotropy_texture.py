@@ -7,15 +7,15 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.gltf.baked import pixels, png
-from service.assets.gltf.place import Place
+from service.assets.gltf.json_view import JsonView
+from service.assets.gltf.texture_bake import pixels, png
 from service.assets.gltf.textures import Textures
 
 BINS = 36  # of 5 degrees: where the fewest texels point is where the angles begin anew
 EVEN = 1.0  # degrees; an image whose directions differ by less is one direction
 
 
-def rotation(textures: Textures, info: Place | None, name: str | None, turn: float) -> Any:
+def rotation(textures: Textures, info: JsonView | None, name: str | None, turn: float) -> Any:
     """Degrees, or the texture that gives them. `info` is the file's texture, `name` the document's, `turn` radians
     that are added.
     """

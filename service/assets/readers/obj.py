@@ -11,11 +11,11 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles
 from service.assets.errors import ParseError
-from service.assets.obj_rows import CORNERS, NUMBERS, Rows, blocks, starts_of_words
-from service.assets.parts import Numbers, Parts
-from service.assets.polygons import Longs, triangulate
+from service.assets.readers.obj_lines import CORNERS, NUMBERS, Lines, blocks, starts_of_words
+from service.assets.readers.polygons import Longs, triangulate
+from service.assets.readers.raw_mesh import Numbers, RawMesh
+from service.assets.types import Doubles
 
 Ints = npt.NDArray[np.int32]
 WIDTHS = {"v": 3, "vt": 2, "vn": 3}
@@ -42,7 +42,7 @@ class Found:
         return sum(map(len, self.tables[keyword]))
 
 
-def read_obj(data: bytes | memoryview) -> Parts:
+def read_obj(data: bytes | memoryview) -> RawMesh:
     """Vertices as the file has them, or, where it gives more, one for each set of indices that a corner has."""
     found = Found()
     for block in blocks(data):
@@ -70,7 +70,7 @@ def read_obj(data: bytes | memoryview) -> Parts:
     return _joined(found)
 
 
-def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces: Rows) -> None:
+def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces: Lines) -> None:
     """Indices from 1 in the place of negative ones; `before`: the rows that preceded each face."""
     back = np.flatnonzero(index < 0)
     if len(back):
@@ -84,7 +84,7 @@ def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces:
         index[back] = resolved
 
 
-def _joined(found: Found) -> Parts:
+def _joined(found: Found) -> RawMesh:
     """One vertex for each distinct set of indices; the file's own where they all count alike."""
     counts = np.concatenate(found.counts).astype(np.int64)
     tables = {k: np.concatenate(found.tables[k] or [np.empty((0, width))]) for k, width in WIDTHS.items()}
@@ -118,7 +118,7 @@ def _joined(found: Found) -> Parts:
         rows = {k: table[places[k][first]] for k, table in rows.items()}
         corner = joined
     faces = corner.reshape(-1, 3) if triangles is None else corner[triangles]
-    return Parts(rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings)
+    return RawMesh(rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings)
 
 
 def _distinct(corner: Ints, have: int, others: list[tuple[Ints, int]]) -> tuple[Longs, Ints]:
@@ -152,7 +152,7 @@ def _check(index: Ints, have: int, keyword: str, found: Found, counts: Longs) ->
         raise ParseError(f"line {line}: {one} {index[bad]} does not exist; there are {have} {many}")
 
 
-def _vectors(found: Rows, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
+def _vectors(found: Lines, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
     """The first numbers of each row; and where every row has six, as some write colours, the last three."""
     counts = found.counts(starts_of_words(np.frombuffer(found.text, np.uint8)))
     # A texture coordinate of one number lies on v = 0.
@@ -176,7 +176,7 @@ def _vectors(found: Rows, keyword: str, width: int) -> tuple[Doubles, Doubles | 
     return vectors, colors
 
 
-def _corners(faces: Rows) -> tuple[Longs, Longs, Longs, Longs]:
+def _corners(faces: Lines) -> tuple[Longs, Longs, Longs, Longs]:
     """How many corners each face has, and each corner's v, vt and vn as written, 0 where absent.
 
     A corner is v, v/vt, v//vn or v/vt/vn: a number's place is told by the slashes before it in its corner.

@@ -13,15 +13,15 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
 from service.assets.errors import ParseError
-from service.assets.sniff import KINDS
-from service.assets.wire import Array, adopt, memory, receive, send
+from service.assets.formats import KINDS
+from service.assets.sandbox.wire import Array, adopt, memory, receive, send
+from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
 from service.spell import answers
 
 log = logging.getLogger(__name__)
 
-ROOT = Path(__file__).resolve().parents[2]
+ROOT = Path(__file__).resolve().parents[3]
 # Address space: what the libraries need at most beside the arrays; what a texel of the largest image needs (float
 # RGBA, thrice); and a byte of a mesh file: 42 were seen for an OBJ of one-letter words, 9 for one of a million
 # triangles with normals, so a big file gets less for each.
@@ -150,7 +150,7 @@ class _Child:
             # Nothing of the service's settings: they may hold its key.
             env = {k: v for k, v in os.environ.items() if not k.startswith("SUNBOX_")} | THREADS
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "service.assets.child", str(theirs.fileno())],
+                [sys.executable, "-m", "service.assets.sandbox.child", str(theirs.fileno())],
                 cwd=ROOT,
                 env=env,
                 pass_fds=[theirs.fileno()],

@@ -12,7 +12,7 @@ LONGEST = 300  # characters of a pointer or a detail
 
 
 @dataclass
-class Notes:
+class Warnings:
     """Details in the order in which they were found. Each has the first of its places, and how many there are."""
 
     _places: dict[str, set[str]] = field(default_factory=dict)  # by detail

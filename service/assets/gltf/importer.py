@@ -7,21 +7,21 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import AssetLimits, SceneFile, ScenePart
 from service.assets.errors import ParseError
-from service.assets.gltf import metering, standing
+from service.assets.gltf import lights_and_camera, metering
+from service.assets.gltf.deform import Skin, morphed, weights
+from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.extensions import note_unsupported
-from service.assets.gltf.file import Array, GltfFile
+from service.assets.gltf.json_view import JsonView, whole
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
-from service.assets.gltf.notes import Notes
-from service.assets.gltf.place import Place, whole
 from service.assets.gltf.placements import Part, Placements
-from service.assets.gltf.pose import Skin, morphed, weights
+from service.assets.gltf.ply_writer import ply
 from service.assets.gltf.primitives import Primitive, read_primitive
 from service.assets.gltf.textures import Textures
-from service.assets.gltf.written import ply
-from service.assets.parts import MAX_COORDINATE
+from service.assets.gltf.warnings import Warnings
+from service.assets.readers.raw_mesh import MAX_COORDINATE
+from service.assets.types import AssetLimits, SceneFile, ScenePart
 
 
 @dataclass
@@ -39,12 +39,12 @@ class _Files:
 
 def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     """Raises ParseError."""
-    return _Importer(GltfFile(data, limits)).run()
+    return _Importer(GltfDocument(data, limits)).run()
 
 
 class _Importer:
-    def __init__(self, file: GltfFile) -> None:
-        self.file, self.notes, self.files = file, Notes(), _Files()
+    def __init__(self, file: GltfDocument) -> None:
+        self.file, self.notes, self.files = file, Warnings(), _Files()
         self.nodes = Nodes(file, self.notes)
         self.textures = Textures(file, self.notes, self.files.keep)
         self.materials = Materials(file, self.textures, self.notes)
@@ -59,12 +59,12 @@ class _Importer:
         for node in shown:
             if "mesh" in node.place:
                 self._mesh(node)
-        lights = standing.lights(file, shown, self.notes)
+        lights = lights_and_camera.lights(file, shown, self.notes)
         self._unread()
         shapes = self.placements.shapes(self.notes)
         if not shapes:
             raise self.notes.nothing_left()
-        camera, aspect = standing.camera(file, shown, self.placements.bounds, self.notes)
+        camera, aspect = lights_and_camera.camera(file, shown, self.placements.bounds, self.notes)
         document = {
             "version": 1,
             "camera": camera,
@@ -74,14 +74,14 @@ class _Importer:
             "shapes": shapes,
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
-        lighting = Notes()
+        lighting = Warnings()
         exposure = self._metered(used, aspect, lighting) if lights else None
         warnings = [*lighting.document(), *self.notes.document()]  # first what concerns the whole picture
         triangles = sum(part.triangles for part in self.placements.shown)
         bounds = [corner.tolist() for corner in self.placements.bounds]
         return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect, bounds)
 
-    def _metered(self, document: dict[str, Any], aspect: float | None, notes: Notes) -> float | None:
+    def _metered(self, document: dict[str, Any], aspect: float | None, notes: Warnings) -> float | None:
         """The exposure that suits the file's lights, where 0 does not; noted, as is that nothing else lights it."""
         place = "/extensions/KHR_lights_punctual"
         stops = metering.exposure(document, self.placements.placed(), aspect)
@@ -104,7 +104,7 @@ class _Importer:
             if part is not None:
                 self.placements.add(part, node, worlds)
 
-    def _part(self, place: Place, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
+    def _part(self, place: JsonView, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
         """Of one primitive in one pose; a skinned one belongs to its node."""
         key = place.pointer, morph, node.index if skin else None
         if key not in self._parts:
@@ -118,9 +118,9 @@ class _Importer:
             self._parts[key] = self._write(primitive, place) if primitive else None
         return self._parts[key]
 
-    def _asked(self, primitive: Primitive, place: Place) -> Primitive:
+    def _asked(self, primitive: Primitive, place: JsonView) -> Primitive:
         """The primitive without tangents, and without its colours' alpha, where its material has no use for them."""
-        material = self.file.follow(place, "material", "materials") if "material" in place else Place({}, "")
+        material = self.file.follow(place, "material", "materials") if "material" in place else JsonView({}, "")
         coat = material.extension("KHR_materials_clearcoat")
         bent = "normalTexture" in material or (coat is not None and "clearcoatNormalTexture" in coat)
         directed = bent or material.extension("KHR_materials_anisotropy") is not None
@@ -130,7 +130,7 @@ class _Importer:
             colors = colors[:, :3]
         return replace(primitive, tangents=primitive.tangents if directed else None, colors=colors)
 
-    def _write(self, primitive: Primitive, place: Place) -> Part:
+    def _write(self, primitive: Primitive, place: JsonView) -> Part:
         vertices = primitive.vertices
         bad = np.flatnonzero(~(np.abs(vertices) <= MAX_COORDINATE).all(axis=1))  # also what is not a number
         if len(bad):
@@ -172,7 +172,7 @@ class _Importer:
         note_unsupported(root, self.notes)
 
 
-def _wrong(primitive: Primitive, place: Place, name: str, rows: Array, row: int, what: str) -> ParseError:
+def _wrong(primitive: Primitive, place: JsonView, name: str, rows: Array, row: int, what: str) -> ParseError:
     """The refusal of a primitive for a row of its attribute `name`."""
     attributes = place.need("attributes")
     item = int(row if primitive.kept is None else primitive.kept[row])

@@ -7,11 +7,11 @@ import stat
 from pathlib import Path
 from types import TracebackType
 
-from service.assets.data import AssetLimits, ImageData, MeshData
+from service.assets.cache import Parsed, ParsedCache, as_image, as_mesh, refused
 from service.assets.errors import ParseError
-from service.assets.loader import Loader, Parsed, as_image, as_mesh, refused
 from service.assets.source import format_of
 from service.assets.store import AssetStore
+from service.assets.types import AssetLimits, ImageData, MeshData
 from service.problems import AssetError
 
 
@@ -24,7 +24,7 @@ class FileAssets:
     def __init__(self, folder: Path, roots: list[Path], fallback: AssetStore | None = None) -> None:
         self._bases = [Path(os.path.realpath(base)) for base in (folder, *roots)]
         self._fallback = fallback
-        self._loader = fallback.loader if fallback else Loader(AssetLimits())
+        self._loader = fallback.loader if fallback else ParsedCache(AssetLimits())
 
     def mesh(self, ref: str) -> MeshData:
         """Raises AssetError."""

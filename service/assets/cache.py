@@ -7,15 +7,15 @@ from concurrent.futures import Future
 
 import numpy as np
 
-from service.assets.data import AssetLimits, ImageData, MeshData
 from service.assets.errors import ParseError
-from service.assets.sandbox import Sandbox
+from service.assets.sandbox.sandbox import Sandbox
+from service.assets.types import AssetLimits, ImageData, MeshData
 from service.problems import AssetError
 
 Parsed = MeshData | ImageData
 
 
-class Loader:
+class ParsedCache:
     """For any number of threads."""
 
     def __init__(self, limits: AssetLimits) -> None:

@@ -1,4 +1,4 @@
-"""The process that parses strangers' files: `python -m service.assets.child FD`, FD being a socket to the parent.
+"""The process that parses strangers' files: `python -m service.assets.sandbox.child FD`, with a socket to the parent.
 
 One request after the other: a format and a file come in, arrays in sealed memory go out. It ends when the parent
 does, and is killed where a file takes too much time; memory that a file must not take is refused to it.
@@ -16,9 +16,9 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.data import AssetLimits, ImageData, MeshData, SceneFile
 from service.assets.errors import ParseError
-from service.assets.wire import Pieces, publish, receive, send
+from service.assets.sandbox.wire import Pieces, publish, receive, send
+from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile
 from service.confined import bound, confine, unbind
 from service.shared import trim
 
@@ -80,9 +80,9 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
     """`whole`: of a file that is a scene not its triangles only."""
-    from service.assets.gltf.scene import read_scene
-    from service.assets.image import SIGNATURES, parse_image
-    from service.assets.mesh import parse_mesh
+    from service.assets.gltf.importer import read_scene
+    from service.assets.readers.image import SIGNATURES, parse_image
+    from service.assets.sandbox.parse_mesh import parse_mesh
 
     size = os.fstat(source).st_size
     if not size:

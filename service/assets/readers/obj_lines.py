@@ -16,7 +16,7 @@ import numpy as np
 import numpy.typing as npt
 
 from service.assets.errors import ParseError
-from service.assets.polygons import Longs
+from service.assets.readers.polygons import Longs
 
 Letters = npt.NDArray[np.uint8]
 
@@ -28,7 +28,7 @@ CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
 
 
 @dataclass(frozen=True)
-class Rows:
+class Lines:
     """What followed one keyword, a line each; `lines` are the numbers of these lines in the file."""
 
     text: bytes
@@ -63,7 +63,7 @@ class Rows:
 class Block:
     """`before`: how many rows of v, vt and vn preceded each row of f in this block (indices may count back)."""
 
-    rows: dict[str, Rows]
+    rows: dict[str, Lines]
     before: Longs  # (faces, 3)
 
 
@@ -81,7 +81,7 @@ def blocks(data: bytes | memoryview) -> Iterator[Block]:
         line += len(starts)
         if any(mask.any() for mask in found.values()):
             lengths = np.diff(starts, append=len(text))
-            rows = {k: Rows(_taken(text, starts, lengths, mask, k), numbers[mask]) for k, mask in found.items()}
+            rows = {k: Lines(_taken(text, starts, lengths, mask, k), numbers[mask]) for k, mask in found.items()}
             faces = found["f"]
             yield Block(rows, np.stack([np.cumsum(found[k])[faces] for k in ("v", "vt", "vn")], axis=1))
 

@@ -6,22 +6,22 @@ from dataclasses import replace
 
 import numpy as np
 
-from service.assets.data import Doubles
 from service.assets.gltf import accessors
-from service.assets.gltf.file import Array, GltfFile
+from service.assets.gltf.document import Array, GltfDocument
+from service.assets.gltf.json_view import JsonView, number
 from service.assets.gltf.nodes import Nodes
-from service.assets.gltf.place import Place, number
 from service.assets.gltf.primitives import Primitive, cofactors
+from service.assets.types import Doubles
 
 
-def weights(node: Place, mesh: Place) -> tuple[float, ...]:
+def weights(node: JsonView, mesh: JsonView) -> tuple[float, ...]:
     """Of the mesh's morph targets: the node's or else the mesh's; () where none has an effect."""
     owner = node if "weights" in node else mesh
     found = tuple(number(one, f"{owner.at('weights')}/{k}") for k, one in enumerate(owner.array("weights")))
     return found if any(found) else ()
 
 
-def morphed(file: GltfFile, primitive: Primitive, place: Place, weights: tuple[float, ...]) -> Primitive:
+def morphed(file: GltfDocument, primitive: Primitive, place: JsonView, weights: tuple[float, ...]) -> Primitive:
     """The primitive with its targets added, each by its weight."""
     vertices: Array = primitive.vertices.astype(np.float64)
     moved: dict[str, Array] = {"POSITION": vertices}
@@ -50,7 +50,7 @@ def morphed(file: GltfFile, primitive: Primitive, place: Place, weights: tuple[f
 class Skin:
     """The joints' matrices: world from the mesh as it was bound."""
 
-    def __init__(self, file: GltfFile, place: Place, nodes: Nodes) -> None:
+    def __init__(self, file: GltfDocument, place: JsonView, nodes: Nodes) -> None:
         self.place = place
         joints = place.array("joints")
         if not joints:
@@ -63,7 +63,7 @@ class Skin:
                 raise place.error("inverseBindMatrices", f"has {len(bound)} items for {len(joints)} joints")
             self.matrices = self.matrices @ bound[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
 
-    def posed(self, primitive: Primitive, place: Place) -> Primitive:
+    def posed(self, primitive: Primitive, place: JsonView) -> Primitive:
         """The primitive in the world. Raises ParseError where it names joints that there are not."""
         if not primitive.joints:
             raise place.error("attributes", f"have no JOINTS_0 and WEIGHTS_0, which {self.place.pointer} needs")

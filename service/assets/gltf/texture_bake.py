@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from service.assets.errors import ParseError
-from service.assets.gltf.place import Place
+from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.textures import Textures
 
 
-def pixels(textures: Textures, info: Place | None) -> Any:
+def pixels(textures: Textures, info: JsonView | None) -> Any:
     """RGBA of a texture's image; None without one."""
     from PIL import Image
 
-    from service.assets.image import check_size
+    from service.assets.readers.image import check_size
 
     source = textures.source(textures.file.follow(info, "index", "textures")) if info else None
     if source is None:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from service.assets.gltf.primitives import Primitive
-from service.assets.ply import ALPHA
+from service.assets.readers.ply import ALPHA
 
 
 def ply(primitive: Primitive) -> bytes:

@@ -5,14 +5,14 @@ from __future__ import annotations
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles, Indices
+from service.assets.types import Doubles, Indices
 
 FLAT = 4 * float(np.finfo(np.float32).eps)
 CHUNK = 1 << 14  # triangles at once: a million's float64 copies take a quarter of a gigabyte
 SHARE = 1 << 20  # triangles whose edges are looked at together: those of a million take a tenth of a gigabyte
 
 
-def oddities(vertices: Doubles, faces: Indices) -> list[str]:
+def mesh_warnings(vertices: Doubles, faces: Indices) -> list[str]:
     """Triangles twice in a place, back to back or inside out; edges of more than two."""
     found: list[str] = []
     flat = _flat(vertices, faces)

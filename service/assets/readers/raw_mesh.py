@@ -5,15 +5,15 @@ from dataclasses import dataclass, field
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles, Floats, Indices
 from service.assets.errors import ParseError
+from service.assets.types import Doubles, Floats, Indices
 
 MAX_COORDINATE = 1e9  # metres; the contract's range of a coordinate
 Numbers = npt.NDArray[np.floating]
 
 
 @dataclass
-class Parts:
+class RawMesh:
     """Rows as the file has them; `faces` may be of any integer type, the others of any floating one."""
 
     vertices: Numbers  # (n, 3)
@@ -26,7 +26,7 @@ class Parts:
     tangents: Numbers | None = None  # (n, 4), as glTF's TANGENT; zero: none
 
 
-def check(parts: Parts, max_triangles: int) -> None:
+def check_raw_mesh(parts: RawMesh, max_triangles: int) -> None:
     """Finite, in range, bounded. Raises ParseError."""
     vertices, faces = parts.vertices, parts.faces
     if not len(faces):

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles, Floats
 from service.assets.errors import ParseError
-from service.assets.parts import Parts, linear
-from service.assets.polygons import Longs, triangulate
+from service.assets.readers.polygons import Longs, triangulate
+from service.assets.readers.raw_mesh import RawMesh, linear
+from service.assets.types import Doubles, Floats
 
 TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
@@ -70,7 +70,7 @@ def _count_of(p: Property) -> str:
     return f"count of {p.name}"
 
 
-def read_ply(data: memoryview) -> Parts:
+def read_ply(data: memoryview) -> RawMesh:
     elements, encoding, start = _header(data)
     body = Body(data, start) if encoding != "ascii" else _text_as_binary(data, start, elements)
     vertex: Columns = {}
@@ -101,7 +101,7 @@ def read_ply(data: memoryview) -> Parts:
         at = int(np.flatnonzero((corners < 0) | (corners >= len(vertices)))[0])
         face = int(np.searchsorted(np.cumsum(counts), at, "right"))
         raise ParseError(f"face {face} (counted from 0) names vertex {corners[at]}; there are {len(vertices)}")
-    return Parts(
+    return RawMesh(
         vertices,
         corners.reshape(-1, 3) if (counts == 3).all() else corners[triangulate(vertices, corners, counts)],
         _named(vertex, (("nx", "ny", "nz"),)),

@@ -5,18 +5,18 @@ from __future__ import annotations
 import math
 from typing import TYPE_CHECKING, Any
 
-from service.assets.gltf import brushed
-from service.assets.gltf.place import Place
+from service.assets.gltf import anisotropy_texture
+from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.textures import factor
 
 if TYPE_CHECKING:
-    from service.assets.gltf.materials import Reading
+    from service.assets.gltf.material_reader import MaterialReader
 
 DEFAULT_IOR, LARGEST_IOR = 1.5, 4.0
 COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
 
 
-def add(read: Reading, document: dict[str, Any]) -> None:
+def add(read: MaterialReader, document: dict[str, Any]) -> None:
     ior = _ior(read)
     transmission = read.place.extension("KHR_materials_transmission")
     through = transmission.number("transmissionFactor", 0, 0, 1) if transmission else 0.0
@@ -32,7 +32,7 @@ def add(read: Reading, document: dict[str, Any]) -> None:
         _volume(read, document, ior)
 
 
-def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[str, Any]:
+def normal_map(read: MaterialReader, owner: JsonView, name: str, parameter: str) -> dict[str, Any]:
     info = owner.object(name)
     if info is None:
         return {}
@@ -49,7 +49,7 @@ def normal_map(read: Reading, owner: Place, name: str, parameter: str) -> dict[s
     return {parameter: {"texture": texture} | ({"scale": scale} if scale != 1 else {})}
 
 
-def _ior(read: Reading) -> float:
+def _ior(read: MaterialReader) -> float:
     extension = read.place.extension("KHR_materials_ior")
     ior = extension.number("ior", DEFAULT_IOR, 0) if extension else DEFAULT_IOR
     if extension and not 1 <= ior <= LARGEST_IOR:
@@ -59,7 +59,7 @@ def _ior(read: Reading) -> float:
     return ior
 
 
-def _specular(read: Reading, document: dict[str, Any], ior: float, clear: bool) -> None:
+def _specular(read: MaterialReader, document: dict[str, Any], ior: float, clear: bool) -> None:
     """The reflectance head-on, F0 = ((ior - 1) / (ior + 1))^2 weight colour, becomes an index and a tint."""
     extension = read.place.extension("KHR_materials_specular")
     if extension is None:
@@ -106,7 +106,7 @@ def _specular(read: Reading, document: dict[str, Any], ior: float, clear: bool) 
     document["ior"] = min(max(eta, 1.0), LARGEST_IOR)
 
 
-def _sheen(read: Reading, document: dict[str, Any]) -> None:
+def _sheen(read: MaterialReader, document: dict[str, Any]) -> None:
     extension = read.place.extension("KHR_materials_sheen")
     if extension is None:
         return
@@ -119,7 +119,7 @@ def _sheen(read: Reading, document: dict[str, Any]) -> None:
     document["sheen_roughness"] = read.scalar(extension, "sheenRoughnessTexture", roughness, "a")
 
 
-def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
+def _anisotropy(read: MaterialReader, document: dict[str, Any]) -> None:
     """glTF stretches along the tangent only: alpha_t = mix(r^2, 1, strength^2), alpha_b = r^2; ours both ways."""
     extension = read.place.extension("KHR_materials_anisotropy")
     strength = extension.number("anisotropyStrength", 0, 0, 1) if extension else 0.0
@@ -131,7 +131,9 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
         )
         return
     turn, info = extension.number("anisotropyRotation", 0, -1e6, 1e6), extension.object("anisotropyTexture")
-    rotation = brushed.rotation(read.textures, info, read.texture(extension, "anisotropyTexture", "linear"), turn)
+    rotation = anisotropy_texture.rotation(
+        read.textures, info, read.texture(extension, "anisotropyTexture", "linear"), turn
+    )
     if rotation:
         document["anisotropic_rotation"] = rotation
     if isinstance(rotation, dict):
@@ -153,7 +155,7 @@ def _anisotropy(read: Reading, document: dict[str, Any]) -> None:
     document["roughness"] = min((along * across) ** 0.25, 1.0)
 
 
-def _clearcoat(read: Reading, document: dict[str, Any]) -> None:
+def _clearcoat(read: MaterialReader, document: dict[str, Any]) -> None:
     extension = read.place.extension("KHR_materials_clearcoat")
     weight = extension.number("clearcoatFactor", 0, 0, 1) if extension else 0.0
     if extension is None or not weight:
@@ -164,7 +166,7 @@ def _clearcoat(read: Reading, document: dict[str, Any]) -> None:
     document.update(normal_map(read, extension, "clearcoatNormalTexture", "clearcoat_normal_map"))
 
 
-def _volume(read: Reading, document: dict[str, Any], ior: float) -> None:
+def _volume(read: MaterialReader, document: dict[str, Any], ior: float) -> None:
     volume = read.place.extension("KHR_materials_volume")
     if volume is not None and volume.number("thicknessFactor", 0, 0) > 0:
         if "thicknessTexture" in volume:

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import Doubles
+from service.assets.types import Doubles
 
 Longs = npt.NDArray[np.int64]
 

@@ -13,10 +13,10 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.data import AssetLimits
 from service.assets.errors import ParseError
 from service.assets.gltf.extensions import check_required, remedy
-from service.assets.gltf.place import Place, escaped, shown, whole
+from service.assets.gltf.json_view import JsonView, escaped, shown, whole
+from service.assets.types import AssetLimits
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MOST_ITEMS = 1 << 20  # of one kind; the time to look at them all is bounded, and a stranger's file may list anything
@@ -25,7 +25,7 @@ Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
 
 
-class GltfFile:
+class GltfDocument:
     """`root` is the JSON. Raises ParseError wherever the file refers to what it does not hold."""
 
     def __init__(self, data: bytes | memoryview, limits: AssetLimits) -> None:
@@ -46,24 +46,24 @@ class GltfFile:
     def count(self, kind: str) -> int:
         return len(self.root.array(kind))
 
-    def item(self, kind: str, index: Any, pointer: str) -> Place:
+    def item(self, kind: str, index: Any, pointer: str) -> JsonView:
         """The item that the value at `pointer` refers to."""
         items = self.root.array(kind)
         k = whole(index, pointer)
         if k >= len(items):
             raise ParseError(f"refers to /{kind}/{k}; there are {len(items)}", pointer)
-        return Place(items[k], f"/{kind}/{k}")
+        return JsonView(items[k], f"/{kind}/{k}")
 
-    def follow(self, place: Place, name: str, kind: str) -> Place:
+    def follow(self, place: JsonView, name: str, kind: str) -> JsonView:
         """The item that a place's member refers to."""
         return self.item(kind, place.value.get(name), place.at(name))
 
-    def view(self, place: Place, name: str = "bufferView") -> tuple[Bytes, Place]:
+    def view(self, place: JsonView, name: str = "bufferView") -> tuple[Bytes, JsonView]:
         """The bytes of the buffer view that a place refers to."""
         view = self.follow(place, name, "bufferViews")
         return self.range(view, view), view
 
-    def range(self, source: Place, named: Place) -> Bytes:
+    def range(self, source: JsonView, named: JsonView) -> Bytes:
         """The bytes from `byteOffset` on, `byteLength` of them, of the buffer that `source` names."""
         buffer = self._buffer(source)
         start, length = source.whole("byteOffset", 0), source.whole("byteLength")
@@ -71,13 +71,13 @@ class GltfFile:
             raise named.error("byteLength", f"ends at byte {start + length} of a buffer of {len(buffer)}")
         return buffer[start : start + length]
 
-    def image(self, place: Place) -> bytes:
+    def image(self, place: JsonView) -> bytes:
         """The bytes of an image as it is stored."""
         if "bufferView" in place:
             return self.view(place)[0].tobytes()
         return embedded(place).tobytes()
 
-    def _buffer(self, source: Place) -> Bytes:
+    def _buffer(self, source: JsonView) -> Bytes:
         place = self.follow(source, "buffer", "buffers")
         index = source.whole("buffer")
         if index not in self._buffers:
@@ -90,7 +90,7 @@ class GltfFile:
         return self._buffers[index]
 
 
-def embedded(place: Place) -> Bytes:
+def embedded(place: JsonView) -> Bytes:
     """What a `data:` URI holds."""
     uri = place.text("uri")
     if not uri:
@@ -149,7 +149,7 @@ def _first_constant(tree: Any) -> str:
     return ""
 
 
-def _root(text: bytes, is_binary: bool) -> Place:
+def _root(text: bytes, is_binary: bool) -> JsonView:
     try:
         tree = load(text)
     except ParseError as error:
@@ -162,7 +162,7 @@ def _root(text: bytes, is_binary: bool) -> Place:
     for kind, items in tree.items():
         if isinstance(items, list) and len(items) > MOST_ITEMS:
             raise ParseError(f"has {len(items)} items; {MOST_ITEMS} are allowed", f"/{kind[:60]}")
-    return Place(tree, "")
+    return JsonView(tree, "")
 
 
 def _chunks(data: memoryview) -> tuple[memoryview, memoryview | None]:

@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
-from service.assets.data import SceneFile, ScenePart
+from service.assets.types import SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
 
 IMPORTER = 1  # counted up whenever a file is to be imported anew: its document or what is said of it has changed

@@ -1,0 +1,11 @@
+"""Readers of single formats, which run in the parsing child.
+
+obj          OBJ: vertices and faces
+obj_lines    the lines of an OBJ text by keyword, in blocks
+ply          PLY, text and binary
+stl          STL, through trimesh
+polygons     polygons -> triangles
+raw_mesh     what a reader found, and the checks that every mesh has to pass
+mesh_checks  warnings about a mesh: triangles without area, repeated ones, holes
+image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
+"""

@@ -1,0 +1,7 @@
+"""Files of strangers are parsed in a child process, within bounds of memory and time.
+
+sandbox     the parent's side: starts the child, hands it a file, takes its arrays
+child       the child's side: `python -m service.assets.sandbox.child`
+wire        messages between both, and arrays in shared memory
+parse_mesh  a mesh file -> arrays that the rest may trust
+"""

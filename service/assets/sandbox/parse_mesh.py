@@ -1,0 +1,60 @@
+"""Mesh files -> arrays that the rest may trust: finite, in range, bounded. Runs in the parsing child."""
+
+from collections.abc import Callable
+
+import numpy as np
+
+from service.assets.formats import text
+from service.assets.readers.mesh_checks import mesh_warnings
+from service.assets.readers.raw_mesh import Numbers, RawMesh, check_raw_mesh, unit_colors, unit_normals
+from service.assets.readers.stl import read_stl
+from service.assets.types import AssetLimits, Floats, Indices, MeshData
+
+
+def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
+    """Raises ParseError, or whatever a library raises on nonsense."""
+    parts = READERS[format](data, limits)
+    check_raw_mesh(parts, limits.max_triangles)
+    # One after the other, so that a million triangles are not there twice.
+    vertices = np.ascontiguousarray(parts.vertices, np.float64)
+    faces: Indices = np.ascontiguousarray(parts.faces, np.int32)
+    parts.vertices, parts.faces = vertices, faces
+    normals = None if parts.normals is None else unit_normals(vertices, faces, parts.normals)
+    parts.normals = None
+    uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
+    tangents = _floats(parts.tangents)
+    parts.uvs = parts.uvs_1 = parts.tangents = None
+    parts.warnings += mesh_warnings(vertices, faces)
+    colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
+    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents)
+
+
+def _floats(rows: Numbers | None) -> Floats | None:
+    return None if rows is None else np.ascontiguousarray(rows, np.float32)
+
+
+def _obj(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.assets.readers.obj import read_obj
+
+    return read_obj(text(bytes(data)) if bytes(data[:1]) in (b"\xef", b"\xfe", b"\xff") else data)
+
+
+def _ply(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.assets.readers.ply import read_ply
+
+    return read_ply(data)
+
+
+def _gltf(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.assets.gltf.merged_mesh import read_merged
+
+    return read_merged(data, limits)
+
+
+READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
+    "obj": _obj,
+    "ply": _ply,
+    "stl": read_stl,
+    "glb": _gltf,
+    "gltf": _gltf,
+}
