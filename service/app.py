@@ -32,11 +32,11 @@ from service.downloads import Pieces
 from service.guard import Guard, turning_away
 from service.logs import Requests
 from service.problems import Unavailable
-from service.rendering.engine import Engine
-from service.rendering.process import Options
-from service.rendering.reading import Reader
-from service.rendering.renders import Bounds, Renders
-from service.rendering.warming import Warming
+from service.rendering.first_frame import FirstFrame
+from service.rendering.jobs.queue import QueueLimits, RenderQueue
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.supervisor.process import Options
+from service.rendering.supervisor.supervisor import Supervisor
 from service.routes import assets, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
@@ -72,11 +72,11 @@ def create_app(config: Config) -> FastAPI:
     own = House(
         config,
         kept.assets,
-        Reader(config, kept.assets),
-        Engine(Options(config.device, config.hang_s, config.gpu_memory, config.checkpoint_s)),
+        RequestReader(config, kept.assets),
+        Supervisor(Options(config.device, config.hang_s, config.gpu_memory, config.checkpoint_s)),
         kept.documents,
         kept.quota,
-        Renders(_bounds(config)),
+        RenderQueue(_bounds(config)),
     )
     app = FastAPI(
         title="Sunbox",
@@ -171,7 +171,7 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         if (reason := await self._house.gpu_missing()) is not None:
             log.error("did not start reason=%s", reason)
-            await self._house.engine.close()
+            await self._house.supervisor.close()
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
@@ -204,20 +204,22 @@ class _Server(uvicorn.Server):
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own: House = app.state.house
-    if own.engine.process_id is None:
-        own.engine.start()
+    if own.supervisor.process_id is None:
+        own.supervisor.start()
     own.assets.warm()
-    warming = asyncio.create_task(Warming(own.engine, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run())
+    warming = asyncio.create_task(
+        FirstFrame(own.supervisor, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run()
+    )
     yield
     warming.cancel()
     await own.farewell()
-    await own.engine.close()
+    await own.supervisor.close()
     await asyncio.to_thread(own.assets.close)
     own.bodies.close()
 
 
-def _bounds(config: Config) -> Bounds:
-    return Bounds(
+def _bounds(config: Config) -> QueueLimits:
+    return QueueLimits(
         running=config.max_running,
         waiting=config.max_queue,
         each=config.max_jobs,

@@ -9,7 +9,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from service.problems import Unavailable
-from service.rendering.statistics import Distribution
+from service.rendering.supervisor.statistics import Distribution
 
 if TYPE_CHECKING:
     from prometheus_client.registry import Collector
@@ -76,8 +76,8 @@ def _collector(house: House, traffic: Traffic) -> Collector:
 
     class Sunbox(Collector):
         def collect(self) -> Iterator[Metric]:
-            seen = house.engine.statistics
-            renderer = house.engine.info or {}
+            seen = house.supervisor.statistics
+            renderer = house.supervisor.info or {}
             about = GaugeMetricFamily("sunbox_info", "Version and renderer.", labels=("version", "renderer"))
             about.add_metric((metadata.version("sunbox"), str(renderer.get("renderer", ""))), 1)
             yield about
@@ -121,7 +121,7 @@ def _collector(house: House, traffic: Traffic) -> Collector:
 
 def _resident(house: House) -> int:
     try:
-        with open(f"/proc/{house.engine.process_id}/statm") as sizes:
+        with open(f"/proc/{house.supervisor.process_id}/statm") as sizes:
             return int(sizes.read().split()[1]) * PAGE
     except (OSError, ValueError, IndexError):
         return 0

@@ -16,12 +16,12 @@ import pytest
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.kernels import features
 from service.cli import main
-from service.rendering.engine import Engine
-from service.rendering.messages import Appraise, Appraised, Done, StopRule, Update
+from service.rendering.ipc.messages import Done, KernelMeasured, MeasureKernel, StopRule, Update
+from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.appraising import NO_KERNEL, NO_PICTURE, Appraising
-from tests.engines import with_engine
 from tests.extremes.scenes import LONG
 from tests.serving import SCENE, SMALL, Server
+from tests.supervisors import with_supervisor
 from tests.test_compiling import arrays_of
 from tests.test_worker import Ears, settings
 
@@ -97,7 +97,7 @@ def test_what_cannot_be_had_is_told(gpu: Renderer, more: None) -> None:
         appraising = Appraising(1, said.append, gpu, compiler)  # type: ignore[arg-type]
         appraising.ask()
         appraising.step(shown)
-        assert said.pop() == Appraised(1, why) and not appraising.due
+        assert said.pop() == KernelMeasured(1, why) and not appraising.due
     picture.release()
     scene.release()
 
@@ -113,30 +113,30 @@ def no_cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[s
 def test_nobody_waits_for_it(gpu: Renderer, no_cache: dict[str, str]) -> None:
     """While another picture grows there is no answer; and none but why, where the renderer is lost."""
 
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         arrays, ears, other = arrays_of("plain"), Ears(), Ears()
-        task, busy = engine.open(ears, "render"), engine.open(other)
-        await engine.send_scene(Update(task, 1, arrays, settings(24), StopRule(2)))
+        task, busy = supervisor.open(ears, "render"), supervisor.open(other)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(24), StopRule(2)))
         await ears.next(Done)
-        await engine.send_scene(Update(busy, 1, arrays, settings(24), StopRule()))
+        await supervisor.send_scene(Update(busy, 1, arrays, settings(24), StopRule()))
         await other.next(object)
-        engine.send(Appraise(task))
+        supervisor.send(MeasureKernel(task))
         await asyncio.sleep(0.4)
         assert ears.messages.empty()
-        engine.drop(busy)
-        assert await ears.next(Appraised) == Appraised(task, NO_KERNEL)
-        busy = engine.open(other)
-        await engine.send_scene(Update(busy, 1, arrays, settings(24), StopRule()))
+        supervisor.drop(busy)
+        assert await ears.next(KernelMeasured) == KernelMeasured(task, NO_KERNEL)
+        busy = supervisor.open(other)
+        await supervisor.send_scene(Update(busy, 1, arrays, settings(24), StopRule()))
         await other.next(object)
-        engine.send(Appraise(task))
-        assert engine.process_id is not None
-        os.kill(engine.process_id, signal.SIGKILL)
-        assert "lost" in (await ears.next(Appraised)).detail
-        engine.drop(busy)
-        engine.send(Appraise(task))  # brought back
-        assert (await ears.next(Appraised)).detail == NO_KERNEL
+        supervisor.send(MeasureKernel(task))
+        assert supervisor.process_id is not None
+        os.kill(supervisor.process_id, signal.SIGKILL)
+        assert "lost" in (await ears.next(KernelMeasured)).detail
+        supervisor.drop(busy)
+        supervisor.send(MeasureKernel(task))  # brought back
+        assert (await ears.next(KernelMeasured)).detail == NO_KERNEL
 
-    with_engine(test, patience_s=60.0)  # a starved renderer is not to be replaced a second time
+    with_supervisor(test, patience_s=60.0)  # a starved renderer is not to be replaced a second time
 
 
 def test_a_status_says_why_it_is_not_known(tmp_path: Path, no_cache: dict[str, str]) -> None:

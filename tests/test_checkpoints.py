@@ -13,31 +13,31 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
-from service.rendering import link
-from service.rendering.engine import Engine
-from service.rendering.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
+from service.rendering.ipc import channel
+from service.rendering.ipc.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
+from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker import keeping
-from tests.engines import with_engine
+from tests.supervisors import with_supervisor
 from tests.test_compiling import LINEAR, arrays_of
 from tests.test_worker import Ears, settings
 
 ENDLESS = 1 << 24
 
 
-async def begun(engine: Engine, samples: int, **more: Any) -> tuple[int, Ears]:
+async def begun(supervisor: Supervisor, samples: int, **more: Any) -> tuple[int, Ears]:
     ears = Ears()
-    task = engine.open(ears, "render")
-    await engine.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4, **more), StopRule(samples)))
+    task = supervisor.open(ears, "render")
+    await supervisor.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4, **more), StopRule(samples)))
     return task, ears
 
 
-async def lost(engine: Engine, ears: Ears) -> int:
+async def lost(supervisor: Supervisor, ears: Ears) -> int:
     """The samples of the last checkpoint; its renderer is no more, and what it said was heard."""
     saved = (await ears.next(Checkpoint)).progress.samples
-    pid = engine.process_id
+    pid = supervisor.process_id
     assert pid is not None
     os.kill(pid, signal.SIGKILL)
-    while engine.process_id == pid:
+    while supervisor.process_id == pid:
         await asyncio.sleep(0.001)
     while not ears.messages.empty():
         message = ears.messages.get_nowait()
@@ -46,66 +46,68 @@ async def lost(engine: Engine, ears: Ears) -> int:
     return int(saved)
 
 
-async def picture(engine: Engine, task: int, ears: Ears) -> np.ndarray:
-    engine.send(Read(task, 1, LINEAR))
+async def picture(supervisor: Supervisor, task: int, ears: Ears) -> np.ndarray:
+    supervisor.send(Read(task, 1, LINEAR))
     return np.array((await ears.next(Image)).pixels)
 
 
 @pytest.mark.parametrize("adaptive", [False, True])
 def test_it_goes_on_to_the_same_bits(gpu: Renderer, adaptive: bool) -> None:
-    async def test(engine: Engine) -> None:
-        task, ears = await begun(engine, ENDLESS, adaptive=adaptive)
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor, ENDLESS, adaptive=adaptive)
         elapsed_s = 0.0
         for _ in range(3):
-            saved = await lost(engine, ears)
-            engine.send(Read(task, 1, LINEAR))  # waits until there is something to read
+            saved = await lost(supervisor, ears)
+            supervisor.send(Read(task, 1, LINEAR))  # waits until there is something to read
             assert (await ears.next(Image)).progress.samples == saved > 0
             again = (await ears.next(Progressed)).progress
             assert again.samples >= saved and again.elapsed_s > elapsed_s
             elapsed_s = again.elapsed_s
-        engine.send(Update(task, 2, stop=StopRule(again.samples + 8), base=1))
+        supervisor.send(Update(task, 2, stop=StopRule(again.samples + 8), base=1))
         done = await ears.next(Done)
         assert done.reason == "max_samples" and done.progress.samples >= again.samples
-        assert engine.statistics.checkpoints >= 3 and engine.statistics.restarts["killed"] == 3
-        pixels = await picture(engine, task, ears)
-        engine.drop(task)
-        task, ears = await begun(engine, done.progress.samples, adaptive=adaptive)
+        assert supervisor.statistics.checkpoints >= 3 and supervisor.statistics.restarts["killed"] == 3
+        pixels = await picture(supervisor, task, ears)
+        supervisor.drop(task)
+        task, ears = await begun(supervisor, done.progress.samples, adaptive=adaptive)
         await ears.next(Done)
-        assert np.array_equal(pixels, await picture(engine, task, ears))
+        assert np.array_equal(pixels, await picture(supervisor, task, ears))
 
-    with_engine(test, checkpoint_s=0.05)
+    with_supervisor(test, checkpoint_s=0.05)
 
 
 def test_what_is_cancelled_meanwhile_stays_as_it_was(gpu: Renderer) -> None:
-    async def test(engine: Engine) -> None:
-        task, ears = await begun(engine, ENDLESS)
-        saved = await lost(engine, ears)
-        engine.send(Stop(task))
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor, ENDLESS)
+        saved = await lost(supervisor, ears)
+        supervisor.send(Stop(task))
         done = await ears.next(Done)
         assert done.reason == "stopped" and done.progress.samples == saved
-        assert (await picture(engine, task, ears)).shape == (96, 96, 4)
+        assert (await picture(supervisor, task, ears)).shape == (96, 96, 4)
 
-    with_engine(test, checkpoint_s=0.05)
+    with_supervisor(test, checkpoint_s=0.05)
 
 
 def test_a_short_render_has_none(gpu: Renderer) -> None:
-    async def test(engine: Engine) -> None:
-        _, ears = await begun(engine, 20)
+    async def test(supervisor: Supervisor) -> None:
+        _, ears = await begun(supervisor, 20)
         await ears.next(Done)
-        assert engine.statistics.checkpoints == 0
+        assert supervisor.statistics.checkpoints == 0
 
-    with_engine(test, checkpoint_s=1e3)
+    with_supervisor(test, checkpoint_s=1e3)
 
 
 def test_a_stream_has_none(gpu: Renderer) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays_of("plain"), settings(64), StopRule(200), interactive=True))
+        task = supervisor.open(ears)
+        await supervisor.send_scene(
+            Update(task, 1, arrays_of("plain"), settings(64), StopRule(200), interactive=True)
+        )
         await ears.next(Done)
-        assert engine.statistics.checkpoints == 0
+        assert supervisor.statistics.checkpoints == 0
 
-    with_engine(test, checkpoint_s=0.001)
+    with_supervisor(test, checkpoint_s=0.001)
 
 
 def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
@@ -117,9 +119,9 @@ def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
     kept.begin(picture)
     while saved is None:
         saved = kept.step()
-    encoded = link.encode(Checkpoint(1, 1, Progress(), saved))
+    encoded = channel.encode(Checkpoint(1, 1, Progress(), saved))
     assert len(encoded[1]) == 1
-    received = link.decode(*encoded).saved
+    received = channel.decode(*encoded).saved
     for mine, theirs, buffer in zip(saved.buffers, received.buffers, picture.state, strict=True):
         assert mine.tobytes() == theirs.tobytes() == buffer.read()
     picture.release()

@@ -19,7 +19,7 @@ from service.cli import main
 from service.commands import render
 from service.commands.progress import ProgressLine, describe
 from service.images import read_metadata
-from service.rendering.messages import Progress
+from service.rendering.ipc.messages import Progress
 
 SCENE: dict[str, Any] = {
     "version": 1,

@@ -18,14 +18,14 @@ from gpu import KernelKey, Renderer, RenderSettings
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.pack import pack
-from service.rendering.engine import Engine
-from service.rendering.messages import Done, Image, Loaded, Read, StopRule, Update, View
+from service.rendering.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
+from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.compiler import Compiled, Compiler, records
 from service.rendering.worker.holding import Holding, wanted_of
 from service.scene import parse_scene
 from tests.documents import Shelf
-from tests.engines import with_engine
 from tests.serving import SCENE
+from tests.supervisors import with_supervisor
 
 SIZE = {"width": 32, "height": 32}
 COLD = {**SIZE, "clamp": 5.0}  # compiled in
@@ -120,32 +120,34 @@ def cold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return tmp_path
 
 
-async def beside(engine: Engine, arrays: Any, kill: bool = False, newer: bool = False) -> tuple[int, np.ndarray]:
+async def beside(
+    supervisor: Supervisor, arrays: Any, kill: bool = False, newer: bool = False
+) -> tuple[int, np.ndarray]:
     """How often somebody else's picture had grown before a cold kernel was there; and what that one made."""
     ears, other = Ears(), Ears()
-    busy, late = engine.open(other), engine.open(ears)
-    await engine.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
+    busy, late = supervisor.open(other), supervisor.open(ears)
+    await supervisor.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
     await other.next(busy, Loaded)
-    await engine.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
+    await supervisor.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
     loaded = asyncio.create_task(ears.next(late, Loaded))
     seen: list[int] = []
     while not loaded.done():
-        engine.send(Read(busy, len(seen), LINEAR))
+        supervisor.send(Read(busy, len(seen), LINEAR))
         seen.append((await other.next(busy, Image)).progress.samples)
         await asyncio.sleep(0)
         if newer and len(seen) == 3:
-            engine.send(Update(late, 2, stop=StopRule(6), base=1))
+            supervisor.send(Update(late, 2, stop=StopRule(6), base=1))
         if kill:
-            for helper in helpers(engine.process_id):
+            for helper in helpers(supervisor.process_id):
                 os.kill(helper, signal.SIGKILL)
                 kill = False
     assert not kill
-    assert (await loaded).generation == 1 + newer and not engine.statistics.restarts
+    assert (await loaded).generation == 1 + newer and not supervisor.statistics.restarts
     assert (await ears.next(late, Done)).reason == "max_samples"
-    engine.send(Read(late, 1, LINEAR))
+    supervisor.send(Read(late, 1, LINEAR))
     pixels = np.array((await ears.next(late, Image)).pixels)
-    engine.drop(busy)
-    engine.drop(late)
+    supervisor.drop(busy)
+    supervisor.drop(late)
     return len(set(seen)), pixels
 
 
@@ -160,38 +162,38 @@ def in_the_loop(gpu: Renderer, arrays: Any, samples: int = 4) -> np.ndarray:
 
 
 def test_others_are_traced_meanwhile(gpu: Renderer, arrays: Any, cold: Path) -> None:
-    async def test(engine: Engine) -> None:
-        grown, pixels = await beside(engine, arrays, newer=True)
+    async def test(supervisor: Supervisor) -> None:
+        grown, pixels = await beside(supervisor, arrays, newer=True)
         assert grown >= 5
         assert np.array_equal(pixels, in_the_loop(gpu, arrays, samples=6))
-        assert len(helpers(engine.process_id)) == 1
+        assert len(helpers(supervisor.process_id)) == 1
 
-    with_engine(test)
+    with_supervisor(test)
 
-    async def again(engine: Engine) -> None:
-        await beside(engine, arrays)
-        assert helpers(engine.process_id) == []  # what is in the disk cache needs none
+    async def again(supervisor: Supervisor) -> None:
+        await beside(supervisor, arrays)
+        assert helpers(supervisor.process_id) == []  # what is in the disk cache needs none
 
-    with_engine(again)
+    with_supervisor(again)
 
 
 def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, arrays: Any, cold: Path) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears, other = Ears(), Ears()
-        busy, late = engine.open(other), engine.open(ears)
+        busy, late = supervisor.open(other), supervisor.open(ears)
         for task, hears, stop in ((busy, other, StopRule()), (late, ears, StopRule(2))):
-            await engine.send_scene(Update(task, 1, arrays, SIZE, stop))
+            await supervisor.send_scene(Update(task, 1, arrays, SIZE, stop))
             await hears.next(task, Loaded)
         await ears.next(late, Done)
-        before = helpers(engine.process_id)
-        engine.send(Read(late, 1, View("normal", encoding="linear")))
+        before = helpers(supervisor.process_id)
+        supervisor.send(Read(late, 1, View("normal", encoding="linear")))
         normal = asyncio.create_task(ears.next(late, Image))
         seen: list[int] = []
         while not normal.done():
-            engine.send(Read(busy, len(seen), LINEAR))
+            supervisor.send(Read(busy, len(seen), LINEAR))
             seen.append((await other.next(busy, Image)).progress.samples)
             await asyncio.sleep(0)
-        assert len(set(seen)) >= 5 and len(before) <= len(helpers(engine.process_id)) == 1
+        assert len(set(seen)) >= 5 and len(before) <= len(helpers(supervisor.process_id)) == 1
         pixels = (await normal).pixels
         scene = gpu.load(arrays)
         picture = gpu.picture(scene, RenderSettings(**SIZE))
@@ -200,7 +202,7 @@ def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, a
         picture.release()
         scene.release()
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
@@ -226,11 +228,11 @@ def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
 
 
 def test_a_helper_that_dies_is_done_without(gpu: Renderer, arrays: Any, cold: Path) -> None:
-    async def test(engine: Engine) -> None:
-        _, pixels = await beside(engine, arrays, kill=True)
+    async def test(supervisor: Supervisor) -> None:
+        _, pixels = await beside(supervisor, arrays, kill=True)
         assert np.array_equal(pixels, in_the_loop(gpu, arrays))
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_without_a_cache_nobody_is_asked(
@@ -238,11 +240,11 @@ def test_without_a_cache_nobody_is_asked(
 ) -> None:
     monkeypatch.setenv("MESA_SHADER_CACHE_DISABLE", "true")
 
-    async def test(engine: Engine) -> None:
-        _, pixels = await beside(engine, arrays)
-        assert helpers(engine.process_id) == [] and np.array_equal(pixels, in_the_loop(gpu, arrays))
+    async def test(supervisor: Supervisor) -> None:
+        _, pixels = await beside(supervisor, arrays)
+        assert helpers(supervisor.process_id) == [] and np.array_equal(pixels, in_the_loop(gpu, arrays))
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 class Instant:
@@ -301,43 +303,43 @@ def test_a_kernel_outlives_the_renderer_that_wanted_it(gpu: Renderer, arrays: An
     wanted = kernel_key(arrays, RenderSettings(**COLD), features.flags(arrays))
     record = records() / wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
 
-    async def test(engine: Engine) -> None:
-        late, helper = await compiled_for(engine, arrays)
-        pid = engine.process_id
+    async def test(supervisor: Supervisor) -> None:
+        late, helper = await compiled_for(supervisor, arrays)
+        pid = supervisor.process_id
         assert pid is not None
-        engine.drop(late)
+        supervisor.drop(late)
         os.kill(pid, signal.SIGKILL)
-        while engine.process_id in (pid, None):
+        while supervisor.process_id in (pid, None):
             await asyncio.sleep(0.01)
         assert not record.exists()  # it has hardly begun
         while is_there(helper):  # until it is done
             await asyncio.sleep(0.02)
         assert record.exists()
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_a_kernel_under_way_ends_with_the_server(gpu: Renderer, arrays: Any, cold: Path) -> None:
     left: list[int] = []
 
-    async def test(engine: Engine) -> None:
-        left.append((await compiled_for(engine, arrays))[1])
+    async def test(supervisor: Supervisor) -> None:
+        left.append((await compiled_for(supervisor, arrays))[1])
 
-    with_engine(test)
+    with_supervisor(test)
     until = time.monotonic() + 30
     while is_there(left[0]):
         assert time.monotonic() < until
         time.sleep(0.02)
 
 
-async def compiled_for(engine: Engine, arrays: Any) -> tuple[int, int]:
+async def compiled_for(supervisor: Supervisor, arrays: Any) -> tuple[int, int]:
     """A task whose kernel is being compiled while another's picture is traced, and the process that does that."""
     other = Ears()
-    busy, late = engine.open(other), engine.open(Ears())
-    await engine.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
+    busy, late = supervisor.open(other), supervisor.open(Ears())
+    await supervisor.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
     await other.next(busy, Loaded)
-    await engine.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
-    while not (begun := helpers(engine.process_id)):
+    await supervisor.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
+    while not (begun := helpers(supervisor.process_id)):
         await asyncio.sleep(0.01)
     return late, begun[0]
 

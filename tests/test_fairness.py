@@ -10,9 +10,9 @@ import pytest
 
 from gpu import Renderer
 from service.pack import pack
-from service.rendering.engine import Engine
-from service.rendering.messages import FromRenderer, Pause, StopRule, Update
-from service.rendering.statistics import Kind
+from service.rendering.ipc.messages import FromRenderer, Pause, StopRule, Update
+from service.rendering.supervisor.statistics import Kind
+from service.rendering.supervisor.supervisor import Supervisor
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -48,23 +48,23 @@ def sharing(
     """What each task used of so many seconds of GPU time, or of up to four times as many until it is `enough`.
 
     A loaded machine makes single turns long, and then it takes more of them to even out. `act` is called all the
-    while with engine, tasks and count.
+    while with supervisor, tasks and count.
     """
 
     async def run() -> list[float]:
-        engine = Engine()
-        engine.start()
-        await engine.ready(30)
-        used = engine.statistics.gpu_s_of
+        supervisor = Supervisor()
+        supervisor.start()
+        await supervisor.ready(30)
+        used = supervisor.statistics.gpu_s_of
         for interactive in (True, False):  # kernels are compiled before anybody pays for them
-            first = engine.open(Deaf(), "server")
-            await engine.send_scene(Update(first, 1, arrays, SIDE, StopRule(1), interactive=interactive))
+            first = supervisor.open(Deaf(), "server")
+            await supervisor.send_scene(Update(first, 1, arrays, SIDE, StopRule(1), interactive=interactive))
             while not used[first]:
                 await asyncio.sleep(0.02)
-            engine.drop(first)
-        tasks = [engine.open(Deaf(), kind, client) for kind, client in clients]
+            supervisor.drop(first)
+        tasks = [supervisor.open(Deaf(), kind, client) for kind, client in clients]
         for task, (kind, _) in zip(tasks, clients, strict=True):
-            await engine.send_scene(Update(task, 1, arrays, SIDE, StopRule(), interactive=kind == "stream"))
+            await supervisor.send_scene(Update(task, 1, arrays, SIDE, StopRule(), interactive=kind == "stream"))
         while not all(used[task] for task in tasks):  # everybody is loaded
             await asyncio.sleep(0.02)
         count = 0
@@ -72,9 +72,9 @@ def sharing(
         while sum(shares) < seconds or not (enough(shares) or sum(shares) > 4 * seconds):
             await asyncio.sleep(0.005)
             if act is not None:
-                act(engine, tasks, count := count + 1)
+                act(supervisor, tasks, count := count + 1)
             shares = [used[task] for task in tasks]  # what they used to load included: who had more waits
-        await engine.close()
+        await supervisor.close()
         return shares
 
     return asyncio.run(run())
@@ -96,16 +96,16 @@ def test_many_renders_of_one_caller_are_one_client(arrays: Any) -> None:
 def test_a_flood_of_edits_takes_no_more_than_its_part(arrays: Any) -> None:
     """Whole scenes, one after the other: to load them is work like any other."""
 
-    def flood(engine: Engine, tasks: list[int], count: int) -> None:
-        engine.send(Update(tasks[0], 1 + count, materials=arrays.materials, settings=SIDE | {"seed": count}))
+    def flood(supervisor: Supervisor, tasks: list[int], count: int) -> None:
+        supervisor.send(Update(tasks[0], 1 + count, materials=arrays.materials, settings=SIDE | {"seed": count}))
 
     shares = sharing(arrays, [("stream", "hostile"), ("stream", "kind"), ("render", "other")], 3.0, flood)
     assert shares[0] / sum(shares) < 0.5, shares
 
 
 def test_who_pauses_uses_nothing(arrays: Any) -> None:
-    def pause(engine: Engine, tasks: list[int], count: int) -> None:
-        engine.send(Pause(tasks[0]))
+    def pause(supervisor: Supervisor, tasks: list[int], count: int) -> None:
+        supervisor.send(Pause(tasks[0]))
 
     shares = sharing(arrays, [("stream", "hidden"), ("stream", "seen")], 3.0, pause)
     assert shares[0] < 0.4 * shares[1], shares  # it was loaded, and seen once

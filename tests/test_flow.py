@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from service.problems import InvalidDocument
-from service.rendering.flow import PATIENCE_S, Flow
-from service.rendering.messages import Frame, Progress, Want
-from service.rendering.protocol import View
+from service.rendering.ipc.messages import Frame, Progress, Want
+from service.rendering.streams.flow_control import PATIENCE_S, FlowControl
+from service.rendering.streams.protocol import View
 
 PIXELS = np.zeros((1, 1, 4), np.uint8)
 
@@ -21,7 +21,7 @@ class Renderer:
 
     def __init__(self) -> None:
         self.wants: list[Want] = []
-        self.flow = Flow(7, self.wants.append)
+        self.flow = FlowControl(7, self.wants.append)
         self.flow.attach()
 
     def frame(self, generation: int, elapsed_s: float = 0.0) -> Frame:

@@ -11,28 +11,28 @@ import pytest
 
 from gpu import Renderer
 from service.problems import Unavailable
-from service.rendering import engine as engines
-from service.rendering.engine import Engine
-from service.rendering.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
-from service.rendering.process import Options
-from tests.engines import with_engine
+from service.rendering.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
+from service.rendering.supervisor import supervisor as supervisors
+from service.rendering.supervisor.process import Options
+from service.rendering.supervisor.supervisor import Supervisor
+from tests.supervisors import with_supervisor
 from tests.test_compiling import arrays_of
 from tests.test_worker import LINEAR, Ears, settings
 
 
-async def replaced(engine: Engine, number: int = signal.SIGKILL) -> None:
+async def replaced(supervisor: Supervisor, number: int = signal.SIGKILL) -> None:
     """Returns when another renderer has been begun in the place of this one."""
-    while (pid := engine.process_id) is None:
+    while (pid := supervisor.process_id) is None:
         await asyncio.sleep(0.001)
     os.kill(pid, number)
-    while engine.process_id in (pid, None):
+    while supervisor.process_id in (pid, None):
         await asyncio.sleep(0.001)
 
 
-async def opened(engine: Engine, ears: Ears, samples: int = 1 << 24) -> int:
-    task = engine.open(ears)
+async def opened(supervisor: Supervisor, ears: Ears, samples: int = 1 << 24) -> int:
+    task = supervisor.open(ears)
     size = settings(64)
-    await engine.send_scene(Update(task, 1, arrays_of("plain"), size, StopRule(samples), interactive=True))
+    await supervisor.send_scene(Update(task, 1, arrays_of("plain"), size, StopRule(samples), interactive=True))
     return task
 
 
@@ -43,122 +43,122 @@ def niceness(pid: int | None) -> set[int]:
 
 def test_who_kills_it_before_it_can_start_never_wins(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four times the three that may fail by themselves, and more than were once allowed."""
-    monkeypatch.setattr(engines, "SIEGE_S", 0.0)
+    monkeypatch.setattr(supervisors, "SIEGE_S", 0.0)
 
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = await opened(engine, ears)
+        task = await opened(supervisor, ears)
         await ears.next(Loaded)
         for _ in range(35):
-            await replaced(engine)
-        assert not engine.hopeless and engine.statistics.restarts["killed"] == 35
-        engine.send(Want(task, 1, View()))
+            await replaced(supervisor)
+        assert not supervisor.hopeless and supervisor.statistics.restarts["killed"] == 35
+        supervisor.send(Want(task, 1, View()))
         assert (await ears.next(Frame)).serial == 1
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_renderers_that_are_killed_at_once_are_not_begun_all_the_time(gpu: Renderer) -> None:
-    engine = Engine()
-    engine._shots = 3
-    assert engine._pause_s(0.1) == pytest.approx(1.4) and engine._pause_s(2.0) == 0.0
-    engine._shots = 1000
-    assert engine._pause_s(0.0) == engines.SIEGE_S and engine._pause_s(8.0) == 0.0
+    supervisor = Supervisor()
+    supervisor._shots = 3
+    assert supervisor._pause_s(0.1) == pytest.approx(1.4) and supervisor._pause_s(2.0) == 0.0
+    supervisor._shots = 1000
+    assert supervisor._pause_s(0.0) == supervisors.SIEGE_S and supervisor._pause_s(8.0) == 0.0
 
 
 def test_what_was_asked_while_there_was_none_is_answered(gpu: Renderer) -> None:
     """A want, an edit and a reading fall into the gap, and the renderer after that is killed as it loads."""
 
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = await opened(engine, ears)
-        engine.send(Want(task, 1, View()))
+        task = await opened(supervisor, ears)
+        supervisor.send(Want(task, 1, View()))
         first = await ears.next(Frame)
-        assert engine.process_id is not None
-        os.kill(engine.process_id, signal.SIGKILL)
-        engine.send(Want(task, 2, View()))  # nobody takes it any more
-        while engine.process_id is not None:
+        assert supervisor.process_id is not None
+        os.kill(supervisor.process_id, signal.SIGKILL)
+        supervisor.send(Want(task, 2, View()))  # nobody takes it any more
+        while supervisor.process_id is not None:
             await asyncio.sleep(0)
-        engine.send(Update(task, 2, camera=arrays_of("plain").camera, base=1))
-        engine.send(Want(task, 3, View(), anyway=True))
-        engine.send(Read(task, 1, LINEAR))
+        supervisor.send(Update(task, 2, camera=arrays_of("plain").camera, base=1))
+        supervisor.send(Want(task, 3, View(), anyway=True))
+        supervisor.send(Read(task, 1, LINEAR))
         await ears.next(str)
-        await replaced(engine)
+        await replaced(supervisor)
         answers = [await ears.next(Frame | Image) for _ in range(2)]  # whichever comes first
         assert {type(each): each.serial for each in answers} == {Frame: 3, Image: 1}
         assert first.generation == 1 and all(each.generation == 2 for each in answers if isinstance(each, Frame))
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_killed_between_a_frame_and_the_next_want(gpu: Renderer) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = await opened(engine, ears)
+        task = await opened(supervisor, ears)
         for serial in range(1, 3):
-            engine.send(Want(task, serial, View()))
+            supervisor.send(Want(task, serial, View()))
             assert (await ears.next(Frame)).serial == serial
-            await replaced(engine)
+            await replaced(supervisor)
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_too_large_an_edit_that_meets_a_kill_falls_back_all_the_same(gpu: Renderer) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = await opened(engine, ears)
+        task = await opened(supervisor, ears)
         await ears.next(Loaded)
-        assert engine.process_id is not None
-        os.kill(engine.process_id, signal.SIGKILL)
-        engine.send(Update(task, 2, settings=settings(6000), base=1))
+        assert supervisor.process_id is not None
+        os.kill(supervisor.process_id, signal.SIGKILL)
+        supervisor.send(Update(task, 2, settings=settings(6000), base=1))
         failed = await ears.next(Failed)
         assert (failed.generation, failed.refused, failed.fallback) == (2, True, 1)
-        engine.send(Want(task, 1, View(), anyway=True))
+        supervisor.send(Want(task, 1, View(), anyway=True))
         assert (await ears.next(Frame)).generation == 1
 
-    with_engine(test, memory=64 << 20)
+    with_supervisor(test, memory=64 << 20)
 
 
 def test_a_renderer_that_makes_a_mistake_is_not_one_that_was_killed(gpu: Renderer) -> None:
     """However busy the machine: it ends at once, and with a code of its own."""
 
-    async def test(engine: Engine) -> None:
-        pid = engine.process_id
-        assert engine._process is not None
-        engine._process.link.send("no message")
-        while engine.process_id in (pid, None):
+    async def test(supervisor: Supervisor) -> None:
+        pid = supervisor.process_id
+        assert supervisor._process is not None
+        supervisor._process.link.send("no message")
+        while supervisor.process_id in (pid, None):
             await asyncio.sleep(0.001)
-        assert dict(engine.statistics.restarts) == {"crashed": 1}
+        assert dict(supervisor.statistics.restarts) == {"crashed": 1}
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_work_is_taken_while_it_is_replaced(gpu: Renderer) -> None:
-    async def test(engine: Engine) -> None:
-        assert engine.process_id is not None
-        os.kill(engine.process_id, signal.SIGKILL)
-        while engine.info is not None:
+    async def test(supervisor: Supervisor) -> None:
+        assert supervisor.process_id is not None
+        os.kill(supervisor.process_id, signal.SIGKILL)
+        while supervisor.info is not None:
             await asyncio.sleep(0)
         with pytest.raises(Unavailable):
-            await engine.ready(0)
-        await engine.able(0)
+            await supervisor.ready(0)
+        await supervisor.able(0)
         ears = Ears()
-        await opened(engine, ears, samples=4)
+        await opened(supervisor, ears, samples=4)
         assert (await ears.next(Done)).progress.samples == 4
         with pytest.raises(Unavailable):
-            await Engine().able(0)
+            await Supervisor().able(0)
 
-    with_engine(test)
+    with_supervisor(test)
 
 
 def test_it_starts_as_fast_as_others_and_steps_back_then(gpu: Renderer) -> None:
     async def test() -> None:
-        engine = Engine(Options())
-        engine.start()
+        supervisor = Supervisor(Options())
+        supervisor.start()
         own = os.getpriority(os.PRIO_PROCESS, 0)
-        assert niceness(engine.process_id) == {own}
-        await engine.ready(60)
-        assert min(niceness(engine.process_id)) >= min(own + 10, 19)
-        await engine.close()
+        assert niceness(supervisor.process_id) == {own}
+        await supervisor.ready(60)
+        assert min(niceness(supervisor.process_id)) >= min(own + 10, 19)
+        await supervisor.close()
 
     asyncio.run(test())

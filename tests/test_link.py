@@ -11,21 +11,21 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.rendering import link
-from service.rendering.messages import Frame, Progress, StopRule, Update, Want
-from service.rendering.messages import View as PictureView
+from service.rendering.ipc import channel
+from service.rendering.ipc.messages import Frame, Progress, StopRule, Update, Want
+from service.rendering.ipc.messages import View as PictureView
 
 
 @pytest.fixture
 def ends() -> Iterator[tuple[socket.socket, socket.socket]]:
-    ours, theirs = link.pair()
+    ours, theirs = channel.pair()
     with ours, theirs:
         yield ours, theirs
 
 
 def through(ends: tuple[socket.socket, socket.socket], message: Any) -> Any:
-    link.send(ends[0], message)
-    return link.receive(ends[1], wait=True)
+    channel.send(ends[0], message)
+    return channel.receive(ends[1], wait=True)
 
 
 def open_descriptors() -> int:
@@ -34,7 +34,7 @@ def open_descriptors() -> int:
 
 def test_small_message_needs_no_memory(ends: tuple[socket.socket, socket.socket]) -> None:
     want = Want(3, 7, PictureView(exposure=1.5), anyway=True)
-    assert link.encode(want)[1] == ()
+    assert channel.encode(want)[1] == ()
     assert through(ends, want) == want
 
 
@@ -81,23 +81,23 @@ def test_descriptors_are_given_back(ends: tuple[socket.socket, socket.socket]) -
 
 
 def test_the_end_of_the_other_end_is_heard(ends: tuple[socket.socket, socket.socket]) -> None:
-    link.send(ends[0], "last words")
+    channel.send(ends[0], "last words")
     with pytest.raises(BlockingIOError):
-        link.receive(ends[0])
+        channel.receive(ends[0])
     ends[0].close()
-    assert link.receive(ends[1]) == "last words"
-    with pytest.raises(link.Closed):
-        link.receive(ends[1], wait=True)
-    with pytest.raises(link.Closed):
-        link.send(ends[1], np.zeros(3))
+    assert channel.receive(ends[1]) == "last words"
+    with pytest.raises(channel.Closed):
+        channel.receive(ends[1], wait=True)
+    with pytest.raises(channel.Closed):
+        channel.send(ends[1], np.zeros(3))
 
 
 def test_the_event_loop_sends_more_than_the_socket_holds() -> None:
     """Nobody listens at first: everything waits in line, and arrives in order."""
 
     async def exchange() -> list[int]:
-        ours, theirs = link.pair()
-        sender = link.Link(ours, lambda message: None, lambda: None)
+        ours, theirs = channel.pair()
+        sender = channel.Channel(ours, lambda message: None, lambda: None)
         for number in range(2000):
             sender.send((number, b"." * 1000))
         got: list[int] = []
@@ -108,7 +108,7 @@ def test_the_event_loop_sends_more_than_the_socket_holds() -> None:
             if len(got) == 2000:
                 done.set()
 
-        receiver = link.Link(theirs, take, lambda: None)
+        receiver = channel.Channel(theirs, take, lambda: None)
         await asyncio.wait_for(done.wait(), 10)
         sender.close()
         receiver.close()
@@ -119,9 +119,9 @@ def test_the_event_loop_sends_more_than_the_socket_holds() -> None:
 
 def test_the_event_loop_hears_of_the_other_end_once() -> None:
     async def exchange() -> int:
-        ours, theirs = link.pair()
+        ours, theirs = channel.pair()
         lost = []
-        alone = link.Link(ours, lambda message: None, lambda: lost.append(True))
+        alone = channel.Channel(ours, lambda message: None, lambda: lost.append(True))
         theirs.close()
         alone.send("nobody hears this")
         await asyncio.sleep(0.05)

@@ -10,7 +10,7 @@ import pytest
 
 from service.config import Config
 from service.problems import InvalidDocument
-from service.rendering import protocol
+from service.rendering.streams import protocol
 from service.scene import merge_patch, parse_scene
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Parsed

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from service.rendering.messages import StopRule
+from service.rendering.ipc.messages import StopRule
 from service.rendering.worker.pace import Pace
 
 

@@ -15,9 +15,9 @@ import pytest
 
 from service.config import MIB, Config
 from service.problems import InvalidDocument, MalformedJson, ServiceError, TooLarge
-from service.rendering import parser_pool
-from service.rendering.parser_pool import ParserPool
-from service.rendering.parsing import Parser, unfolded
+from service.rendering.requests import parser_pool
+from service.rendering.requests.parser_pool import ParserPool
+from service.rendering.requests.request_parser import RequestParser, unfolded
 from service.scene import MeshShape, load_json
 from service.scene.text import most_bytes, weigh
 from tests.serving import SCENE, SMALL
@@ -51,7 +51,7 @@ def children() -> list[int]:
 
 def test_a_request_is_understood_as_in_the_service(pool: ParserPool) -> None:
     body = written(REQUEST)
-    found, expected = pool.parse("request", body), Parser(config()).request(body)
+    found, expected = pool.parse("request", body), RequestParser(config()).request(body)
     assert found.scene == expected.scene and found.settings == expected.settings
     assert found.document == expected.document and json.loads(unfolded(found.document)) == REQUEST["scene"]
     mesh = found.scene.shapes[-1]
@@ -76,7 +76,7 @@ def test_mistakes_are_told_as_in_the_service(
     with pytest.raises(kind, match=said) as beside:
         pool.parse("request", bytearray(text))
     with pytest.raises(kind) as within:
-        Parser(config()).request(bytearray(text))
+        RequestParser(config()).request(bytearray(text))
     assert str(beside.value) == str(within.value)
     if isinstance(beside.value, InvalidDocument) and isinstance(within.value, InvalidDocument):
         assert beside.value.errors == within.value.errors

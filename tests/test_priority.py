@@ -34,7 +34,7 @@ print(*found, os.getpriority(os.PRIO_PROCESS, 0))
 """
 PACKS = """
 import asyncio, os
-from service.rendering.threads import packing
+from service.rendering.executors import packing
 
 os.nice(10)
 print(asyncio.run(packing(lambda: os.getpriority(os.PRIO_PROCESS, 0))))

@@ -10,7 +10,7 @@ from typing import Any
 import pytest
 
 from service.problems import Gone, NotFound, TooManyRequests, Unavailable
-from service.rendering.renders import Bounds, Renders
+from service.rendering.jobs.queue import QueueLimits, RenderQueue
 
 
 class Job:
@@ -38,9 +38,9 @@ async def ended(renders: Any, *jobs: Job) -> None:
         await asyncio.sleep(0.01)
 
 
-def keeping(bounds: Bounds, scenario: Callable[[Any], Awaitable[None]]) -> None:
+def keeping(bounds: QueueLimits, scenario: Callable[[Any], Awaitable[None]]) -> None:
     async def run() -> None:
-        await scenario(Renders(bounds))
+        await scenario(RenderQueue(bounds))
 
     asyncio.run(run())
 
@@ -54,7 +54,7 @@ def test_the_oldest_of_an_owner_make_room() -> None:
         with pytest.raises(NotFound):
             renders.get("a0", "b")
 
-    keeping(Bounds(kept=2), scenario)
+    keeping(QueueLimits(kept=2), scenario)
 
 
 def test_who_holds_most_makes_room() -> None:
@@ -65,7 +65,7 @@ def test_who_holds_most_makes_room() -> None:
         assert renders.get("small", "b") is small and renders.get("a1", "a") is big[1]
         assert big[0].released and not small.released
 
-    keeping(Bounds(kept_bytes=100), scenario)
+    keeping(QueueLimits(kept_bytes=100), scenario)
 
 
 def test_the_newest_stays_however_large() -> None:
@@ -73,7 +73,7 @@ def test_the_newest_stays_however_large() -> None:
         await ended(renders, Job("a", size=1000))
         assert renders.get("a").id == "a"
 
-    keeping(Bounds(kept_bytes=10), scenario)
+    keeping(QueueLimits(kept_bytes=10), scenario)
 
 
 def test_time_makes_an_end() -> None:
@@ -86,7 +86,7 @@ def test_time_makes_an_end() -> None:
             renders.get("first")
         assert first.released and renders.kept == 0
 
-    keeping(Bounds(kept_s=0.05), scenario)
+    keeping(QueueLimits(kept_s=0.05), scenario)
 
 
 def test_others_do_not_hear_of_it() -> None:
@@ -98,7 +98,7 @@ def test_others_do_not_hear_of_it() -> None:
             assert renders.all(owner) == []
         renders.close()
 
-    keeping(Bounds(), scenario)
+    keeping(QueueLimits(), scenario)
 
 
 def test_there_is_an_end_to_the_queue() -> None:
@@ -116,4 +116,4 @@ def test_there_is_an_end_to_the_queue() -> None:
         renders.submit(Job("more", "a"))
         renders.close()
 
-    keeping(Bounds(running=1, waiting=2, each=2), scenario)
+    keeping(QueueLimits(running=1, waiting=2, each=2), scenario)

@@ -12,13 +12,13 @@ from websockets.exceptions import ConnectionClosed
 from service.assets import Assets
 from service.config import Config
 from service.problems import NotFound, TooManyRequests
-from service.rendering import sessions
-from service.rendering.engine import Engine
-from service.rendering.reading import Reader
-from service.rendering.sessions import Sessions
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.streams import sessions
+from service.rendering.streams.sessions import Sessions
+from service.rendering.supervisor.supervisor import Supervisor
 from tests.serving import ENDLESS, SMALL, Client, Picture, Server
 
-READER = Reader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
+READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
 
 
 def entered(server: Server, session: str | None = None) -> tuple[Client, str]:
@@ -103,9 +103,9 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sessions, "KEPT_S", 0.05)
 
     async def test() -> None:
-        engine: Any = Engine()
-        engine.open = lambda listener: 1
-        kept = Sessions(engine, READER, most=2)
+        supervisor: Any = Supervisor()
+        supervisor.open = lambda listener: 1
+        kept = Sessions(supervisor, READER, most=2)
         one, two = kept.enter(None), kept.enter(None)
         assert one.id != two.id and kept.attended == 2
         with pytest.raises(TooManyRequests):
@@ -138,9 +138,9 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def test_two_variants_count_as_one_client() -> None:
     async def test() -> None:
-        engine: Any = Engine()
-        engine.open = lambda listener: 1
-        kept = Sessions(engine, READER, most=1)
+        supervisor: Any = Supervisor()
+        supervisor.open = lambda listener: 1
+        kept = Sessions(supervisor, READER, most=1)
         first = kept.enter(None)
         second = kept.enter(None, first.id)
         assert kept.attended == 1

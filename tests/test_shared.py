@@ -8,7 +8,7 @@ import os
 import numpy as np
 
 from service import shared
-from service.rendering import link
+from service.rendering.ipc import channel
 from service.shared import LEAST, Shelf, whereabouts
 
 
@@ -42,14 +42,14 @@ def test_shelved_arrays_are_sent_without_a_copy() -> None:
     before = descriptors()
     large, small = shelved()
     other = np.arange(5)
-    ours, theirs = link.pair()
+    ours, theirs = channel.pair()
     with ours, theirs:
-        encoded = link.encode([large, other, small, other[:0]])
+        encoded = channel.encode([large, other, small, other[:0]])
         assert sorted(os.fstat(each).st_size for each in encoded[1]) == [other.nbytes, LEAST + 128]
-        link.discard(link.another(encoded))
-        link.discard(encoded)
-        link.send(ours, [large, other, small, other[:0]])
-        received = link.receive(theirs, wait=True)
+        channel.discard(channel.another(encoded))
+        channel.discard(encoded)
+        channel.send(ours, [large, other, small, other[:0]])
+        received = channel.receive(theirs, wait=True)
     assert [a.tolist() for a in received[1:]] == [other.tolist(), small.tolist(), []]
     large[7] = 99  # seen on the other side: it is the same memory
     assert received[0][7] == 99 and not received[0].flags.writeable
@@ -62,11 +62,11 @@ def test_shelved_arrays_are_sent_without_a_copy() -> None:
 
 def test_more_blocks_than_a_message_takes() -> None:
     before = descriptors()
-    arrays = [shelved()[0] for _ in range(2 * link.MOST)]
-    ours, theirs = link.pair()
+    arrays = [shelved()[0] for _ in range(2 * channel.MOST)]
+    ours, theirs = channel.pair()
     with ours, theirs:
-        link.send(ours, arrays)
-        received = link.receive(theirs, wait=True)
+        channel.send(ours, arrays)
+        received = channel.receive(theirs, wait=True)
     assert all(np.array_equal(a, b) for a, b in zip(arrays, received, strict=True))
     del arrays, received
     assert descriptors() == before

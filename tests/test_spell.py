@@ -13,7 +13,7 @@ from collections.abc import Iterator
 import pytest
 
 from service import spell
-from service.rendering.process import Options, Process
+from service.rendering.supervisor.process import Options, Process
 from service.spell import LEAST, Spell, had_s, ran
 
 SECOND = 10**9

@@ -16,13 +16,13 @@ from gpu.analysis.kernel_cost import full_kernel
 from gpu.kernels import features
 from gpu.precompile import fallback
 from service.pack import pack
-from service.rendering.engine import Engine
-from service.rendering.messages import Frame, Loaded, Pause, StopRule, Update, View, Want
+from service.rendering.ipc.messages import Frame, Loaded, Pause, StopRule, Update, View, Want
+from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.compiler import records
 from service.scene import parse_scene
 from tests.documents import Shelf
-from tests.engines import with_engine
 from tests.serving import SCENE
+from tests.supervisors import with_supervisor
 from tests.test_compiling import Ears
 from tests.test_flags import IMAGES, SCENES
 
@@ -89,11 +89,11 @@ def test_what_an_edit_tells_it() -> None:
     assert fallback.edits(arrays, arrays_of(SCENE)) is None
 
 
-async def shown(engine: Engine, ears: Ears, task: int, generation: int) -> list[Frame | Loaded]:
+async def shown(supervisor: Supervisor, ears: Ears, task: int, generation: int) -> list[Frame | Loaded]:
     """What is told of a generation until its picture is there in full."""
     told: list[Frame | Loaded] = []
     serial = 100 * generation
-    engine.send(Want(task, serial, View(encoding="linear")))
+    supervisor.send(Want(task, serial, View(encoding="linear")))
     while True:
         message = await ears.next(task, Frame, Loaded)
         if message.generation != generation:
@@ -103,7 +103,7 @@ async def shown(engine: Engine, ears: Ears, task: int, generation: int) -> list[
             if message.scale == 1.0:
                 return told
             serial += 1
-            engine.send(Want(task, serial, View(encoding="linear")))
+            supervisor.send(Want(task, serial, View(encoding="linear")))
 
 
 def test_a_stream_sees_at_once_what_is_compiled_for(
@@ -115,18 +115,18 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
     assert wanted is not None
     record = records() / wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
 
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays, SIZE, StopRule(64), interactive=True))
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(64), interactive=True))
         await ears.next(task, Loaded)
         until = time.monotonic() + BUILT_S
         while not record.exists():
             assert time.monotonic() < until
             await asyncio.sleep(0.1)
 
-        engine.send(Update(task, 2, settings={**SIZE, "clamp": 5.0}, base=1))
-        told = await shown(engine, ears, task, 2)
+        supervisor.send(Update(task, 2, settings={**SIZE, "clamp": 5.0}, base=1))
+        told = await shown(supervisor, ears, task, 2)
         loaded = next(i for i, message in enumerate(told) if isinstance(message, Loaded))
         before, after = told[:loaded], told[loaded + 1 :]
         frames = [message for message in told if isinstance(message, Frame)]
@@ -137,11 +137,11 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         first, last = frames[0].pixels, frames[-1].pixels
         assert first.mean((0, 1)) == pytest.approx(last.mean((0, 1)), rel=0.25)
 
-        engine.send(Pause(task))
+        supervisor.send(Pause(task))
         open_lens = replace(arrays.camera, aperture_radius=0.1)
-        engine.send(Update(task, 3, camera=open_lens, base=2))
-        (only,) = await shown(engine, ears, task, 3)
+        supervisor.send(Update(task, 3, camera=open_lens, base=2))
+        (only,) = await shown(supervisor, ears, task, 3)
         assert isinstance(only, Frame) and not only.provisional, "at rest one first look is all it wants"
-        assert not engine.statistics.restarts
+        assert not supervisor.statistics.restarts
 
-    with_engine(test)
+    with_supervisor(test)

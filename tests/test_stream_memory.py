@@ -13,27 +13,27 @@ from service.assets import Assets
 from service.config import Config
 from service.pack import CacheBudget, PackCache
 from service.problems import InvalidDocument, TooLarge, Unavailable
-from service.rendering import live, protocol
-from service.rendering.engine import Engine
-from service.rendering.live import Live
-from service.rendering.reading import Reader
-from service.rendering.stream import WAITING_CHARACTERS, Stream
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.streams import edit_session, protocol
+from service.rendering.streams.edit_session import EditSession
+from service.rendering.streams.stream import WAITING_CHARACTERS, Stream
+from service.rendering.supervisor.supervisor import Supervisor
 from tests.serving import SCENE, SMALL
 
 KIB = 1 << 10
 GREY = {"type": "diffuse", "albedo": 0.5}
 
 
-def reader(**limits: Any) -> Reader:
-    return Reader(Config(_env_file=None, **limits), cast(Assets, None))  # type: ignore[call-arg]
+def reader(**limits: Any) -> RequestReader:
+    return RequestReader(Config(_env_file=None, **limits), cast(Assets, None))  # type: ignore[call-arg]
 
 
-def say(client: Live, generation: int, kind: str = "update", **message: Any) -> None:
+def say(client: EditSession, generation: int, kind: str = "update", **message: Any) -> None:
     client.take(protocol.parse(json.dumps({"type": kind, "generation": generation, **message})))  # type: ignore[arg-type]
 
 
-def started(of: Reader) -> Live:
-    client = Live(of, 1)
+def started(of: RequestReader) -> EditSession:
+    client = EditSession(of, 1)
     say(client, 1, "start", scene=SCENE, settings=SMALL)
     return client
 
@@ -68,7 +68,7 @@ def test_all_scenes_together_have_a_bound() -> None:
     clients = [started(of)]
     with pytest.raises(Unavailable, match="SUNBOX_MAX_STREAM_MEMORY") as refused:
         for _ in range(200):
-            clients.append(Live(of, 1))
+            clients.append(EditSession(of, 1))
             say(clients[-1], 1, "start", scene=SCENE, settings=SMALL)
     assert refused.value.retry_after
     assert len(clients) > 10
@@ -84,7 +84,7 @@ def test_versions_that_nobody_has_seen_are_not_all_kept() -> None:
         say(client, generation, scene={"camera": {"vfov": generation}})
         client.settle()
     kept = sorted(client._good)
-    assert len(kept) == live.MOST_GOOD and kept[0] == 1 and kept[-1] == 49
+    assert len(kept) == edit_session.MOST_GOOD and kept[0] == 1 and kept[-1] == 49
     assert client.failed(49, 1) is None and client.version is not None and client.version.generation == 1
 
 
@@ -126,7 +126,7 @@ def test_large_messages_wait_in_the_network() -> None:
         def send(self, message: object) -> None: ...
 
     async def run() -> None:
-        stream = Stream(cast(Engine, Quiet()), reader())
+        stream = Stream(cast(Supervisor, Quiet()), reader())
         large = json.dumps({"type": "update", "generation": 1, "scene": {"title": "x" * WAITING_CHARACTERS}})
         await asyncio.wait_for(stream.hear('{"type": "ping"}'), 10)
         hearing = asyncio.create_task(stream.hear(large))

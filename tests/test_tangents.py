@@ -14,7 +14,7 @@ from service.assets import AssetStore, MeshData
 from service.pack import pack
 from service.pack.geometry.tangents import codes
 from service.pack.geometry.vertex_normals import decode
-from service.rendering.change import change
+from service.rendering.streams.scene_diff import scene_diff
 from service.scene import parse_scene
 from tests.documents import Shelf, matrix_of
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
@@ -298,9 +298,9 @@ def test_edits_know_of_them() -> None:
         return parse_scene(document([shape], {"m": {**BRUSHED, **numbers}}))
 
     sphere = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
-    assert change(scene(TRIANGLES, anisotropic=0), scene(TRIANGLES, anisotropic=0.1)).whole
-    assert not change(scene(TRIANGLES, anisotropic=0.2), scene(TRIANGLES, anisotropic=0.1)).whole
-    assert not change(scene(sphere, anisotropic=0), scene(sphere, anisotropic=0.1)).whole
+    assert scene_diff(scene(TRIANGLES, anisotropic=0), scene(TRIANGLES, anisotropic=0.1)).whole
+    assert not scene_diff(scene(TRIANGLES, anisotropic=0.2), scene(TRIANGLES, anisotropic=0.1)).whole
+    assert not scene_diff(scene(sphere, anisotropic=0), scene(sphere, anisotropic=0.1)).whole
 
 
 @pytest.fixture(scope="module")

@@ -17,7 +17,7 @@ from gpu.layout import texture_records
 from gpu.layout.bindings import Slot
 from service.pack import pack, pack_materials, repacked
 from service.problems import InvalidDocument
-from service.rendering.change import Change, change
+from service.rendering.streams.scene_diff import SceneDiff, scene_diff
 from service.scene import parse_scene
 from tests.documents import Few
 from tests.probing import PROBES
@@ -363,7 +363,7 @@ def test_an_edit_of_a_factor_moves_numbers_only(gpu: Renderer) -> None:
     shelf = Images(**{"sha256:rgb": IMAGES["rgb"]})
     scenes = [parse_scene(scene_of(tone, {"emission": 0.1, "albedo": {"texture": "t", "factor": f}},
                                    environment={"type": "constant", "radiance": 1})) for f in (1, 0.25)]  # fmt: skip
-    assert change(*scenes) == Change(materials=True)
+    assert scene_diff(*scenes) == SceneDiff(materials=True)
     packs = [pack(scene, shelf).arrays for scene in scenes]
     loaded = [gpu.load(arrays) for arrays in packs]
     assert loaded[0]._images is loaded[1]._images, "the images stand on the device once"
@@ -377,7 +377,7 @@ def test_an_edit_of_a_factor_moves_numbers_only(gpu: Renderer) -> None:
         scene.release()
     assert np.array_equal(*images) and images[0].std() > 0.01
     other = parse_scene(scene_of({"t": {"asset": "sha256:rgb", "wrap": "clamp"}}, {"albedo": {"texture": "t"}}))
-    assert change(scenes[0], other).whole
+    assert scene_diff(scenes[0], other).whole
 
 
 def test_a_server_bounds_the_texels_of_a_scene() -> None:

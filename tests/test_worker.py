@@ -16,8 +16,7 @@ import pytest
 from gpu import Renderer, RenderSettings
 from service.pack import pack
 from service.problems import Unavailable
-from service.rendering.engine import Engine
-from service.rendering.messages import (
+from service.rendering.ipc.messages import (
     Done,
     Failed,
     Frame,
@@ -34,10 +33,11 @@ from service.rendering.messages import (
     View,
     Want,
 )
-from service.rendering.process import Options
-from service.rendering.scheduler import FIRST_FRAME_LEAD_S, Scheduler
+from service.rendering.supervisor.process import Options
+from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.ladder import FULL_S, NEXT_S, Ladder
 from service.rendering.worker.loop import coalesced
+from service.rendering.worker.scheduler import FIRST_FRAME_LEAD_S, Scheduler
 from service.rendering.worker.stopping import late, reached
 from service.scene import parse_scene
 from tests.documents import Shelf
@@ -196,18 +196,18 @@ def arrays(gpu: Renderer) -> Any:
 
 
 @pytest.fixture(scope="module")
-def rendering(gpu: Renderer) -> Iterator[Callable[[Callable[[Engine], Awaitable[None]]], None]]:
+def rendering(gpu: Renderer) -> Iterator[Callable[[Callable[[Supervisor], Awaitable[None]]], None]]:
     """Runs a test with a renderer's process that all tests of this file share."""
     with asyncio.Runner() as runner:
-        engine = Engine()
+        supervisor = Supervisor()
 
         async def start() -> None:
-            engine.start()
-            await engine.ready(20)
+            supervisor.start()
+            await supervisor.ready(20)
 
         runner.run(start())
-        yield lambda test: runner.run(test(engine))  # type: ignore[arg-type]
-        runner.run(engine.close())
+        yield lambda test: runner.run(test(supervisor))  # type: ignore[arg-type]
+        runner.run(supervisor.close())
 
 
 def settings(side: int = 32, **others: Any) -> dict[str, Any]:
@@ -215,39 +215,39 @@ def settings(side: int = 32, **others: Any) -> dict[str, Any]:
 
 
 def test_load_trace_done_read(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(20)))
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(), StopRule(20)))
         loaded = await ears.next(Loaded)
         assert loaded.generation == 1 and loaded.setup_s > 0 and loaded.warnings == []
         done = await ears.next(Done)
         assert done.reason == "max_samples" and done.progress.samples == 20 and done.progress.noise > 0
-        engine.send(Read(task, 3, LINEAR))
-        engine.send(Read(task, 4, View(encoding="f4")))
+        supervisor.send(Read(task, 3, LINEAR))
+        supervisor.send(Read(task, 4, View(encoding="f4")))
         linear, shown = await ears.next(Image), await ears.next(Image)
         assert (linear.serial, shown.serial) == (3, 4)
         assert linear.pixels.shape == shown.pixels.shape == (32, 32, 4) and 0 <= shown.pixels.min() <= 1
-        engine.drop(task)
+        supervisor.drop(task)
 
     rendering(test)
 
 
 def test_pauses_and_other_tasks_change_no_pixel(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         async def picture(disturbed: bool) -> np.ndarray:
             ears = Ears()
-            task = engine.open(ears)
-            await engine.send_scene(Update(task, 1, arrays, settings(128), StopRule(24)))
+            task = supervisor.open(ears)
+            await supervisor.send_scene(Update(task, 1, arrays, settings(128), StopRule(24)))
             for _ in range(3 if disturbed else 0):
                 await asyncio.sleep(0.03)
-                engine.send(Pause(task))
+                supervisor.send(Pause(task))
                 await asyncio.sleep(0.02)
-                engine.send(Resume(task))
+                supervisor.send(Resume(task))
             await ears.next(Done)
-            engine.send(Read(task, 1, LINEAR))
+            supervisor.send(Read(task, 1, LINEAR))
             pixels = (await ears.next(Image)).pixels
-            engine.drop(task)
+            supervisor.drop(task)
             return np.array(pixels)
 
         alone = await picture(disturbed=False)
@@ -258,75 +258,75 @@ def test_pauses_and_other_tasks_change_no_pixel(rendering: Any, arrays: Any) -> 
 
 
 def test_a_want_is_answered_once_and_only_by_something_new(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(4), interactive=True))
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(), StopRule(4), interactive=True))
         await ears.next(Done)
-        engine.send(Want(task, 1, View()))
+        supervisor.send(Want(task, 1, View()))
         frame = await ears.next(Frame)
         assert frame.serial == 1 and frame.last and frame.progress.samples == 4 and frame.pixels.dtype == np.uint8
-        engine.send(Want(task, 2, View()))
+        supervisor.send(Want(task, 2, View()))
         with pytest.raises(TimeoutError):
             await asyncio.wait_for(ears.next(Frame), 0.2)
-        engine.send(Want(task, 3, View(exposure=1.0), anyway=True))
+        supervisor.send(Want(task, 3, View(exposure=1.0), anyway=True))
         assert (await ears.next(Frame)).serial == 3
-        engine.drop(task)
+        supervisor.drop(task)
 
     rendering(test)
 
 
 def test_a_failure_is_the_tasks_own(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         good, bad = Ears(), Ears()
-        one, other = engine.open(good), engine.open(bad)
-        await engine.send_scene(Update(one, 1, arrays, settings(), ENDLESS))
-        await engine.send_scene(Update(other, 1, arrays, settings(filter="sinc"), ENDLESS))
+        one, other = supervisor.open(good), supervisor.open(bad)
+        await supervisor.send_scene(Update(one, 1, arrays, settings(), ENDLESS))
+        await supervisor.send_scene(Update(other, 1, arrays, settings(filter="sinc"), ENDLESS))
         failed = await bad.next(Failed)
         assert failed.generation == 1 and failed.detail and failed.serial is None
         before = (await good.next(Progressed)).progress.samples
         while (await good.next(Progressed)).progress.samples <= before:  # a pass takes longer than a report
             pass
-        engine.send(Update(other, 2, materials=arrays.materials))  # in vain, and harmless
-        await engine.send_scene(Update(other, 3, arrays, settings(), StopRule(2)))
+        supervisor.send(Update(other, 2, materials=arrays.materials))  # in vain, and harmless
+        await supervisor.send_scene(Update(other, 3, arrays, settings(), StopRule(2)))
         assert (await bad.next(Done)).generation == 3
-        engine.send(Read(other, 9, View(aov="beauty")))
+        supervisor.send(Read(other, 9, View(aov="beauty")))
         assert (await bad.next(Failed)).serial == 9
-        engine.send(Read(other, 10, LINEAR))
+        supervisor.send(Read(other, 10, LINEAR))
         assert (await bad.next(Image)).pixels is not None
-        engine.drop(one)
-        engine.drop(other)
+        supervisor.drop(one)
+        supervisor.drop(other)
 
     rendering(test)
 
 
 def test_an_image_before_the_first_sample_is_none(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays, settings(2048, max_bounces=64), ENDLESS))
-        engine.send(Read(task, 1, LINEAR))
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(2048, max_bounces=64), ENDLESS))
+        supervisor.send(Read(task, 1, LINEAR))
         assert (await ears.next(Image)).pixels is None
         began = time.monotonic()
-        engine.send(Stop(task))
+        supervisor.send(Stop(task))
         done = await ears.next(Done)
         assert done.reason == "stopped" and time.monotonic() - began < 10
-        engine.drop(task)
+        supervisor.drop(task)
 
     rendering(test)
 
 
 def test_idle_costs_nothing(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
+    async def test(supervisor: Supervisor) -> None:
         ears = Ears()
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(4)))
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(), StopRule(4)))
         await ears.next(Done)
-        assert engine.process_id is not None
-        before = cpu_ticks(engine.process_id)
+        assert supervisor.process_id is not None
+        before = cpu_ticks(supervisor.process_id)
         await asyncio.sleep(0.4)
-        assert cpu_ticks(engine.process_id) - before <= 1
-        engine.drop(task)
+        assert cpu_ticks(supervisor.process_id) - before <= 1
+        supervisor.drop(task)
 
     rendering(test)
 
@@ -337,26 +337,26 @@ def cpu_ticks(pid: int) -> int:
 
 
 def test_what_was_used_is_told(rendering: Any, arrays: Any) -> None:
-    async def test(engine: Engine) -> None:
-        ears, before = Ears(), dict(engine.statistics.gpu_s)
-        samples, loads = engine.statistics.samples, engine.statistics.setup_s.count
-        task = engine.open(ears, "render")
-        await engine.send_scene(Update(task, 1, arrays, settings(), StopRule(20)))
+    async def test(supervisor: Supervisor) -> None:
+        ears, before = Ears(), dict(supervisor.statistics.gpu_s)
+        samples, loads = supervisor.statistics.samples, supervisor.statistics.setup_s.count
+        task = supervisor.open(ears, "render")
+        await supervisor.send_scene(Update(task, 1, arrays, settings(), StopRule(20)))
         await ears.next(Done)
         await asyncio.sleep(0.1)
-        used_s = engine.statistics.gpu_s["render"] - before.get("render", 0.0)
-        assert 0 < used_s < 20 and engine.statistics.gpu_s_of[task] == pytest.approx(used_s)
-        assert engine.statistics.samples - samples == 20 * 32 * 32
-        assert engine.statistics.setup_s.count == loads + 1 and engine.statistics.tasks >= 1
-        engine.drop(task)
-        assert task not in engine.statistics.gpu_s_of
+        used_s = supervisor.statistics.gpu_s["render"] - before.get("render", 0.0)
+        assert 0 < used_s < 20 and supervisor.statistics.gpu_s_of[task] == pytest.approx(used_s)
+        assert supervisor.statistics.samples - samples == 20 * 32 * 32
+        assert supervisor.statistics.setup_s.count == loads + 1 and supervisor.statistics.tasks >= 1
+        supervisor.drop(task)
+        assert task not in supervisor.statistics.gpu_s_of
 
     rendering(test)
 
 
 def test_it_is_polite(rendering: Any) -> None:
-    async def test(engine: Engine) -> None:
-        nice = Path(f"/proc/{engine.process_id}/stat").read_text().rsplit(")", 1)[1].split()[16]
+    async def test(supervisor: Supervisor) -> None:
+        nice = Path(f"/proc/{supervisor.process_id}/stat").read_text().rsplit(")", 1)[1].split()[16]
         assert int(nice) >= 10
 
     rendering(test)
@@ -364,28 +364,28 @@ def test_it_is_polite(rendering: Any) -> None:
 
 def test_no_renderer_is_told_after_three_tries(gpu: Renderer) -> None:
     async def test() -> None:
-        engine = Engine(Options(device=99))
-        engine.start()
+        supervisor = Supervisor(Options(device=99))
+        supervisor.start()
         with pytest.raises(Unavailable) as refused:
-            await engine.ready(300)  # three starts one after the other, however busy the machine
+            await supervisor.ready(300)  # three starts one after the other, however busy the machine
         assert refused.value.detail and "starting" not in refused.value.detail
         with pytest.raises(Unavailable):
-            engine.open(Ears())
-        await engine.close()
+            supervisor.open(Ears())
+        await supervisor.close()
 
     asyncio.run(test())
 
 
 def test_it_ends_with_its_link(gpu: Renderer, arrays: Any) -> None:
     async def test() -> None:
-        engine, ears = Engine(), Ears()
-        engine.start()
-        await engine.ready(20)
-        task = engine.open(ears)
-        await engine.send_scene(Update(task, 1, arrays, settings(512), ENDLESS))
+        supervisor, ears = Supervisor(), Ears()
+        supervisor.start()
+        await supervisor.ready(20)
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(512), ENDLESS))
         await ears.next(Loaded)
-        pid, began = engine.process_id, time.monotonic()
-        await engine.close()
+        pid, began = supervisor.process_id, time.monotonic()
+        await supervisor.close()
         assert time.monotonic() - began < 10 and not Path(f"/proc/{pid}").exists()
         assert await ears.next(str)
 

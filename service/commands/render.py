@@ -29,7 +29,7 @@ from service.commands.documents import (
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
     from service.recipe import PictureView
-    from service.rendering.messages import Encoding
+    from service.rendering.ipc.messages import Encoding
 
 FORMATS = ("png", "exr", "hdr", "npy")
 REPEATABLE = ("png", "exr")  # carry in their metadata what they were made from
@@ -142,7 +142,7 @@ def _choose(option: str, value: str, known: tuple[str, ...]) -> None:
 
 def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, str]) -> bytes:
     from service import images, recipe
-    from service.rendering.messages import View
+    from service.rendering.ipc.messages import View
 
     view, made_from = output.view, None
     if output.format in REPEATABLE:

@@ -14,12 +14,12 @@ from gpu import GpuError
 from service.commands import Failed
 from service.commands.progress import ProgressLine
 from service.quality import forecast
-from service.rendering import messages
-from service.rendering.messages import (
-    Appraised,
+from service.rendering.ipc import messages
+from service.rendering.ipc.messages import (
     Done,
     FromRenderer,
     Image,
+    KernelMeasured,
     Loaded,
     Progress,
     Progressed,
@@ -38,7 +38,7 @@ if TYPE_CHECKING:
     from service.quality import ResolvedSettings
 
 NUMBER = 1  # of the only task
-UNMEASURED = Appraised(NUMBER, "Not measured.")
+UNMEASURED = KernelMeasured(NUMBER, "Not measured.")
 SIGNAL_S = 0.1  # how long a signal may go unnoticed while the denoiser works
 
 
@@ -137,7 +137,7 @@ class Tracing:
     def _hear(self, message: FromRenderer) -> None:
         if isinstance(message, Image):
             self._pixels, self._answered = message.pixels, True
-        elif isinstance(message, Appraised):
+        elif isinstance(message, KernelMeasured):
             self._appraised = message
         elif isinstance(message, Progressed):
             if self._line.due():

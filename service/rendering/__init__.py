@@ -1,1 +1,12 @@
-"""What is wanted of the renderer, how far it is, and the process that owns the GPU."""
+"""What is wanted of the renderer, how far it is, and the process that owns the GPU.
+
+requests     from what a caller wrote to what the renderer takes
+jobs         renders asked for over REST
+streams      scenes that are edited while they are watched
+supervisor   the renderer's process, kept alive
+ipc          what both processes say to each other
+worker       the renderer's process itself: the only room here that imports `gpu`
+executors    the threads of the server's slow work
+first_frame  what the first client would have to wait for, done before it comes
+priority     niceness of threads and processes
+"""

@@ -17,7 +17,7 @@ from service import presets
 from service.assets import AssetInfo
 from service.assets.scene_import import Imported
 from service.downloads import FileAnswer
-from service.rendering.threads import storing
+from service.rendering.executors import storing
 from service.routes import answers
 from service.routes.house import house
 from service.scene.text import dump_json

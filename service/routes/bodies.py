@@ -11,9 +11,9 @@ from starlette.requests import Request
 
 from service.config import Config
 from service.problems import TooLarge, Unavailable, UnsupportedMedia
-from service.rendering.parser_pool import ParserPool
-from service.rendering.parsing import PARSERS, Kind
-from service.rendering.threads import parsing, waiting_for_parsers
+from service.rendering.executors import parsing, waiting_for_parsers
+from service.rendering.requests.parser_pool import ParserPool
+from service.rendering.requests.request_parser import PARSERS, Kind
 
 # The last three are what programs say who have not been told what they send (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}

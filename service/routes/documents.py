@@ -9,7 +9,7 @@ from fastapi import APIRouter, Path, Query, Request, Response
 
 from service.documents import LONGEST_NAME, CheckedDocument, check_kind
 from service.downloads import PIECE
-from service.rendering.threads import saving
+from service.rendering.executors import saving
 from service.routes import answers
 from service.routes.house import caller, house
 

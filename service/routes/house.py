@@ -19,10 +19,10 @@ from service.problems import Unavailable
 from service.quality import priced
 from service.quota import Quota
 from service.readiness import SOFTWARE, Readiness
-from service.rendering.engine import Engine
-from service.rendering.reading import Reader
-from service.rendering.renders import Renders
-from service.rendering.sessions import Sessions
+from service.rendering.jobs.queue import RenderQueue
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.streams.sessions import Sessions
+from service.rendering.supervisor.supervisor import Supervisor
 from service.routes.bodies import Bodies
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
@@ -35,11 +35,11 @@ FAREWELL_S = 4.0  # for a client that reads slowly to be told
 class House:
     config: Config
     assets: AssetStore
-    reader: Reader
-    engine: Engine
+    reader: RequestReader
+    supervisor: Supervisor
     documents: Documents
     quota: Quota
-    renders: Renders = field(default_factory=Renders)
+    renders: RenderQueue = field(default_factory=RenderQueue)
     traffic: Traffic = field(default_factory=Traffic)
     sessions: Sessions = field(init=False)
     downloads: Downloads = field(init=False)
@@ -48,14 +48,14 @@ class House:
 
     def __post_init__(self) -> None:
         self.bodies = Bodies(self.config)
-        self.readiness = Readiness(self.engine, self.reader, self.config.require_gpu)
+        self.readiness = Readiness(self.supervisor, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
-        self.sessions = Sessions(self.engine, self.reader, self.config.max_clients)
+        self.sessions = Sessions(self.supervisor, self.reader, self.config.max_clients)
 
     async def info(self) -> dict[str, Any]:
         """What GET /v1/info says. Waits for a renderer that is being started; null when there is none."""
         try:
-            renderer: dict[str, Any] | None = await self.engine.ready(STARTING_S)
+            renderer: dict[str, Any] | None = await self.supervisor.ready(STARTING_S)
         except Unavailable:
             renderer = None
         return {
@@ -69,9 +69,9 @@ class House:
         """Why SUNBOX_REQUIRE_GPU forbids to start; None where nothing does. Waits for the renderer."""
         if not self.config.require_gpu:
             return None
-        self.engine.start()
+        self.supervisor.start()
         try:
-            renderer = await self.engine.ready(GPU_S)
+            renderer = await self.supervisor.ready(GPU_S)
         except Unavailable as error:
             return f"SUNBOX_REQUIRE_GPU is set, and there is no renderer: {error.detail}"
         return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None

@@ -12,8 +12,8 @@ from fastapi.responses import JSONResponse, PlainTextResponse
 
 from service import scene
 from service.metrics import MIME, text
-from service.rendering import protocol
-from service.rendering.threads import measuring
+from service.rendering.executors import measuring
+from service.rendering.streams import protocol
 from service.routes import answers
 from service.routes.house import house
 

@@ -17,10 +17,10 @@ from pydantic import BaseModel, ConfigDict, Field
 from service import images, recipe
 from service.downloads import Downloads, FileAnswer, Written, disconnected, present
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
-from service.rendering.job import Job
-from service.rendering.messages import Encoding, View
-from service.rendering.parsing import ParsedRequest, unfolded
-from service.rendering.threads import packing, writing
+from service.rendering.executors import packing, writing
+from service.rendering.ipc.messages import Encoding, View
+from service.rendering.jobs.job import Job
+from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.routes import answers
 from service.routes.errors import GONE
 from service.routes.house import STARTING_S, House, caller, house, owner
@@ -157,11 +157,11 @@ async def _job(request: Request) -> Job:
     own: House = house(request)
     async with own.bodies.taken(request) as body:
         own.renders.admit(owner(request))
-        await own.engine.able(STARTING_S)
+        await own.supervisor.able(STARTING_S)
         parsed: ParsedRequest = await own.bodies.parsed("request", body)
     packed = await packing(partial(own.reader.pack, parsed.scene))
     setup_s = time.monotonic() - began
-    return Job(own.engine, packed, parsed.settings, setup_s, owner(request), parsed.document)
+    return Job(own.supervisor, packed, parsed.settings, setup_s, owner(request), parsed.document)
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:

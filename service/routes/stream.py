@@ -9,7 +9,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from starlette.websockets import WebSocketState
 
 from service.problems import NotFound, ServiceError, TooManyRequests
-from service.rendering.stream import LOST, Attendance, Stream
+from service.rendering.streams.stream import LOST, Attendance, Stream
 from service.routes.house import house, owner
 
 router = APIRouter()

@@ -11,10 +11,10 @@ import socket
 from pathlib import Path
 
 from service import logs
-from service.rendering import link
-from service.rendering.messages import Ready, Unable
+from service.rendering.ipc import channel
+from service.rendering.ipc.heartbeat import Heartbeat
+from service.rendering.ipc.messages import Ready, Unable
 from service.rendering.priority import raise_process_niceness
-from service.rendering.pulse import Pulse
 from service.rendering.worker.lifeline import end_with
 
 OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
@@ -42,7 +42,7 @@ def main() -> int:
     logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     try:
         code = _serve(socket.socket(fileno=arguments.descriptor), arguments)
-    except link.Closed:
+    except channel.Closed:
         code = 0
     except BaseException:
         log.exception("the renderer failed")
@@ -61,18 +61,18 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     try:
         renderer = Renderer(arguments.device)
     except GpuError as error:
-        link.send(end, Unable(str(error)))
+        channel.send(end, Unable(str(error)))
         return 1
     # Only now: beside a dozen busy programs, starting at this priority took half a minute instead of three seconds.
     raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS)
-    link.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
+    channel.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
     if renderer.info["software"] and (closed := closed_gpus(DEVICES)):
         log.warning(
             "the processor renders, as this user may not use the GPU device=%s group=%s", closed[0], closed[0].group()
         )
     limit = arguments.memory or default_limit(bool(renderer.info["software"]))
-    pulse, lifeline = Pulse(arguments.pulse), arguments.lifeline
+    pulse, lifeline = Heartbeat(arguments.pulse), arguments.lifeline
     Loop(end, renderer, pulse, limit, arguments.device, arguments.checkpoint, lifeline).run()
     return 0
 

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 from gpu import GpuError
 from gpu.analysis.kernel_cost import full_kernel, kernel_cost_steps
-from service.rendering.messages import Appraised, FromRenderer
+from service.rendering.ipc.messages import FromRenderer, KernelMeasured
 from service.rendering.worker.compiler import Compiler
 
 if TYPE_CHECKING:
@@ -56,7 +56,7 @@ class Appraising:
 
     def step(self, picture: Picture | None) -> None:
         if picture is None:
-            self._tell(Appraised(self._number, NO_PICTURE))
+            self._tell(KernelMeasured(self._number, NO_PICTURE))
             return
         try:
             if self._steps is None and not self._waits(picture):
@@ -66,10 +66,10 @@ class Appraising:
         except StopIteration as end:
             price = end.value
             full_ms, self._compile_ms = price.full_compile_ms + self._compile_ms, 0.0
-            self._tell(Appraised(self._number, "", full_ms, price.sample_s, price.full_sample_s))
+            self._tell(KernelMeasured(self._number, "", full_ms, price.sample_s, price.full_sample_s))
         except GpuError as error:
             log.warning("could not compare kernels error=%s", error)
-            self._tell(Appraised(self._number, f"Not measured: {error}"))
+            self._tell(KernelMeasured(self._number, f"Not measured: {error}"))
 
     def _waits(self, picture: Picture) -> bool:
         """Whether the kernel with everything on is not there yet, or can't be had."""
@@ -78,12 +78,12 @@ class Appraising:
             self._compiling = self._compiler.waits(wanted, self._hear_compiled)
             if self._compiling or self._compiler.has(wanted):
                 return self._compiling
-        self._tell(Appraised(self._number, NO_KERNEL))
+        self._tell(KernelMeasured(self._number, NO_KERNEL))
         return True
 
     def _hear_compiled(self, milliseconds: float) -> None:
         self._compiling, self._compile_ms = False, milliseconds
 
-    def _tell(self, appraised: Appraised) -> None:
+    def _tell(self, appraised: KernelMeasured) -> None:
         self._asked, self._steps = False, None
         self._send(appraised)

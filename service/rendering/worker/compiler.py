@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.rendering import link
+from service.rendering.ipc import channel
 from service.rendering.worker.helper import Helper
 from service.spell import Spell
 
@@ -158,7 +158,7 @@ class Compiler:
             if not self._orders or time.monotonic() < self._until or self._is_starved():
                 return
             self._ended(f"it took more than {self._limit_s:.0f} s")
-        except link.Closed:
+        except channel.Closed:
             self._ended("the compiler's process ended unexpectedly")
         else:
             self._failures = 0 if answer.cached else self._failures + 1
@@ -204,7 +204,7 @@ class Compiler:
                 self._until = time.monotonic() + self._limit_s
                 self._spell = None if self._helper.process_id is None else Spell(self._helper.process_id)
                 return
-        except (link.Closed, OSError) as error:  # it can't be started
+        except (channel.Closed, OSError) as error:  # it can't be started
             log.info("could not start the compiler error=%s", error or "it had ended")
             self.close()
         self._able = False

@@ -18,7 +18,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 
-from service.rendering import link
+from service.rendering.ipc import channel
 from service.rendering.priority import HIGHEST, raise_thread_niceness
 from service.rendering.worker.compiler import Compiled, records
 from service.rendering.worker.lifeline import end_with, end_with_pipe, hung_up
@@ -52,7 +52,7 @@ def main() -> int:
         try:
             ahead = Precompiler(arguments.device)
             while select.select([end], [], [], SPARE_IDLE_S if arguments.spare else IDLE_S)[0]:
-                recipe = link.receive(end, wait=True)
+                recipe = channel.receive(end, wait=True)
                 record = records() / recipe.digest(arguments.driver)
                 try:
                     # In spare time nobody may be made to wait: that can take as long as it likes.
@@ -62,8 +62,8 @@ def main() -> int:
                             _record(record)
                 except GpuError as error:  # the renderer meets it too, and says it to whom it concerns
                     compiled = Compiled(0.0, True, str(error))
-                link.send(end, compiled)
-        except (link.Closed, GpuError):
+                channel.send(end, compiled)
+        except (channel.Closed, GpuError):
             pass
     return 0
 
@@ -85,7 +85,7 @@ def _alone(record: Path, end: socket.socket) -> Iterator[None]:
                 break
             except BlockingIOError:
                 if hung_up(end.fileno()):
-                    raise link.Closed from None
+                    raise channel.Closed from None
                 time.sleep(LOOK_S)
         yield
         path.unlink(missing_ok=True)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from service.rendering.messages import Progress, Reason, StopRule
+from service.rendering.ipc.messages import Progress, Reason, StopRule
 from service.rendering.worker.beyond import Beyond
 from service.rendering.worker.held import Held
 from service.rendering.worker.meter import Meter

@@ -12,7 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from gpu import denoise
-from service.rendering import link
+from service.rendering.ipc import channel
 from service.rendering.worker.helper import Helper
 
 # How long a stream waits for its denoised frame, and in times of what the last one took; then it goes on without.
@@ -88,7 +88,7 @@ class Denoiser:
             delivery: Delivery = self._helper.hear()
         except BlockingIOError:
             return
-        except link.Closed:
+        except channel.Closed:
             self.close()
             if not self.busy:
                 return

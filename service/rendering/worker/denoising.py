@@ -11,7 +11,7 @@ import os
 import select
 import socket
 
-from service.rendering import link
+from service.rendering.ipc import channel
 from service.rendering.worker.denoiser import Delivery, Order
 from service.rendering.worker.lifeline import end_with
 
@@ -30,8 +30,8 @@ def main() -> int:
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
             while select.select([end], [], [], IDLE_S)[0]:
-                link.send(end, deliver(link.receive(end, wait=True)))
-        except link.Closed:
+                channel.send(end, deliver(channel.receive(end, wait=True)))
+        except channel.Closed:
             pass
     return 0
 

@@ -7,7 +7,7 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from gpu import OutOfMemory, RenderSettings
-from service.rendering.messages import Update
+from service.rendering.ipc.messages import Update
 from service.rendering.worker.holding import Aside, Holding, needed
 from service.rendering.worker.ladder import Ladder
 from service.rendering.worker.memory import Holder, Memory

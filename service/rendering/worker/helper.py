@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
-from service.rendering import link
+from service.rendering.ipc import channel
 
 ROOT = Path(__file__).parents[3]
 
@@ -39,16 +39,16 @@ class Helper:
     def ask(self, message: object) -> None:
         """Raises link.Closed where it ends as soon as it begins, OSError where it can't be started."""
         try:
-            link.send(self._begin(), message)
-        except link.Closed:  # it had just ended, being idle
+            channel.send(self._begin(), message)
+        except channel.Closed:  # it had just ended, being idle
             self.close()
-            link.send(self._begin(), message)
+            channel.send(self._begin(), message)
 
     def hear(self) -> Any:
         """What it said. Raises BlockingIOError when that is nothing, link.Closed when it has ended."""
         if self._end is None:
             raise BlockingIOError
-        return link.receive(self._end)
+        return channel.receive(self._end)
 
     def close(self) -> None:
         if self._end is not None:
@@ -61,7 +61,7 @@ class Helper:
     def _begin(self) -> socket.socket:
         if self._end is not None:
             return self._end
-        self._end, theirs = link.pair()
+        self._end, theirs = channel.pair()
         with theirs:
             command = [sys.executable, "-m", self._module, str(theirs.fileno()), "--parent", str(os.getpid())]
             try:

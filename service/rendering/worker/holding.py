@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 from gpu import RenderSettings, picture_bytes, save, scene_bytes
 from gpu.kernels import features
 from gpu.precompile import kernel_keys
-from service.rendering.messages import Update
+from service.rendering.ipc.messages import Update
 from service.rendering.worker.ladder import Ladder
 
 if TYPE_CHECKING:

@@ -11,13 +11,14 @@ from collections.abc import Callable, Iterator
 
 from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
-from service.rendering import link
-from service.rendering.messages import (
-    Appraise,
+from service.rendering.ipc import channel
+from service.rendering.ipc.heartbeat import Heartbeat
+from service.rendering.ipc.messages import (
     Drop,
     Evicted,
     Failed,
     FromRenderer,
+    MeasureKernel,
     Pause,
     Read,
     Restore,
@@ -29,11 +30,10 @@ from service.rendering.messages import (
     Usage,
     Want,
 )
-from service.rendering.pulse import Pulse
-from service.rendering.scheduler import Scheduler
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.denoiser import Denoiser
 from service.rendering.worker.memory import Memory
+from service.rendering.worker.scheduler import Scheduler
 from service.rendering.worker.task import Task
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
@@ -47,7 +47,7 @@ class Loop:
         self,
         end: socket.socket,
         renderer: Renderer,
-        pulse: Pulse,
+        pulse: Heartbeat,
         memory_limit: int,
         device: int | None,
         checkpoint_s: float,
@@ -98,7 +98,7 @@ class Loop:
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
         try:
             while True:
-                message = link.receive(self._end)
+                message = channel.receive(self._end)
                 self._pulse.take()
                 yield message
         except BlockingIOError:
@@ -147,7 +147,9 @@ class Loop:
                 self._tasks[message.task] = task
             task.update(message)
         elif task is None:
-            if isinstance(message, Read | Appraise):  # evicted, and the server had not heard of it when it sent this
+            if isinstance(
+                message, Read | MeasureKernel
+            ):  # evicted, and the server had not heard of it when it sent this
                 self._send(Evicted(message.task))
         elif isinstance(message, Want):
             task.look(message)
@@ -157,7 +159,7 @@ class Loop:
             self._work(task, task.settle)
         elif isinstance(message, Restore):
             self._work(task, lambda: task.restore(message))
-        elif isinstance(message, Appraise):
+        elif isinstance(message, MeasureKernel):
             task.appraising.ask()
         elif isinstance(message, Pause):
             task.pause(message.away)
@@ -187,7 +189,7 @@ class Loop:
         try:
             work()
             return
-        except link.Closed:
+        except channel.Closed:
             raise
         except GpuError as error:
             log.warning("task failed task=%d kind=%s error=%s", task.number, type(error).__name__, error)
@@ -200,7 +202,7 @@ class Loop:
         self._send(Failed(task.number, task.attempted, detail, refused, read.serial if read else None))
 
     def _send(self, message: FromRenderer) -> None:
-        link.send(self._end, message)
+        channel.send(self._end, message)
 
 
 def coalesced(messages: Iterator[ToRenderer]) -> Iterator[ToRenderer]:

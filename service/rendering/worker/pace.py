@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 
 from service.quality import TRUSTED_SAMPLES
-from service.rendering.messages import StopRule
+from service.rendering.ipc.messages import StopRule
 
 GROWTH = 1.05  # of samples from one mark to the next: some hundred marks to a million
 # Of the samples before them, those to start from: at 8 the noise meter begins, which makes samples dearer in small

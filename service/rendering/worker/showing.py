@@ -10,7 +10,7 @@ import numpy as np
 from gpu import picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
-from service.rendering.messages import Frame, FromRenderer, Image, Read, View, Want
+from service.rendering.ipc.messages import Frame, FromRenderer, Image, Read, View, Want
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.course import Course
 from service.rendering.worker.held import Held

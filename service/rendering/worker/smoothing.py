@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpu.denoise import GUIDE_SAMPLES
-from service.rendering.messages import Progress
+from service.rendering.ipc.messages import Progress
 from service.rendering.worker.denoiser import Delivery, Denoiser, order
 
 if TYPE_CHECKING:

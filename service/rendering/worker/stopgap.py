@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 
 from gpu import GpuError, OutOfMemory, scene_bytes
 from gpu.precompile import fallback
-from service.rendering.messages import Frame, FromRenderer, Progress, Want
+from service.rendering.ipc.messages import Frame, FromRenderer, Progress, Want
 from service.rendering.worker.compiler import Compiler
 from service.rendering.worker.holding import Wanted
 from service.rendering.worker.ladder import FIRST_S, SCALES, SMALLEST_SIDE, Ladder

@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 
 from service.quality import TRUSTED_SAMPLES
-from service.rendering.messages import Reason, StopRule
+from service.rendering.ipc.messages import Reason, StopRule
 
 MAX_SAMPLES = 1 << 24  # of the contract: where float32 sums stop counting
 

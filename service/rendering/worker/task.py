@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gpu import GpuError, OutOfMemory, RenderSettings
 from gpu.precompile import kernel_keys
-from service.rendering.messages import (
+from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
     Failed,

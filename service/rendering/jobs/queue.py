@@ -8,14 +8,14 @@ from collections import Counter, OrderedDict
 from dataclasses import dataclass
 
 from service.problems import Gone, NotFound, TooManyRequests, Unavailable
-from service.rendering.job import Job
+from service.rendering.jobs.job import Job
 
 REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
 RETRY_S = 5  # when to ask again where there is no room
 
 
 @dataclass(frozen=True)
-class Bounds:
+class QueueLimits:
     """How many render at once, and what is kept of those that have ended."""
 
     running: int = 8  # the others wait in line, for each holds its scene and its picture on the GPU
@@ -26,11 +26,11 @@ class Bounds:
     kept_s: float = 3600.0  # ... and for how long
 
 
-class Renders:
+class RenderQueue:
     """An owner is a text that the caller chooses; who is not the owner of a render does not hear that it exists."""
 
-    def __init__(self, bounds: Bounds | None = None) -> None:
-        self._bounds = bounds or Bounds()
+    def __init__(self, bounds: QueueLimits | None = None) -> None:
+        self._bounds = bounds or QueueLimits()
         self._jobs: dict[str, Job] = {}
         self._gone: OrderedDict[str, str] = OrderedDict()  # the owners of forgotten ones
         self._room = asyncio.Semaphore(self._bounds.running)

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
-from service.rendering import link
-from service.rendering.link import Encoded
-from service.rendering.messages import (
-    Appraise,
-    Appraised,
+from service.rendering.ipc import channel
+from service.rendering.ipc.channel import Encoded
+from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
     Failed,
     Frame,
     FromRenderer,
     Image,
+    KernelMeasured,
     Loaded,
+    MeasureKernel,
     Pause,
     Progressed,
     Read,
@@ -42,12 +42,12 @@ class _State:
     since: Update | None = None
 
 
-class Record:
+class ReplayLog:
     """Closed, it gives back the scenes' memory."""
 
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
-        self.appraise: Appraise | None = None  # not answered yet
+        self.appraise: MeasureKernel | None = None  # not answered yet
         self.saved: Restore | None = None  # a finished picture
         self._checkpoint: Restore | None = None  # one under way
         self._task = task
@@ -63,7 +63,7 @@ class Record:
         return self.saved or self._checkpoint
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
-        self._push(_State(update.generation, link.another(encoded), whole=True))
+        self._push(_State(update.generation, channel.another(encoded), whole=True))
 
     def told(self, message: ToRenderer) -> None:
         if isinstance(message, Update):
@@ -72,7 +72,7 @@ class Record:
             self._want = message
         elif isinstance(message, Read):
             self.reads[message.serial] = message
-        elif isinstance(message, Appraise):
+        elif isinstance(message, MeasureKernel):
             self.appraise = message
         elif isinstance(message, Pause | Resume):
             self._paused = message
@@ -88,7 +88,7 @@ class Record:
                 self._fall_back(message)
         elif isinstance(message, Image):
             self.reads.pop(message.serial, None)
-        elif isinstance(message, Appraised):
+        elif isinstance(message, KernelMeasured):
             self.appraise = None
         elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
             self._works(message.generation)
@@ -104,7 +104,7 @@ class Record:
         for number, state in enumerate(self._states):
             if number:  # joined with the one before, that would be lost with it
                 out.append(Settle(self._task))
-            out.append(link.another(state.scene))
+            out.append(channel.another(state.scene))
             if state.since is not None:
                 out.append(state.since)
         if kept is not None:
@@ -128,12 +128,12 @@ class Record:
 
     def close(self) -> None:
         while self._states:
-            link.discard(self._states.pop().scene)
+            channel.discard(self._states.pop().scene)
 
     def _push(self, state: _State) -> None:
         self._states.append(state)
         if len(self._states) > STATES:
-            link.discard(self._states.pop(1).scene)
+            channel.discard(self._states.pop(1).scene)
         self._stopped, self._stopped_at, self._checkpoint = False, None, None
 
     def _edited(self, update: Update) -> None:
@@ -142,14 +142,14 @@ class Record:
         last = self._states[-1]
         since = last.since.then(update) if last.since is not None else update
         if update.settings is not None:  # it may be too large, and then the state before it is the one that counts
-            self._push(_State(update.generation, link.another(last.scene), whole=False, since=since))
+            self._push(_State(update.generation, channel.another(last.scene), whole=False, since=since))
         else:
             last.since = since
             self._stopped, self._stopped_at, self._checkpoint = False, None, None
 
     def _works(self, generation: int) -> None:
         while len(self._states) > 1 and self._states[1].began <= generation:
-            link.discard(self._states.pop(0).scene)
+            channel.discard(self._states.pop(0).scene)
 
     def _fall_back(self, failed: Failed) -> None:
         """Forgets what failed and what was built on it, but not a whole scene that was sent later."""
@@ -159,7 +159,7 @@ class Record:
             if later or (failed.fallback is not None and state.began <= failed.fallback):
                 kept.append(state)
             else:
-                link.discard(state.scene)
+                channel.discard(state.scene)
         self._states = kept
 
     def _done(self, done: Done) -> Done:

@@ -15,7 +15,7 @@ BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for
 
 
 @dataclass(frozen=True)
-class Change:
+class SceneDiff:
     """`whole`: the scene must be packed again; else only what is named differs."""
 
     whole: bool = False
@@ -24,17 +24,17 @@ class Change:
     environment: bool = False
 
 
-def change(old: Scene, new: Scene) -> Change:
+def scene_diff(old: Scene, new: Scene) -> SceneDiff:
     if _skeleton(old) != _skeleton(new):
-        return Change(whole=True)
-    return Change(
+        return SceneDiff(whole=True)
+    return SceneDiff(
         camera=old.camera != new.camera,
         materials=old.materials != new.materials,
         environment=old.environment != new.environment,
     )
 
 
-def risky(old: Scene, new: Scene) -> bool:
+def may_be_refused(old: Scene, new: Scene) -> bool:
     """Whether packing `new` could be refused where `old` was not: other files, or more to hold."""
     return _files(old) != _files(new) or _asked(old) != _asked(new) or len(old.shapes) != len(new.shapes)
 

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Callable
 
 from service.problems import FieldError, InvalidDocument
-from service.rendering.messages import Frame, Want
-from service.rendering.protocol import View
+from service.rendering.ipc.messages import Frame, Want
+from service.rendering.streams.protocol import View
 
 CREDITS = 2  # frames unacknowledged; without a bound a slow client had 857 of them queued
 MOST_FPS = 30  # unless the view says otherwise: every frame costs the renderer and the encoder some milliseconds
@@ -18,7 +18,7 @@ PACE, SLOWEST_S = 0.05, 0.2
 PATIENCE_S = 0.25
 
 
-class Flow:
+class FlowControl:
     def __init__(self, task: int, send: Callable[[Want], None]) -> None:
         self.view = View()
         self.generation: int | None = None

@@ -10,21 +10,21 @@ from typing import Any
 
 from service.pack import warm_builder
 from service.problems import ServiceError
-from service.rendering.engine import Engine
-from service.rendering.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
-from service.rendering.reading import Reader
-from service.rendering.threads import packing
+from service.rendering.executors import packing
+from service.rendering.ipc.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.supervisor.supervisor import Supervisor
 
 SETTINGS = {"width": 64, "height": 64}
 
 log = logging.getLogger(__name__)
 
 
-class Warming:
+class FirstFrame:
     """A first picture that nobody asked for: `document` in the default settings, as a stream would have it."""
 
-    def __init__(self, engine: Engine, reader: Reader, document: Any) -> None:
-        self._engine = engine
+    def __init__(self, supervisor: Supervisor, reader: RequestReader, document: Any) -> None:
+        self._supervisor = supervisor
         self._reader = reader
         self._document = document
         self._seen = asyncio.Event()
@@ -35,18 +35,20 @@ class Warming:
         try:
             packed = await packing(lambda: self._reader.pack(self._reader.scene(self._document)))
             settings = await packing(partial(self._reader.settings, SETTINGS))
-            task = self._engine.open(self, "server")
+            task = self._supervisor.open(self, "server")
         except ServiceError as error:
             log.warning("did not warm up error=%s", error)
             return
         try:
             stop = StopRule(max_samples=1)
-            await self._engine.send_scene(Update(task, 1, packed.arrays, settings.for_gpu(), stop, interactive=True))
-            self._engine.send(Want(task, 1, View()))
+            await self._supervisor.send_scene(
+                Update(task, 1, packed.arrays, settings.for_gpu(), stop, interactive=True)
+            )
+            self._supervisor.send(Want(task, 1, View()))
             await self._seen.wait()
             log.info("warmed up seconds=%.2f", time.monotonic() - began)
         finally:
-            self._engine.drop(task)
+            self._supervisor.drop(task)
         await packing(warm_builder)
         log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
 

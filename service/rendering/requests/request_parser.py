@@ -37,7 +37,7 @@ class ParsedRequest:
     document: bytes
 
 
-class Parser:
+class RequestParser:
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
     def __init__(self, config: Config) -> None:
@@ -89,7 +89,7 @@ def unfolded(data: bytes) -> str:
 Kind = Literal["request", "scenes", "materials"]
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
-    "request": lambda config, body: Parser(config).request(body),
+    "request": lambda config, body: RequestParser(config).request(body),
     "scenes": lambda config, body: checked("scenes", load_json(body), config),
     "materials": lambda config, body: checked("materials", load_json(body), config),
 }

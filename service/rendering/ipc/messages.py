@@ -131,7 +131,7 @@ class Drop:
 
 
 @dataclass(frozen=True)
-class Appraise:
+class MeasureKernel:
     """Asks what the kernel of a render saves, to be measured when there is nothing else to do."""
 
     task: int
@@ -240,7 +240,7 @@ class Checkpoint:
 
 
 @dataclass(frozen=True)
-class Appraised:
+class KernelMeasured:
     """What a render's own kernel takes beside the one with everything on, or in `detail` why that is not known."""
 
     task: int
@@ -297,7 +297,18 @@ class Failed:
     fallback: int | None = None
 
 
-ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Settle | Restore | Appraise
+ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Settle | Restore | MeasureKernel
 FromRenderer = (
-    Ready | Unable | Usage | Loaded | Frame | Image | Progressed | Checkpoint | Done | Appraised | Evicted | Failed
+    Ready
+    | Unable
+    | Usage
+    | Loaded
+    | Frame
+    | Image
+    | Progressed
+    | Checkpoint
+    | Done
+    | KernelMeasured
+    | Evicted
+    | Failed
 )

@@ -17,13 +17,13 @@ from typing import Any
 
 from service.config import MIB, Config
 from service.problems import ServiceError, TooLarge, Unavailable
-from service.rendering import link
-from service.rendering.parser_child import Failed, Work
-from service.rendering.parsing import Kind
+from service.rendering.ipc import channel
+from service.rendering.requests.parser_child import Failed, Work
+from service.rendering.requests.request_parser import Kind
 from service.scene.text import most_bytes
 from service.spell import answers
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 START_SECONDS = 30.0  # libraries read from a cold disk
 SECONDS_PER_BYTE = 0.25 / MIB  # of the slowest body there is, twice
 CLOSING_SECONDS = 5.0
@@ -141,12 +141,12 @@ class _Room:
 
 class _Child:
     def __init__(self) -> None:
-        self.link, theirs = link.pair()
+        self.link, theirs = channel.pair()
         with theirs:
             # Nothing of the service's settings: they may hold its key.
             env = {k: v for k, v in os.environ.items() if not k.startswith("SUNBOX_")} | THREADS
             self.process = subprocess.Popen(
-                [sys.executable, "-m", "service.rendering.parser_child", str(theirs.fileno())],
+                [sys.executable, "-m", "service.rendering.requests.parser_child", str(theirs.fileno())],
                 cwd=ROOT,
                 env=env,
                 pass_fds=[theirs.fileno()],
@@ -158,12 +158,12 @@ class _Child:
     def ask(self, work: Work) -> Any:
         """The answer. Raises TooLarge where it died or took too long; it must be killed then."""
         try:
-            link.send(self.link, work)
+            channel.send(self.link, work)
             if not answers(self.link, self.process.pid, work.seconds + (0 if self._started else START_SECONDS)):
                 raise TooLarge(f"Reading this body takes longer than the {work.seconds:.0f} s allowed.")
             with _uncollected:
-                answer = link.receive(self.link, wait=True)
-        except link.Closed:
+                answer = channel.receive(self.link, wait=True)
+        except channel.Closed:
             raise self._death(work) from None
         self._started = True
         return answer

@@ -43,7 +43,7 @@ tending = Pool("tending", 2)  # the renderers' ends and replacements, and what t
 measuring = Pool("measuring", 1)  # /metrics
 
 
-class Lane:
+class ClientExecutor:
     """A thread for one client's parsing and packing, begun at its first work: whoever asks for much waits alone."""
 
     def __init__(self, name: str) -> None:

@@ -15,7 +15,7 @@ _NUMBERS = struct.Struct("<qqqdd")
 SIZE = 64
 
 
-class Pulse:
+class Heartbeat:
     """One writer. Torn reads do no harm: the server looks again, and judges by what stays."""
 
     def __init__(self, descriptor: int) -> None:

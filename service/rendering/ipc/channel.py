@@ -94,7 +94,7 @@ def send(end: socket.socket, message: object) -> None:
         discard(encoded)
 
 
-class Link:
+class Channel:
     """The server's end: sends and receives on the event loop and never waits."""
 
     def __init__(self, end: socket.socket, receive: Callable[[Any], None], lost: Callable[[], None]) -> None:

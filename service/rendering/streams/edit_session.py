@@ -10,10 +10,10 @@ from typing import Any
 from service.pack import PackCache, pack_camera, pack_materials, pack_turn, repacked, scene_delta
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
-from service.rendering import protocol
-from service.rendering.change import change, risky
-from service.rendering.messages import Update
-from service.rendering.reading import Reader, stop_rule
+from service.rendering.ipc.messages import Update
+from service.rendering.requests.request_reader import RequestReader, stop_rule
+from service.rendering.streams import protocol
+from service.rendering.streams.scene_diff import may_be_refused, scene_diff
 from service.scene import Scene, merge_patch
 from service.scene.document import Parsed
 from service.scene.text import weigh
@@ -33,24 +33,24 @@ class Version:
 
 
 @dataclass(frozen=True)
-class Good:
+class Accepted:
     """A version, and the arrays that it was last packed as."""
 
     version: Version
     arrays: Any
 
 
-class Live:
+class EditSession:
     """Not for the event loop: its methods parse and pack. One call at a time."""
 
-    def __init__(self, reader: Reader, task: int) -> None:
+    def __init__(self, reader: RequestReader, task: int) -> None:
         self.version: Version | None = None  # the last valid one
         self._reader = reader
         self._task = task
         self._cache = PackCache(budget=reader.caches)
         self._bytes = 0  # that the scene's document takes at most
         self._given: Version | None = None  # the last one that the renderer has
-        self._good: dict[int, Good] = {}  # that the renderer may go back to, by generation
+        self._good: dict[int, Accepted] = {}  # that the renderer may go back to, by generation
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
         self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
 
@@ -64,7 +64,9 @@ class Live:
             raise InvalidDocument([FieldError("/generation", f"must rise: {message.generation} comes after {last}")])
         version = self._started(message) if isinstance(message, protocol.Start) else self._updated(message)
         # Whether such a scene can be packed is known when it was; then the update is as good as made.
-        update = self._give(version) if self._given is None or risky(self._given.scene, version.scene) else None
+        update = (
+            self._give(version) if self._given is None or may_be_refused(self._given.scene, version.scene) else None
+        )
         self.version = version
         return update
 
@@ -139,7 +141,7 @@ class Live:
         newest = max((g for g in self._good if g <= self.works), default=None)
         if newest is not None:
             self._good = {g: kept for g, kept in self._good.items() if g >= newest}
-        self._good[version.generation] = Good(version, self._arrays)
+        self._good[version.generation] = Accepted(version, self._arrays)
         if len(self._good) > MOST_GOOD:  # the one that works, and the newest
             del self._good[sorted(self._good)[1]]
         return update
@@ -152,7 +154,7 @@ class Live:
             update = replace(update, stop=stop_rule(new.settings))
         if old is None or old.settings.denoise != new.settings.denoise:
             update = replace(update, denoise=new.settings.denoise)
-        touched = change(old.scene, new.scene) if old is not None else None
+        touched = scene_diff(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
             arrays = self._reader.pack(new.scene, self._cache).arrays
             elsewhere = None if old is None else scene_delta(self._arrays, arrays)

@@ -14,15 +14,14 @@ import numpy as np
 from service.pack import Packed
 from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocument, ServiceError, answer, problem
 from service.quality import ResolvedSettings, forecast
-from service.rendering.engine import Engine
-from service.rendering.messages import (
-    Appraise,
-    Appraised,
+from service.rendering.ipc.messages import (
     Done,
     Failed,
     FromRenderer,
     Image,
+    KernelMeasured,
     Loaded,
+    MeasureKernel,
     Progress,
     Progressed,
     Read,
@@ -30,12 +29,15 @@ from service.rendering.messages import (
     Update,
     View,
 )
-from service.rendering.reading import stop_rule, weight
+from service.rendering.requests.request_reader import stop_rule, weight
+from service.rendering.supervisor.supervisor import Supervisor
 
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 
-UNASKED = Appraised(0, "Nobody asked: GET this render with ?saving=true, and wait=60 to wait for it.")
-ASKED = Appraised(0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60.")
+UNASKED = KernelMeasured(0, "Nobody asked: GET this render with ?saving=true, and wait=60 to wait for it.")
+ASKED = KernelMeasured(
+    0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60."
+)
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 ID_BYTES = 16  # 128 bits: nobody guesses one
 PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
@@ -46,7 +48,7 @@ class Job:
 
     def __init__(
         self,
-        engine: Engine,
+        supervisor: Supervisor,
         packed: Packed,
         settings: ResolvedSettings,
         setup_s: float,
@@ -61,7 +63,7 @@ class Job:
         self.state: State = "queued"
         self.finished = asyncio.Event()
         self.bytes = settings.render_width * settings.render_height * PICTURE_BYTES + weight(packed) + len(document)
-        self._engine = engine
+        self._supervisor = supervisor
         self._packed: Packed | None = packed
         self._settings = settings
         self._warnings = list(packed.warnings)
@@ -83,13 +85,13 @@ class Job:
         if self._packed is None:
             return
         try:
-            self._task = self._engine.open(self, "render", self.owner or "anybody")
+            self._task = self._supervisor.open(self, "render", self.owner or "anybody")
             arrays, self._packed = self._packed.arrays, None
             settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
             update = Update(self._task, 1, arrays, settings, stop, denoise=self._settings.denoise)
-            await self._engine.send_scene(update)
+            await self._supervisor.send_scene(update)
             if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
-                self._engine.send(Stop(self._task))
+                self._supervisor.send(Stop(self._task))
         except ServiceError as error:
             self._fail(error)
         await self.finished.wait()
@@ -100,13 +102,13 @@ class Job:
             return
         self.state, self._packed = "cancelled", None
         if self._task is not None:
-            self._engine.send(Stop(self._task))
+            self._supervisor.send(Stop(self._task))
         self._finish()
 
     def release(self) -> None:
         """Forgets the picture."""
         if self._task is not None:
-            self._engine.drop(self._task)
+            self._supervisor.drop(self._task)
             self._task = None
 
     def appraise(self) -> None:
@@ -115,7 +117,7 @@ class Job:
             self._appraised = ASKED
             self._answered.clear()
             if self._kernel is not None and self._task is not None:
-                self._engine.send(Appraise(self._task))
+                self._supervisor.send(MeasureKernel(self._task))
 
     async def settled(self, appraised: bool) -> None:
         """Returns when it is finished, and with `appraised` when that is answered."""
@@ -157,7 +159,7 @@ class Job:
             raise self._error or Conflict("There is no sample yet.")
         serial = next(self._serials)
         self._reads[serial] = asyncio.get_running_loop().create_future()
-        self._engine.send(Read(self._task, serial, view))
+        self._supervisor.send(Read(self._task, serial, view))
         image = await self._reads[serial]
         if image.pixels is None:
             raise Conflict("There is no sample yet.")
@@ -178,7 +180,7 @@ class Job:
             self._progress = message.progress
             if message.progress.samples:
                 self._sampled.set()
-        elif isinstance(message, Appraised):
+        elif isinstance(message, KernelMeasured):
             self._appraised = message
             self._answered.set()
         elif isinstance(message, Done):
@@ -218,7 +220,7 @@ class Job:
 
     def _fail(self, error: ServiceError) -> None:
         self.state = "failed"
-        self._engine.statistics.errors[answer(error).type] += 1
+        self._supervisor.statistics.errors[answer(error).type] += 1
         self._forget(error)
         self._finish()
 

@@ -11,8 +11,8 @@ from pydantic import Field, TypeAdapter
 
 from service import images
 from service.problems import TooLarge
-from service.rendering.messages import Encoding, Frame
-from service.rendering.messages import View as PictureView
+from service.rendering.ipc.messages import Encoding, Frame
+from service.rendering.ipc.messages import View as PictureView
 from service.scene.base import Model, hint
 from service.scene.mistakes import validated
 from service.scene.text import load_json, most_bytes

@@ -10,13 +10,13 @@ from service.config import Config
 from service.pack import CacheBudget, PackCache, Packed, pack
 from service.problems import InvalidDocument
 from service.quality import ResolvedSettings
-from service.rendering.messages import StopRule
-from service.rendering.parsing import Parser
-from service.rendering.stream_memory import StreamMemory
+from service.rendering.ipc.messages import StopRule
+from service.rendering.requests.request_parser import RequestParser
+from service.rendering.requests.stream_memory import StreamMemory
 from service.scene import Scene
 
 
-class Reader(Parser):
+class RequestReader(RequestParser):
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
     def __init__(self, config: Config, assets: Assets) -> None:

@@ -12,10 +12,9 @@ from functools import partial
 from typing import Any, Protocol
 
 from service.problems import Unavailable
-from service.rendering import link
-from service.rendering.messages import (
-    Appraise,
-    Appraised,
+from service.rendering.executors import sending, tending
+from service.rendering.ipc import channel
+from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
     Drop,
@@ -23,7 +22,9 @@ from service.rendering.messages import (
     Frame,
     FromRenderer,
     Image,
+    KernelMeasured,
     Loaded,
+    MeasureKernel,
     Progress,
     Progressed,
     Read,
@@ -33,10 +34,9 @@ from service.rendering.messages import (
     Update,
     Usage,
 )
-from service.rendering.process import Cause, Options, Process
-from service.rendering.record import Record
-from service.rendering.statistics import Kind, Statistics
-from service.rendering.threads import sending, tending
+from service.rendering.supervisor.process import Cause, Options, Process
+from service.rendering.supervisor.replay_log import ReplayLog
+from service.rendering.supervisor.statistics import Kind, Statistics
 
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
 BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start, ever
@@ -65,21 +65,21 @@ class Listener(Protocol):
 
 
 @dataclass
-class _Held:
+class _Task:
     listener: Listener
     kind: Kind
     client: str
-    record: Record
+    record: ReplayLog
     resident: bool = True  # the renderer has it, or is being told
     strikes: int = 0
     struck_at: float = field(default=0.0)
 
 
-class Engine:
+class Supervisor:
     def __init__(self, options: Options | None = None) -> None:
         self.statistics = Statistics()
         self._options = options or Options()
-        self._tasks: dict[int, _Held] = {}
+        self._tasks: dict[int, _Task] = {}
         self._numbers = itertools.count(1)
         self._ready: asyncio.Future[dict[str, Any]] | None = None
         self._process: Process | None = None
@@ -150,7 +150,7 @@ class Engine:
         if self._ready is None or self._closed or self.hopeless:
             raise Unavailable(self._detail)
         task = next(self._numbers)
-        self._tasks[task] = _Held(listener, kind, client or str(task), Record(task))
+        self._tasks[task] = _Task(listener, kind, client or str(task), ReplayLog(task))
         return task
 
     def drop(self, task: int) -> None:
@@ -168,7 +168,7 @@ class Engine:
         held.record.told(message)
         if held.resident:
             self._send(message)
-        elif isinstance(message, Read | Appraise):
+        elif isinstance(message, Read | MeasureKernel):
             self._do(self._bring_back(message.task, held))
 
     async def send_scene(self, update: Update) -> None:
@@ -177,9 +177,9 @@ class Engine:
         if held is None:
             return
         update = replace(update, client=held.client)
-        encoded = await sending(partial(link.encode, update))
+        encoded = await sending(partial(channel.encode, update))
         if update.task not in self._tasks:
-            return link.discard(encoded)
+            return channel.discard(encoded)
         held.record.scene_told(update, encoded)
         self._send_encoded(encoded)
 
@@ -187,11 +187,11 @@ class Engine:
         if self._process is not None:
             self._process.link.send(message)
 
-    def _send_encoded(self, encoded: link.Encoded) -> None:
+    def _send_encoded(self, encoded: channel.Encoded) -> None:
         if self._process is not None:
             self._process.link.send_encoded(encoded)
         else:
-            link.discard(encoded)
+            channel.discard(encoded)
 
     def _begin(self) -> None:
         lifeline = None if self._lifeline is None else self._lifeline[0]
@@ -205,19 +205,19 @@ class Engine:
             elif held.record.saved is None or held.record.reads:
                 self._do(self._bring_back(task, held))
 
-    def _tell_all(self, record: Record, kept: link.Encoded | None = None) -> None:
+    def _tell_all(self, record: ReplayLog, kept: channel.Encoded | None = None) -> None:
         for message in record.again(kept):
             if isinstance(message, tuple):
                 self._send_encoded(message)
             else:
                 self._send(message)
 
-    async def _bring_back(self, task: int, held: _Held) -> None:
+    async def _bring_back(self, task: int, held: _Task) -> None:
         """Gives the renderer a picture that it has no more, to go on with or to be read."""
         process = self._process
-        encoded = await tending(partial(link.encode, held.record.kept))
+        encoded = await tending(partial(channel.encode, held.record.kept))
         if held.resident or process is None or process is not self._process or task not in self._tasks:
-            return link.discard(encoded)
+            return channel.discard(encoded)
         held.resident = True
         self._tell_all(held.record, encoded)
 
@@ -234,7 +234,7 @@ class Engine:
         elif (held := self._tasks.get(message.task)) is not None:
             self._hear(message, held)
 
-    def _hear(self, message: FromRenderer, held: _Held) -> None:
+    def _hear(self, message: FromRenderer, held: _Task) -> None:
         if isinstance(message, Evicted):
             self._not_appraised(held, "It made room for others meanwhile: ask again.")
             held.resident = held.record.saved is None
@@ -254,10 +254,10 @@ class Engine:
             held.strikes = 0
         held.listener.heard(held.record.heard(message))
 
-    def _not_appraised(self, held: _Held, why: str) -> None:
+    def _not_appraised(self, held: _Task, why: str) -> None:
         """Nobody is tempted to try again and again what may have been too much."""
         if (asked := held.record.appraise) is not None:
-            held.listener.heard(held.record.heard(Appraised(asked.task, why)))
+            held.listener.heard(held.record.heard(KernelMeasured(asked.task, why)))
 
     def _is_ready(self, message: Ready) -> None:
         assert self._process is not None

@@ -16,11 +16,11 @@ from pathlib import Path
 from typing import Any, Literal
 
 from service import logs
-from service.rendering import link, pulse
-from service.rendering.threads import tending
+from service.rendering.executors import tending
+from service.rendering.ipc import channel, heartbeat
 from service.spell import Spell
 
-ROOT = Path(__file__).parents[2]
+ROOT = Path(__file__).parents[3]
 TURNS = 10  # a piece of work may take so many times as long as the last one, and the patience on top
 STARTING_S = 60.0  # it imports, finds a driver and asks for a context before it can beat
 KILLS = {-signal.SIGKILL, -signal.SIGTERM}
@@ -51,14 +51,14 @@ class Process:
         self.pulse, self._options = _Watched(), options
         self._condemned: Cause | None = None
         self._oom_kills = _oom_kills()
-        ours, theirs = link.pair()
+        ours, theirs = channel.pair()
         try:
             self._process = _spawn(theirs, self.pulse.descriptor, options, lifeline)
         finally:
             theirs.close()
             os.close(self.pulse.descriptor)
         self.pulse.begin(self._process.pid)
-        self.link = link.Link(ours, received, lost)
+        self.link = channel.Channel(ours, received, lost)
 
     @property
     def lived_s(self) -> float:
@@ -96,11 +96,11 @@ class Process:
         return "killed" if _oom_kills() == self._oom_kills else "out of memory"
 
 
-class _Watched(pulse.Pulse):
+class _Watched(heartbeat.Heartbeat):
     """A pulse with the time since it last beat, as much of it as its process had."""
 
     def __init__(self) -> None:
-        self.descriptor = pulse.memory()
+        self.descriptor = heartbeat.memory()
         super().__init__(self.descriptor)
         self._beats, self._pid = 0, 0
         self._silence: Spell | None = None

@@ -1,4 +1,4 @@
-"""The process that parses large JSON bodies: `python -m service.rendering.parser_child FD`, FD being a link.
+"""The process that parses large JSON bodies: `python -m service.rendering.requests.parser_child FD`, FD being a link.
 
 The C scanner and pydantic keep all other threads of their process waiting, seconds for some bodies. Here nobody
 waits, and what takes too much memory or time is ended. It ends with its parent, and when nothing came for a while.
@@ -17,8 +17,8 @@ from typing import Any
 from service.config import Config
 from service.confined import bound, confine, unbind
 from service.problems import ServiceError, TooLarge
-from service.rendering import link
-from service.rendering.parsing import PARSERS, Kind
+from service.rendering.ipc import channel
+from service.rendering.requests.request_parser import PARSERS, Kind
 from service.shared import trim
 
 NICENESS = 10  # the renderer's, whose share of the processors large bodies would else take
@@ -50,9 +50,9 @@ def main() -> None:
     end.settimeout(IDLE_S)
     while True:
         try:
-            answer = _answer(link.receive(end, wait=True), end)
-            link.send(end, answer)
-        except (link.Closed, TimeoutError):
+            answer = _answer(channel.receive(end, wait=True), end)
+            channel.send(end, answer)
+        except (channel.Closed, TimeoutError):
             return
         del answer
         gc.collect()

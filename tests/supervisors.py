@@ -1,0 +1,23 @@
+"""A supervisor with a renderer's process of its own, for as long as one test takes."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from typing import Any
+
+from service.rendering.supervisor.process import Options
+from service.rendering.supervisor.supervisor import Supervisor
+
+
+def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], **options: Any) -> None:
+    async def run() -> None:
+        supervisor = Supervisor(Options(**options))
+        supervisor.start()
+        try:
+            await supervisor.ready(30)
+            await test(supervisor)
+        finally:
+            await supervisor.close()
+
+    asyncio.run(run())
