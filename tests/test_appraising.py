@@ -18,7 +18,7 @@ from gpu.kernels import features
 from service.cli import main
 from service.rendering.ipc.messages import Done, KernelMeasured, MeasureKernel, StopRule, Update
 from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.appraising import NO_KERNEL, NO_PICTURE, Appraising
+from service.rendering.worker.kernel_savings import NO_KERNEL, NO_PICTURE, KernelSavings
 from tests.extremes.scenes import LONG
 from tests.serving import SCENE, SMALL, Server
 from tests.supervisors import with_supervisor
@@ -43,12 +43,12 @@ class Elsewhere:
         self.told: Any = None
         self.there = False
 
-    def waits(self, recipe: KernelKey, told: Any) -> bool:
-        self.asked.append(recipe)
+    def waits(self, key: KernelKey, told: Any) -> bool:
+        self.asked.append(key)
         self.told = told
         return not self.there
 
-    def has(self, recipe: KernelKey) -> bool:
+    def has(self, key: KernelKey) -> bool:
         return self.there
 
     def forget(self, told: Any) -> None:
@@ -61,20 +61,20 @@ def test_it_is_measured_between_slices(gpu: Renderer, more: None) -> None:
     picture = gpu.picture(scene, RenderSettings(40, 30, clamp=3.0))
     picture.trace(60.0, 4)
     before = picture.read()
-    appraising = Appraising(7, said.append, gpu, compiler)  # type: ignore[arg-type]
-    assert not appraising.due
-    appraising.ask()
-    appraising.step(picture)
-    assert not appraising.due and not said, "it waits for the kernel"
+    savings = KernelSavings(7, said.append, gpu, compiler)  # type: ignore[arg-type]
+    assert not savings.due
+    savings.ask()
+    savings.step(picture)
+    assert not savings.due and not said, "it waits for the kernel"
     assert dict(compiler.asked[0].defines)["HAS_BOXES"] == 1 and dict(compiler.asked[0].defines)["HAS_CLAMP"] == 1
     compiler.there = True
     compiler.told(12000.0)
     steps = 0
-    while appraising.due:
-        appraising.step(picture)
+    while savings.due:
+        savings.step(picture)
         steps += 1
         if steps == 4:
-            appraising.part()  # its picture was put aside, and is back
+            savings.part()  # its picture was put aside, and is back
     (price,) = said
     assert steps > 10 and price.task == 7 and not price.detail and price.full_compile_ms >= 12000
     assert 0 < price.sample_s < 1e-3 and 0 < price.full_sample_s < 1e-3
@@ -94,10 +94,10 @@ def test_what_cannot_be_had_is_told(gpu: Renderer, more: None) -> None:
     scene = gpu.load(arrays_of("plain"))
     picture = gpu.picture(scene, RenderSettings(16, 16))
     for compiler, shown, why in ((None, picture, NO_KERNEL), (Elsewhere(), None, NO_PICTURE)):
-        appraising = Appraising(1, said.append, gpu, compiler)  # type: ignore[arg-type]
-        appraising.ask()
-        appraising.step(shown)
-        assert said.pop() == KernelMeasured(1, why) and not appraising.due
+        savings = KernelSavings(1, said.append, gpu, compiler)  # type: ignore[arg-type]
+        savings.ask()
+        savings.step(shown)
+        assert said.pop() == KernelMeasured(1, why) and not savings.due
     picture.release()
     scene.release()
 

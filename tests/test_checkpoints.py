@@ -16,7 +16,7 @@ from gpu import Renderer, RenderSettings
 from service.rendering.ipc import channel
 from service.rendering.ipc.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
 from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker import keeping
+from service.rendering.worker.device import checkpoints
 from tests.supervisors import with_supervisor
 from tests.test_compiling import LINEAR, arrays_of
 from tests.test_worker import Ears, settings
@@ -115,7 +115,7 @@ def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
     scene = gpu.load(arrays_of("plain"))
     picture = gpu.picture(scene, RenderSettings(192, 192))
     picture.trace(60.0, 2)
-    kept, saved = keeping.Keeping(10.0), None
+    kept, saved = checkpoints.Checkpointer(10.0), None
     kept.begin(picture)
     while saved is None:
         saved = kept.step()
@@ -138,9 +138,12 @@ def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> No
             yield
         return "saved"
 
-    monkeypatch.setattr(keeping.time, "monotonic", lambda: now)
-    monkeypatch.setattr(keeping, "save", slow)
-    kept, shown = keeping.Keeping(10.0), SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[])
+    monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
+    monkeypatch.setattr(checkpoints, "save", slow)
+    kept, shown = (
+        checkpoints.Checkpointer(10.0),
+        SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[]),
+    )
     small: Any = shown
     assert not kept.due(small)
     now = 10.0

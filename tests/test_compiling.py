@@ -20,8 +20,8 @@ from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.pack import pack
 from service.rendering.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.compiler import Compiled, Compiler, records
-from service.rendering.worker.holding import Holding, wanted_of
+from service.rendering.worker.device.loaded_scene import LoadedScene, kernel_request
+from service.rendering.worker.helpers.compile_client import CompileClient, Compiled, records
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -207,23 +207,23 @@ def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, a
 
 def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
     """What a slider raised while it was moved stays raised: no other kernel, and no other bits."""
-    holding = Holding(gpu, arrays, RenderSettings(32, 32), True, {})
+    loaded = LoadedScene(gpu, arrays, RenderSettings(32, 32), True, {})
     rough = np.array(arrays.materials)
     glowing = rough.copy()
     glowing["emission"] = 1.0
     for materials in (glowing, rough):
-        holding.scene.edit(materials=materials)
-    holding.ladder.reset()
-    holding.ladder.full.trace(60.0, 3)
-    flags = holding.scene.flags
+        loaded.scene.edit(materials=materials)
+    loaded.ladder.reset()
+    loaded.ladder.full.trace(60.0, 3)
+    flags = loaded.scene.flags
     assert flags > features.flags(arrays, editing=True)
-    aside = holding.aside()
+    offloaded = loaded.offloaded()
     edit = Update(1, 2, materials=rough, base=1)
-    wanted = wanted_of(edit, aside.settings, None, aside)
-    back = Holding.back(gpu, aside)
+    wanted = kernel_request(edit, offloaded.settings, None, offloaded)
+    back = LoadedScene.back(gpu, offloaded)
     assert back.scene.flags == flags and back.ladder.full.samples == 3
     assert back.ladder.full.compile_ms == 0  # it is still there
-    assert wanted is not None and dict(wanted.recipe.defines) == back.scene.defines(aside.settings)
+    assert wanted is not None and dict(wanted.key.defines) == back.scene.defines(offloaded.settings)
     back.release()
 
 
@@ -256,8 +256,8 @@ class Instant:
         self.asked: list[KernelKey] = []
         self.answers = 0
 
-    def ask(self, recipe: KernelKey) -> None:
-        self.asked.append(recipe)
+    def ask(self, key: KernelKey) -> None:
+        self.asked.append(key)
 
     def hear(self) -> Compiled:
         if self.answers == len(self.asked):
@@ -270,12 +270,12 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
     """What pictures are shown with, and what the noise meter and `adaptive` ask."""
     asked = []
     for _ in range(2):
-        compiler, helper = Compiler(gpu.info, None, lambda: True, spare=True), Instant()
+        compiler, helper = CompileClient(gpu.info, None, lambda: True, spare=True), Instant()
         compiler._helper = helper  # type: ignore[assignment]
         compiler.prepare(common_keys())
         while compiler.left_s is not None:
             compiler.hear()
-        assert all(compiler.has(recipe) for recipe in common_keys())
+        assert all(compiler.has(key) for key in common_keys())
         asked.append(helper.asked)
     assert asked == [common_keys(), []] and len(common_keys()) == 15
 
@@ -354,7 +354,7 @@ def is_there(pid: int) -> bool:
 def test_the_other_end_of_a_pipe_is_a_lifeline() -> None:
     """Of two that share it, in the middle of a loop that never looks."""
     read, write = os.pipe()
-    program = "import sys\nfrom service.rendering.worker.lifeline import end_with_pipe\n"
+    program = "import sys\nfrom service.rendering.worker.helpers.lifeline import end_with_pipe\n"
     program += "print(end_with_pipe(int(sys.argv[1])), flush=True)\nwhile True: pass"
     command = [sys.executable, "-c", program, str(read)]
     both = [subprocess.Popen(command, pass_fds=[read], stdout=subprocess.PIPE, text=True) for _ in range(2)]

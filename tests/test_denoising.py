@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from service.cli import main
-from service.rendering.worker.denoiser import DIED, Delivery, Denoiser, order
+from service.rendering.worker.helpers.denoise_client import DIED, DenoiseClient, DenoiseResult, denoise_request
 from tests.serving import SCENE, Client, Server
 from tests.serving import client as opened
 
@@ -183,11 +183,11 @@ def test_the_command_line_denoises(tmp_path: Path, raw: Any, reference: Any) -> 
 
 
 def test_a_denoiser_that_dies_is_replaced_and_then_given_up() -> None:
-    denoiser, told = Denoiser(), list[Delivery]()
+    denoiser, told = DenoiseClient(), list[DenoiseResult]()
     color, guide = np.random.default_rng(1).random((32, 32, 4), np.float32), np.ones((32, 32, 3), np.float32)
 
-    def ask(kill: bool) -> Delivery:
-        denoiser.ask(order(color, (guide, guide), fine=False), told.append)
+    def ask(kill: bool) -> DenoiseResult:
+        denoiser.ask(denoise_request(color, (guide, guide), fine=False), told.append)
         assert denoiser.busy
         if kill:
             assert denoiser.process_id is not None
@@ -197,7 +197,7 @@ def test_a_denoiser_that_dies_is_replaced_and_then_given_up() -> None:
             denoiser.hear()
         return told[-1]
 
-    assert ask(kill=True) == Delivery(None, DIED)
+    assert ask(kill=True) == DenoiseResult(None, DIED)
     good = ask(kill=False)
     assert good.pixels is not None and good.pixels.shape == color.shape and denoiser.missing is None
     for last in (False, False, True):
@@ -208,9 +208,10 @@ def test_a_denoiser_that_dies_is_replaced_and_then_given_up() -> None:
 
 def test_the_helper_ends_with_its_parent() -> None:
     program = (
-        "import sys, numpy as np; from service.rendering.worker.denoiser import Denoiser, order\n"
-        "d = Denoiser(); a = np.ones((64, 64, 4), np.float32)\n"
-        "d.ask(order(a, (a[..., :3], a[..., :3]), True), print)\n"
+        "import sys, numpy as np\n"
+        "from service.rendering.worker.helpers.denoise_client import DenoiseClient, denoise_request\n"
+        "d = DenoiseClient(); a = np.ones((64, 64, 4), np.float32)\n"
+        "d.ask(denoise_request(a, (a[..., :3], a[..., :3]), True), print)\n"
         "sys.stdout.write(str(d.process_id)); sys.stdout.flush()\n"
         "import os; os._exit(0)"
     )

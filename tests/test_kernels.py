@@ -11,7 +11,7 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.kernels import cache
 from gpu.kernels.cache import KernelCache
-from service.rendering.worker import compiler
+from service.rendering.worker.helpers import compile_client
 from tests.test_compiling import arrays_of
 
 TEXT = """
@@ -99,11 +99,11 @@ def test_pictures_hold_theirs(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_records_of_kernels_are_pruned(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(compiler, "RECORDS", 10)
+    monkeypatch.setattr(compile_client, "RECORDS", 10)
     for n in range(11):
         (tmp_path / str(n)).touch()
-    compiler._prune(tmp_path)
+    compile_client._prune(tmp_path)
     assert len(list(tmp_path.iterdir())) == 5
-    compiler._prune(tmp_path)
+    compile_client._prune(tmp_path)
     assert len(list(tmp_path.iterdir())) == 5
-    compiler._prune(tmp_path / "none")
+    compile_client._prune(tmp_path / "none")

@@ -5,38 +5,42 @@ from __future__ import annotations
 import pytest
 
 from service.rendering.ipc.messages import StopRule
-from service.rendering.worker.pace import Pace
+from service.rendering.worker.progress.eta import EtaEstimate
 
 
-def gone(samples: int, sample_s: float = 0.1, slow: float = 0.0, power: float | None = None, step: int = 1) -> Pace:
+def gone(
+    samples: int, sample_s: float = 0.1, slow: float = 0.0, power: float | None = None, step: int = 1
+) -> EtaEstimate:
     """As many samples, of which the first ten took `slow` more; noise .8 of one, falling by that power."""
-    pace, elapsed_s = Pace(), 0.0
+    eta, elapsed_s = EtaEstimate(), 0.0
     for n in range(step, samples + 1, step):
         elapsed_s += step * sample_s + (slow if n <= 10 else 0.0)
-        pace.passed(n, elapsed_s)
+        eta.passed(n, elapsed_s)
         if power is not None and n >= 2:
-            pace.heard(n, 0.8 * n**-power)
-    return pace
+            eta.heard(n, 0.8 * n**-power)
+    return eta
 
 
 def test_it_is_that_of_the_first_limit() -> None:
-    pace = gone(25)
-    assert pace.eta_s(StopRule(100), 2.5) == pytest.approx(7.5)
-    assert pace.eta_s(StopRule(100), 2.7) == pytest.approx(7.3)  # some of the next one is there
-    assert pace.eta_s(StopRule(100, time_limit=5.0), 2.5) == pytest.approx(2.5)
-    assert pace.eta_s(StopRule(20), 2.5) == 0
-    assert pace.eta_s(StopRule(), 2.5) is None and pace.eta_s(StopRule(target_noise=0.1), 2.5) is None
-    assert Pace().eta_s(StopRule(100), 0.3) is None and Pace().eta_s(StopRule(time_limit=2.0), 0.5) == 1.5
+    eta = gone(25)
+    assert eta.eta_s(StopRule(100), 2.5) == pytest.approx(7.5)
+    assert eta.eta_s(StopRule(100), 2.7) == pytest.approx(7.3)  # some of the next one is there
+    assert eta.eta_s(StopRule(100, time_limit=5.0), 2.5) == pytest.approx(2.5)
+    assert eta.eta_s(StopRule(20), 2.5) == 0
+    assert eta.eta_s(StopRule(), 2.5) is None and eta.eta_s(StopRule(target_noise=0.1), 2.5) is None
+    assert (
+        EtaEstimate().eta_s(StopRule(100), 0.3) is None and EtaEstimate().eta_s(StopRule(time_limit=2.0), 0.5) == 1.5
+    )
 
 
 def test_what_was_slow_once_is_not_expected_again() -> None:
-    pace = gone(100, slow=2.0)
-    assert pace.eta_s(StopRule(400), 30.0) == pytest.approx(30.0)
-    pace = gone(1000, sample_s=0.1)
+    eta = gone(100, slow=2.0)
+    assert eta.eta_s(StopRule(400), 30.0) == pytest.approx(30.0)
+    eta = gone(1000, sample_s=0.1)
     for n in range(1001, 2001):  # others came
-        pace.passed(n, 100 + 0.3 * (n - 1000))
-    assert pace.eta_s(StopRule(2500), 400.0) == pytest.approx(150, rel=0.1)  # as far back as ahead
-    assert pace.eta_s(StopRule(4000), 400.0) == pytest.approx(400, rel=0.1)
+        eta.passed(n, 100 + 0.3 * (n - 1000))
+    assert eta.eta_s(StopRule(2500), 400.0) == pytest.approx(150, rel=0.1)  # as far back as ahead
+    assert eta.eta_s(StopRule(4000), 400.0) == pytest.approx(400, rel=0.1)
 
 
 @pytest.mark.parametrize("power", [0.5, 0.65, 0.8])
@@ -47,13 +51,13 @@ def test_noise_falls_as_it_has(power: float) -> None:
 
 
 def test_noise_that_tells_nothing_yet() -> None:
-    pace = gone(10)
-    pace.heard(10, 0.2)
-    assert pace.eta_s(StopRule(target_noise=0.1), 1.0) == pytest.approx(2 ** (1 / 0.55) - 0.9)  # as usual, and a pass
-    assert pace.eta_s(StopRule(target_noise=0.5), 1.0) == pytest.approx(0.7)  # 16 there are to be
-    pace.heard(16, 0.0)
-    assert pace.eta_s(StopRule(target_noise=0.1), 1.6) == pytest.approx(0.1)
-    rising = Pace()
+    eta = gone(10)
+    eta.heard(10, 0.2)
+    assert eta.eta_s(StopRule(target_noise=0.1), 1.0) == pytest.approx(2 ** (1 / 0.55) - 0.9)  # as usual, and a pass
+    assert eta.eta_s(StopRule(target_noise=0.5), 1.0) == pytest.approx(0.7)  # 16 there are to be
+    eta.heard(16, 0.0)
+    assert eta.eta_s(StopRule(target_noise=0.1), 1.6) == pytest.approx(0.1)
+    rising = EtaEstimate()
     for n in (16, 32, 64):
         rising.passed(n, n / 10)
         rising.heard(n, 0.1 * n)
@@ -62,22 +66,22 @@ def test_noise_that_tells_nothing_yet() -> None:
 
 def test_there_is_time_left_while_the_target_is_not_reached() -> None:
     """Though by the noise that was read last it should be, of fewer samples than there are by now."""
-    pace = gone(100, power=0.5)
+    eta = gone(100, power=0.5)
     for n in range(101, 131):
-        pace.passed(n, n / 10)
-    assert pace.eta_s(StopRule(target_noise=0.8 * 110**-0.5), 13.0) == pytest.approx(13 / 16 + 0.1, rel=0.05)
+        eta.passed(n, n / 10)
+    assert eta.eta_s(StopRule(target_noise=0.8 * 110**-0.5), 13.0) == pytest.approx(13 / 16 + 0.1, rel=0.05)
 
 
 def test_it_goes_on_after_a_checkpoint() -> None:
-    pace = Pace()
-    pace.passed(5000, 50.0)
-    assert pace.eta_s(StopRule(10000), 50.0) == pytest.approx(50)
-    pace.passed(5001, 50.1)
-    assert pace.eta_s(StopRule(10000), 50.1) == pytest.approx(50, rel=0.1)
+    eta = EtaEstimate()
+    eta.passed(5000, 50.0)
+    assert eta.eta_s(StopRule(10000), 50.0) == pytest.approx(50)
+    eta.passed(5001, 50.1)
+    assert eta.eta_s(StopRule(10000), 50.1) == pytest.approx(50, rel=0.1)
 
 
 def test_marks_stay_few() -> None:
-    pace = Pace()
+    eta = EtaEstimate()
     for n in range(1, 200_000):
-        pace.passed(n, n * 1e-3)
-    assert len(pace._marks) < 250 and pace.eta_s(StopRule(400_000), 200.0) == pytest.approx(200, rel=0.01)
+        eta.passed(n, n * 1e-3)
+    assert len(eta._marks) < 250 and eta.eta_s(StopRule(400_000), 200.0) == pytest.approx(200, rel=0.01)

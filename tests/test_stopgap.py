@@ -18,7 +18,7 @@ from gpu.precompile import fallback
 from service.pack import pack
 from service.rendering.ipc.messages import Frame, Loaded, Pause, StopRule, Update, View, Want
 from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.compiler import records
+from service.rendering.worker.helpers.compile_client import records
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -42,7 +42,7 @@ def test_one_kernel_for_all_that_it_knows() -> None:
     raised = frozenset[str]().union(*(features.flags(arrays) for arrays in KNOWN.values()))
     assert raised == fallback.flags(), "each flag is in some scene here"
     found = {fallback.kernel_key(arrays, SMALL) for arrays in KNOWN.values()}
-    sides = {dict((unit, side) for unit, _, _, *side in recipe.textures)[0][0] for recipe in found if recipe}
+    sides = {dict((unit, side) for unit, _, _, *side in key.textures)[0][0] for key in found if key}
     assert len(found) == len(sides) <= 2, "one for environments of each kind"
 
 

@@ -14,7 +14,7 @@ from service.bench import pareto, tradeoff, tradeoff_report
 from service.bench.tradeoff_scenes import TradeoffAssets, bumps, cases, planks
 from service.cli import main
 from service.pack import pack
-from service.rendering.worker.beyond import LIMITS
+from service.rendering.worker.progress.truncated_light import LIMITS
 from service.scene import parse_scene
 from tests.serving import SCENE, Server
 

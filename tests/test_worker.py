@@ -35,10 +35,10 @@ from service.rendering.ipc.messages import (
 )
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.ladder import FULL_S, NEXT_S, Ladder
+from service.rendering.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
 from service.rendering.worker.loop import coalesced
+from service.rendering.worker.progress.stop_rules import late, reached
 from service.rendering.worker.scheduler import FIRST_FRAME_LEAD_S, Scheduler
-from service.rendering.worker.stopping import late, reached
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -144,7 +144,7 @@ class Pictures:
 @pytest.mark.parametrize("pixel_s", [None, 1e-9, 1.2e-7, 1e-6, 1e-3])
 def test_ladder(side: int, pixel_s: float | None) -> None:
     renderer: Any = Pictures()
-    ladder = Ladder(renderer, renderer, RenderSettings(side, side))
+    ladder = ResolutionLadder(renderer, renderer, RenderSettings(side, side))
     scale = ladder.first(pixel_s)
     assert scale == 1.0 or side * scale >= 16
     if pixel_s and side * side * pixel_s <= FULL_S:

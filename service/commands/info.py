@@ -63,11 +63,11 @@ def kernel(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple
     """What the scene's kernel is compiled for, what not, and what that saves; measured here and now."""
     from gpu.analysis.kernel_cost import SIZE, full_kernel, kernel_cost
     from gpu.settings import RenderSettings
-    from service.rendering.worker.compiler import Compiler
+    from service.rendering.worker.helpers.compile_client import CompileClient
 
     settings = RenderSettings(SIZE, SIZE)
     price = kernel_cost(renderer, packed.arrays, settings)
-    Compiler(renderer.info, device, crowded=lambda: False).met(full_kernel(packed.arrays, settings))
+    CompileClient(renderer.info, device, crowded=lambda: False).met(full_kernel(packed.arrays, settings))
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
         ("features", " ".join(price.raised) or "none"),

@@ -28,8 +28,8 @@ from service.rendering.ipc.messages import (
     Update,
     View,
 )
-from service.rendering.worker.compiler import Compiler
-from service.rendering.worker.denoiser import Denoiser
+from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.worker.helpers.denoise_client import DenoiseClient
 from service.rendering.worker.task import Task
 
 if TYPE_CHECKING:
@@ -75,8 +75,8 @@ class Tracing:
         self._pixels: np.ndarray | None = None
         self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
-        self._denoiser = Denoiser()
-        at_hand = Compiler(renderer.info, None, crowded=lambda: False)  # compiles nothing, knows what was
+        self._denoiser = DenoiseClient()
+        at_hand = CompileClient(renderer.info, None, crowded=lambda: False)  # compiles nothing, knows what was
         self._task = Task(renderer, NUMBER, self._hear, self._denoiser, spare=at_hand)
         update = Update(NUMBER, 1, packed.arrays, settings.for_gpu(), stop, denoise=settings.denoise)
         self._task.update(update)
@@ -103,8 +103,8 @@ class Tracing:
 
     def appraise(self) -> None:
         """Measures what its kernel saves, where that takes no compiling."""
-        self._task.appraising.ask()
-        while self._task.appraising.due:
+        self._task.savings.ask()
+        while self._task.savings.due:
             self._task.appraise()
 
     def close(self) -> None:

@@ -1,4 +1,14 @@
 """The process that owns the GPU: takes the newest messages, traces a slice for whose turn it is, publishes.
 
 `python -m service.rendering.worker DESCRIPTOR` with one end of `link.pair()`.
+
+__main__        the process: its options, its device, its end
+loop            takes the newest messages, chooses whose turn it is, traces a slice, publishes
+scheduler       whose turn it is
+task            one client's picture, from its first update to its end
+kernel_savings  what a scene's own kernel saves, measured on demand
+device          what a task has on the device
+progress        how far a picture is, and when it is finished
+view            what a client is shown
+helpers         processes that compile and denoise
 """

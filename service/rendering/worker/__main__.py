@@ -15,7 +15,7 @@ from service.rendering.ipc import channel
 from service.rendering.ipc.heartbeat import Heartbeat
 from service.rendering.ipc.messages import Ready, Unable
 from service.rendering.priority import raise_process_niceness
-from service.rendering.worker.lifeline import end_with
+from service.rendering.worker.helpers.lifeline import end_with
 
 OOM_SCORE = 500  # of 1000, more than the server's: a cluster may have raised that one, and only root may lower it
 NICENESS = 10  # steps above the server's: its event loop and encoders come first, before llvmpipe's threads too
@@ -55,8 +55,8 @@ def main() -> int:
 
 def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     from gpu import GpuError, Renderer, denoise
+    from service.rendering.worker.device.memory import default_limit
     from service.rendering.worker.loop import Loop
-    from service.rendering.worker.memory import default_limit
 
     try:
         renderer = Renderer(arguments.device)

@@ -30,9 +30,9 @@ from service.rendering.ipc.messages import (
     Usage,
     Want,
 )
-from service.rendering.worker.compiler import Compiler
-from service.rendering.worker.denoiser import Denoiser
-from service.rendering.worker.memory import Memory
+from service.rendering.worker.device.memory import Memory
+from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.worker.helpers.denoise_client import DenoiseClient
 from service.rendering.worker.scheduler import Scheduler
 from service.rendering.worker.task import Task
 
@@ -60,9 +60,9 @@ class Loop:
         self._tasks: dict[int, Task] = {}
         self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
-        self._denoiser = Denoiser()
-        self._compiler = Compiler(renderer.info, device, self._crowded, lifeline=lifeline)
-        self._spare = Compiler(renderer.info, device, lambda: True, spare=True)
+        self._denoiser = DenoiseClient()
+        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline=lifeline)
+        self._spare = CompileClient(renderer.info, device, lambda: True, spare=True)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
@@ -117,7 +117,7 @@ class Loop:
 
     def _appraise(self) -> bool:
         """A step of what is only done when there is nothing else; whether there was one."""
-        task = next((task for task in self._tasks.values() if task.appraising.due), None)
+        task = next((task for task in self._tasks.values() if task.savings.due), None)
         if task is not None:
             self._work(task, task.appraise, spare=True)
         return task is not None
@@ -160,7 +160,7 @@ class Loop:
         elif isinstance(message, Restore):
             self._work(task, lambda: task.restore(message))
         elif isinstance(message, MeasureKernel):
-            task.appraising.ask()
+            task.savings.ask()
         elif isinstance(message, Pause):
             task.pause(message.away)
         elif isinstance(message, Resume):

@@ -13,7 +13,7 @@ import numpy as np
 
 from gpu import denoise
 from service.rendering.ipc import channel
-from service.rendering.worker.helper import Helper
+from service.rendering.worker.helpers.process import HelperProcess
 
 # How long a stream waits for its denoised frame, and in times of what the last one took; then it goes on without.
 PATIENCE_S, PATIENCE = 3.0, 3.0
@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
-class Order:
+class DenoiseRequest:
     """A picture to denoise, as gpu.denoise.denoise takes it."""
 
     color: np.ndarray
@@ -35,7 +35,7 @@ class Order:
 
 
 @dataclass(frozen=True)
-class Delivery:
+class DenoiseResult:
     """The denoised picture; or None and why not, `missing` when no other will fare better."""
 
     pixels: np.ndarray | None
@@ -43,13 +43,13 @@ class Delivery:
     missing: bool = False
 
 
-class Denoiser:
+class DenoiseClient:
     """Its process starts with the first order and ends when idle for a while."""
 
     def __init__(self) -> None:
         self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why it does nothing
-        self._helper = Helper("service.rendering.worker.denoising")
-        self._told: Callable[[Delivery], None] | None = None
+        self._helper = HelperProcess("service.rendering.worker.helpers.denoise_main")
+        self._told: Callable[[DenoiseResult], None] | None = None
         self._deaths = 0
         self._asked_at = self._took_s = 0.0
 
@@ -77,7 +77,7 @@ class Denoiser:
     def process_id(self) -> int | None:
         return self._helper.process_id
 
-    def ask(self, order: Order, told: Callable[[Delivery], None]) -> None:
+    def ask(self, order: DenoiseRequest, told: Callable[[DenoiseResult], None]) -> None:
         """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
         self._told, self._asked_at = told, time.monotonic()
         self._helper.ask(order)
@@ -85,7 +85,7 @@ class Denoiser:
     def hear(self) -> None:
         """Hands on what was denoised, if anything was."""
         try:
-            delivery: Delivery = self._helper.hear()
+            delivery: DenoiseResult = self._helper.hear()
         except BlockingIOError:
             return
         except channel.Closed:
@@ -93,7 +93,7 @@ class Denoiser:
             if not self.busy:
                 return
             self._deaths += 1
-            delivery = Delivery(None, DIED, missing=self._deaths >= TRIES)
+            delivery = DenoiseResult(None, DIED, missing=self._deaths >= TRIES)
         else:
             self._deaths = 0
             self._took_s = time.monotonic() - self._asked_at
@@ -113,5 +113,7 @@ class Denoiser:
         self._helper.close()
 
 
-def order(color: np.ndarray, guides: tuple[np.ndarray, np.ndarray], fine: bool) -> Order:
-    return Order(np.ascontiguousarray(color), np.ascontiguousarray(guides[0]), np.ascontiguousarray(guides[1]), fine)
+def denoise_request(color: np.ndarray, guides: tuple[np.ndarray, np.ndarray], fine: bool) -> DenoiseRequest:
+    return DenoiseRequest(
+        np.ascontiguousarray(color), np.ascontiguousarray(guides[0]), np.ascontiguousarray(guides[1]), fine
+    )

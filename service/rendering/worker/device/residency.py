@@ -8,42 +8,42 @@ from typing import TYPE_CHECKING
 
 from gpu import OutOfMemory, RenderSettings
 from service.rendering.ipc.messages import Update
-from service.rendering.worker.holding import Aside, Holding, needed
-from service.rendering.worker.ladder import Ladder
-from service.rendering.worker.memory import Holder, Memory
+from service.rendering.worker.device.loaded_scene import LoadedScene, Offloaded, needed
+from service.rendering.worker.device.memory import Holder, Memory
+from service.rendering.worker.device.resolution_ladder import ResolutionLadder
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
 
 
-class Held:
+class Residency:
     """Nothing, before something was loaded and when that failed. Raises what the renderer raises."""
 
     def __init__(self, renderer: Renderer, memory: Memory, owner: Holder, parting: Callable[[], None]) -> None:
         """`owner` is whom others ask to evict it; `parting` is called before what is there leaves the device."""
-        self.holding: Holding | None = None
+        self.loaded: LoadedScene | None = None
         self.rested_since = 0.0
-        self._aside: Aside | None = None
+        self._offloaded: Offloaded | None = None
         self._renderer, self._memory = renderer, memory
         self._owner, self._parting = owner, parting
 
     @property
     def there(self) -> bool:
         """On the device or aside."""
-        return self.holding is not None or self._aside is not None
+        return self.loaded is not None or self._offloaded is not None
 
     @property
-    def aside(self) -> Aside | None:
-        return self._aside
+    def offloaded(self) -> Offloaded | None:
+        return self._offloaded
 
     @property
     def bytes(self) -> int:
-        return 0 if self.holding is None else self.holding.bytes
+        return 0 if self.loaded is None else self.loaded.bytes
 
     @property
-    def ladder(self) -> Ladder:
-        assert self.holding is not None
-        return self.holding.ladder
+    def ladder(self) -> ResolutionLadder:
+        assert self.loaded is not None
+        return self.loaded.ladder
 
     @property
     def full(self) -> Picture:
@@ -53,14 +53,14 @@ class Held:
         """It was worked on, or looked at, until now."""
         self.rested_since = time.monotonic()
 
-    def change(self, update: Update, settings: RenderSettings) -> Holding | None:
+    def change(self, update: Update, settings: RenderSettings) -> LoadedScene | None:
         """Has on the device what the update asks for; where that is another scene, what shall take the place of
         what is there, which goes only now that this has come."""
         if update.scene is None:
             self.wake()
-            assert self.holding is not None
+            assert self.loaded is not None
             if update.edits:
-                self.holding.scene.edit(**update.edits)
+                self.loaded.scene.edit(**update.edits)
             if update.settings is None:
                 if update.edits:
                     self.ladder.reset()
@@ -70,12 +70,12 @@ class Held:
                 self.ladder.configure(settings)
                 return None
 
-        def make() -> Holding | None:
+        def make() -> LoadedScene | None:
             if update.scene is None:
-                assert self.holding is not None
-                self.holding.resize(settings)
+                assert self.loaded is not None
+                self.loaded.resize(settings)
                 return None
-            return Holding(self._renderer, update.scene, settings, update.interactive, update.edits)
+            return LoadedScene(self._renderer, update.scene, settings, update.interactive, update.edits)
 
         return self._with_room(needed(update.scene, settings), make, update.scene is not None)
 
@@ -83,19 +83,19 @@ class Held:
         """For so many bytes more. Raises OutOfMemory."""
         self._memory.make_room(size, self._owner)
 
-    def _with_room(self, size: int, make: Callable[[], Holding | None], whole: bool) -> Holding | None:
+    def _with_room(self, size: int, make: Callable[[], LoadedScene | None], whole: bool) -> LoadedScene | None:
         """What `make` makes, where need be at the expense of who rests, and of what is held here."""
         try:
             self.make_room(size)
             return self._insist(make)
         except OutOfMemory:
-            if self.holding is None or not whole:
+            if self.loaded is None or not whole:
                 raise
-            self.put_aside()
+            self.offload()
             self.make_room(size)
             return self._insist(make)
 
-    def _insist(self, make: Callable[[], Holding | None]) -> Holding | None:
+    def _insist(self, make: Callable[[], LoadedScene | None]) -> LoadedScene | None:
         """The driver may have less than is allowed."""
         while True:
             try:
@@ -106,20 +106,20 @@ class Held:
 
     def wake(self) -> None:
         """Has back on the device what was put aside."""
-        aside = self._aside
-        if aside is not None and self.holding is None:
-            self.make_room(needed(aside.arrays, aside.settings))
-            self.holding = self._insist(lambda: Holding.back(self._renderer, aside))
-            self._aside = None
+        offloaded = self._offloaded
+        if offloaded is not None and self.loaded is None:
+            self.make_room(needed(offloaded.arrays, offloaded.settings))
+            self.loaded = self._insist(lambda: LoadedScene.back(self._renderer, offloaded))
+            self._offloaded = None
 
-    def put_aside(self) -> None:
+    def offload(self) -> None:
         """To the machine's memory."""
-        assert self.holding is not None
+        assert self.loaded is not None
         self._parting()
-        self._aside, self.holding = self.holding.aside(), None
+        self._offloaded, self.loaded = self.loaded.offloaded(), None
 
     def release(self) -> None:
-        holding, self.holding, self._aside = self.holding, None, None
+        loaded, self.loaded, self._offloaded = self.loaded, None, None
         self._parting()
-        if holding is not None:
-            holding.release()
+        if loaded is not None:
+            loaded.release()

@@ -10,14 +10,14 @@ from gpu import RenderSettings, picture_bytes, save, scene_bytes
 from gpu.kernels import features
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Update
-from service.rendering.worker.ladder import Ladder
+from service.rendering.worker.device.resolution_ladder import ResolutionLadder
 
 if TYPE_CHECKING:
     from gpu import KernelKey, Renderer, Saved, Scene, SceneArrays
 
 
 @dataclass(frozen=True)
-class Aside:
+class Offloaded:
     """What was on the device, in full: it goes on to the same bits."""
 
     arrays: SceneArrays
@@ -27,7 +27,7 @@ class Aside:
     pictures: dict[float, Saved]  # by scale, of those that had begun
 
 
-class Holding:
+class LoadedScene:
     """Raises what the renderer raises, and then holds nothing."""
 
     def __init__(
@@ -45,7 +45,7 @@ class Holding:
         try:
             if edits:
                 self.scene.edit(**edits)
-            self.ladder = Ladder(renderer, self.scene, settings)
+            self.ladder = ResolutionLadder(renderer, self.scene, settings)
         except Exception:
             self.scene.release()
             raise
@@ -60,22 +60,22 @@ class Holding:
 
     def resize(self, settings: RenderSettings) -> None:
         """Takes settings of another size; what there is stays when that can't be had."""
-        ladder = Ladder(self._renderer, self.scene, settings)
+        ladder = ResolutionLadder(self._renderer, self.scene, settings)
         self.ladder.release()
         self.ladder = ladder
 
-    def aside(self) -> Aside:
+    def offloaded(self) -> Offloaded:
         """Off the device; this holding is released."""
         pictures = {scale: finished(save(made)) for scale, made in self.ladder.begun.items()}
-        out = Aside(self.scene.arrays, self.ladder.full.settings, self._editing, self.scene.flags, pictures)
+        out = Offloaded(self.scene.arrays, self.ladder.full.settings, self._editing, self.scene.flags, pictures)
         self.release()
         return out
 
     @classmethod
-    def back(cls, renderer: Renderer, aside: Aside) -> Holding:
-        out = cls(renderer, aside.arrays, aside.settings, aside.editing, {}, aside.flags)
+    def back(cls, renderer: Renderer, offloaded: Offloaded) -> LoadedScene:
+        out = cls(renderer, offloaded.arrays, offloaded.settings, offloaded.editing, {}, offloaded.flags)
         try:
-            for scale, saved in aside.pictures.items():
+            for scale, saved in offloaded.pictures.items():
                 out.ladder.picture(scale).restore(saved)
         except Exception:
             out.release()
@@ -103,17 +103,17 @@ def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class KernelRequest:
     """What an update comes to, and the kernel that it takes."""
 
     arrays: SceneArrays
     settings: RenderSettings
-    recipe: KernelKey
+    key: KernelKey
 
 
-def wanted_of(
-    update: Update, old: RenderSettings | None, holding: Holding | None, aside: Aside | None
-) -> Wanted | None:
+def kernel_request(
+    update: Update, old: RenderSettings | None, loaded: LoadedScene | None, offloaded: Offloaded | None
+) -> KernelRequest | None:
     """The picture that the update makes; None: its kernel is the one there is, or nothing can come of it."""
     settings = old if update.settings is None else RenderSettings(**update.settings)
     edits, raised = update.edits, frozenset[str]()
@@ -122,16 +122,16 @@ def wanted_of(
     if update.scene is not None:
         arrays, editing = update.scene, update.interactive
         raised = features.flags(arrays, editing)
-    elif holding is not None:
-        arrays, editing, raised = holding.scene.arrays, holding.editing, holding.scene.flags
+    elif loaded is not None:
+        arrays, editing, raised = loaded.scene.arrays, loaded.editing, loaded.scene.flags
         aperture = update.camera is None or update.camera.aperture_radius == arrays.camera.aperture_radius
         if update.settings is None and aperture and not edits.keys() & {"materials", "texture_words", "moved"}:
             return None
-    elif aside is not None:
-        arrays, editing, raised = aside.arrays, aside.editing, aside.flags
+    elif offloaded is not None:
+        arrays, editing, raised = offloaded.arrays, offloaded.editing, offloaded.flags
     else:
         return None
     if edits or update.scene is None:
         arrays = kernel_keys.apply_edit(arrays, edits)
         raised = features.grown(raised, arrays) if editing else features.flags(arrays)
-    return Wanted(arrays, settings, kernel_keys.kernel_key(arrays, settings, raised))
+    return KernelRequest(arrays, settings, kernel_keys.kernel_key(arrays, settings, raised))

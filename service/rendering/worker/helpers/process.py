@@ -11,10 +11,10 @@ from typing import Any
 
 from service.rendering.ipc import channel
 
-ROOT = Path(__file__).parents[3]
+ROOT = Path(__file__).parents[4]
 
 
-class Helper:
+class HelperProcess:
     """Runs `python -m MODULE DESCRIPTOR --parent PID ARGUMENTS`, which may end by itself when idle."""
 
     def __init__(self, module: str, *arguments: str, lifeline: int | None = None) -> None:

@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 PAUSE = 20  # times what reading took until the next reading, which so costs 5 % at most
 
 
-class Meter:
+class NoiseReading:
     def __init__(self) -> None:
         self.noise: float | None = None  # as it was last read
         self.at = 0  # samples at the last reading

@@ -18,7 +18,7 @@ REST = 100  # times what the last one took until the next, which so cost 1 % at 
 MOST_BYTES = 256 << 20  # of a picture under way, as the server has one of each render
 
 
-class Keeping:
+class Checkpointer:
     """Steps, between which others have their turns."""
 
     def __init__(self, every_s: float) -> None:

@@ -1,4 +1,4 @@
-"""The helper process that denoises: `python -m service.rendering.worker.denoising DESCRIPTOR --parent PID`.
+"""Denoises pictures: `python -m service.rendering.worker.helpers.denoise_main DESCRIPTOR --parent PID`.
 
 A process of its own, so that neither the denoiser's seconds nor its misfortunes are the render loop's, and at the
 lowest priority, so that nobody's first frame waits for it.
@@ -12,15 +12,15 @@ import select
 import socket
 
 from service.rendering.ipc import channel
-from service.rendering.worker.denoiser import Delivery, Order
-from service.rendering.worker.lifeline import end_with
+from service.rendering.worker.helpers.denoise_client import DenoiseRequest, DenoiseResult
+from service.rendering.worker.helpers.lifeline import end_with
 
 NICENESS = 19  # the renderer is at 10: where both want the processor, this one gets an eighth of it
 IDLE_S = 60.0  # then it ends, and gives back what the library holds (some 200 MB)
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m service.rendering.worker.denoising")
+    parser = argparse.ArgumentParser(prog="python -m service.rendering.worker.helpers.denoise_main")
     parser.add_argument("descriptor", type=int)
     parser.add_argument("--parent", type=int, required=True)
     arguments = parser.parse_args()
@@ -36,15 +36,15 @@ def main() -> int:
     return 0
 
 
-def deliver(order: Order) -> Delivery:
+def deliver(order: DenoiseRequest) -> DenoiseResult:
     from gpu import denoise
 
     if (detail := denoise.missing()) is not None:
-        return Delivery(None, detail, missing=True)
+        return DenoiseResult(None, detail, missing=True)
     try:
-        return Delivery(denoise.denoise(order.color, order.albedo, order.normal, order.fine))
+        return DenoiseResult(denoise.denoise(order.color, order.albedo, order.normal, order.fine))
     except (RuntimeError, MemoryError) as error:
-        return Delivery(None, f"Open Image Denoise failed: {error}")
+        return DenoiseResult(None, f"Open Image Denoise failed: {error}")
 
 
 if __name__ == "__main__":

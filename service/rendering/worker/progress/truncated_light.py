@@ -17,7 +17,7 @@ WORTH = 50  # as many times its own paths are to be in the picture first: 2 % of
 log = logging.getLogger(__name__)
 
 
-class Beyond:
+class TruncatedLight:
     def __init__(self, renderer: Renderer) -> None:
         self.shares: dict[int, float] | None = None  # by bounces; None: not known yet
         self._renderer = renderer

@@ -13,10 +13,10 @@ from typing import TYPE_CHECKING
 from gpu import GpuError, OutOfMemory, scene_bytes
 from gpu.precompile import fallback
 from service.rendering.ipc.messages import Frame, FromRenderer, Progress, Want
-from service.rendering.worker.compiler import Compiler
-from service.rendering.worker.holding import Wanted
-from service.rendering.worker.ladder import FIRST_S, SCALES, SMALLEST_SIDE, Ladder
-from service.rendering.worker.showing import GUIDES, SLICE_S, pixels_of
+from service.rendering.worker.device.loaded_scene import KernelRequest
+from service.rendering.worker.device.resolution_ladder import FIRST_S, SCALES, SMALLEST_SIDE, ResolutionLadder
+from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.worker.view.frames import GUIDES, SLICE_S, pixels_of
 
 if TYPE_CHECKING:
     from gpu import Renderer, RenderSettings, Scene, SceneArrays
@@ -29,18 +29,18 @@ BEGIN_S = 4e-6  # a sample of a pixel, before there was one (llvmpipe with 2 cor
 log = logging.getLogger(__name__)
 
 
-class Stopgap:
+class FallbackPreview:
     """Between `begin` and `release` there is a picture of that update."""
 
     def __init__(
-        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, spare: Compiler | None
+        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, spare: CompileClient | None
     ) -> None:
         """`spare` compiles in time that nobody wants; without it there is never anything to see."""
         self.generation = 0
         self.scale: float | None = None  # of what there is to see
         self._number, self._send, self._renderer, self._spare = number, send, renderer, spare
         self._scene: Scene | None = None
-        self._ladder: Ladder | None = None
+        self._ladder: ResolutionLadder | None = None
         self._next = 1.0  # the scale that is traced
         self._pixel_s = BEGIN_S
         self._spent_s = 0.0
@@ -61,22 +61,22 @@ class Stopgap:
 
     def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> None:
         """Has the kernel compiled, some time, that edits of these will need."""
-        recipe = fallback.kernel_key(arrays, settings)
-        if recipe is not None and self._spare is not None:
-            self._spare.prepare([recipe])
+        key = fallback.kernel_key(arrays, settings)
+        if key is not None and self._spare is not None:
+            self._spare.prepare([key])
 
-    def can(self, wanted: Wanted) -> bool:
+    def can(self, wanted: KernelRequest) -> bool:
         """Whether there would be anything to see at once."""
         if self._spare is None or min(wanted.settings.width, wanted.settings.height) * LARGEST < SMALLEST_SIDE:
             return False
-        recipe = fallback.kernel_key(wanted.arrays, wanted.settings)
-        return recipe is not None and self._spare.has(recipe) and scene_bytes(wanted.arrays) <= MOST_BYTES
+        key = fallback.kernel_key(wanted.arrays, wanted.settings)
+        return key is not None and self._spare.has(key) and scene_bytes(wanted.arrays) <= MOST_BYTES
 
-    def begin(self, wanted: Wanted, generation: int) -> None:
+    def begin(self, wanted: KernelRequest, generation: int) -> None:
         """Begins with what `can` be shown; where it can't after all, there is nothing to see."""
         settings = fallback.settings_for(wanted.settings)
-        recipe = fallback.kernel_key(wanted.arrays, wanted.settings)
-        assert settings is not None and recipe is not None and self._spare is not None
+        key = fallback.kernel_key(wanted.arrays, wanted.settings)
+        assert settings is not None and key is not None and self._spare is not None
         self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
         try:
             edits = None if self._scene is None else fallback.edits(self._scene.arrays, wanted.arrays)
@@ -87,10 +87,10 @@ class Stopgap:
                 self._scene = self._renderer.load_fallback(wanted.arrays)
             if self._ladder is not None:
                 self._ladder.release()
-            self._ladder = Ladder(self._renderer, self._scene, settings, full=False)
+            self._ladder = ResolutionLadder(self._renderer, self._scene, settings, full=False)
             self._next = self._fitting(self._ladder, FIRST_S)
             self._ladder.picture(self._next)
-            self._spare.met(recipe)
+            self._spare.met(key)
         except GpuError as error:
             log.info("could not use a stopgap error=%s", error)
             self.release()
@@ -104,7 +104,7 @@ class Stopgap:
             self.release()
             return 0
 
-    def _trace(self, ladder: Ladder) -> int:
+    def _trace(self, ladder: ResolutionLadder) -> int:
         picture = ladder.picture(self._next)
         before = picture.samples
         self._spent_s += picture.trace(SLICE_S, before + 1)
@@ -115,7 +115,7 @@ class Stopgap:
                 self._next = max(self._next, self._fitting(ladder, ENOUGH_S - self._spent_s))
         return (picture.samples - before) * picture.settings.width * picture.settings.height
 
-    def _fitting(self, ladder: Ladder, seconds: float) -> float:
+    def _fitting(self, ladder: ResolutionLadder, seconds: float) -> float:
         """The largest scale at which a sample takes no longer, or the smallest one there is."""
         scales = [scale for scale in SCALES if scale <= LARGEST]
         return next((s for s in scales if ladder.pixels(s) * self._pixel_s <= seconds), scales[-1])

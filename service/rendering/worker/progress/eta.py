@@ -20,7 +20,7 @@ LOOK_BACK = 8  # times fewer samples: as far as readings count
 LEAST_LEFT = 1 / 16  # of the samples there are: so many more at least, while the target is not reached
 
 
-class Pace:
+class EtaEstimate:
     def __init__(self) -> None:
         self._marks: list[tuple[int, float]] = [(0, 0.0)]  # complete samples and the seconds to them
         self._latest = self._marks[0]

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from service.rendering.ipc import channel
-from service.rendering.worker.helper import Helper
+from service.rendering.worker.helpers.process import HelperProcess
 from service.spell import Spell
 
 if TYPE_CHECKING:
@@ -41,12 +41,12 @@ class Compiled:
 
 
 @dataclass
-class _Order:
-    recipe: KernelKey
+class _CompileRequest:
+    key: KernelKey
     told: set[Told] = field(default_factory=set)
 
 
-class Compiler:
+class CompileClient:
     """Its process starts with the first order and ends when idle for a while."""
 
     def __init__(
@@ -64,13 +64,13 @@ class Compiler:
         self._crowded = crowded
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
         given += ["--spare"] if spare else []
-        self._helper = Helper("service.rendering.worker.compiling", *given, lifeline=lifeline)
+        self._helper = HelperProcess("service.rendering.worker.helpers.compile_main", *given, lifeline=lifeline)
         self._limit_s = SPARE_LIMIT_S if spare else LIMIT_S
         self._able = _has_cache()
         self._records = records()
         self._known: set[KernelKey] = set()  # what needs no helper any more, or was not helped
         self._met: set[KernelKey] = set()
-        self._orders: list[_Order] = []  # the first is under way
+        self._orders: list[_CompileRequest] = []  # the first is under way
         self._until = 0.0
         self._spell: Spell | None = None  # of the order under way
         self._failures = 0
@@ -85,24 +85,24 @@ class Compiler:
         """How long it makes sense to wait for that."""
         return max(0.0, self._until - time.monotonic()) if self._orders else None
 
-    def knows(self, recipe: KernelKey) -> bool:
+    def knows(self, key: KernelKey) -> bool:
         """Whether nobody need wait for it any more."""
-        return recipe in self._known
+        return key in self._known
 
-    def waits(self, recipe: KernelKey, told: Told, alone: bool = False) -> bool:
+    def waits(self, key: KernelKey, told: Told, alone: bool = False) -> bool:
         """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
         it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop, as
         where nobody else is there, unless there is something to do meanwhile (`alone`).
         """
         if told is not _nobody:
             self.forget(told)
-        if self.knows(recipe):
+        if self.knows(key):
             return False
-        order = next((order for order in self._orders if order.recipe == recipe), None)
+        order = next((order for order in self._orders if order.key == key), None)
         if order is None:
-            if not self._able or not (alone or self._crowded()) or self._is_recorded(recipe):
+            if not self._able or not (alone or self._crowded()) or self._is_recorded(key):
                 return False
-            order = _Order(recipe)
+            order = _CompileRequest(key)
             self._orders.append(order)
             if len(self._orders) == 1:
                 self._begin()
@@ -111,36 +111,36 @@ class Compiler:
         order.told.add(told)
         return True
 
-    def prepare(self, recipes: list[KernelKey]) -> None:
+    def prepare(self, keys: list[KernelKey]) -> None:
         """Has them compiled, those that no renderer here has met yet, though nobody waits."""
-        for recipe in recipes:
-            self.waits(recipe, _nobody)
+        for key in keys:
+            self.waits(key, _nobody)
 
-    def met(self, recipe: KernelKey) -> None:
+    def met(self, key: KernelKey) -> None:
         """The renderer has this kernel: the driver's disk cache too."""
-        if recipe in self._met:
+        if key in self._met:
             return
         if len(self._known) >= REMEMBERED:  # the records know them, too
             self._known.clear()
             self._met.clear()
             _prune(self._records)
-        self._known.add(recipe)
-        self._met.add(recipe)
-        self._record(recipe)
+        self._known.add(key)
+        self._met.add(key)
+        self._record(key)
 
-    def has(self, recipe: KernelKey) -> bool:
+    def has(self, key: KernelKey) -> bool:
         """Whether it loads at once."""
-        return recipe in self._met or self._is_recorded(recipe)
+        return key in self._met or self._is_recorded(key)
 
-    def _is_recorded(self, recipe: KernelKey) -> bool:
-        return self._able and os.path.exists(self._records / recipe.digest(self._driver))
+    def _is_recorded(self, key: KernelKey) -> bool:
+        return self._able and os.path.exists(self._records / key.digest(self._driver))
 
-    def _record(self, recipe: KernelKey) -> None:
+    def _record(self, key: KernelKey) -> None:
         """It is in the driver's disk cache."""
         if self._able:
             try:
                 self._records.mkdir(parents=True, exist_ok=True)
-                (self._records / recipe.digest(self._driver)).touch()
+                (self._records / key.digest(self._driver)).touch()
             except OSError as error:
                 log.info("could not record a compiled kernel error=%s", error)
 
@@ -169,7 +169,7 @@ class Compiler:
             else:
                 log.info("compiled ahead ms=%.0f", answer.milliseconds)
             if answer.cached and not answer.detail:
-                self._record(self._orders[0].recipe)
+                self._record(self._orders[0].key)
             self._tell(answer.milliseconds)
         if self._orders:
             self._begin()
@@ -192,7 +192,7 @@ class Compiler:
 
     def _tell(self, milliseconds: float) -> None:
         order = self._orders.pop(0)
-        self._known.add(order.recipe)
+        self._known.add(order.key)
         for told in order.told:
             told(milliseconds)
 
@@ -200,7 +200,7 @@ class Compiler:
         """Sends the first order; where that can't be, all are told to do without."""
         try:
             if self._failures < TRIES:
-                self._helper.ask(self._orders[0].recipe)
+                self._helper.ask(self._orders[0].key)
                 self._until = time.monotonic() + self._limit_s
                 self._spell = None if self._helper.process_id is None else Spell(self._helper.process_id)
                 return

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpu.denoise import GUIDE_SAMPLES
 from service.rendering.ipc.messages import Progress
-from service.rendering.worker.denoiser import Delivery, Denoiser, order
+from service.rendering.worker.helpers.denoise_client import DenoiseClient, DenoiseResult, denoise_request
 
 if TYPE_CHECKING:
     from gpu import Picture
@@ -23,17 +23,17 @@ REST, AGE_SHARE, LONGEST_REST_S = 2.0, 0.25, 1.0
 
 
 @dataclass(frozen=True)
-class Smooth:
+class Denoised:
     pixels: np.ndarray  # (height, width, 4), as Picture.read gives colour
     progress: Progress  # of the picture that was denoised
     fine: bool
 
 
-class Smoothing:
-    def __init__(self, denoiser: Denoiser, yields: bool) -> None:
+class DenoisePolicy:
+    def __init__(self, denoiser: DenoiseClient, yields: bool) -> None:
         """`yields`: the renderer computes where the denoiser does, and goes on when that is through."""
         self.wanted = False
-        self.latest: Smooth | None = None
+        self.latest: Denoised | None = None
         self.pending = False
         self._denoiser = denoiser
         self._yields = yields
@@ -68,7 +68,7 @@ class Smoothing:
         """Whether such a picture is shown denoised: not when it is clean, nor when nothing can denoise it."""
         return self.wanted and aov == "color" and self.warning is None and not (noise is not None and noise < CLEAN)
 
-    def has(self, samples: int) -> Smooth | None:
+    def has(self, samples: int) -> Denoised | None:
         """The final form of a picture of so many samples."""
         latest = self.latest
         return latest if latest is not None and latest.fine and latest.progress.samples == samples else None
@@ -85,7 +85,7 @@ class Smoothing:
         self.pending = True
         age, began = self._age, time.monotonic()
 
-        def hear(delivery: Delivery) -> None:
+        def hear(delivery: DenoiseResult) -> None:
             if age != self._age:
                 return
             self.pending, now = False, time.monotonic()
@@ -93,7 +93,7 @@ class Smoothing:
             if delivery.pixels is None:
                 self._failed = delivery.detail
             else:
-                self.latest = Smooth(delivery.pixels, progress, fine)
+                self.latest = Denoised(delivery.pixels, progress, fine)
             told()
 
-        self._denoiser.ask(order(picture.read(), picture.guides(GUIDE_SAMPLES), fine), hear)
+        self._denoiser.ask(denoise_request(picture.read(), picture.guides(GUIDE_SAMPLES), fine), hear)

@@ -11,10 +11,10 @@ from gpu import picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Frame, FromRenderer, Image, Read, View, Want
-from service.rendering.worker.compiler import Compiler
-from service.rendering.worker.course import Course
-from service.rendering.worker.held import Held
-from service.rendering.worker.smoothing import Smooth, Smoothing
+from service.rendering.worker.device.residency import Residency
+from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.worker.progress.progress import ProgressTracker
+from service.rendering.worker.view.denoise_policy import Denoised, DenoisePolicy
 
 if TYPE_CHECKING:
     from gpu import Picture
@@ -23,26 +23,26 @@ GUIDES = ("albedo", "normal", "depth", "shape_id", "material_id")
 SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
 
 
-class Showing:
+class FrameSource:
     """What cannot be shown at once is prepared in steps, while `due`."""
 
     def __init__(
         self,
         number: int,
         send: Callable[[FromRenderer], None],
-        held: Held,
-        course: Course,
-        smoothing: Smoothing,
+        residency: Residency,
+        tracker: ProgressTracker,
+        denoising: DenoisePolicy,
         finish: Callable[[], None],
-        compiler: Compiler | None,
+        compiler: CompileClient | None,
     ) -> None:
         """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
         self.want: Want | None = None
         self.scale: float | None = None  # of what there is to see
         self.owes_done = False
-        self.smoothing = smoothing
+        self.denoising = denoising
         self._number, self._send, self._finish = number, send, finish
-        self._held, self._course = held, course
+        self._residency, self._tracker = residency, tracker
         self._compiler = compiler
         self._compiling = False  # the kernel of the AOVs of the first hit
         self._served: tuple[object, ...] = ()
@@ -54,7 +54,7 @@ class Showing:
     def restart(self) -> None:
         """Another picture: nothing of it was seen yet."""
         self.part()
-        self.smoothing.restart()
+        self.denoising.restart()
         self._smoothed = False
         self.scale = None
 
@@ -89,83 +89,83 @@ class Showing:
 
     def answer(self) -> bool:
         """Sends the frame that is wanted if there is something new to see in it."""
-        want, shown, course = self.want, self.scale, self._course
+        want, shown, tracker = self.want, self.scale, self._tracker
         if want is None or shown is None:
             return False
-        if self._held.aside is not None:  # at rest: there is nothing new in it
-            if self._served and self._served[3] == course.reason and not want.anyway:
+        if self._residency.offloaded is not None:  # at rest: there is nothing new in it
+            if self._served and self._served[3] == tracker.reason and not want.anyway:
                 return False
-            self._held.wake()
-        if self._held.holding is None:
+            self._residency.wake()
+        if self._residency.loaded is None:
             return False
-        picture = self._held.ladder.picture(shown)
+        picture = self._residency.ladder.picture(shown)
         if self._needs_guides(picture, want.view):
             return False
         smooth = None
-        if shown == 1.0 and self.smoothing.covers(want.view.aov, course.meter.noise):
+        if shown == 1.0 and self.denoising.covers(want.view.aov, tracker.meter.noise):
             smooth = self._smooth_frame()
             if smooth is None and self._holds_frame(want):
                 return False
-        progress = smooth.progress if smooth else course.progress(self._held, shown)
-        whole = smooth is None or smooth is self.smoothing.has(picture.samples)
-        content = (course.generation, shown, progress.samples, course.reason, smooth is not None and smooth.fine)
+        progress = smooth.progress if smooth else tracker.progress(self._residency, shown)
+        whole = smooth is None or smooth is self.denoising.has(picture.samples)
+        content = (tracker.generation, shown, progress.samples, tracker.reason, smooth is not None and smooth.fine)
         if content == self._served and not want.anyway:
             return False
         pixels = pixels_of(picture, want.view, smooth)
-        last = course.reason is not None and whole
+        last = tracker.reason is not None and whole
         self._served, self.want = content, None
         denoised = smooth is not None
-        self._send(Frame(self._number, want.serial, course.generation, pixels, progress, shown, last, denoised))
+        self._send(Frame(self._number, want.serial, tracker.generation, pixels, progress, shown, last, denoised))
         return True
 
-    def _smooth_frame(self) -> Smooth | None:
+    def _smooth_frame(self) -> Denoised | None:
         """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
-        latest = self.smoothing.latest
-        if latest is None or self._served[:2] != (self._course.generation, 1.0):
+        latest = self.denoising.latest
+        if latest is None or self._served[:2] != (self._tracker.generation, 1.0):
             return latest
         samples, seen = latest.progress.samples, int(str(self._served[2]))
-        stale = samples == seen < self._held.full.samples and not self.smoothing.under_way
+        stale = samples == seen < self._residency.full.samples and not self.denoising.under_way
         return None if samples < seen or stale else latest
 
     def _holds_frame(self, want: Want) -> bool:
         """Whether the client has something to look at until the denoised picture comes, which can't be long."""
-        seen = self._served[:1] == (self._course.generation,)
-        return self.smoothing.under_way and seen and not want.anyway
+        seen = self._served[:1] == (self._tracker.generation,)
+        return self.denoising.under_way and seen and not want.anyway
 
     def read(self, read: Read) -> None:
-        self._held.wake()
-        full = self._held.full if self._held.holding and self._held.full.samples else None
+        self._residency.wake()
+        full = self._residency.full if self._residency.loaded and self._residency.full.samples else None
         if full is not None and self._needs_guides(full, read.view):
             self._reads.append(read)
             return
         smooth = None
-        if full is not None and self.smoothing.covers(read.view.aov, self._course.meter.read(full, fresh=True)):
-            smooth = self.smoothing.has(full.samples)
+        if full is not None and self.denoising.covers(read.view.aov, self._tracker.meter.read(full, fresh=True)):
+            smooth = self.denoising.has(full.samples)
             if smooth is None:
                 self._smooth_reads.append(read)
                 return
         self._give(read, full, smooth)
 
-    def _give(self, read: Read, full: Picture | None, smooth: Smooth | None) -> None:
+    def _give(self, read: Read, full: Picture | None, smooth: Denoised | None) -> None:
         pixels = pixels_of(full, read.view, smooth) if full else None
-        progress = smooth.progress if smooth else self._course.progress(self._held)
-        self._held.rests()
+        progress = smooth.progress if smooth else self._tracker.progress(self._residency)
+        self._residency.rests()
         self._send(Image(self._number, read.serial, pixels, progress, smooth is not None))
 
     @property
     def _smooth_due(self) -> bool:
         """Whether somebody waits for the picture to be denoised, and it can be."""
-        if self._held.holding is None or self.scale != 1.0 or not self.smoothing.wanted:
+        if self._residency.loaded is None or self.scale != 1.0 or not self.denoising.wanted:
             return False
-        want = self.want if self._course.interactive else None
-        watched = want is not None and self.smoothing.covers(want.view.aov, self._course.meter.noise)
+        want = self.want if self._tracker.interactive else None
+        watched = want is not None and self.denoising.covers(want.view.aov, self._tracker.meter.noise)
         if not (watched or self.owes_done or self._smooth_reads):
             return False
-        return self.smoothing.due(self._held.full.samples, fine=self._smooth_finely)
+        return self.denoising.due(self._residency.full.samples, fine=self._smooth_finely)
 
     @property
     def _smooth_finely(self) -> bool:
-        return self._course.reason is not None or bool(self._smooth_reads)
+        return self._tracker.reason is not None or bool(self._smooth_reads)
 
     def _smooth(self) -> bool:
         """A slice of what denoising needs on this side, where any is due."""
@@ -173,18 +173,18 @@ class Showing:
             self._smoothed = False
             reads, self._smooth_reads = self._smooth_reads, []
             for read in reads:
-                self._give(read, self._held.full, None if self.smoothing.warning else self.smoothing.latest)
+                self._give(read, self._residency.full, None if self.denoising.warning else self.denoising.latest)
             if self.owes_done:
                 self._finish()
             return True
         if not self._smooth_due:
             return False
-        full, course = self._held.full, self._course
+        full, tracker = self._residency.full, self._tracker
         if self._waits(full):
             return True
         if full.trace_guides(SLICE_S, GUIDE_SAMPLES):
-            course.meter.read(full, fresh=True)
-            self.smoothing.begin(full, course.progress(self._held), self._smooth_finely, self._hear_smoothed)
+            tracker.meter.read(full, fresh=True)
+            self.denoising.begin(full, tracker.progress(self._residency), self._smooth_finely, self._hear_smoothed)
         return True
 
     def _hear_smoothed(self) -> None:
@@ -209,7 +209,7 @@ class Showing:
             return False
         if not picture.guided:
             more = picture_bytes(picture.settings, guided=True) - picture_bytes(picture.settings)
-            self._held.make_room(more)
+            self._residency.make_room(more)
         if picture.trace_guides(0.0):
             return False
         self._guided = picture
@@ -218,8 +218,8 @@ class Showing:
     def _trace_guides(self) -> bool:
         """A slice of them, where somebody waits for them; then the readings that they held up."""
         picture = self._guided
-        if picture is None and self._reads and self._held.holding is not None:  # it was aside meanwhile
-            picture = self._held.full
+        if picture is None and self._reads and self._residency.loaded is not None:  # it was aside meanwhile
+            picture = self._residency.full
         if picture is None:
             return False
         if self._waits(picture):
@@ -232,7 +232,7 @@ class Showing:
         return True
 
 
-def pixels_of(picture: Picture, view: View, smooth: Smooth | None) -> np.ndarray:
+def pixels_of(picture: Picture, view: View, smooth: Denoised | None) -> np.ndarray:
     """What is shown of it: (height, width, 4) as the view wants it."""
     color = smooth.pixels if smooth else None
     if view.encoding == "linear":

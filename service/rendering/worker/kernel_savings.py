@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from gpu import GpuError
 from gpu.analysis.kernel_cost import full_kernel, kernel_cost_steps
 from service.rendering.ipc.messages import FromRenderer, KernelMeasured
-from service.rendering.worker.compiler import Compiler
+from service.rendering.worker.helpers.compile_client import CompileClient
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
@@ -27,9 +27,9 @@ NO_PICTURE = "Not measured: there is no picture of it any more, or none yet."
 log = logging.getLogger(__name__)
 
 
-class Appraising:
+class KernelSavings:
     def __init__(
-        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, compiler: Compiler | None
+        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, compiler: CompileClient | None
     ) -> None:
         """`compiler` is one for spare time; without one nothing is measured."""
         self._number, self._send = number, send

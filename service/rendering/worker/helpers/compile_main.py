@@ -1,4 +1,4 @@
-"""The helper process that compiles: `python -m service.rendering.worker.compiling DESCRIPTOR --parent PID`.
+"""Compiles kernels: `python -m service.rendering.worker.helpers.compile_main DESCRIPTOR --parent PID`.
 
 A process of its own with its own context: what it compiles the renderer loads from the driver's disk cache. Where the
 renderer is lost, the kernel under way is finished, for the next one: killed every few seconds on a starved machine,
@@ -20,8 +20,8 @@ from pathlib import Path
 
 from service.rendering.ipc import channel
 from service.rendering.priority import HIGHEST, raise_thread_niceness
-from service.rendering.worker.compiler import Compiled, records
-from service.rendering.worker.lifeline import end_with, end_with_pipe, hung_up
+from service.rendering.worker.helpers.compile_client import Compiled, records
+from service.rendering.worker.helpers.lifeline import end_with, end_with_pipe, hung_up
 
 IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
 LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
@@ -29,7 +29,7 @@ SPARE_IDLE_S = 5.0  # ... where kernels come seldom
 
 
 def main() -> int:
-    parser = argparse.ArgumentParser(prog="python -m service.rendering.worker.compiling")
+    parser = argparse.ArgumentParser(prog="python -m service.rendering.worker.helpers.compile_main")
     parser.add_argument("descriptor", type=int)
     parser.add_argument("--parent", type=int, required=True)
     parser.add_argument("--driver", required=True, help="its name and version, which records go by")
@@ -52,12 +52,12 @@ def main() -> int:
         try:
             ahead = Precompiler(arguments.device)
             while select.select([end], [], [], SPARE_IDLE_S if arguments.spare else IDLE_S)[0]:
-                recipe = channel.receive(end, wait=True)
-                record = records() / recipe.digest(arguments.driver)
+                key = channel.receive(end, wait=True)
+                record = records() / key.digest(arguments.driver)
                 try:
                     # In spare time nobody may be made to wait: that can take as long as it likes.
                     with nullcontext() if arguments.spare else _alone(record, end):
-                        compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(recipe))
+                        compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(key))
                         if compiled.cached:
                             _record(record)
                 except GpuError as error:  # the renderer meets it too, and says it to whom it concerns

@@ -20,7 +20,7 @@ NEXT_S = 0.120  # how long a first look may stand before something sharper repla
 UNMEASURED_S = 2e-6  # a sample of a pixel, before there was one; a large mesh takes 1e-6 on llvmpipe with 2 cores
 
 
-class Ladder:
+class ResolutionLadder:
     """The pictures of one scene with the same settings. Rungs below 1 are made when first climbed."""
 
     def __init__(self, renderer: Renderer, scene: Scene, settings: RenderSettings, full: bool = True) -> None:

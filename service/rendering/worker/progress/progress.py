@@ -1,0 +1,74 @@
+"""How far one task's picture is, when that is enough, and what there is to tell of it."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from service.rendering.ipc.messages import Progress, Reason, StopRule
+from service.rendering.worker.device.residency import Residency
+from service.rendering.worker.progress.eta import EtaEstimate
+from service.rendering.worker.progress.noise import NoiseReading
+from service.rendering.worker.progress.stop_rules import MAX_SAMPLES, Clock, late, reached
+from service.rendering.worker.progress.truncated_light import TruncatedLight
+
+if TYPE_CHECKING:
+    from gpu import Renderer
+
+
+class ProgressTracker:
+    def __init__(self, renderer: Renderer) -> None:
+        self.generation = 0  # of what is there
+        self.interactive = False  # a person looks on, and may edit at any moment
+        self.stop = StopRule()
+        self.reason: Reason | None = None  # why it ended
+        self.pixel_s: float | None = None  # what a sample of a pixel took lately
+        self.truncated = TruncatedLight(renderer)
+        self.restart()
+
+    def restart(self) -> None:
+        """At zero samples; what was learnt of their price stays."""
+        self.truncated.restart()
+        self.clock, self.meter, self.eta = Clock(), NoiseReading(), EtaEstimate()
+        self.even = True  # as many samples in every pixel, as far as is known
+
+    def progress(self, residency: Residency, scale: float = 1.0) -> Progress:
+        if residency.loaded is None:
+            return Progress()
+        samples, elapsed_s = residency.ladder.picture(scale).samples, self.clock.elapsed_s
+        noise = self.noise(residency) if scale == 1.0 else None
+        stopped = self.reason == "stopped"
+        done = self.reason is not None and not stopped
+        eta = 0.0 if done else self.eta.eta_s(self.stop, elapsed_s)
+        return Progress(samples, noise, elapsed_s, None if stopped else eta, self.truncated.shares)
+
+    def noise(self, residency: Residency, fresh: bool = False) -> float | None:
+        """Of the picture at full size, as the meter has it."""
+        noise = self.meter.read(residency.full, fresh)
+        self.eta.heard(self.meter.at, noise)
+        return noise
+
+    def cap(self, residency: Residency) -> int:
+        """How many samples to trace for: all, or what fits into the time, so that every pixel ends with as many."""
+        limit, samples = self.stop.max_samples or MAX_SAMPLES, residency.full.samples
+        if residency.full.under_way[0] and reached(self.stop, samples, self.meter.noise) is not None:
+            return samples + residency.full.under_way[0]  # see `enough`
+        if self.stop.time_limit is None:
+            return limit
+        left_s, sample_s = self.stop.time_limit - self.clock.now_s, self._sample_s(residency)
+        # Half of what fits: passes shrink as the end draws near, and a machine that slows down halts none halfway.
+        return min(limit, samples + max(1, int(0.5 * left_s / sample_s) if sample_s else 1))
+
+    def enough(self, residency: Residency) -> Reason | None:
+        """Why it ends now, if it does."""
+        noise = self.noise(residency) if self.stop.target_noise is not None else None
+        reason = reached(self.stop, residency.full.samples, noise)
+        if residency.full.under_way[
+            0
+        ]:  # is finished first: a picture of so many samples is to come out the same again
+            reason = None
+        if reason is None and late(self.stop, self.clock.now_s, self._sample_s(residency), self.even):
+            reason = "time_limit"
+        return reason
+
+    def _sample_s(self, residency: Residency) -> float:
+        return (self.pixel_s or 0.0) * residency.full.settings.width * residency.full.settings.height

@@ -1,0 +1,6 @@
+"""What a client is shown.
+
+frames            frames and images of a task's picture, on demand
+fallback_preview  first frames by a kernel for many scenes, until a scene's own is compiled
+denoise_policy    when a picture is denoised, and what of it is shown meanwhile
+"""
