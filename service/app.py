@@ -41,7 +41,7 @@ from service.routes import assets, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import respond, tell_errors
-from service.routes.house import MESSAGE_BYTES, House
+from service.state import MESSAGE_BYTES, AppState
 from service.storage import storage
 
 WEB = Path(__file__).parents[1] / "web"
@@ -69,7 +69,7 @@ log = logging.getLogger(__name__)
 def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
     kept = storage(config)
-    own = House(
+    own = AppState(
         config,
         kept.assets,
         RequestReader(config, kept.assets),
@@ -86,7 +86,7 @@ def create_app(config: Config) -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    app.state.house = own
+    app.state.sunbox = own
     for router in (info.router, preset_routes.router, assets.router, documents.router, renders.router, stream.router):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)
@@ -115,7 +115,7 @@ def run(config: Config) -> int:
     if not config.api_key and not ipaddress.ip_address(host).is_loopback:
         log.warning(OPEN_TO_ALL, host)
     app = create_app(config)
-    own: House = app.state.house
+    own: AppState = app.state.sunbox
     try:
         own.documents.prepare()
     except DamagedFile as error:
@@ -156,9 +156,9 @@ def _take_descriptors() -> int:
 class _Server(uvicorn.Server):
     """Says where it is once it answers; ends by closing its clients as going away, with exit code 0."""
 
-    def __init__(self, config: uvicorn.Config, house: House, address: str) -> None:
+    def __init__(self, config: uvicorn.Config, state: AppState, address: str) -> None:
         super().__init__(config)
-        self._house = house
+        self._state = state
         self._address = address
         self._watch = Watch()
         self.refused = False
@@ -169,9 +169,9 @@ class _Server(uvicorn.Server):
         return await super().on_tick(counter)
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
-        if (reason := await self._house.gpu_missing()) is not None:
+        if (reason := await self._state.gpu_missing()) is not None:
             log.error("did not start reason=%s", reason)
-            await self._house.supervisor.close()
+            await self._state.supervisor.close()
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
@@ -181,7 +181,7 @@ class _Server(uvicorn.Server):
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         log.info("shutting down connections=%d", len(self.server_state.connections))
-        await self._house.farewell()
+        await self._state.farewell()
         await super().shutdown(sockets)
 
     @contextlib.contextmanager
@@ -203,7 +203,7 @@ class _Server(uvicorn.Server):
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    own: House = app.state.house
+    own: AppState = app.state.sunbox
     if own.supervisor.process_id is None:
         own.supervisor.start()
     own.assets.warm()

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import Counter
 from collections.abc import Iterator, Mapping
 from contextlib import suppress
 from importlib import metadata
@@ -14,39 +13,24 @@ from service.rendering.supervisor.statistics import Distribution
 if TYPE_CHECKING:
     from prometheus_client.registry import Collector
 
-    from service.routes.house import House
+    from service.state import AppState
+from service.traffic import Traffic
 
-METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "WEBSOCKET")
 MIME = "text/plain; version=0.0.4; charset=utf-8"
 PAGE = 4096  # bytes, of /proc/PID/statm
 
 
-class Traffic:
-    """Requests since the server began."""
-
-    def __init__(self) -> None:
-        self.count: Counter[tuple[str, str, str]] = Counter()
-        self.seconds = Distribution()
-
-    def heard(self, method: str, route: str, status: int, seconds: float) -> None:
-        """`route` is the address's pattern, "" for none: addresses themselves would be endless."""
-        known = method if method in METHODS else "OTHER"
-        self.count[known, route or "other", str(status)] += 1
-        if known != "WEBSOCKET":
-            self.seconds.add(seconds)
-
-
-def text(house: House, traffic: Traffic) -> bytes:
+def text(state: AppState, traffic: Traffic) -> bytes:
     """One scrape."""
     from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
 
     registry = CollectorRegistry(auto_describe=False)
     ProcessCollector(registry=registry)
-    registry.register(_collector(house, traffic))
+    registry.register(_collector(state, traffic))
     return generate_latest(registry)
 
 
-def _collector(house: House, traffic: Traffic) -> Collector:
+def _collector(state: AppState, traffic: Traffic) -> Collector:
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
     from prometheus_client.registry import Collector
 
@@ -76,8 +60,8 @@ def _collector(house: House, traffic: Traffic) -> Collector:
 
     class Sunbox(Collector):
         def collect(self) -> Iterator[Metric]:
-            seen = house.supervisor.statistics
-            renderer = house.supervisor.info or {}
+            seen = state.supervisor.statistics
+            renderer = state.supervisor.info or {}
             about = GaugeMetricFamily("sunbox_info", "Version and renderer.", labels=("version", "renderer"))
             about.add_metric((metadata.version("sunbox"), str(renderer.get("renderer", ""))), 1)
             yield about
@@ -104,24 +88,24 @@ def _collector(house: House, traffic: Traffic) -> Collector:
             yield histogram("recovery_seconds", "From a renderer's loss to the next one.", seen.recovery_s)
             errors = {(kind,): float(count) for kind, count in seen.errors.items()}
             yield counters("errors", "Told on streams and of failed renders, by problem.", ("type",), errors)
-            renders = house.renders
+            renders = state.renders
             states = {"queued": renders.queued, "running": renders.running, "kept": renders.kept}
             yield gauges("renders", "Renders asked for over REST.", "state", states)
-            sessions = {"connected": house.sessions.attended, "waiting": house.sessions.waiting}
+            sessions = {"connected": state.sessions.attended, "waiting": state.sessions.waiting}
             yield gauges("streams", "Streams with a client, and those whose client may come back.", "state", sessions)
             yield gauge("renderer_tasks", "Pictures that the renderer holds.", seen.tasks)
             yield gauge("gpu_bytes", "What they hold on the GPU.", seen.gpu_bytes)
-            yield gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(house))
+            yield gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(state))
             with suppress(Unavailable):  # the disk fails: all else is still to be told
-                yield gauge("data_bytes", "Assets and documents on the disk.", house.quota.used())
-            yield gauge("data_quota_bytes", "What they may take.", house.config.data_quota)
+                yield gauge("data_bytes", "Assets and documents on the disk.", state.quota.used())
+            yield gauge("data_quota_bytes", "What they may take.", state.config.data_quota)
 
     return Sunbox()
 
 
-def _resident(house: House) -> int:
+def _resident(state: AppState) -> int:
     try:
-        with open(f"/proc/{house.supervisor.process_id}/statm") as sizes:
+        with open(f"/proc/{state.supervisor.process_id}/statm") as sizes:
             return int(sizes.read().split()[1]) * PAGE
     except (OSError, ValueError, IndexError):
         return 0

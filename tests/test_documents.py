@@ -212,7 +212,7 @@ def test_a_large_document_is_sent_from_a_file(tmp_path: Path) -> None:
     """In memory, those that slow clients fetch would add up."""
     text = b'{"a": ' + b"1" * 3_000_000 + b"}"
     saved = SimpleNamespace(documents=SimpleNamespace(get=lambda *key: text), downloads=Downloads(tmp_path))
-    scope = {"type": "http", "app": SimpleNamespace(state=SimpleNamespace(house=saved)), "client": ("::1", 1)}
+    scope = {"type": "http", "app": SimpleNamespace(state=SimpleNamespace(sunbox=saved)), "client": ("::1", 1)}
     answer: Any = asyncio.run(document(Request(scope), "scenes", "large"))
     assert isinstance(answer, FileAnswer) and answer.media_type == "application/json"
     with open(answer._file.fileno(), "rb", closefd=False) as file:

@@ -15,7 +15,7 @@ SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {"
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
-    {"service.problems", "service.shared", "service.spell", "service.confined"},
+    {"service.problems", "service.shared_memory", "service.cpu_time", "service.confined"},
     {"service.config"},
     {"service.scene", "service.images"},
     {"service.quality", "service.presets", "service.assets"},
@@ -28,6 +28,8 @@ LAYERS = [
     {"service.downloads"},
     {"service.rendering"},
     {"service.readiness"},
+    {"service.traffic", "service.bodies"},
+    {"service.state"},
     {"service.keys"},
     {"service.connection_limits", "service.connections", "service.guard", "service.metrics", "service.routes"},
     {"service.app"},

@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service import spell
+from service import cpu_time
 from service.assets import ImageData, MeshData
 from service.assets.errors import ParseError
 from service.assets.sandbox import sandbox
@@ -120,7 +120,7 @@ def test_waiting_for_a_processor_is_not_the_files_fault(box: Sandbox, monkeypatc
         waited += 10**12
         return {pid: (0, waited)}
 
-    monkeypatch.setattr(spell, "ran", starved)
+    monkeypatch.setattr(cpu_time, "ran", starved)
     os.kill(pid, signal.SIGSTOP)
     going_on = threading.Timer(1.0, os.kill, [pid, signal.SIGCONT])
     going_on.start()

@@ -7,9 +7,9 @@ import os
 
 import numpy as np
 
-from service import shared
+from service import shared_memory
 from service.rendering.ipc import channel
-from service.shared import LEAST, Shelf, whereabouts
+from service.shared_memory import LEAST, SharedArena, locate
 
 
 def descriptors() -> int:
@@ -19,7 +19,7 @@ def descriptors() -> int:
 
 def shelved() -> tuple[np.ndarray, np.ndarray]:
     large, small = np.arange(LEAST, dtype=np.uint8), np.arange(12.0).reshape(4, 3)
-    shelf = Shelf(large.nbytes, small.nbytes)
+    shelf = SharedArena(large.nbytes, small.nbytes)
     return shelf.put(large), shelf.put(small, np.array([3, 0]))
 
 
@@ -27,14 +27,14 @@ def test_a_shelf_holds_what_is_put_there() -> None:
     large, small = shelved()
     assert np.array_equal(large, np.arange(LEAST, dtype=np.uint8))
     assert small.tolist() == [[9, 10, 11], [0, 1, 2]]
-    found = whereabouts(memoryview(small).cast("B"))
+    found = locate(memoryview(small).cast("B"))
     assert found is not None and found[1] == LEAST
-    assert whereabouts(memoryview(np.zeros(9)).cast("B")) is None
+    assert locate(memoryview(np.zeros(9)).cast("B")) is None
 
 
 def test_few_bytes_need_no_descriptor() -> None:
     before, array = descriptors(), np.arange(9)
-    assert Shelf(array.nbytes).put(array) is array
+    assert SharedArena(array.nbytes).put(array) is array
     assert descriptors() == before
 
 
@@ -73,9 +73,9 @@ def test_more_blocks_than_a_message_takes() -> None:
 
 
 def test_nothing_is_left_of_a_block() -> None:
-    known = len(shared._blocks)
+    known = len(shared_memory._blocks)
     kept = shelved()
-    assert len(shared._blocks) == known + 1
+    assert len(shared_memory._blocks) == known + 1
     del kept
     gc.collect()
-    assert len(shared._blocks) == known
+    assert len(shared_memory._blocks) == known

@@ -12,9 +12,9 @@ from collections.abc import Iterator
 
 import pytest
 
-from service import spell
+from service import cpu_time
+from service.cpu_time import LEAST, RunnableTime, elapsed_s, ran
 from service.rendering.supervisor.process import Options, Process
-from service.spell import LEAST, Spell, had_s, ran
 
 SECOND = 10**9
 
@@ -33,11 +33,11 @@ SECOND = 10**9
 def test_waiting_does_not_count(run: int, waited: int, had: float) -> None:
     before = {1: (7 * SECOND, SECOND), 2: (9 * SECOND, 90 * SECOND)}  # the second one has ended meanwhile
     after = {1: (7 * SECOND + run, SECOND + waited), 3: (SECOND, SECOND)}
-    assert had_s(10.0, before, after) == pytest.approx(had)
+    assert elapsed_s(10.0, before, after) == pytest.approx(had)
 
 
 def test_where_the_system_says_nothing_all_time_counts() -> None:
-    assert had_s(3.0, {}, {}) == 3.0
+    assert elapsed_s(3.0, {}, {}) == 3.0
     assert ran(2**22 + 1) == {}
 
 
@@ -57,14 +57,14 @@ def test_it_is_what_the_system_counts(spinning: subprocess.Popen[bytes]) -> None
     spinning.send_signal(signal.SIGSTOP)
     os.waitpid(spinning.pid, os.WUNTRACED)
     began = time.monotonic()
-    stopped = Spell(spinning.pid)
+    stopped = RunnableTime(spinning.pid)
     time.sleep(0.2)
-    assert 0.2 <= stopped.had_s <= time.monotonic() - began
+    assert 0.2 <= stopped.elapsed_s <= time.monotonic() - began
 
 
 def test_a_starved_renderer_is_not_said_to_hang(monkeypatch: pytest.MonkeyPatch) -> None:
     clock = [1000.0]
-    monkeypatch.setattr(spell.time, "monotonic", lambda: clock[0])
+    monkeypatch.setattr(cpu_time.time, "monotonic", lambda: clock[0])
 
     async def test() -> None:
         process = Process(Options(patience_s=10.0), lambda message: None, lambda: None)
@@ -74,7 +74,7 @@ def test_a_starved_renderer_is_not_said_to_hang(monkeypatch: pytest.MonkeyPatch)
             os.waitpid(process.id, os.WUNTRACED)
             process.link.send("something")
             counted = {process.id: (0, 0)}
-            monkeypatch.setattr(spell, "ran", lambda pid: dict(counted))
+            monkeypatch.setattr(cpu_time, "ran", lambda pid: dict(counted))
             process.watch()
             clock[0], counted[process.id] = 1100.0, (5 * SECOND, 95 * SECOND)
             process.watch()

@@ -52,7 +52,7 @@ def run(arguments: argparse.Namespace) -> int:
     stats = files.writable(Path(arguments.stats)) if arguments.stats else None
     config = configuration()
     given = read_settings(arguments.set or [], config)
-    from service.shared import reuse_freed  # here, as it loads numpy
+    from service.shared_memory import reuse_freed  # here, as it loads numpy
 
     reuse_freed()
     source = read_source(Path(arguments.input), arguments.asset_root, config)

@@ -19,8 +19,8 @@ from service.assets.scene_import import Imported
 from service.downloads import FileAnswer
 from service.rendering.executors import storing
 from service.routes import answers
-from service.routes.house import house
 from service.scene.text import dump_json
+from service.state import app_state
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
@@ -39,7 +39,7 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     kind = request.headers.get("content-type")
-    own = house(request)
+    own = app_state(request)
     file = await asyncio.to_thread(own.assets.incoming)
     async for chunk in request.stream():
         await asyncio.to_thread(own.assets.receive, file, chunk)
@@ -64,7 +64,7 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
     `Sunbox-Aspect-Ratio`, each only where there is something to say."""
 
     def read() -> tuple[Imported, str]:
-        imported = house(request).assets.scene(id)
+        imported = app_state(request).assets.scene(id)
         return imported, dump_json(imported.scene(presets.default_environment()))
 
     imported, text = await storing(read)
@@ -89,7 +89,7 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
     with ExitStack() as stack:
-        source = await storing(partial(stack.enter_context, house(request).assets.opened(id)))
+        source = await storing(partial(stack.enter_context, app_state(request).assets.opened(id)))
         headers = {"content-disposition": "attachment", "cache-control": FOREVER}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)

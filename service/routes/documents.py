@@ -11,7 +11,7 @@ from service.documents import LONGEST_NAME, CheckedDocument, check_kind
 from service.downloads import PIECE
 from service.rendering.executors import saving
 from service.routes import answers
-from service.routes.house import caller, house
+from service.state import app_state, caller
 
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
 
@@ -34,12 +34,12 @@ Title = Annotated[str | None, Query(min_length=1, max_length=200, description="F
 
 @router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
 async def names(request: Request, kind: answers.DocumentKind) -> list[answers.Named]:
-    return [answers.Named(**entry) for entry in await saving(partial(house(request).documents.names, kind))]
+    return [answers.Named(**entry) for entry in await saving(partial(app_state(request).documents.names, kind))]
 
 
 @router.get("/{kind}/{name}", summary="The bare document", responses=answers.DOCUMENT | answers.problems(404, 422))
 async def document(request: Request, kind: answers.DocumentKind, name: Name) -> Response:
-    own = house(request)
+    own = app_state(request)
     data = await saving(partial(own.documents.get, kind, name))
     if len(data) <= PIECE:
         return Response(data, media_type=JSON)
@@ -57,7 +57,7 @@ async def document(request: Request, kind: answers.DocumentKind, name: Name) -> 
 async def put(
     request: Request, response: Response, kind: answers.DocumentKind, name: Name, title: Title = None
 ) -> answers.Named:
-    own = house(request)
+    own = app_state(request)
     async with own.bodies.taken(request) as body:
         checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body)
     kept, new = await saving(partial(own.documents.put, kind, name, checked, title))
@@ -68,4 +68,4 @@ async def put(
 
 @router.delete("/{kind}/{name}", status_code=204, summary="Delete a document", responses=answers.problems(404, 422))
 async def delete(request: Request, kind: answers.DocumentKind, name: Name) -> None:
-    await saving(partial(house(request).documents.delete, kind, name))
+    await saving(partial(app_state(request).documents.delete, kind, name))

@@ -15,7 +15,7 @@ from service.metrics import MIME, text
 from service.rendering.executors import measuring
 from service.rendering.streams import protocol
 from service.routes import answers
-from service.routes.house import house
+from service.state import app_state
 
 router = APIRouter(tags=["service"])
 
@@ -32,7 +32,7 @@ async def healthz() -> dict[str, str]:
     responses=answers.problems(503),
 )
 async def readyz(request: Request) -> dict[str, str]:
-    await house(request).readiness.check()
+    await app_state(request).readiness.check()
     return {"status": "ok"}
 
 
@@ -43,13 +43,13 @@ async def readyz(request: Request) -> dict[str, str]:
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
 async def metrics(request: Request) -> Response:
-    own = house(request)
+    own = app_state(request)
     return Response(await measuring(partial(text, own, own.traffic)), media_type=MIME)
 
 
 @router.get("/v1/info", summary="Version, renderer, limits, quality presets")
 async def info(request: Request) -> dict[str, Any]:
-    return await house(request).info()
+    return await app_state(request).info()
 
 
 @router.get(

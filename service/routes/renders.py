@@ -23,7 +23,7 @@ from service.rendering.jobs.job import Job
 from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.routes import answers
 from service.routes.errors import GONE
-from service.routes.house import STARTING_S, House, caller, house, owner
+from service.state import STARTING_S, AppState, app_state, caller, owner
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 
@@ -75,7 +75,7 @@ class ImageQuery(BaseModel):
 async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
     view = query.view()
     job = await _job(request)
-    house(request).renders.submit(job, listed=False)
+    app_state(request).renders.submit(job, listed=False)
     try:
         await _finished_or_gone(request, job)
         if not job.finished.is_set():
@@ -99,7 +99,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
 )
 async def start(request: Request, response: Response) -> dict[str, Any]:
     job = await _job(request)
-    house(request).renders.submit(job)
+    app_state(request).renders.submit(job)
     response.headers["location"] = f"renders/{job.id}"
     return job.status()
 
@@ -111,7 +111,7 @@ async def start(request: Request, response: Response) -> dict[str, Any]:
     responses=answers.shaped(list[answers.Render]),
 )
 async def renders(request: Request) -> list[dict[str, Any]]:
-    return [job.status() for job in house(request).renders.all(owner(request))]
+    return [job.status() for job in app_state(request).renders.all(owner(request))]
 
 
 @router.get(
@@ -123,7 +123,7 @@ async def renders(request: Request) -> list[dict[str, Any]]:
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422),
 )
 async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving: Saving = False) -> dict[str, Any]:
-    job = house(request).renders.get(id, owner(request))
+    job = app_state(request).renders.get(id, owner(request))
     if saving:
         job.appraise()
     if wait:
@@ -139,7 +139,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving:
     responses=answers.files(*images.MIME.values()) | answers.problems(404, 409, 410, 422),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
-    return await _image(request, house(request).renders.get(id, owner(request)), query, query.view())
+    return await _image(request, app_state(request).renders.get(id, owner(request)), query, query.view())
 
 
 @router.delete(
@@ -149,12 +149,12 @@ async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQu
     responses=answers.problems(404, 410),
 )
 async def cancel(request: Request, id: answers.RenderId) -> None:
-    house(request).renders.get(id, owner(request)).cancel()
+    app_state(request).renders.get(id, owner(request)).cancel()
 
 
 async def _job(request: Request) -> Job:
     began = time.monotonic()
-    own: House = house(request)
+    own: AppState = app_state(request)
     async with own.bodies.taken(request) as body:
         own.renders.admit(owner(request))
         await own.supervisor.able(STARTING_S)
@@ -174,7 +174,7 @@ async def _finished_or_gone(request: Request, job: Job) -> None:
 
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
-    downloads = house(request).downloads
+    downloads = app_state(request).downloads
     client = caller(request)
     key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
     async with present(request.receive) as gone, downloads.turn(client):

@@ -10,7 +10,7 @@ from starlette.websockets import WebSocketState
 
 from service.problems import NotFound, ServiceError, TooManyRequests
 from service.rendering.streams.stream import LOST, Attendance, Stream
-from service.routes.house import house, owner
+from service.state import app_state, owner
 
 router = APIRouter()
 
@@ -21,7 +21,7 @@ REASON_CHARACTERS = 100  # a close frame holds 123 bytes of it
 
 @router.websocket("/v1/stream")
 async def stream(socket: WebSocket) -> None:
-    own = house(socket)
+    own = app_state(socket)
     await socket.accept(SUBPROTOCOL if SUBPROTOCOL in socket.scope["subprotocols"] else None)
     try:
         info = await own.info()

@@ -20,7 +20,7 @@ from service.assets.errors import ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile
 from service.confined import bound, confine, unbind
-from service.shared import trim
+from service.shared_memory import trim
 
 NICENESS = 5
 LARGE = 1 << 20  # bytes of a file after which memory is given back to the system

@@ -17,7 +17,7 @@ from service.assets.errors import ParseError
 from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
-from service.spell import answers
+from service.cpu_time import answers
 
 log = logging.getLogger(__name__)
 

@@ -26,7 +26,7 @@ from service.pack.parameters import vec3
 from service.pack.textures.uses import RequiredCharts
 from service.scene.numbers import Vec3
 from service.scene.shape import Shape
-from service.shared import LEAST, Shelf, trim
+from service.shared_memory import LEAST, SharedArena, trim
 
 MANY = 100_000  # triangles, after which what was needed on the way is worth giving back
 
@@ -132,9 +132,9 @@ def assemble(
         details, shared = write_triangles(triangles, places, shared)
     else:
         details, shared = again.details, again.models
-    shelf = Shelf(*(array.nbytes for array in (*found.values(), nodes, placed)))
-    nodes, placed = shelf.put(nodes), shelf.put(placed)
-    found = {kind: shelf.put(array, order.get(kind)) for kind, array in found.items()}
+    arena = SharedArena(*(array.nbytes for array in (*found.values(), nodes, placed)))
+    nodes, placed = arena.put(nodes), arena.put(placed)
+    found = {kind: arena.put(array, order.get(kind)) for kind, array in found.items()}
     found[ShapeKind.TRIANGLE] = details.triangles[: len(triangles)]
     _hide((*found.values(), placed) if again is None else _others(found, placed), shapes)
     shining = lights.mark(found, np.array([name in emissive for name in names]))

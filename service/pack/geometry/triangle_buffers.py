@@ -11,7 +11,7 @@ import numpy as np
 from gpu.layout import Node, Triangle, TriangleNormals
 from service.pack.geometry.meshes import Triangles
 from service.pack.geometry.shared_meshes import SharedMesh
-from service.shared import Shelf
+from service.shared_memory import SharedArena
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,7 @@ class TriangleBuffers:
 def write_triangles(
     triangles: Triangles, places: np.ndarray | None, shared: Sequence[SharedMesh]
 ) -> tuple[TriangleBuffers, tuple[SharedMesh, ...]]:
-    """All of it on one shelf, which is what the models are kept on from now on."""
+    """All of it on one arena, which is what the models are kept on from now on."""
     own = len(triangles)
     count, node_count = own + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
     tangents = triangles.any_tangents or any(each.any_tangents for each in shared)
@@ -42,10 +42,10 @@ def write_triangles(
     shapes = {name: (count * _some_have(name, triangles, shared), 3, width) for name, width in CORNERS.items()}
     sizes = [int(np.prod(shape)) * _at_corner(name).itemsize for name, shape in shapes.items()]
     parts = count * Triangle.dtype.itemsize, smooth * TriangleNormals.dtype.itemsize, node_count * Node.dtype.itemsize
-    shelf = Shelf(*parts, *sizes)
-    out, normals = shelf.room((count,), Triangle.dtype), shelf.room((smooth,), TriangleNormals.dtype)
-    nodes = shelf.room((node_count,), Node.dtype)
-    corners = {name: shelf.room(shape, _at_corner(name)) for name, shape in shapes.items()}
+    arena = SharedArena(*parts, *sizes)
+    out, normals = arena.room((count,), Triangle.dtype), arena.room((smooth,), TriangleNormals.dtype)
+    nodes = arena.room((node_count,), Node.dtype)
+    corners = {name: arena.room(shape, _at_corner(name)) for name, shape in shapes.items()}
     triangles.write(places, out[:own])
     if smooth:
         triangles.write_normals(places, normals[:own])

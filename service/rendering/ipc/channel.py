@@ -1,8 +1,8 @@
 """Messages between the server and the renderer's process: a datagram each, its arrays in one piece of shared memory.
 
 A message is pickled (both ends are this program, on a private socket pair). Its arrays stay out of the pickle: they
-are laid one after the other into a memfd, whose descriptor travels with the datagram; those that lie in a
-`service.shared` block already stay there, and its descriptor goes along. The receiver maps them and gets read-only
+are laid one after the other into a memfd, whose descriptor travels with the datagram; those that lie in a block of
+`service.shared_memory` already stay there, and its descriptor goes along. The receiver maps them and gets read-only
 arrays without a copy. (A memfd, and not /dev/shm: a container's holds 64 MB.)
 """
 
@@ -18,7 +18,7 @@ from collections import deque
 from collections.abc import Callable
 from typing import Any
 
-from service import shared
+from service import shared_memory
 
 INLINE = 32 * 1024  # bytes of a pickle; a longer one goes to memory: a datagram must fit the socket's buffer
 ALIGNMENT = 64  # a cache line, and more than any dtype asks for
@@ -174,10 +174,10 @@ def discard(message: Encoded) -> None:
         os.close(each)
 
 
-def _places(parts: list[memoryview]) -> tuple[list[Place], list[memoryview], list[shared.Block]]:
+def _places(parts: list[memoryview]) -> tuple[list[Place], list[memoryview], list[shared_memory.Block]]:
     """Where each part will be found, those that must be copied, and the blocks in which the others lie."""
-    blocks: list[shared.Block] = []
-    found = [shared.whereabouts(part) for part in parts]
+    blocks: list[shared_memory.Block] = []
+    found = [shared_memory.locate(part) for part in parts]
     for known in found:
         if known is not None and len(blocks) < MOST - 1 and all(known[0] is not block for block in blocks):
             blocks.append(known[0])

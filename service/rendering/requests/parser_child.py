@@ -19,7 +19,7 @@ from service.confined import bound, confine, unbind
 from service.problems import ServiceError, TooLarge
 from service.rendering.ipc import channel
 from service.rendering.requests.request_parser import PARSERS, Kind
-from service.shared import trim
+from service.shared_memory import trim
 
 NICENESS = 10  # the renderer's, whose share of the processors large bodies would else take
 IDLE_S = 300.0

@@ -16,12 +16,12 @@ from pathlib import Path
 from typing import Any
 
 from service.config import MIB, Config
+from service.cpu_time import answers
 from service.problems import ServiceError, TooLarge, Unavailable
 from service.rendering.ipc import channel
 from service.rendering.requests.parser_child import Failed, Work
 from service.rendering.requests.request_parser import Kind
 from service.scene.text import most_bytes
-from service.spell import answers
 
 ROOT = Path(__file__).parents[3]
 START_SECONDS = 30.0  # libraries read from a cold disk

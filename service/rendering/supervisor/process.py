@@ -16,9 +16,9 @@ from pathlib import Path
 from typing import Any, Literal
 
 from service import logs
+from service.cpu_time import RunnableTime
 from service.rendering.executors import tending
 from service.rendering.ipc import channel, heartbeat
-from service.spell import Spell
 
 ROOT = Path(__file__).parents[3]
 TURNS = 10  # a piece of work may take so many times as long as the last one, and the patience on top
@@ -103,11 +103,11 @@ class _Watched(heartbeat.Heartbeat):
         self.descriptor = heartbeat.memory()
         super().__init__(self.descriptor)
         self._beats, self._pid = 0, 0
-        self._silence: Spell | None = None
+        self._silence: RunnableTime | None = None
 
     def begin(self, pid: int) -> None:
         self._pid = pid
-        self._silence = Spell(pid)
+        self._silence = RunnableTime(pid)
 
     def excuse(self) -> None:
         self._silence = None
@@ -119,8 +119,8 @@ class _Watched(heartbeat.Heartbeat):
             self._beats, self._silence = self.beats, None
             return 0.0
         if self._silence is None:
-            self._silence = Spell(self._pid)
-        return self._silence.had_s
+            self._silence = RunnableTime(self._pid)
+        return self._silence.elapsed_s
 
 
 def _spawn(

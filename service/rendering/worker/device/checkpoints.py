@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from gpu import picture_bytes, save
-from service import shared
+from service import shared_memory
 
 if TYPE_CHECKING:
     from gpu import Picture, Saved
@@ -44,8 +44,10 @@ class Checkpointer:
         return late and picture.samples > 0 and picture_bytes(picture.settings) <= MOST_BYTES
 
     def begin(self, picture: Picture) -> None:
-        shelf = shared.Shelf(*(buffer.size for buffer in picture.state))  # one descriptor goes with the picture
-        self._steps, self._took_s = save(picture, lambda size: shelf.room((size,), np.dtype(np.uint8))), 0.0
+        arena = shared_memory.SharedArena(
+            *(buffer.size for buffer in picture.state)
+        )  # one descriptor goes with the picture
+        self._steps, self._took_s = save(picture, lambda size: arena.room((size,), np.dtype(np.uint8))), 0.0
 
     def step(self) -> Saved | None:
         """The picture, with the last step."""

@@ -12,9 +12,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from service.cpu_time import RunnableTime
 from service.rendering.ipc import channel
 from service.rendering.worker.helpers.process import HelperProcess
-from service.spell import Spell
 
 if TYPE_CHECKING:
     from gpu import KernelKey
@@ -72,7 +72,7 @@ class CompileClient:
         self._met: set[KernelKey] = set()
         self._orders: list[_CompileRequest] = []  # the first is under way
         self._until = 0.0
-        self._spell: Spell | None = None  # of the order under way
+        self._runnable: RunnableTime | None = None  # of the order under way
         self._failures = 0
 
     @property
@@ -176,7 +176,7 @@ class CompileClient:
 
     def _is_starved(self) -> bool:
         """Whether it had no processor for some of its time; that much it gets on top."""
-        left_s = 0.0 if self._spell is None else self._limit_s - self._spell.had_s
+        left_s = 0.0 if self._runnable is None else self._limit_s - self._runnable.elapsed_s
         self._until = time.monotonic() + left_s
         return left_s > 0
 
@@ -202,7 +202,7 @@ class CompileClient:
             if self._failures < TRIES:
                 self._helper.ask(self._orders[0].key)
                 self._until = time.monotonic() + self._limit_s
-                self._spell = None if self._helper.process_id is None else Spell(self._helper.process_id)
+                self._runnable = None if self._helper.process_id is None else RunnableTime(self._helper.process_id)
                 return
         except (channel.Closed, OSError) as error:  # it can't be started
             log.info("could not start the compiler error=%s", error or "it had ended")

@@ -62,9 +62,7 @@ class ProgressTracker:
         """Why it ends now, if it does."""
         noise = self.noise(residency) if self.stop.target_noise is not None else None
         reason = reached(self.stop, residency.full.samples, noise)
-        if residency.full.under_way[
-            0
-        ]:  # is finished first: a picture of so many samples is to come out the same again
+        if residency.full.under_way[0]:  # the pass is finished first, so that as many samples give the same picture
             reason = None
         if reason is None and late(self.stop, self.clock.now_s, self._sample_s(residency), self.even):
             reason = "time_limit"

@@ -40,7 +40,7 @@ def block(size: int) -> Block:
     return made
 
 
-def whereabouts(part: memoryview) -> tuple[Block, int] | None:
+def locate(part: memoryview) -> tuple[Block, int] | None:
     """The block in which these bytes lie, and from which of its bytes on."""
     if not part.nbytes:
         return None
@@ -51,7 +51,7 @@ def whereabouts(part: memoryview) -> tuple[Block, int] | None:
     return None
 
 
-class Shelf:
+class SharedArena:
     """Room for arrays side by side, in one block where they are large."""
 
     def __init__(self, *sizes: int) -> None:

@@ -11,10 +11,10 @@ from typing import Any
 from starlette.requests import HTTPConnection
 
 from service.assets import AssetStore
+from service.bodies import Bodies
 from service.config import Config
 from service.documents import Documents
 from service.downloads import Downloads
-from service.metrics import Traffic
 from service.problems import Unavailable
 from service.quality import priced
 from service.quota import Quota
@@ -23,7 +23,7 @@ from service.rendering.jobs.queue import RenderQueue
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.sessions import Sessions
 from service.rendering.supervisor.supervisor import Supervisor
-from service.routes.bodies import Bodies
+from service.traffic import Traffic
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
@@ -32,7 +32,7 @@ FAREWELL_S = 4.0  # for a client that reads slowly to be told
 
 
 @dataclass
-class House:
+class AppState:
     config: Config
     assets: AssetStore
     reader: RequestReader
@@ -85,8 +85,8 @@ class House:
             await asyncio.sleep(0.01)
 
 
-def house(connection: HTTPConnection) -> House:
-    found: House = connection.app.state.house
+def app_state(connection: HTTPConnection) -> AppState:
+    found: AppState = connection.app.state.sunbox
     return found
 
 

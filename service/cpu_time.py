@@ -16,7 +16,7 @@ LEAST = 0.05
 Ran = Mapping[int, tuple[int, int]]  # by thread: ns on a processor, ns ready for one and waiting
 
 
-class Spell:
+class RunnableTime:
     """From now on."""
 
     def __init__(self, pid: int) -> None:
@@ -24,23 +24,23 @@ class Spell:
         self._began, self._ran = time.monotonic(), ran(pid)
 
     @property
-    def had_s(self) -> float:
-        return had_s(time.monotonic() - self._began, self._ran, ran(self._pid))
+    def elapsed_s(self) -> float:
+        return elapsed_s(time.monotonic() - self._began, self._ran, ran(self._pid))
 
 
 def answers(link: socket.socket, pid: int, seconds: float) -> bool:
     """Whether something comes from that process within so many seconds of its own."""
     poll = select.poll()
     poll.register(link, select.POLLIN)
-    spell, left = Spell(pid), seconds
+    runnable, left = RunnableTime(pid), seconds
     while left > 0:
         if poll.poll(max(1, left * 1000)):
             return True
-        left = seconds - spell.had_s
+        left = seconds - runnable.elapsed_s
     return False
 
 
-def had_s(passed_s: float, before: Ran, after: Ran) -> float:
+def elapsed_s(passed_s: float, before: Ran, after: Ran) -> float:
     """Of `passed_s` what was the process's own: all of it where it slept, was stopped or ran undisturbed."""
     both = before.keys() & after.keys()
     ran_s = sum(after[thread][0] - before[thread][0] for thread in both) / 1e9
