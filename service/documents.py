@@ -20,8 +20,8 @@ from service.quota import Quota
 from service.scene import Material, parse_scene
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Limits
-from service.scene.mistakes import escaped, validated
 from service.scene.text import dump_json
+from service.scene.validation import escaped, validated
 
 log = logging.getLogger(__name__)
 

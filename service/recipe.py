@@ -13,7 +13,7 @@ from pydantic import Field, TypeAdapter
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings
 from service.scene.base import Model
-from service.scene.mistakes import validated
+from service.scene.validation import validated
 
 Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id", "all"]
 

@@ -14,8 +14,8 @@ from service.rendering.streams import protocol
 from service.scene import merge_patch, parse_scene
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Parsed
-from service.scene.mistakes import LONGEST_STEP
 from service.scene.shape import SphereShape
+from service.scene.validation import LONGEST_STEP
 
 MANY = 100_000
 BALL = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "grey"}

@@ -1,4 +1,18 @@
-"""The document as a person writes it: models with ranges, defaults, units and hints, and what is made from them."""
+"""The document as a person writes it: models with ranges, defaults, units and hints, and what is made from them.
+
+document        the document, and how it is parsed
+camera, light, shape, environment, material, texture, transform   its parts
+settings        the settings of a render
+base            the base of all models: strict, with hints for editors
+numbers         numbers with their ranges and units
+number_arrays   lists of numbers, checked in one go
+color           colours: linear, sRGB and radiometric
+validation      what pydantic says, as errors with pointers
+error_location  a pointer into the document, from pydantic's
+text            JSON texts: parsed, weighed and bounded
+patch           JSON merge patches
+schema          the schema that editors are made from
+"""
 
 from __future__ import annotations
 

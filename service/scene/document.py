@@ -15,10 +15,10 @@ from service.scene.camera import Camera
 from service.scene.environment import Environment
 from service.scene.light import Light
 from service.scene.material import Material
-from service.scene.mistakes import among, escaped, mistakes, validated_entries
 from service.scene.numbers import described
 from service.scene.shape import Shape
 from service.scene.texture import Texture
+from service.scene.validation import among, escaped, mistakes, validated_entries
 
 
 def _version(value: Any) -> Any:

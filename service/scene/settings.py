@@ -9,8 +9,8 @@ from pydantic import Field, TypeAdapter
 from service.config import MAX_PIXELS
 from service.problems import FieldError, InvalidDocument
 from service.scene.base import OMITTABLE, Model, hint
-from service.scene.mistakes import validated
 from service.scene.numbers import BRIGHTEST, LARGEST
+from service.scene.validation import validated
 
 # The knobs of quality "balanced", which are the defaults; service.quality has the other presets.
 BALANCED: dict[str, Any] = {"max_samples": 256, "max_bounces": 8, "roulette_depth": 3, "resolution_scale": 1.0}

@@ -9,8 +9,8 @@ import numpy as np
 from pydantic import ConfigDict, Field, model_validator
 
 from service.scene.base import OMITTABLE, Model, hint, refusal
+from service.scene.number_arrays import Colors, Coordinates, Directions, Points, Triangles, first_beyond
 from service.scene.numbers import Point, PositiveLength
-from service.scene.rows import Colors, Coordinates, Directions, Points, Triangles, first_beyond
 from service.scene.transform import AnyTransform
 
 # The sine between a quad's edges below which its float32 normal is noise: the spacing of float32 near 1.

@@ -13,10 +13,10 @@ from service.pack.edits.cache import PackCache, lasting
 from service.pack.textures.uses import DECODED
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene import Scene
-from service.scene.mistakes import escaped
 from service.scene.texture import (
     ImageTexture,
 )
+from service.scene.validation import escaped
 
 MAX_TEXELS = 2**27  # what two textures of the device hold, 16384 rows each
 

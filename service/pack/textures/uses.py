@@ -10,7 +10,6 @@ from service.pack.parameters import member_of
 from service.problems import FieldError, InvalidDocument
 from service.scene import Scene
 from service.scene.material import Material, stretches
-from service.scene.mistakes import escaped
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
@@ -19,6 +18,7 @@ from service.scene.texture import (
     Reference,
     references,
 )
+from service.scene.validation import escaped
 
 DECODED = " decoded"  # after an asset's reference
 

@@ -16,7 +16,6 @@ from service.pack.textures.images import PackedTexels, TexelLimits, images_of, l
 from service.pack.textures.uses import TextureReference, check_channels, uses_of
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
-from service.scene.mistakes import escaped
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
@@ -26,6 +25,7 @@ from service.scene.texture import (
     ScalarTexture,
     references,
 )
+from service.scene.validation import escaped
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
 

@@ -17,7 +17,7 @@ from service.quality import ResolvedSettings, resolve
 from service.scene import Scene, load_json, parse_scene, parse_settings
 from service.scene.base import Model
 from service.scene.document import Parsed
-from service.scene.mistakes import validated
+from service.scene.validation import validated
 
 
 class _Request(Model):

@@ -14,8 +14,8 @@ from service.problems import TooLarge
 from service.rendering.ipc.messages import Encoding, Frame
 from service.rendering.ipc.messages import View as PictureView
 from service.scene.base import Model, hint
-from service.scene.mistakes import validated
 from service.scene.text import load_json, most_bytes
+from service.scene.validation import validated
 
 MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact

@@ -14,16 +14,16 @@ from pydantic import BaseModel, Tag
 
 
 @dataclass
-class Place:
+class ErrorLocation:
     """`steps` in the document; `holder` is the model that the last step is, or would be, a field of."""
 
     steps: list[int | str] = field(default_factory=list)
     holder: type[BaseModel] | None = None
 
 
-def locate(kind: Any, loc: tuple[int | str, ...]) -> Place:
+def locate(kind: Any, loc: tuple[int | str, ...]) -> ErrorLocation:
     """Walks `loc` from a value of the type `kind`."""
-    place = Place()
+    place = ErrorLocation()
     for step in loc:
         members = _members(kind)
         if len(members) > 1:

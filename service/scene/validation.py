@@ -11,8 +11,8 @@ from pydantic import BaseModel, TypeAdapter, ValidationError
 
 from service.problems import FieldError, InvalidDocument
 from service.scene.base import MOST_MISTAKES, REFUSAL, field_names
+from service.scene.error_location import ErrorLocation, locate
 from service.scene.numbers import described
-from service.scene.places import Place, locate
 
 T = TypeVar("T")
 
@@ -57,7 +57,7 @@ def validated_entries(
 
 def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
     """Where and what, in the order of the document; `kind` is the type that was validated."""
-    found: dict[str, tuple[Any, Place]] = {}
+    found: dict[str, tuple[Any, ErrorLocation]] = {}
     kinds: set[str] = set()
     for entry in error.errors(include_url=False):
         place = locate(kind, entry["loc"])
@@ -94,7 +94,7 @@ def _is_below(pointer: str, holders: set[str]) -> bool:
     return False
 
 
-def _detail(entry: Any, place: Place) -> str:
+def _detail(entry: Any, place: ErrorLocation) -> str:
     kind, value, context = entry["type"], entry["input"], entry.get("ctx", {})
     if kind == REFUSAL:
         return str(context["detail"])
