@@ -10,7 +10,7 @@ import { isUnderNoSky, studio } from "./lighting.js";
 import { PLAIN } from "./materials.js";
 import { pointer } from "./patch.js";
 import { ballOf } from "./placing.js";
-import { problemText } from "./problem-text.js";
+import { fileValueWords, problemText, warningText } from "./problem-text.js";
 import { readRecipe } from "./recipe.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
@@ -52,7 +52,7 @@ export class Importer {
       try {
         if (await this.#take(file, place, next)) next = "add"; // the others of these files belong to it
       } catch (problem) {
-        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem) });
+        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem, {}, fileValueWords) });
       }
       this.messages.hide("upload");
     }
@@ -158,7 +158,7 @@ export class Importer {
 
   #tell(file, warnings, what, action = null) {
     if (!warnings.length) return;
-    const list = warnings.map((each) => (typeof each === "string" ? each : [each.pointer, each.detail].filter(Boolean).join(": ")));
+    const list = warnings.map((each) => (typeof each === "string" ? each : warningText(each)));
     this.messages.show("import", { title: `${file.name}: ${what}`, list, action });
   }
 
@@ -193,7 +193,7 @@ export class Importer {
     try {
       await this.#paint(place, await this.upload(file), file);
     } catch (problem) {
-      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem) });
+      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem, {}, fileValueWords) });
     }
     this.messages.hide("upload");
   }

@@ -39,6 +39,32 @@ export function placeWords(pointer, titles = {}) {
   return field === undefined ? sentence(owner) : `${titles[field] ?? `“${field}”`} of ${owner}`;
 }
 
+const IN_FILE = {
+  materials: "Material", meshes: "Mesh", nodes: "Node", textures: "Texture", images: "Image", cameras: "Camera", lights: "Light",
+  accessors: "Accessor", bufferViews: "Buffer view", buffers: "Buffer", skins: "Skin", samplers: "Sampler", scenes: "Scene",
+};
+
+// "/materials/3/normalTexture" -> "Material 4": the place in a model file, or "" where its details say enough alone.
+export function filePlaceWords(pointer) {
+  const parts = pointer.split("/").slice(1);
+  const at = parts[0] === "extensions" ? 2 : 0;
+  const [kind, index] = parts.slice(at);
+  return IN_FILE[kind] && /^\d+$/.test(index ?? "") ? `${IN_FILE[kind]} ${Number(index) + 1}` : "";
+}
+
+// "/materials/3/alphaMode" -> "Material 4, alphaMode": a value that has to be mended in the file itself.
+export function fileValueWords(pointer) {
+  const place = filePlaceWords(pointer);
+  const value = pointer.split("/").slice(3).findLast((part) => !/^\d+$/.test(part));
+  return [place, place && value].filter(Boolean).join(", ");
+}
+
+// A warning of an import, as a sentence.
+export function warningText({ pointer = "", detail }) {
+  const place = filePlaceWords(pointer);
+  return place ? `${place}: ${detail}` : sentence(detail);
+}
+
 const ended = (text) => (/[.!?…]$/.test(text) ? text : `${text}.`);
 
 // What is wrong with a value, short enough to stand beside it.
@@ -48,13 +74,17 @@ export function detailWords(detail) {
   return ended(all && all.length <= LONGEST_LIST ? `${first}; ${all}` : first);
 }
 
-export function problemText(problem, titles = {}) {
+// `place` puts the pointer of a bad value into words.
+export function problemText(problem, titles = {}, place = (pointer) => placeWords(pointer, titles)) {
   const [first, ...others] = problem.errors ?? [];
   if (first) {
-    const words = detailWords(first.detail);
-    const place = placeWords(first.pointer, titles);
+    // What was found in a file is told with its place before it.
+    const [, told = first.detail] = first.pointer ? first.detail.split(`${first.pointer}: `) : [];
+    const words = detailWords(told);
+    const where = place(first.pointer);
     const more = others.length ? ` ${others.length === 1 ? "Another value is" : `${others.length} other values are`} wrong, too.` : "";
-    return (VERB.test(words) ? `${place} ${words}` : `${place}: ${words}`) + more;
+    if (!where) return sentence(words) + more;
+    return (VERB.test(words) ? `${where} ${words}` : `${where}: ${words}`) + more;
   }
   if (problem instanceof SyntaxError) return "This is not valid JSON.";
   if (problem instanceof Problem && (problem.isGeneric || problem.status === 429 || problem.status === 503)) {

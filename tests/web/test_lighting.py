@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 
+import numpy as np
+
 from tests.gltf_lights import BLENDER_LAMP, start_up
 from tests.web.conftest import Editor
 
@@ -48,3 +50,25 @@ def test_an_exposure_of_ones_own_stays(editor: Editor) -> None:
     editor.wait("the scene", lambda: editor.page.input_value("#scene") == "cornell-boxes")
     editor.tab("render")
     assert exposure.input_value() == "-9"
+
+
+def test_what_is_said_of_a_file_is_in_words(editor: Editor) -> None:
+    """A client of the interface has the places as JSON pointers; here they are words, or left out."""
+    file = start_up(BLENDER_LAMP)
+    file.tree["animations"] = [{"channels": [], "samplers": []}]
+    file.tree["materials"] = [{}, {"occlusionTexture": {"index": file.texture(np.full((2, 2, 3), 200, np.uint8))}}]
+    file.tree["meshes"][0]["primitives"][0]["material"] = 1
+    editor.drop("#stage", {"lit.glb": file.glb()})
+    editor.page.click("dialog[open] [value=open]")
+    editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
+    said = editor.page.locator("#messages li").all_inner_texts()
+    assert "Animations are not played; the file's own pose is shown" in said, said
+    assert "Material 2: the occlusion texture is not used; occlusion is traced" in said, said
+    assert all(line[0].isupper() for line in said), said
+
+    file.tree["materials"][1]["alphaMode"] = "HALF"
+    editor.drop("#stage", {"bad.glb": file.glb()})
+    editor.page.click("dialog[open] [value=open]")
+    editor.wait("the refusal", lambda: "bad.glb was not taken" in editor.text("#messages"))
+    refusal = editor.page.inner_text("#messages .refusal")
+    assert "Material 2, alphaMode must be OPAQUE, MASK or BLEND, not 'HALF'." in refusal, refusal
