@@ -151,8 +151,9 @@ export class Comparison {
     const { compare, scene } = this.acts.state;
     const types = [scene.materials[compare.material]?.type, compare.document.type];
     ["a", "b"].forEach((side, i) => {
-      const words = [side.toUpperCase(), types[i] && inWords(types[i]), headers[i] && `${headers[i].samples} samples`];
-      this.stage.querySelector(`.variant.${side}`).textContent = words.filter(Boolean).join(" · ");
+      const words = [side.toUpperCase(), types[i] && inWords(types[i]), headers[i] && String(headers[i].samples)];
+      const unit = element("span", { class: "unit" }, headers[i] ? " samples" : "");
+      this.stage.querySelector(`.variant.${side}`).replaceChildren(words.filter(Boolean).join(" · "), unit);
     });
   }
 

@@ -1,0 +1,108 @@
+"""What is written can be read: values in their boxes, words in narrow bars; and an unset slider shows what holds."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator
+from typing import Any
+
+import pytest
+from playwright.sync_api import Browser
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+
+Size = tuple[int, int, bool]
+SIZES: list[Size] = [(1440, 900, False), (1024, 768, False), (390, 844, True)]
+SCENE: dict[str, Any] = {
+    "version": 1,
+    "camera": {
+        "position": [2.417, 1.553, 15.53], "target": [-2.417, 0.625, -1.234], "vfov": 49.56,
+        "aperture_radius": 0.3125, "focus_distance": 15.53,
+    },
+    "environment": {"type": "constant", "radiance": [0.2, 0.5, 0.8]},
+    "materials": {"ball": {"type": "principled", "base_color": "#ca4b36", "roughness": 0.5312}},
+    "shapes": [
+        {
+            "type": "box", "min": [-2.417, -1.553, -0.625], "max": [2.417, 1.553, 0.625], "material": "ball",
+            "transform": {"rotate": [49.56, -115.5, 12.34], "translate": [-15.53, 2.417, -49.56]},
+        },
+    ],
+}  # fmt: skip
+PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
+CUT = """() => [...document.querySelectorAll("input.entry")]
+    .filter((each) => each.checkVisibility() && each.scrollWidth > each.clientWidth)
+    .map((each) => `${each.getAttribute("aria-label") ?? each.id}: ${each.value}`)"""
+
+
+@pytest.fixture
+def at(browser: Browser, server: Server, request: pytest.FixtureRequest) -> Iterator[Editor]:
+    """The editor in a window of the size that a test names."""
+    width, height, touch = request.param
+    context = browser.new_context(viewport={"width": width, "height": height}, has_touch=touch, is_mobile=touch)
+    opened = Editor(context.new_page())
+    opened.open(server.url)
+    yield opened
+    context.close()
+
+
+def paste(editor: Editor, document: dict[str, Any]) -> None:
+    editor.page.evaluate(PASTE, json.dumps(document))
+    editor.page.click("#paste-material")
+
+
+@pytest.mark.parametrize("at", SIZES, indirect=True)
+def test_values_fit_into_their_boxes(at: Editor) -> None:
+    page = at.page
+    paste(at, SCENE)
+    hexes = f"{at.field('base_color', 'text')}"
+    at.wait("the scene", lambda: page.input_value(hexes) == "#ca4b36")
+    assert page.evaluate(CUT) == []
+    at.tab("scene")
+    shown: set[str] = set()
+    for thing in page.locator("#outline-list [role=option]").all():
+        thing.click()
+        assert page.evaluate(CUT) == [], thing.inner_text()
+        shown |= set(page.evaluate("[...document.querySelectorAll('#page-scene input.entry')].map((e) => e.value)"))
+    assert {"2.417", "49.56", "15.53", "-49.56", "-115.5"} <= shown
+
+
+@pytest.mark.parametrize("at", SIZES[:1], indirect=True)
+def test_an_unset_slider_stands_where_the_value_is_that_holds(at: Editor) -> None:
+    page = at.page
+    paste(at, {"type": "principled", "base_color": 0.5})
+    slider, box = at.field("ior"), at.field("ior", "number")
+    at.wait("the material", lambda: page.input_value(slider) == "1.5")
+    assert page.input_value(box) == "" and page.get_attribute(box, "placeholder") == "1.5"
+    assert page.get_attribute(slider, "aria-valuetext") == "not set, 1.5"
+    ghost = "(range) => range.classList.contains('ghost')"
+    assert page.eval_on_selector(slider, ghost)
+    page.fill(box, "1.7")
+    page.press(box, "Enter")
+    at.wait("a value of its own", lambda: not page.eval_on_selector(slider, ghost))
+    assert page.input_value(slider) == "1.7"
+
+
+@pytest.mark.parametrize("at", [(320, 640, True), (320, 640, False), (390, 844, True)], indirect=True)
+def test_narrow_bars_clip_no_word(at: Editor) -> None:
+    page = at.page
+    past = """() => ["top", "bar", "readings"].map((name) => document.querySelector(`.${name}`))
+        .filter((each) => each.scrollWidth > each.clientWidth).map((each) => each.className)"""
+    longest = """() => {
+        for (const [id, text] of [["samples", "256 / 256"], ["left", "13 min"]]) {
+            document.getElementById(id).textContent = text;
+        }
+    }"""
+    page.click("#pause")
+    at.wait("a pause", lambda: at.text("#state") == "Paused")
+    page.evaluate(longest)
+    assert page.evaluate(past) == []
+    page.click("#pause")
+    page.click("#compare")
+    label = ".variant.b"
+    at.wait("a label", lambda: any(letter.isdigit() for letter in at.text(label)))
+    if page.viewport_size == {"width": 390, "height": 844}:
+        for side in ("a", "b"):
+            assert (
+                page.evaluate(f"(e => e.scrollWidth - e.clientWidth)(document.querySelector('.variant.{side}'))") <= 0
+            )
