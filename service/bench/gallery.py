@@ -101,19 +101,23 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
     "editor": ((1400, 900), "dark", []),
     "editor-compare": (
         (1280, 800), "dark",
-        [("key", "c", ""), ("select", "#comparison select", "blinn_phong")],
+        [("key", "c", ""), ("select", "#comparison [aria-label^=Turn]", "blinn_phong")],
     ),
     "editor-scene": ((1280, 800), "light", [("click", "#tab-scene", ""), ("key", "h", ""), ("key", "4", "")]),
+    "editor-render": (
+        (1280, 800), "light",
+        [("click", "#tab-render", ""), ("select", "#layer", "normal")],
+    ),
     "editor-phone": ((390, 844), "dark", [("click", "#material-presets [data-name=copper]", "")]),
     "editor-lost": (  # the last: it ends the server
         (1280, 800), "dark",
-        [("fill", "#panel [data-field=roughness] input[type=number]", "7"), ("lose", "", "")],
+        [("fill", "#panel [data-field=roughness] input.number", "7"), ("lose", "", "")],
     ),
 }  # fmt: skip
 LOST = "text=The connection to the server was lost"
 
 
-def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: float = 25) -> None:
+def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: float = 18) -> None:
     """The editor's states, converged, in a headless browser (a development dependency)."""
     from playwright.sync_api import sync_playwright
 
@@ -138,6 +142,7 @@ def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: 
                     page.wait_for_timeout(1000 * wait_s)
                     server.terminate()
                     page.wait_for_selector(LOST)
+                    page.locator(":focus").evaluate("(field) => field.scrollIntoView({ block: 'center' })")
                     wait_s = 0.5  # before it is tried again
                 else:
                     page.select_option(what, value)
