@@ -1,4 +1,22 @@
-"""Arrays in, images out. Knows no HTTP, no JSON, no scene document; all names not listed here are private."""
+"""Arrays in, images out. Knows no HTTP, no JSON, no scene document; who may import what is in docs/house.md.
+
+renderer    the one way in: load a scene, take a picture of it
+arrays      a scene as finished arrays, which the service makes
+settings    the choices that change pixels
+errors      what can go wrong on the GPU
+context     a headless OpenGL context
+denoise     Open Image Denoise over pixels that were read back; public, without GL
+footprint   how many bytes of the device a scene and a picture take
+jit         machine code for the few loops that numpy cannot express
+layout      the bytes that the host and the shaders share; public, without GL
+accel       the trees that make rays and lights quick to find; public, without GL
+tables      tables that kernels draw from and look up; public, without GL
+kernels     from a scene to compiled kernels
+device      arrays as OpenGL objects
+picture     one picture in the making
+precompile  kernels that are compiled before they are needed; public
+analysis    measurements of a scene at hand; public
+"""
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light
 from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays

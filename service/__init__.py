@@ -1,1 +1,36 @@
-"""What a scene means: documents, assets, jobs, routes and the command line. No GL call is made here."""
+"""What a scene means: documents, assets, jobs, routes and the command line. No GL call is made here.
+
+app                what is served: the routes and the editor's files
+cli                the command line; `commands` has a module for each command
+config             every limit, and the SUNBOX_* variables that set it
+problems           the errors that callers see, with their HTTP statuses
+scene              the document as a person writes it
+pack               a document -> the renderer's arrays
+assets             meshes and images that scenes refer to
+images             pixels -> files
+presets            built-in scenes, materials and environments
+quality            quality presets, and settings with every knob resolved
+recipe             what a picture was made from, in its metadata
+rendering          what is wanted of the renderer, and the process that owns the GPU
+routes             the endpoints
+bodies             JSON bodies, taken in and parsed
+state              what the routes share
+traffic            requests, counted and timed
+metrics            /metrics
+readiness          whether a picture can be rendered now
+guard              who may ask, from which hosts and pages
+keys               whose key somebody shows
+connections        connections below HTTP
+connection_limits  how many connections there are, and how long one may stand still
+downloads          large answers, in pieces
+documents          what users saved, in SQLite
+quota              room on the disk
+storage            what is kept in the data folder
+logs               a line or a JSON object for each event
+log_output         where log records go
+confined           what a process gives up that works on strangers' files
+cpu_time           how long a process was able to run
+shared_memory      arrays that another process may map
+commands           the commands
+bench              measurements of the product
+"""

@@ -48,6 +48,16 @@ def kernel_key(
     return KernelKey(tuple(defines.items()), _textures(arrays, raised), entry)
 
 
+def flags(arrays: SceneArrays, editing: bool = False) -> frozenset[str]:
+    """The flags that a scene raises; `editing`: also those that its materials' sliders could raise."""
+    return features.flags(arrays, editing)
+
+
+def flags_after_edit(raised: frozenset[str], arrays: SceneArrays, editing: bool) -> frozenset[str]:
+    """The flags of a scene after an edit, where these were raised before: while it is edited none is lowered."""
+    return features.grown(raised, arrays) if editing else features.flags(arrays)
+
+
 def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey | None:
     """What a stream will need when it first moves a large mesh of this scene; None where it has none, or instances.
     A guess where there are small meshes beside it, some of which may stand in the kernel's loop.

@@ -9,15 +9,15 @@ changes, else wall time; scaled from the measured size to 512 x 512.
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
+from contextlib import nullcontext
 from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
 
 from gpu import Renderer, RenderSettings, denoise
-from gpu.picture import noise_meter
+from gpu.analysis.metering import noise_meter_off
 from service.bench import machine, pareto
 from service.bench.tradeoff_scenes import Case, TradeoffAssets, cases
 from service.pack import pack
@@ -134,7 +134,7 @@ class Bench:
         settings = self._settings(**variation.settings)
         side = max(1, round(self._options.size * variation.scale))
         settings = replace(settings, width=side, height=side)
-        with _meter(variation.metered):
+        with nullcontext() if variation.metered else noise_meter_off():
             runs = [self._picture(replace(settings, seed=s), counts, variation.denoise) for s in seeds]
         return [self._judged([run[k] for run in runs]) for k in range(len(counts))]
 
@@ -186,16 +186,6 @@ class Bench:
         color = np.ones((*pixels.shape[:2], 4), np.float32)
         color[..., :3] = pixels
         return np.ascontiguousarray(self._viewer.display(dtype="f4", color=color)[..., :3])
-
-
-@contextmanager
-def _meter(running: bool) -> Iterator[None]:
-    before = noise_meter.FROM
-    noise_meter.FROM = before if running else 1 << 30
-    try:
-        yield
-    finally:
-        noise_meter.FROM = before
 
 
 def _relative(difference: np.ndarray, reference: np.ndarray) -> float:

@@ -1,4 +1,19 @@
-"""The commands, a module each: `run(arguments) -> exit code`. The errors that end them early are here."""
+"""The commands, a module each: `run(arguments) -> exit code`. The errors that end them early are here.
+
+render         a picture of a document, into a file
+serve          the editor and the API
+import         a glTF model as a document with files beside it
+info           what would render here
+bench          measurements
+health         the container's health check
+assets         the assets of a scene, and their ids
+configuration  the configuration; what is wrong in it ends the command
+documents      documents and settings, from files and from `--set`
+files          files, never half-written
+models         glTF models with the files that they refer to
+progress       how far a render is, on stderr
+tracing        one render in this process
+"""
 
 from __future__ import annotations
 

@@ -61,8 +61,8 @@ def _triangles(packed: Packed) -> str:
 
 def kernel(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple[str, str]]:
     """What the scene's kernel is compiled for, what not, and what that saves; measured here and now."""
+    from gpu import RenderSettings
     from gpu.analysis.kernel_cost import SIZE, full_kernel, kernel_cost
-    from gpu.settings import RenderSettings
     from service.rendering.worker.helpers.compile_client import CompileClient
 
     settings = RenderSettings(SIZE, SIZE)

@@ -1,4 +1,7 @@
-"""Pixels -> PNG, JPEG, WebP, EXR, Radiance HDR and npy, with what they were made from in PNG's and EXR's metadata."""
+"""Pixels -> PNG, JPEG, WebP, EXR, Radiance HDR and npy, with what they were made from in PNG's and EXR's metadata.
+
+metadata  what PNG and EXR files carry beside their pixels
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,14 @@
 
 A file's `title` is for menus, its `source` says where numbers were measured; neither is part of the document.
 `"builtin:NAME"` in it stands for an asset of `generated`.
+
+generated  the assets that presets use
+field      a thousand spheres
+knot       a torus knot, as a mesh
+skies      painted skies
+studio     a photographer's studio
+latlong    directions and shapes of light in latitude-longitude pictures
+exr        a writer of the plainest OpenEXR files
 """
 
 from __future__ import annotations

@@ -1,1 +1,13 @@
-"""The endpoints: a handler parses, asks, answers. What they ask is in `House`, which the application keeps."""
+"""The endpoints: a handler parses, asks, answers. What they share is `service.state`.
+
+renders      renders asked for over REST
+stream       the stream's WebSocket
+assets       uploads
+documents    saved scenes and materials
+presets      built-in documents
+info         what the service is, whether it lives, what its documents look like
+answers      what answers look like, for the API's description
+errors       errors as problem+json
+description  openapi.json
+examples     documents that the description shows
+"""

@@ -7,7 +7,6 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from gpu import RenderSettings, picture_bytes, save, scene_bytes
-from gpu.kernels import features
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
@@ -121,7 +120,7 @@ def kernel_request(
         return None
     if update.scene is not None:
         arrays, editing = update.scene, update.interactive
-        raised = features.flags(arrays, editing)
+        raised = kernel_keys.flags(arrays, editing)
     elif loaded is not None:
         arrays, editing, raised = loaded.scene.arrays, loaded.editing, loaded.scene.flags
         aperture = update.camera is None or update.camera.aperture_radius == arrays.camera.aperture_radius
@@ -133,5 +132,5 @@ def kernel_request(
         return None
     if edits or update.scene is None:
         arrays = kernel_keys.apply_edit(arrays, edits)
-        raised = features.grown(raised, arrays) if editing else features.flags(arrays)
+        raised = kernel_keys.flags_after_edit(raised, arrays, editing)
     return KernelRequest(arrays, settings, kernel_keys.kernel_key(arrays, settings, raised))
