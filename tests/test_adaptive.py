@@ -18,7 +18,7 @@ from service.cli import main
 from tests.rendering import Images, document, picture
 from tests.serving import SCENE, SMALL, Client, Server
 from tests.serving import client as opened
-from tests.test_meter import SCENES, SHAPES, luminance
+from tests.test_noise_meter import SCENES, SHAPES, luminance
 
 RAW = {"format": "rgba32f"}
 SIZE: dict[str, Any] = {"width": 44, "height": 37, "max_bounces": 3, "filter": "blackman_harris"}

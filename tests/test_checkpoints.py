@@ -18,7 +18,7 @@ from service.rendering.ipc.messages import Checkpoint, Done, Image, Progress, Pr
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device import checkpoints
 from tests.supervisors import with_supervisor
-from tests.test_compiling import LINEAR, arrays_of
+from tests.test_precompile import LINEAR, arrays_of
 from tests.test_worker import Ears, settings
 
 ENDLESS = 1 << 24

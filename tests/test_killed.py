@@ -16,7 +16,7 @@ from service.rendering.supervisor import supervisor as supervisors
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
 from tests.supervisors import with_supervisor
-from tests.test_compiling import arrays_of
+from tests.test_precompile import arrays_of
 from tests.test_worker import LINEAR, Ears, settings
 
 

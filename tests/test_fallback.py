@@ -23,8 +23,8 @@ from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
 from tests.supervisors import with_supervisor
-from tests.test_compiling import Ears
 from tests.test_flags import IMAGES, SCENES
+from tests.test_precompile import Ears
 
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}

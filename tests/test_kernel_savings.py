@@ -22,7 +22,7 @@ from service.rendering.worker.kernel_savings import NO_KERNEL, NO_PICTURE, Kerne
 from tests.extremes.scenes import LONG
 from tests.serving import SCENE, SMALL, Server
 from tests.supervisors import with_supervisor
-from tests.test_compiling import arrays_of
+from tests.test_precompile import arrays_of
 from tests.test_worker import Ears, settings
 
 FIGURES = ("saving", "sample_s", "full_sample_s", "full_compile_ms")
