@@ -58,7 +58,9 @@ def test_what_moves_beside_a_mesh_leaves_its_tree(
     monkeypatch: pytest.MonkeyPatch, first: dict[str, Any], change: dict[str, Any], planted: int
 ) -> None:
     calls = []
-    monkeypatch.setattr(assemble, "plant", lambda *given: calls.append(given) or scene_bvh.build_scene_bvh(*given))
+    monkeypatch.setattr(
+        assemble, "build_scene_bvh", lambda *given: calls.append(given) or scene_bvh.build_scene_bvh(*given)
+    )
     cache = PackCache()
     assert_same(pack(parse_scene(first), Images(), cache), pack(parse_scene(first), Images()))
     calls.clear()
