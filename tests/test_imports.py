@@ -4,14 +4,20 @@ from __future__ import annotations
 
 import ast
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator, Mapping
+from functools import cache
 from pathlib import Path
 
 import pytest
 
 ROOT = Path(__file__).parent.parent
 MODULES = sorted((*ROOT.glob("gpu/**/*.py"), *ROOT.glob("service/**/*.py")))
+FOLDERS = sorted({path.parent for path in MODULES})
 SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {".glsl", ".comp"})
+SOURCES = sorted((*MODULES, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROOT.glob("web/**/*.js")))
+MOST_LINES = 400
+STILL_LONG = {"service/rendering/worker/task.py"}  # until its phases have modules of their own
+STILL_CIRCLES = [["gpu.picture.picture", "gpu.picture.saved"]]  # until a picture saves itself
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
@@ -37,9 +43,32 @@ LAYERS = [
     {"service.commands"},
     {"service.cli"},
 ]
-NAMES_GPU = ("service.pack", "service.cli", "service.commands", "service.rendering.worker", "service.bench")
+GPU_LAYERS = [
+    {"gpu.layout", "gpu.errors", "gpu.settings", "gpu.jit", "gpu.denoise"},
+    {"gpu.tables", "gpu.accel"},
+    {"gpu.arrays", "gpu.context", "gpu.footprint"},
+    {"gpu.kernels"},
+    {"gpu.device"},
+    {"gpu.picture"},
+    {"gpu.precompile"},
+    {"gpu.renderer"},
+    {"gpu.analysis"},
+]
+# Which rooms of `gpu` others may look into; `gpu` stands for the names that gpu/__init__.py lists.
+RUNS_KERNELS = ("gpu", "gpu.errors", "gpu.denoise", "gpu.precompile", "gpu.analysis")
+LOOKS_INTO_GPU = {
+    "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables"),
+    "service.rendering.worker": RUNS_KERNELS,
+    "service.commands": RUNS_KERNELS,
+    "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
+}
+WITHOUT_GL = ("gpu.layout", "gpu.accel", "gpu.tables", "gpu.errors", "gpu.settings", "gpu.jit", "gpu.denoise")
+OFFLINE = "gpu.tables.build"
+SHARED_BY_PROCESSES = ("service.rendering.ipc", "service.rendering.priority")  # by the server's and the renderer's
 ERRORS = ("gpu.errors", "service.problems")
 WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic", "pydantic_settings"}
+
+Graph = Mapping[str, Iterable[str]]
 
 
 def name_of(path: Path) -> str:
@@ -64,8 +93,51 @@ def within(module: str, *packages: str) -> bool:
     return any(module == package or module.startswith(package + ".") for package in packages)
 
 
-def layer(module: str) -> int:
-    return next((i for i, packages in enumerate(LAYERS) if within(module, *packages)), -1)
+def layer(module: str, layers: list[set[str]] = LAYERS) -> int:
+    return next((i for i, packages in enumerate(layers) if within(module, *packages)), -1)
+
+
+@cache
+def graph() -> dict[str, set[str]]:
+    """Module -> modules of ours that it imports."""
+    ours = {name_of(path) for path in MODULES}
+    found = {name_of(path): {existing(imported, ours) for imported in imports_of(path)} for path in MODULES}
+    return {module: imported - {"", module} for module, imported in found.items()}
+
+
+def existing(imported: str, ours: set[str]) -> str:
+    """The module that an import names, or that has the imported name; "" for others'."""
+    return imported if imported in ours else next((m for m in [imported.rpartition(".")[0]] if m in ours), "")
+
+
+def circles(arrows: Graph) -> list[list[str]]:
+    """Groups in which everybody is reached from everybody [Tarjan 1972]."""
+    number, low, stack, found = dict[str, int](), dict[str, int](), list[str](), list[list[str]]()
+
+    def visit(module: str) -> None:
+        number[module] = low[module] = len(number)
+        stack.append(module)
+        for other in arrows.get(module, ()):
+            if other not in number:
+                visit(other)
+                low[module] = min(low[module], low[other])
+            elif other in stack:
+                low[module] = min(low[module], number[other])
+        if low[module] == number[module]:
+            at = stack.index(module)
+            group = stack[at:]
+            del stack[at:]
+            if len(group) > 1:
+                found.append(sorted(group))
+
+    for module in arrows:
+        if module not in number:
+            visit(module)
+    return found
+
+
+def folder_of(module: str) -> str:
+    return module if (ROOT / module.replace(".", "/")).is_dir() else module.rpartition(".")[0]
 
 
 @pytest.mark.parametrize("path", MODULES, ids=name_of)
@@ -76,20 +148,77 @@ def test_module_keeps_to_its_room(path: Path) -> None:
         said = f"{module} imports {imported}"
         if within(module, "gpu"):
             assert top != "service" and top not in WEB_FRAMEWORK, said
+            assert top != "moderngl" or not within(module, *WITHOUT_GL), said
         else:
             assert top != "moderngl", said
-            assert top != "gpu" or within(module, *NAMES_GPU), said
         if module in ERRORS:
             assert top not in {"gpu", "service"}, said
         if top == "service" and module != "service":
             assert layer(imported) <= layer(module), f"{said}: that arrow points up"
+        if top == "gpu" and within(module, "gpu") and module != "gpu":
+            assert layer(imported, GPU_LAYERS) <= layer(module, GPU_LAYERS), f"{said}: that arrow points up"
 
 
-def test_every_service_module_has_its_place() -> None:
-    assert [name_of(path) for path in MODULES if layer(name_of(path)) < 0 and path.match("service/*")] in (
-        [],
-        ["service"],
-    )
+def test_every_module_has_its_place() -> None:
+    names = [name_of(path) for path in MODULES if name_of(path) not in ("gpu", "service")]
+    assert [name for name in names if max(layer(name), layer(name, GPU_LAYERS)) < 0] == []
+
+
+def test_only_public_rooms_of_gpu_are_looked_into() -> None:
+    for module, imported in graph().items():
+        for other in imported:
+            said = f"{module} imports {other}"
+            assert not within(other, OFFLINE) or within(module, OFFLINE), said
+            if not within(other, "gpu") or within(module, "gpu"):
+                continue
+            rooms = [room for package, room in LOOKS_INTO_GPU.items() if within(module, package)]
+            assert rooms, f"{said}: nobody there speaks to gpu"
+            assert other == "gpu" or within(other, *rooms[0][1:]), f"{said}: that room is private"
+
+
+def test_the_renderers_process_shares_only_its_channel() -> None:
+    worker = "service.rendering.worker"
+    for module, imported in graph().items():
+        for other in imported:
+            said = f"{module} imports {other}"
+            if within(module, "service.rendering") and not within(module, worker):
+                assert not within(other, worker, "gpu"), said
+            if within(module, worker) and within(other, "service.rendering"):
+                assert within(other, worker, *SHARED_BY_PROCESSES), said
+
+
+def test_there_are_no_circles() -> None:
+    assert circles(graph()) in ([], STILL_CIRCLES)
+
+
+def test_there_are_no_circles_between_folders() -> None:
+    folders: dict[str, set[str]] = {}
+    for module, imported in graph().items():
+        mine = folder_of(module)
+        others = {folder_of(other) for other in imported}
+        folders.setdefault(mine, set()).update(o for o in others if not within(o, mine) and not within(mine, o))
+    assert circles(folders) == []
+
+
+def test_a_circle_is_seen() -> None:
+    assert circles({"a": ["b"], "b": ["c"], "c": ["b", "d"], "d": []}) == [["b", "c"]]
+
+
+@pytest.mark.parametrize("path", SOURCES, ids=lambda path: str(path.relative_to(ROOT)))
+def test_file_is_not_too_long(path: Path) -> None:
+    if str(path.relative_to(ROOT)) not in STILL_LONG:
+        assert len(path.read_text().splitlines()) <= MOST_LINES, "ask what its second subject is"
+
+
+@pytest.mark.parametrize("folder", FOLDERS, ids=lambda folder: str(folder.relative_to(ROOT)))
+def test_folder_has_a_table_of_contents(folder: Path) -> None:
+    """The docstring of `__init__.py` has a line for each module, `name  what it holds`, and for nothing else."""
+    contents = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
+    lines = re.findall(r"^(\w+(?:, \w+)*) {2,}\S", contents, re.MULTILINE)
+    listed = {name for line in lines for name in line.split(", ")}
+    modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    folders = {path.parent.name for path in folder.glob("*/__init__.py")}
+    assert listed == modules | folders
 
 
 def test_shaders_are_text() -> None:
