@@ -131,7 +131,7 @@ def test_a_stream_goes_on_when_its_denoiser_does_not(server: Server, client: Cli
     client.start(settings=ENDLESS, view=RAW)
     while not client.frame().header.get("denoised"):
         pass
-    search = ["pgrep", "-P", str(server.renderer()), "-f", "denoising"]
+    search = ["pgrep", "-P", str(server.renderer()), "-f", "denoise_main"]
     helper = int(subprocess.run(search, capture_output=True, text=True).stdout)
     os.kill(helper, signal.SIGSTOP)
     try:

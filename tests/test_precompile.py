@@ -107,7 +107,7 @@ def helpers(parent: int | None) -> list[int]:
         try:
             of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
             command = (path / "cmdline").read_bytes()
-            if of == parent and b"compiling" in command and b"--spare" not in command:
+            if of == parent and b"compile_main" in command and b"--spare" not in command:
                 found.append(int(path.name))
         except OSError:
             continue
