@@ -32,7 +32,7 @@ from gpu.errors import (
 )
 from gpu.footprint import picture_bytes, scene_bytes
 from gpu.picture.picture import Picture
-from gpu.picture.saved import Saved, save
+from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
 from gpu.renderer import Renderer
 from gpu.settings import AOVS, ESTIMATORS, FILTERS, SAMPLERS, TONE_MAPS, RenderSettings
@@ -63,6 +63,5 @@ __all__ = [
     "bounced_paths",
     "missing_light",
     "picture_bytes",
-    "save",
     "scene_bytes",
 ]

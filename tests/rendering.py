@@ -57,7 +57,7 @@ def release_pictures() -> None:
     """What tests have left of `picture(...)`: each holds a kernel, 7 MB."""
     while _made:
         left = _made.pop()
-        if left._kernel is not None and not isinstance(left.context.mglo, moderngl.InvalidObject):  # not released yet
+        if not left.released and not isinstance(left.context.mglo, moderngl.InvalidObject):
             left.release()
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Picture, Renderer, RenderSettings, save
+from gpu import Picture, Renderer, RenderSettings
 from gpu.layout.bindings import Slot
 from gpu.picture import adaptive
 from gpu.picture.noise_meter import FROM
@@ -101,7 +101,7 @@ def test_pixels_get_all_that_a_decision_wants(gpu: Renderer, monkeypatch: pytest
     monkeypatch.setattr(adaptive, "SLICE_S", 1e-12)
     for samples in (decision + 1, decision + 22):
         made.trace(600, samples)
-        wanted = made._adaptive._kept().at(samples)
+        wanted = made._passes.schedule._kept().at(samples)
         y, x = np.mgrid[: SIZE["height"], : SIZE["width"]]
         assert np.array_equal(counts(made), wanted[y // AREA, x // AREA, y % CLASSES])
     made.release()
@@ -111,9 +111,9 @@ def test_pixels_get_all_that_a_decision_wants(gpu: Renderer, monkeypatch: pytest
 def test_saved_in_the_middle_of_a_pass(gpu: Renderer, samples: int) -> None:
     whole = picture(gpu, SCENES["cornell"], 90, adaptive=True, **SIZE)
     half = picture(gpu, SCENES["cornell"], samples, adaptive=True, **SIZE)
-    half._begin_pass(samples + 9)
-    half._slice()
-    steps, state = save(half), None
+    half._passes._begin_pass(samples + 9)
+    half._passes._slice()
+    steps, state = half.save(), None
     while state is None:
         try:
             next(steps)

@@ -131,7 +131,7 @@ def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
 def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
     now = 0.0
 
-    def slow(picture: Any, room: Any) -> Generator[None, None, str]:
+    def slow(room: Any) -> Generator[None, None, str]:
         nonlocal now
         for _ in range(4):
             now += 0.5
@@ -139,10 +139,9 @@ def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> No
         return "saved"
 
     monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
-    monkeypatch.setattr(checkpoints, "save", slow)
     kept, shown = (
         checkpoints.Checkpointer(10.0),
-        SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[]),
+        SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[], save=slow),
     )
     small: Any = shown
     assert not kept.due(small)

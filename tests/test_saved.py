@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import OutOfMemory, Picture, Renderer, RenderSettings, picture_bytes, save, scene_bytes
+from gpu import OutOfMemory, Picture, Renderer, RenderSettings, picture_bytes, scene_bytes
 from gpu import context as contexts
-from gpu.picture import saved as saving
+from gpu.picture import picture as pictures
 from service.pack import pack
 from service.scene import parse_scene
 from tests.rendering import Images, document, picture
@@ -23,7 +23,7 @@ SCENE = document(
 
 def saved(picture: Picture) -> tuple[Any, int]:
     """What was saved, and in how many steps."""
-    steps: Generator[None, None, Any] = save(picture)
+    steps: Generator[None, None, Any] = picture.save()
     count = 0
     while True:
         try:
@@ -35,13 +35,13 @@ def saved(picture: Picture) -> tuple[Any, int]:
 
 @pytest.mark.parametrize("tiles", [0, 1])
 def test_it_goes_on_to_the_same_bits(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, tiles: int) -> None:
-    monkeypatch.setattr(saving, "PIECE_BYTES", 5000)
+    monkeypatch.setattr(pictures, "PIECE_BYTES", 5000)
     whole = picture(gpu, SCENE, 9)
     half = picture(gpu, SCENE, 4)
     for _ in range(tiles):  # in the middle of a pass
-        half._pass_samples = half._tiles.pass_samples(half.samples)
-        half._tiles.took((0, 0, 32, 32), 1, 1024.0)  # so dear that a tile is a part of the picture
-        half._slice()
+        half._passes._begin_pass(9)
+        half._passes.schedule.took((0, 0, 32, 32), 1, 1024.0)  # so dear that a tile is a part of the picture
+        half._passes._slice()
     state, steps = saved(half)
     assert state.samples == 4 and steps > 3 * 32 * 32 * 16 // 5000
     half.release()

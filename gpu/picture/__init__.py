@@ -1,10 +1,14 @@
 """One picture in the making: its samples are added slice by slice, and it can be read at any time.
 
-picture      its accumulators, the passes over them, and reading
+picture      its life: accumulators on the device, settings, saving and restoring
+passes       which samples are traced next, slice by slice
+schedule     what a pass asks of `tiles` or `adaptive`
 tiles        how a pass is cut, by the measured cost of each band of rows
 adaptive     passes over the areas of a sample plan
 sample_plan  how many samples each part of a picture gets
 noise_meter  a picture's error, from a second, independent estimate of a share of its pixels
+readout      what is read of a picture
+dispatcher   kernels run over parts of a picture
 first_hit    AOVs of the first hit
 resolve      accumulators to what a display takes, on the device
 display      AOVs as pictures for the eye

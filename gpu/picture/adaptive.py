@@ -11,7 +11,8 @@ from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
 from gpu.picture.sample_plan import AREA, CLASSES, DECISIONS, WORDS, SamplePlan, pixels_of, weights_of
-from gpu.picture.tiles import GUESS_S, SLICE_S, USUAL_BOUNCES, Tile, usual_pass
+from gpu.picture.schedule import Dispatch, Tile
+from gpu.picture.tiles import GUESS_S, SLICE_S, USUAL_BOUNCES, usual_pass
 
 _MOST_AREAS = 1 << 14  # of a dispatch
 
@@ -28,13 +29,14 @@ class Adaptive:
         self._caution = max(1.0, max_bounces / USUAL_BOUNCES)
         self.cost_s = 0.0  # per sample of a pixel; 0: unknown
         self.rounds = self.chunk = 1  # of the pass under way; samples of an invocation
+        self.stops: tuple[int, ...] = DECISIONS
         self._pixels = pixels_of(*size)
         self._rates = np.zeros(len(self._pixels))  # the same as cost_s, by row of areas
         self._areas, self._amounts = np.zeros(0, np.int64), np.zeros(0)  # listed; samples that each gets
         self._turns = np.zeros(1, np.int64)  # where each round ends in the list
         self._plan: SamplePlan | None = SamplePlan(self._pixels)
         count = self._pixels.shape[0] * self._pixels.shape[1]
-        self.buffer = contexts.allocate(context, WORDS.itemsize * count)
+        self._words = contexts.allocate(context, WORDS.itemsize * count)
         self._counts = contexts.allocate(context, 4 * CLASSES * count)
         self._work = contexts.allocate(context, 4 * _MOST_AREAS)
 
@@ -42,25 +44,34 @@ class Adaptive:
     def size(self) -> tuple[int, int]:
         return 1, len(self._areas)
 
+    @property
+    def buffers(self) -> tuple[Any, ...]:
+        return (self._words,)
+
+    def resume(self, row: int, column: int) -> tuple[int, int]:
+        """The pass begins again: pixels that have their samples get no more."""
+        return 0, 0
+
     def forget(self) -> None:
-        """The plan is that of `buffer`, which was written or cleared."""
         self._plan = None
 
     def _kept(self) -> SamplePlan:
         if self._plan is None:
-            words = np.frombuffer(self.buffer.read(), WORDS).reshape(self._pixels.shape[:2])
+            words = np.frombuffer(self._words.read(), WORDS).reshape(self._pixels.shape[:2])
             decided = bool((words["weights"] > 0).all())
             self._plan = (
                 SamplePlan(self._pixels, words["counts"], words["weights"]) if decided else SamplePlan(self._pixels)
             )
         return self._plan
 
-    def decide(self, main: dict[Slot, Any]) -> None:
-        """Plans anew, by the picture's second moments."""
+    def decide(self, samples: int, main: dict[Slot, Any]) -> None:
+        """At a stop, plan anew by the picture's second moments."""
+        if samples not in self.stops:
+            return
         variances, counts = self._seen(main[Slot.MOMENTS])
         words = np.zeros(self._pixels.shape[:2], WORDS)
         words["counts"], words["weights"] = counts, weights_of(variances, self._pixels)
-        self.buffer.write(words.tobytes())
+        self._words.write(words.tobytes())
         self._plan = SamplePlan(self._pixels, words["counts"], words["weights"])
 
     def _seen(self, moments: Any) -> tuple[np.ndarray, np.ndarray]:
@@ -129,17 +140,22 @@ class Adaptive:
             return 1
         return max(1, usual_pass(self._picture, self.cost_s, samples))
 
-    def bind(self, tile: Tile | None) -> Tile:
-        """Binds the plan and, but for the meter, the areas of the slice; the tile of the picture that they lie in."""
+    def bind(self) -> None:
         self._counts.bind_to_storage_buffer(int(Slot.NORMAL))
         self._work.bind_to_storage_buffer(int(Slot.OUTPUT))
-        if tile is None:
-            return 0, 0, 0, 0
+
+    def dispatch(self, tile: Tile) -> Dispatch:
+        """A group for each area listed in the tile; each pixel goes on from the samples that it has."""
+        self.bind()
         y, x = np.divmod(self._areas[tile[1] : tile[1] + tile[3]], self._pixels.shape[1])
         self._work.write((x | y << 16).astype(np.uint32).tobytes())
         (width, height), top = self._picture, AREA * int(y[0])
-        return 0, top, width, min(height, AREA * (int(y[-1]) + 1)) - top
+        part = 0, top, width, min(height, AREA * (int(y[-1]) + 1)) - top
+        return Dispatch(part, tile[:2], (tile[3], 1), 0, self.chunk, (tile[3], 1))
+
+    def meter_samples(self, since: int) -> tuple[int, int]:
+        return 0, self.chunk
 
     def release(self) -> None:
-        for buffer in (self.buffer, self._counts, self._work):
+        for buffer in (self._words, self._counts, self._work):
             buffer.release()

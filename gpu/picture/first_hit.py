@@ -10,7 +10,7 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu.layout.bindings import Slot
-from gpu.picture.tiles import Tile
+from gpu.picture.schedule import Tile
 
 SAMPLES = 256  # they average at most so many
 IDS = ("shape_id", "material_id")
@@ -73,3 +73,7 @@ class FirstHit:
     def _vectors(self, slot: Slot) -> np.ndarray:
         flat = np.frombuffer(self.buffers[slot].read(), np.float32)
         return flat.reshape(self._size[1], self._size[0], 4)
+
+    def release(self) -> None:
+        for buffer in self.buffers.values():
+            buffer.release()

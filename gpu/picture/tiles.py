@@ -5,7 +5,12 @@ Runs without GL.
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
+
+from gpu.layout.bindings import Slot
+from gpu.picture.schedule import Dispatch, Tile
 
 SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
 PASS_S = 0.2  # samples per pass aim at this, once there are some
@@ -19,8 +24,6 @@ _LEAST = 8  # columns of a tile: a work group's
 _LONG_BAND, _LONG_LEAST = 4, 16  # where paths may be so long that 128 pixels take a tenth of a second
 GUESS_S = 2e-7  # of a sample of a pixel, before any was measured
 USUAL_BOUNCES = 16  # of more, a path that nobody has seen yet may cost as much more than those seen
-
-Tile = tuple[int, int, int, int]  # x, y, width, height
 
 
 class Tiles:
@@ -38,6 +41,9 @@ class Tiles:
         self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
         self._rates = np.zeros(-(-height // self._band))  # s per sample of a pixel, by band; 0: unknown
         self.cost_s = 0.0  # the same of late; 0: unknown
+        self.stops: tuple[int, ...] = ()
+        self.rounds = 1
+        self._before, self.chunk = 0, 1  # the first sample of the pass under way, and how many it takes
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
         """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
@@ -71,6 +77,37 @@ class Tiles:
             return 1
         fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
         return max(1, min(fits, usual_pass(self.size, self.cost_s, samples), self._most_samples))
+
+    def begin(self, before: int, after: int, most: int) -> None:
+        self._before, self.chunk = before, after - before
+
+    def dispatch(self, tile: Tile) -> Dispatch:
+        groups = -(-tile[2] // 8), -(-tile[3] // 8)
+        return Dispatch(tile, tile[:2], tile[2:], self._before, self.chunk, groups)
+
+    def meter_samples(self, since: int) -> tuple[int, int]:
+        first = self._before if self._before >= since else 0
+        return first, self._before + self.chunk - first
+
+    def resume(self, row: int, column: int) -> tuple[int, int]:
+        return row, column
+
+    # There is no plan, and nothing of it on the device.
+    @property
+    def buffers(self) -> tuple[Any, ...]:
+        return ()
+
+    def decide(self, samples: int, main: dict[Slot, Any]) -> None:
+        pass
+
+    def bind(self) -> None:
+        pass
+
+    def forget(self) -> None:
+        pass
+
+    def release(self) -> None:
+        pass
 
 
 def usual_pass(size: tuple[int, int], cost_s: float, samples: int) -> int:

@@ -32,7 +32,7 @@ def _bits(gpu: Renderer, cut: str, monkeypatch: pytest.MonkeyPatch, **settings: 
     slice_s, pass_s, most, budget = CUTS[cut]
     for name, value in (("SLICE_S", slice_s), ("PASS_S", pass_s), ("MAX_SAMPLES_A_PASS", most)):
         monkeypatch.setattr(cutting, name, value)
-    monkeypatch.setattr("gpu.picture.picture.MAX_SAMPLES_A_PASS", most)
+    monkeypatch.setattr("gpu.picture.passes.MAX_SAMPLES_A_PASS", most)
     mesh = icosphere("white", 2, translate=[0, 0.5, 0], scale=0.6)
     loaded = gpu.load(packed(everything(shapes=[everything()["shapes"][0], everything()["shapes"][8], mesh])).arrays)
     defaults = {"width": 40, "height": 24, "max_bounces": 4, "seed": 7}

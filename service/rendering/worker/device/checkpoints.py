@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import picture_bytes, save
+from gpu import picture_bytes
 from service import shared_memory
 
 if TYPE_CHECKING:
@@ -44,10 +44,9 @@ class Checkpointer:
         return late and picture.samples > 0 and picture_bytes(picture.settings) <= MOST_BYTES
 
     def begin(self, picture: Picture) -> None:
-        arena = shared_memory.SharedArena(
-            *(buffer.size for buffer in picture.state)
-        )  # one descriptor goes with the picture
-        self._steps, self._took_s = save(picture, lambda size: arena.room((size,), np.dtype(np.uint8))), 0.0
+        # One descriptor goes with the picture.
+        arena = shared_memory.SharedArena(*(buffer.size for buffer in picture.state))
+        self._steps, self._took_s = picture.save(lambda size: arena.room((size,), np.dtype(np.uint8))), 0.0
 
     def step(self) -> Saved | None:
         """The picture, with the last step."""

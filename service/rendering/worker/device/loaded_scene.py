@@ -6,7 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from gpu import RenderSettings, picture_bytes, save, scene_bytes
+from gpu import RenderSettings, picture_bytes, scene_bytes
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
@@ -65,7 +65,7 @@ class LoadedScene:
 
     def offloaded(self) -> Offloaded:
         """Off the device; this holding is released."""
-        pictures = {scale: finished(save(made)) for scale, made in self.ladder.begun.items()}
+        pictures = {scale: finished(made.save()) for scale, made in self.ladder.begun.items()}
         out = Offloaded(self.scene.arrays, self.ladder.full.settings, self._editing, self.scene.flags, pictures)
         self.release()
         return out

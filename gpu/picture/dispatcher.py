@@ -1,0 +1,86 @@
+"""Runs kernels over parts of a picture: what all of them read is bound here, and their `Frame` is written."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from gpu import context as contexts
+from gpu.device.scene import Scene
+from gpu.kernels import features
+from gpu.layout import Frame, bindings
+from gpu.layout.bindings import Slot
+from gpu.picture import filters
+from gpu.picture.schedule import Tile
+from gpu.settings import RenderSettings
+
+_ALIGNED = 32  # pixels: a binding may begin at a multiple of so many, at 8 bytes or 16, on any driver
+
+
+class Dispatcher:
+    """Made for one picture; `frame` is the device's buffer of that record, which all pictures share."""
+
+    def __init__(self, context: Any, frame: Any, scene: Scene, settings: RenderSettings) -> None:
+        self.context, self._frame_buffer = context, frame
+        self.scene, self.settings = scene, settings
+        # As drivers bind no more than 128 MiB at once, to be sure of.
+        self.most_pixels = contexts.storage_block_bytes(context) // 16 // _ALIGNED * _ALIGNED - _ALIGNED
+        self.counters = context.buffer(reserve=16)  # paths that were ended, and cut
+        self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
+
+    def configure(self, settings: RenderSettings) -> None:
+        """Take these settings from now on."""
+        self.settings = settings
+        table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
+        table[:, 0] = filters.inverse(settings.filter, features.FILTER_TABLE_SIZE)
+        self._filter.write(table)
+
+    def bind(self) -> None:
+        """Bind what every kernel reads; `bind_part` binds what it writes."""
+        self.scene.bind()
+        self.counters.bind_to_storage_buffer(int(Slot.ALBEDO))
+        self._frame_buffer.bind_to_uniform_block(bindings.FRAME_BLOCK)
+        self._filter.bind_to_uniform_block(bindings.FILTER_BLOCK)
+
+    def bind_part(self, buffers: dict[Slot, Any], tile: Tile, width: int) -> int:
+        """Bind the part of each buffer, of rows of `width` pixels, that a tile touches; the part's first pixel."""
+        x, y, columns, rows = tile
+        first = (y * width + x) // _ALIGNED * _ALIGNED
+        count = (y + rows - 1) * width + x + columns - first
+        for slot, buffer in buffers.items():
+            pixel_bytes = 8 if slot == Slot.OUTPUT else 16
+            buffer.bind_to_storage_buffer(int(slot), offset=first * pixel_bytes, size=count * pixel_bytes)
+        return first
+
+    def frame(self, origin: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:
+        """The `Frame` for samples [first, first + count) of the invocations of a tile."""
+        s = self.settings
+        frame: np.ndarray = np.zeros((), Frame.dtype)
+        self.scene.write_frame(frame)
+        frame["resolution"] = (s.width, s.height)
+        frame["tile_origin"], frame["tile_size"] = origin, size
+        frame["sample_first"], frame["sample_count"] = first, count
+        frame["max_bounces"], frame["roulette_depth"], frame["seed"] = s.max_bounces, s.roulette_depth, s.seed
+        frame["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
+        frame["slot_width"] = s.width
+        return frame
+
+    def run(self, kernel: Any, frame: np.ndarray, groups: tuple[int, int]) -> None:
+        """Start a kernel; the caller waits for it."""
+        self._frame_buffer.write(frame.tobytes())
+        kernel.run(*groups)
+
+    @property
+    def warnings(self) -> list[str]:
+        """What became of paths that the kernel could not follow to their end."""
+        ended, cut = np.frombuffer(self.counters.read(8), np.uint32).tolist()
+        out = [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
+        if cut:
+            out.append(f"{cut} paths are short: this driver ends the loops of a kernel after 65 535 turns")
+        return out
+
+    def release(self) -> None:
+        self._filter.release()
+        self.counters.release()

@@ -1,0 +1,182 @@
+"""Tracing a picture: passes of some samples for every pixel, cut into slices that leave others their turn.
+
+The cut follows measured cost and never shows: every pixel adds its samples one by one, in order.
+"""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+from gpu import context as contexts
+from gpu.kernels import features
+from gpu.kernels.cache import KernelCache
+from gpu.layout.bindings import Slot
+from gpu.picture import noise_meter
+from gpu.picture.adaptive import Adaptive
+from gpu.picture.dispatcher import Dispatcher
+from gpu.picture.noise_meter import NoiseMeter
+from gpu.picture.schedule import Schedule, Tile
+from gpu.picture.tiles import MAX_SAMPLES_A_PASS, Tiles, samples_at_once
+
+
+class Passes:
+    """How far a picture is. `main` are its accumulators; the meter's pixels are traced after each pass of its own."""
+
+    def __init__(
+        self, dispatcher: Dispatcher, kernels: KernelCache, main: dict[Slot, Any], meter: NoiseMeter
+    ) -> None:
+        self._dispatcher, self._kernels, self._main, self._meter = dispatcher, kernels, main, meter
+        self._kernel: Any = None
+        self._schedule: Schedule | None = None
+        self.compile_ms = 0.0  # since the picture was made
+        self._begin_again()
+
+    def _begin_again(self) -> None:
+        self.samples = 0  # of every pixel; in the mean, where the schedule is adaptive
+        self._pass_samples = 0  # of the pass under way; 0: none is
+        self._row, self._column = 0, 0  # where its next tile begins; rows beyond the schedule's are the meter's
+
+    def reset(self) -> None:
+        """Start at zero samples, with the scene and the settings as they are now. The accumulators are cleared."""
+        d = self._dispatcher
+        kernel = self._kernels.get("pathtrace.comp", d.scene.defines(d.settings))
+        self.compile_ms += self._kernels.last_compile_ms
+        if kernel is not self._kernel:
+            self._kernels.hold(kernel)
+            self._let_go()
+            self._kernel = kernel
+            self._cut()
+        elif self.schedule.max_bounces != d.settings.max_bounces:
+            self._cut()
+        if self._kernels.last_compile_ms:
+            self._compile_fully()
+        for buffer in self.schedule.buffers:
+            buffer.clear()
+        self.schedule.forget()
+        self._begin_again()
+
+    @property
+    def schedule(self) -> Schedule:
+        """Made by the first `reset`."""
+        assert self._schedule is not None
+        return self._schedule
+
+    @property
+    def under_way(self) -> tuple[int, int, int]:
+        """Of the pass under way: its samples (0: there is none), row and column of the next tile."""
+        return self._pass_samples, self._row, self._column
+
+    def restore(self, samples: int, under_way: tuple[int, int, int]) -> None:
+        """Go on there; the buffers have been written."""
+        self.samples = samples
+        self._pass_samples, row, column = under_way
+        self.schedule.forget()
+        self._row, self._column = self.schedule.resume(row, column)
+        if self._pass_samples:
+            self._begin_schedule()
+
+    def trace(self, budget_s: float, max_samples: int) -> float:
+        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
+        start = time.perf_counter()
+        self._dispatcher.bind()
+        while self.samples < max_samples:
+            if self._pass_samples == 0:
+                self._begin_pass(max_samples)
+            self._slice()
+            if time.perf_counter() - start >= budget_s:
+                break
+        return time.perf_counter() - start
+
+    def release(self) -> None:
+        if self._schedule is not None:
+            self._schedule.release()
+        self._let_go()
+
+    def _let_go(self) -> None:
+        if self._kernel is not None:
+            self._kernels.let_go(self._kernel)
+            self._kernel = None
+
+    def _cut(self) -> None:
+        """Make the schedules for this kernel and these settings."""
+        d, s = self._dispatcher, self._dispatcher.settings
+        samples = MAX_SAMPLES_A_PASS
+        if contexts.describe(d.context)["software"]:
+            counts = features.counts(d.scene.arrays)
+            standing = sum(int(str(counts[name])) for name in features.COUNTS)
+            samples = samples_at_once(s.max_bounces, standing, len(d.scene.arrays.nodes) // 8)
+        self._most_samples = samples  # of an invocation
+        if self._schedule is not None:
+            self._schedule.release()
+            self._schedule = None
+        size = s.width, s.height
+        if s.adaptive:
+            self._schedule = Adaptive(d.context, self._kernels, size, d.most_pixels, s.max_bounces)
+        else:
+            self._schedule = Tiles(*size, d.most_pixels, s.max_bounces, samples)
+        self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples)
+
+    def _compile_fully(self) -> None:
+        """Drivers write machine code when a kernel first runs: here, over no pixel, and not in a timed slice."""
+        start = time.perf_counter()
+        d = self._dispatcher
+        d.bind()
+        d.bind_part(self._main, (0, 0, 1, 1), 1)
+        self.schedule.bind()
+        d.run(self._kernel, d.frame((0, 0), (0, 0), 0, 1), (1, 1))
+        d.context.finish()
+        self.compile_ms += (time.perf_counter() - start) * 1e3
+
+    def _begin_pass(self, max_samples: int) -> None:
+        schedule = self.schedule
+        schedule.decide(self.samples, self._main)
+        stops = (stop for stop in (noise_meter.FROM, *schedule.stops) if stop > self.samples)
+        end = min([max_samples, *stops])
+        self._pass_samples = min(schedule.pass_samples(self.samples), end - self.samples)
+        self._begin_schedule()
+
+    def _begin_schedule(self) -> None:
+        self.schedule.begin(self.samples, self.samples + self._pass_samples, self._most_samples)
+
+    def _slice(self) -> None:
+        """Trace the next tile of the pass: of the picture, then of the meter."""
+        schedule = self.schedule
+        height, lines = schedule.size[1], self._meter.lines
+        metering = self._row >= height
+        row = (self._row - height) % lines if metering else self._row
+        tiles: Schedule = self._meter_tiles if metering else schedule
+        tile = tiles.tile(row, self._column, schedule.chunk)
+        start = time.perf_counter()
+        if metering:
+            self._trace_meter(tile)
+        else:
+            self._trace_picture(tile)
+        self._dispatcher.context.finish()
+        tiles.took(tile, schedule.chunk, time.perf_counter() - start)
+        self._column = tile[0] + tile[2]
+        if self._column >= tiles.size[0]:
+            self._column, self._row = 0, self._row + tile[3]
+        after = self.samples + self._pass_samples
+        if self._row == height and self._column == 0 and self.samples < noise_meter.FROM <= after:
+            self._meter.place(self._main, self._dispatcher.settings.seed)
+            self._dispatcher.bind()
+        if self._row >= height + lines * schedule.rounds or (self._row >= height and after < noise_meter.FROM):
+            self._row = 0
+            self.samples += self._pass_samples
+            self._pass_samples = 0
+
+    def _trace_picture(self, tile: Tile) -> None:
+        d = self._dispatcher
+        part, origin, size, first, samples, groups = self.schedule.dispatch(tile)
+        frame = d.frame(origin, size, first, samples)
+        frame["slot_first"] = d.bind_part(self._main, part, d.settings.width)
+        d.run(self._kernel, frame, groups)
+
+    def _trace_meter(self, tile: Tile) -> None:
+        d = self._dispatcher
+        self.schedule.bind()
+        frame = d.frame(tile[:2], tile[2:], *self.schedule.meter_samples(noise_meter.FROM))
+        frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, noise_meter.LINE
+        frame["slot_first"] = d.bind_part(self._meter.buffers, tile, noise_meter.LINE)
+        d.run(self._kernel, frame, (-(-tile[2] // 8), -(-tile[3] // 8)))

@@ -1,0 +1,85 @@
+"""What is read of a picture: its mean, variance and noise, the first hits, and the mean as a display shows it."""
+
+from __future__ import annotations
+
+import time
+from typing import Any
+
+import numpy as np
+
+from gpu.kernels.cache import KernelCache
+from gpu.layout.bindings import Slot
+from gpu.picture import first_hit, noise_meter
+from gpu.picture.dispatcher import Dispatcher
+from gpu.picture.first_hit import FirstHit
+from gpu.picture.noise_meter import NoiseMeter
+from gpu.picture.resolve import resolve
+from gpu.picture.schedule import Tile
+
+FIRST_HIT_AOVS = (*first_hit.IDS, "albedo", "normal", "depth")
+
+
+class Readout:
+    """Reads the accumulators `main` and the meter's; traces first hits when they are first asked for."""
+
+    def __init__(
+        self, dispatcher: Dispatcher, kernels: KernelCache, main: dict[Slot, Any], meter: NoiseMeter
+    ) -> None:
+        self._dispatcher, self._kernels, self._main, self._meter = dispatcher, kernels, main, meter
+        self._size = dispatcher.settings.width, dispatcher.settings.height
+        self.first_hit = FirstHit(dispatcher.context, self._size)
+
+    def _vectors(self, slot: Slot) -> np.ndarray:
+        flat = np.frombuffer(self._main[slot].read(), np.float32)
+        return flat.reshape(self._size[1], self._size[0], 4)
+
+    def color(self) -> np.ndarray:
+        """Mean radiance and alpha: (height, width, 4) float32."""
+        counts = np.maximum(self._vectors(Slot.MOMENTS)[..., 3:], 1)
+        mean: np.ndarray = self._vectors(Slot.SUM) / counts
+        return mean
+
+    def variance(self) -> np.ndarray:
+        """Of each pixel's mean, as if its samples were independent: (height, width, 3) float32."""
+        moments = self._vectors(Slot.MOMENTS)
+        n = np.maximum(moments[..., 3:], 1)
+        scale = np.float32(self._dispatcher.scene.arrays.radiance_scale)
+        spread = np.where(n > 1, moments[..., :3] / np.maximum(n - 1, 1) / n, 0)
+        return np.minimum(spread.astype(np.float64) * float(scale) ** 2, 3e38).astype(np.float32)
+
+    def noise(self, samples: int) -> float | None:
+        """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""
+        if samples < 2:
+            return None
+        scale = float(self._dispatcher.scene.arrays.radiance_scale)
+        return self._meter.noise(self._main, samples >= noise_meter.FROM, scale)
+
+    def display(self, exposure: float, tone_map: str, dtype: str, color: np.ndarray | None) -> np.ndarray:
+        """Colour as `Picture.display` gives it."""
+        d = self._dispatcher
+        own: dict[Slot, Any] = {}
+        if color is not None:
+            given = {Slot.SUM: color, Slot.MOMENTS: np.ones_like(color)}
+            own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
+        pixels = resolve(d.context, self._kernels, own or self._main, d.most_pixels, exposure, tone_map, dtype)
+        for buffer in own.values():
+            buffer.release()
+        return pixels.reshape(self._size[1], self._size[0], 4)
+
+    def trace_first_hits(self, want: int, until: float) -> bool:
+        """Trace them until there are `want` samples, or `until` (perf_counter); whether they are all there."""
+        d = self._dispatcher
+        if not self.first_hit.buffers:
+            self.first_hit.allocate()
+        if self.first_hit.samples < want and time.perf_counter() < until:
+            kernel = self._kernels.get("guides.comp", d.scene.defines(d.settings))
+            d.bind()
+            self.first_hit.trace(lambda tile, sample: self._trace_first_hit(kernel, tile, sample), want, until)
+        return self.first_hit.samples >= want
+
+    def _trace_first_hit(self, kernel: Any, tile: Tile, sample: int) -> None:
+        d = self._dispatcher
+        frame = d.frame(tile[:2], tile[2:], sample, 1)
+        frame["slot_first"] = d.bind_part(self.first_hit.buffers, tile, d.settings.width)
+        d.run(kernel, frame, (-(-tile[2] // 8), -(-tile[3] // 8)))
+        d.context.finish()

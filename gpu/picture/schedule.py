@@ -1,0 +1,72 @@
+"""What a pass asks of its schedule. `Tiles` gives every pixel as many samples; `Adaptive` follows a sample plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple, Protocol
+
+from gpu.layout.bindings import Slot
+
+Tile = tuple[int, int, int, int]  # x, y, width, height
+
+
+class Dispatch(NamedTuple):
+    """One run of the path tracer's kernel."""
+
+    part: Tile  # of the picture: the accumulators of these pixels are bound
+    origin: tuple[int, int]  # of the invocations, in the picture or in a list of areas
+    size: tuple[int, int]  # of the same
+    first: int  # sample; 0 where each pixel goes on from those it has
+    samples: int  # of an invocation
+    groups: tuple[int, int]
+
+
+class Schedule(Protocol):
+    """Cuts a pass into tiles of a grid, row by row; each tile is one dispatch."""
+
+    stops: tuple[int, ...]  # numbers of samples at which a pass must end
+    chunk: int  # samples that an invocation of the pass under way takes
+    rounds: int  # how often the pass under way comes to a pixel, at most
+    max_bounces: int
+    cost_s: float  # seconds per sample of a pixel, as measured lately; 0: unknown
+
+    @property
+    def size(self) -> tuple[int, int]:
+        """Columns and rows of the grid."""
+
+    @property
+    def buffers(self) -> Sequence[Any]:
+        """What belongs to the picture's saved state."""
+
+    def decide(self, samples: int, main: dict[Slot, Any]) -> None:
+        """Look at the accumulators, before the pass that begins at `samples`."""
+
+    def pass_samples(self, samples: int) -> int:
+        """How many samples a pixel gets, in the mean, in the pass that begins at `samples`."""
+
+    def begin(self, before: int, after: int, most: int) -> None:
+        """Begin a pass from `before` samples to `after`; an invocation takes at most `most`."""
+
+    def tile(self, row: int, column: int, samples: int) -> Tile:
+        """The tile that begins there and takes about as long as a slice."""
+
+    def took(self, tile: Tile, samples: int, seconds: float) -> None:
+        """Learn from what a tile has cost."""
+
+    def bind(self) -> None:
+        """Bind what the kernel reads of the schedule."""
+
+    def dispatch(self, tile: Tile) -> Dispatch:
+        """The run for a tile; what is the schedule's own is bound for it."""
+
+    def meter_samples(self, since: int) -> tuple[int, int]:
+        """First sample and number of samples for the noise meter's pixels, which began at 0 and joined at `since`."""
+
+    def resume(self, row: int, column: int) -> tuple[int, int]:
+        """Where a pass that was saved goes on, once `buffers` have been written."""
+
+    def forget(self) -> None:
+        """Forget the plan: `buffers` were written or cleared."""
+
+    def release(self) -> None:
+        """Give the device's memory back."""
