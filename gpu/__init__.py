@@ -19,7 +19,7 @@ analysis    measurements of a scene at hand; public
 """
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light
-from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays
+from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays, apply_edit
 from gpu.device.scene import Scene
 from gpu.errors import (
     CompileError,
@@ -60,6 +60,7 @@ __all__ = [
     "SceneTooLarge",
     "TextureArrays",
     "WrongThread",
+    "apply_edit",
     "bounced_paths",
     "missing_light",
     "picture_bytes",

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
@@ -125,3 +126,31 @@ class SceneArrays:
     def light_words(self) -> np.ndarray:
         """The lights' tree; where there is none, for kernels that ask: a head by which no number goes down a tree."""
         return self.light_tree if len(self.light_tree) else np.zeros((2, 4), np.uint32)
+
+
+def apply_edit(
+    arrays: SceneArrays,
+    camera: CameraArrays | None = None,
+    materials: np.ndarray | None = None,
+    texture_words: np.ndarray | None = None,
+    environment: tuple[float, float] | None = None,
+    moved: Mapping[str, Any] | None = None,
+) -> SceneArrays:
+    """The arrays after an edit: the camera, the materials' bytes (as many as before), what they have of textures
+    (`TextureArrays.words`), the environment's (rotation, scale); `moved` are members of the arrays that tell where
+    shapes stand, with the scene's tree and the lights, as many as before. The tree may change where there are
+    instances. Raises ValueError for another number of materials.
+    """
+    changes: dict[str, Any] = dict(moved or {})
+    if camera is not None:
+        changes["camera"] = camera
+    if materials is not None:
+        if len(materials) != len(arrays.materials):
+            raise ValueError(f"{len(materials)} materials for a scene of {len(arrays.materials)}")
+        changes["materials"] = materials
+    if texture_words is not None and arrays.textures is not None:
+        changes["textures"] = replace(arrays.textures, words=texture_words)
+    if environment is not None and arrays.environment is not None:
+        rotation, scale = environment
+        changes["environment"] = replace(arrays.environment, rotation=rotation, scale=scale)
+    return replace(arrays, **changes)

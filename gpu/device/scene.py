@@ -5,16 +5,15 @@ from __future__ import annotations
 import logging
 import math
 from collections.abc import Mapping
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gpu import context as contexts
 from gpu import layout
-from gpu.arrays import CameraArrays, SceneArrays
+from gpu.arrays import CameraArrays, SceneArrays, apply_edit
 from gpu.device import buffers
-from gpu.device.textures import KINDS, TextureCache, linear_texture, placeholder
+from gpu.device.textures import IMAGE_UNITS, KINDS, TextureCache, bound_textures, linear_texture, placeholder
 from gpu.errors import OutOfMemory
 from gpu.kernels import features
 from gpu.layout import LightKind, bindings
@@ -108,35 +107,22 @@ class Scene:
 
     def _upload_details(self) -> None:
         """Textures of the images' texels and of what triangles have at their corners, each only where it is asked."""
-        a = self.arrays
-        colors = a.corner_colors if "HAS_VERTEX_COLORS" in self._raised else a.triangle_colors
-        asked = {
-            bindings.UVS_TEXTURES[0]: (a.triangle_uvs, 2, "f4"),
-            bindings.UVS_TEXTURES[1]: (a.triangle_uvs_1, 2, "f4"),
-            bindings.COLORS_TEXTURE: (colors, 4, "f2"),
-            bindings.INSTANCES_TEXTURE: (a.instances, 4, "u4"),
-        }
-        for unit, (values, channels, dtype) in asked.items():
-            if len(values):
-                self._details[unit] = linear_texture(self._context, values, channels, dtype)
-        if "HAS_LIGHT_TREE" in self._raised:
-            self._details[bindings.LIGHT_TREE_TEXTURE] = linear_texture(self._context, a.light_words, 4, "u4")
-        if a.textures is not None:
-            if a.textures.key:
-                self._images, self._key = self._shared.take(a.textures.key, self._upload_images), a.textures.key
-            else:
-                self._images = self._upload_images()
+        bound = bound_textures(self.arrays, self._raised)
+        for unit, values in bound.items():
+            if unit not in IMAGE_UNITS:
+                self._details[unit] = linear_texture(self._context, values, *KINDS[unit])
+        key = self.arrays.textures.key if self.arrays.textures is not None else ""
+        images = {unit: values for unit, values in bound.items() if unit in IMAGE_UNITS}
+        if key:
+            self._images, self._key = self._shared.take(key, lambda: self._upload_images(images)), key
+        else:
+            self._images = self._upload_images(images)
         if self._everything:  # its kernels look everywhere: at what was bound for another scene, if at nothing else
             missing = KINDS.keys() - self._details.keys() - self._images.keys()
             self._details |= {unit: placeholder(self._context, unit) for unit in missing}
 
-    def _upload_images(self) -> dict[int, Any]:
-        textures = self.arrays.textures
-        assert textures is not None
-        asked = {bindings.BYTES_TEXTURE: (textures.texels, "f1"), bindings.FLOATS_TEXTURE: (textures.floats, "f4")}
-        return {
-            u: linear_texture(self._context, values, 4, dtype) for u, (values, dtype) in asked.items() if len(values)
-        }
+    def _upload_images(self, images: dict[int, np.ndarray]) -> dict[int, Any]:
+        return {unit: linear_texture(self._context, values, *KINDS[unit]) for unit, values in images.items()}
 
     def _raise_flags(self) -> None:
         self._looped = features.looped(self.arrays)
@@ -188,33 +174,16 @@ class Scene:
         environment: tuple[float, float] | None = None,
         moved: Mapping[str, Any] | None = None,
     ) -> None:
-        """Replace the camera, the materials' bytes (as many as before), what they have of textures
-        (`TextureArrays.words`), the environment's (rotation, scale); `moved`: members of the arrays that tell where
-        shapes stand, with the scene's tree and the lights, as many as before. The tree may change where there are
-        instances.
+        """Change what `gpu.arrays.apply_edit` describes, and upload nothing else.
 
-        Uploads nothing else. Pictures of this scene must be reset by the caller. Raises OutOfMemory, and nothing has
-        changed then.
+        The caller resets its pictures. Raises OutOfMemory or ValueError, and changes nothing then.
         """
         contexts.use(self._context)
-        changes: dict[str, Any] = {}
-        if camera is not None:
-            changes["camera"] = camera
-        if materials is not None:
-            if len(materials) != len(self.arrays.materials):
-                raise ValueError(f"{len(materials)} materials for a scene of {len(self.arrays.materials)}")
-            changes["materials"] = materials
-        if texture_words is not None and self.arrays.textures is not None:
-            changes["textures"] = replace(self.arrays.textures, words=texture_words)
-        if environment is not None and self.arrays.environment is not None:
-            rotation, scale = environment
-            changes["environment"] = replace(self.arrays.environment, rotation=rotation, scale=scale)
+        arrays = apply_edit(self.arrays, camera, materials, texture_words, environment, moved)
         if moved is not None:
-            arrays = replace(self.arrays, **moved)
             self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
-            self.arrays = arrays
-        self.arrays = replace(self.arrays, **changes)
-        if len(self.arrays.materials) and changes.keys() & {"materials", "textures"}:
+        self.arrays = arrays
+        if len(arrays.materials) and (materials is not None or texture_words is not None):
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._raise_flags()
         if "HAS_PRINCIPLED_LOBES" in self._raised and not self._tables:

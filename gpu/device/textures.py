@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from gpu.arrays import SceneArrays
 from gpu.errors import OutOfMemory
 from gpu.layout import bindings
 
@@ -21,6 +22,25 @@ KINDS = {  # channels and dtype, by texture unit
     bindings.LIGHT_TREE_TEXTURE: (4, "u4"),
     bindings.INSTANCES_TEXTURE: (4, "u4"),
 }
+IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
+
+
+def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.ndarray]:
+    """The values behind each texture unit that kernels with these flags read of a scene, where it has any: what
+    triangles have at their corners, instances, the lights' tree, images. See KINDS for their format."""
+    colors = arrays.corner_colors if "HAS_VERTEX_COLORS" in flags else arrays.triangle_colors
+    values = {
+        bindings.UVS_TEXTURES[0]: arrays.triangle_uvs,
+        bindings.UVS_TEXTURES[1]: arrays.triangle_uvs_1,
+        bindings.COLORS_TEXTURE: colors,
+        bindings.INSTANCES_TEXTURE: arrays.instances,
+    }
+    if arrays.textures is not None:
+        values[bindings.BYTES_TEXTURE] = arrays.textures.texels
+        values[bindings.FLOATS_TEXTURE] = arrays.textures.floats
+    if "HAS_LIGHT_TREE" in flags:
+        values[bindings.LIGHT_TREE_TEXTURE] = arrays.light_words
+    return {unit: each for unit, each in values.items() if len(each)}
 
 
 def linear_texture(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Any
 
 import numpy as np
 
 from gpu import layout
 from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
-from gpu.device.textures import BYTES, KINDS
+from gpu.device.textures import BYTES, KINDS, bound_textures
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
@@ -108,34 +107,12 @@ def common_keys() -> list[KernelKey]:
 def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, str, int, int], ...]:
     height, width = (1, 1) if a.environment is None else a.environment.texels.shape[:2]
     out = [(bindings.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
-    rows = [
-        (bindings.UVS_TEXTURES[0], a.triangle_uvs, 2, "f4"),
-        (bindings.UVS_TEXTURES[1], a.triangle_uvs_1, 2, "f4"),
-        (bindings.COLORS_TEXTURE, a.corner_colors if "HAS_VERTEX_COLORS" in raised else a.triangle_colors, 4, "f2"),
-        (bindings.INSTANCES_TEXTURE, a.instances, 4, "u4"),
-    ]
-    if a.textures is not None:
-        rows += [(bindings.BYTES_TEXTURE, a.textures.texels, 4, "f1")]
-        rows += [(bindings.FLOATS_TEXTURE, a.textures.floats, 4, "f4")]
-    if "HAS_LIGHT_TREE" in raised:
-        rows += [(bindings.LIGHT_TREE_TEXTURE, a.light_words, 4, "u4")]
-    for unit, values, channels, dtype in rows:
-        if len(values):
-            height = -(-values.nbytes // (bindings.TEXELS_A_ROW * channels * BYTES[dtype]))
-            out.append((unit, channels, dtype, _side(bindings.TEXELS_A_ROW), _side(height)))
+    for unit, values in bound_textures(a, raised).items():
+        channels, dtype = KINDS[unit]
+        height = -(-values.nbytes // (bindings.TEXELS_A_ROW * channels * BYTES[dtype]))
+        out.append((unit, channels, dtype, _side(bindings.TEXELS_A_ROW), _side(height)))
     return tuple(out)
 
 
 def _side(length: int) -> int:
     return 1 if length & (length - 1) == 0 else 3
-
-
-def apply_edit(arrays: SceneArrays, edits: dict[str, Any]) -> SceneArrays:
-    """The arrays after `Scene.edit` of these."""
-    changes: dict[str, Any] = {name: edits[name] for name in ("camera", "materials") if name in edits}
-    if "environment" in edits and arrays.environment is not None:
-        rotation, scale = edits["environment"]
-        changes["environment"] = replace(arrays.environment, rotation=rotation, scale=scale)
-    if "texture_words" in edits and arrays.textures is not None:
-        changes["textures"] = replace(arrays.textures, words=edits["texture_words"])
-    return replace(arrays, **changes, **edits.get("moved", {}))

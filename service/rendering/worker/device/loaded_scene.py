@@ -6,7 +6,7 @@ from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from gpu import RenderSettings, picture_bytes, scene_bytes
+from gpu import RenderSettings, apply_edit, picture_bytes, scene_bytes
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
@@ -131,6 +131,6 @@ def kernel_request(
     else:
         return None
     if edits or update.scene is None:
-        arrays = kernel_keys.apply_edit(arrays, edits)
+        arrays = apply_edit(arrays, **edits)
         raised = kernel_keys.flags_after_edit(raised, arrays, editing)
     return KernelRequest(arrays, settings, kernel_keys.kernel_key(arrays, settings, raised))
