@@ -36,6 +36,7 @@ from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
 from gpu.renderer import Renderer
 from gpu.settings import AOVS, ESTIMATORS, FILTERS, SAMPLERS, TONE_MAPS, RenderSettings
+from gpu.steps import Steps
 
 __all__ = [
     "AOVS",
@@ -58,6 +59,7 @@ __all__ = [
     "Scene",
     "SceneArrays",
     "SceneTooLarge",
+    "Steps",
     "TextureArrays",
     "WrongThread",
     "apply_edit",

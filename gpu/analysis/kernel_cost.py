@@ -12,6 +12,7 @@ from gpu.device.scene import Everything, Scene
 from gpu.picture.picture import Picture
 from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
+from gpu.steps import Steps
 
 if TYPE_CHECKING:
     from gpu.precompile.kernel_keys import KernelKey
@@ -20,8 +21,6 @@ if TYPE_CHECKING:
 SIZE = 128  # pixels a side at most: enough work for a dispatch, little enough for a large mesh
 _TURNS = 5
 _ENOUGH_S = 4.0  # of tracing: then it is not begun again
-
-KernelCostSteps = Generator[None, None, "KernelCost"]
 
 
 @dataclass(frozen=True)
@@ -50,19 +49,14 @@ def kernel_cost(renderer: Renderer, arrays: SceneArrays, settings: RenderSetting
     """Compiles both kernels and renders with them."""
     scene = renderer.load(arrays)
     try:
-        steps = kernel_cost_steps(renderer, scene, settings or RenderSettings(SIZE, SIZE))
-        while True:
-            next(steps)
-    except StopIteration as end:
-        price: KernelCost = end.value
-        return price
+        return Steps(kernel_cost_steps(renderer, scene, settings or RenderSettings(SIZE, SIZE))).finish()
     finally:
         scene.release()
 
 
 def kernel_cost_steps(
     renderer: Renderer, scene: Scene, settings: RenderSettings, slice_s: float = math.inf
-) -> KernelCostSteps:
+) -> Generator[None, None, KernelCost]:
     """Renders small pictures with both kernels in turns, so that both meet the same machine; between steps, of about
     `slice_s` seconds but for loading a kernel, others may have theirs."""
     full, pictures = Everything(scene), list[Picture]()

@@ -28,6 +28,7 @@ from service.rendering.ipc.messages import (
     Update,
     View,
 )
+from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.helpers.compile_client import CompileClient
 from service.rendering.worker.helpers.denoise_client import DenoiseClient
 from service.rendering.worker.task import Task
@@ -77,7 +78,7 @@ class Tracing:
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
         self._denoiser = DenoiseClient()
         at_hand = CompileClient(renderer.info, None, crowded=lambda: False)  # compiles nothing, knows what was
-        self._task = Task(renderer, NUMBER, self._hear, self._denoiser, spare=at_hand)
+        self._task = Task(WorkerContext(renderer, self._hear, self._denoiser, at_hand), NUMBER)
         update = Update(NUMBER, 1, packed.arrays, settings.for_gpu(), stop, denoise=settings.denoise)
         self._task.update(update)
 
@@ -105,7 +106,7 @@ class Tracing:
         """Measures what its kernel saves, where that takes no compiling."""
         self._task.savings.ask()
         while self._task.savings.due:
-            self._task.appraise()
+            self._task.measure_kernel()
 
     def close(self) -> None:
         self._denoiser.close()

@@ -6,6 +6,9 @@ __main__        the process: its options, its device, its end
 loop            takes the newest messages, chooses whose turn it is, traces a slice, publishes
 scheduler       whose turn it is
 task            one client's picture, from its first update to its end
+updates         the update that waits to be applied, perhaps for its kernel
+ending          how a render ends, and how its picture comes to the server
+context         what all tasks of a process share
 kernel_savings  what a scene's own kernel saves, measured on demand
 device          what a task has on the device
 progress        how far a picture is, and when it is finished

@@ -5,17 +5,17 @@ nobody has work. That kernel is compiled (17 s of llvmpipe) by a process that ge
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gpu import GpuError
+from gpu import GpuError, Steps
 from gpu.analysis.kernel_cost import full_kernel, kernel_cost_steps
-from service.rendering.ipc.messages import FromRenderer, KernelMeasured
-from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.ipc.messages import KernelMeasured
+from service.rendering.worker.context import WorkerContext
+from service.rendering.worker.helpers.kernel_wait import KernelWait
 
 if TYPE_CHECKING:
-    from gpu import Picture, Renderer
-    from gpu.analysis.kernel_cost import KernelCostSteps
+    from gpu import Picture
+    from gpu.analysis.kernel_cost import KernelCost
 
 SLICE_S = 0.015  # how long who comes may have to wait
 NO_KERNEL = (
@@ -28,20 +28,17 @@ log = logging.getLogger(__name__)
 
 
 class KernelSavings:
-    def __init__(
-        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, compiler: CompileClient | None
-    ) -> None:
-        """`compiler` is one for spare time; without one nothing is measured."""
-        self._number, self._send = number, send
-        self._renderer, self._compiler = renderer, compiler
-        self._asked = self._compiling = False
-        self._compile_ms = 0.0  # what it took elsewhere
-        self._steps: KernelCostSteps | None = None
+    def __init__(self, context: WorkerContext, number: int) -> None:
+        """Without a compiler for spare time nothing is measured."""
+        self._number, self._send, self._renderer = number, context.send, context.renderer
+        self._spare, self._wait = context.spare, KernelWait(context.spare)
+        self._asked = False
+        self._steps: Steps[KernelCost] | None = None
 
     @property
     def due(self) -> bool:
         """There is a step to be done, when nothing else is."""
-        return self._asked and not self._compiling
+        return self._asked and not self._wait.compiling
 
     def ask(self) -> None:
         self._asked = True
@@ -50,9 +47,8 @@ class KernelSavings:
         """The picture leaves the device, or is another: what is under way begins again."""
         if self._steps is not None:
             self._steps.close()
-        if self._compiler is not None:
-            self._compiler.forget(self._hear_compiled)
-        self._steps, self._compiling = None, False
+        self._wait.forget()
+        self._steps = None
 
     def step(self, picture: Picture | None) -> None:
         if picture is None:
@@ -60,13 +56,10 @@ class KernelSavings:
             return
         try:
             if self._steps is None and not self._waits(picture):
-                self._steps = kernel_cost_steps(self._renderer, picture.scene, picture.settings, SLICE_S)
-            if self._steps is not None:
-                next(self._steps)
-        except StopIteration as end:
-            price = end.value
-            full_ms, self._compile_ms = price.full_compile_ms + self._compile_ms, 0.0
-            self._tell(KernelMeasured(self._number, "", full_ms, price.sample_s, price.full_sample_s))
+                self._steps = Steps(kernel_cost_steps(self._renderer, picture.scene, picture.settings, SLICE_S))
+            if self._steps is not None and (cost := self._steps.step()) is not None:
+                full_ms = cost.full_compile_ms + self._wait.take_ms()
+                self._tell(KernelMeasured(self._number, "", full_ms, cost.sample_s, cost.full_sample_s))
         except GpuError as error:
             log.warning("could not compare kernels error=%s", error)
             self._tell(KernelMeasured(self._number, f"Not measured: {error}"))
@@ -74,15 +67,10 @@ class KernelSavings:
     def _waits(self, picture: Picture) -> bool:
         """Whether the kernel with everything on is not there yet, or can't be had."""
         wanted = full_kernel(picture.scene.arrays, picture.settings)
-        if self._compiler is not None:
-            self._compiling = self._compiler.waits(wanted, self._hear_compiled)
-            if self._compiling or self._compiler.has(wanted):
-                return self._compiling
+        if self._spare is not None and (self._wait.begin(wanted) or self._spare.has(wanted)):
+            return self._wait.compiling
         self._tell(KernelMeasured(self._number, NO_KERNEL))
         return True
-
-    def _hear_compiled(self, milliseconds: float) -> None:
-        self._compiling, self._compile_ms = False, milliseconds
 
     def _tell(self, appraised: KernelMeasured) -> None:
         self._asked, self._steps = False, None

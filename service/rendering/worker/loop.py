@@ -30,6 +30,7 @@ from service.rendering.ipc.messages import (
     Usage,
     Want,
 )
+from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.memory import Memory
 from service.rendering.worker.helpers.compile_client import CompileClient
 from service.rendering.worker.helpers.denoise_client import DenoiseClient
@@ -56,13 +57,22 @@ class Loop:
         self._end = end
         self._renderer = renderer
         self._pulse = pulse
-        self._checkpoint_s = checkpoint_s
         self._tasks: dict[int, Task] = {}
         self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
         self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline=lifeline)
         self._spare = CompileClient(renderer.info, device, lambda: True, spare=True)
+        self._context = WorkerContext(
+            renderer,
+            self._send,
+            self._denoiser,
+            self._spare,
+            self._compiler,
+            self._memory,
+            self._forget,
+            checkpoint_s,
+        )
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
@@ -87,7 +97,7 @@ class Loop:
                     self._work(task, task.answer)
             busy = any(task.ready for task in self._tasks.values())
             self._account(at_once=not busy)
-            busy = busy or self._appraise()
+            busy = busy or self._measure_kernel()
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """What has come in by now; with `wait`, as soon as there is anything, or a helper has spoken."""
@@ -115,11 +125,11 @@ class Loop:
             self._scheduler.charge(task, seconds)
         self._used_s[task.number] += seconds
 
-    def _appraise(self) -> bool:
+    def _measure_kernel(self) -> bool:
         """A step of what is only done when there is nothing else; whether there was one."""
         task = next((task for task in self._tasks.values() if task.savings.due), None)
         if task is not None:
-            self._work(task, task.appraise, spare=True)
+            self._work(task, task.measure_kernel, spare=True)
         return task is not None
 
     def _crowded(self) -> bool:
@@ -143,7 +153,7 @@ class Loop:
         task = self._tasks.get(message.task)
         if isinstance(message, Update):
             if task is None:
-                task = self._new(message)
+                task = Task(self._context, message.task, message.client)
                 self._tasks[message.task] = task
             task.update(message)
         elif task is None:
@@ -170,15 +180,10 @@ class Loop:
         elif isinstance(message, Drop):
             self._remove(task)
 
-    def _new(self, first: Update) -> Task:
-        shared = self._denoiser, first.client, self._memory, self._forget
-        more = self._compiler, self._checkpoint_s, self._spare
-        return Task(self._renderer, first.task, self._send, *shared, *more)
-
-    def _forget(self, task: Task) -> None:
+    def _forget(self, number: int) -> None:
         """The server has this finished picture, and brings it back when somebody asks for it."""
-        self._remove(task)
-        self._send(Evicted(task.number))
+        self._remove(self._tasks[number])
+        self._send(Evicted(number))
 
     def _remove(self, task: Task) -> None:
         self._traced -= task.traced

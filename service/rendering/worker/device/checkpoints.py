@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Generator
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import picture_bytes
+from gpu import Steps, picture_bytes
 from service import shared_memory
 
 if TYPE_CHECKING:
@@ -24,7 +23,7 @@ class Checkpointer:
     def __init__(self, every_s: float) -> None:
         """`every_s`: between two of a picture under way, at least."""
         self._every_s = every_s
-        self._steps: Generator[None, None, Saved] | None = None
+        self._steps: Steps[Saved] | None = None
         self._took_s = 0.0
         self._due_at = 0.0
         self.restart()
@@ -46,16 +45,16 @@ class Checkpointer:
     def begin(self, picture: Picture) -> None:
         # One descriptor goes with the picture.
         arena = shared_memory.SharedArena(*(buffer.size for buffer in picture.state))
-        self._steps, self._took_s = picture.save(lambda size: arena.room((size,), np.dtype(np.uint8))), 0.0
+        self._steps = Steps(picture.save(lambda size: arena.room((size,), np.dtype(np.uint8))))
+        self._took_s = 0.0
 
     def step(self) -> Saved | None:
         """The picture, with the last step."""
         assert self._steps is not None
-        began, saved = time.monotonic(), None
-        try:
-            next(self._steps)
-        except StopIteration as end:
-            self._steps, saved = None, end.value
+        began = time.monotonic()
+        saved = self._steps.step()
+        if saved is not None:
+            self._steps = None
         now = time.monotonic()
         self._took_s += now - began
         self._due_at = now + max(self._every_s, REST * self._took_s)

@@ -2,11 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Generator
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from gpu import RenderSettings, apply_edit, picture_bytes, scene_bytes
+from gpu import RenderSettings, Steps, apply_edit, picture_bytes, scene_bytes
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
@@ -65,7 +64,7 @@ class LoadedScene:
 
     def offloaded(self) -> Offloaded:
         """Off the device; this holding is released."""
-        pictures = {scale: finished(made.save()) for scale, made in self.ladder.begun.items()}
+        pictures = {scale: Steps(made.save()).finish() for scale, made in self.ladder.begun.items()}
         out = Offloaded(self.scene.arrays, self.ladder.full.settings, self._editing, self.scene.flags, pictures)
         self.release()
         return out
@@ -84,16 +83,6 @@ class LoadedScene:
     def release(self) -> None:
         self.ladder.release()
         self.scene.release()
-
-
-def finished(saving: Generator[None, None, Saved]) -> Saved:
-    """What a saving comes to, all at once."""
-    while True:
-        try:
-            next(saving)
-        except StopIteration as end:
-            saved: Saved = end.value
-            return saved
 
 
 def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:

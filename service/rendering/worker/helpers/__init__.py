@@ -3,6 +3,7 @@
 process         one such process, started on demand
 lifeline        a helper ends when its renderer does
 compile_client  asks for kernels to be compiled, and knows which are
+kernel_wait     one kernel that a task waits for
 compile_main    compiles kernels: `python -m service.rendering.worker.helpers.compile_main`
 denoise_client  asks for pictures to be denoised
 denoise_main    denoises pictures: `python -m service.rendering.worker.helpers.denoise_main`

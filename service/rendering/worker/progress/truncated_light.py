@@ -3,10 +3,9 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Generator
 from typing import TYPE_CHECKING
 
-from gpu import GpuError, bounced_paths, missing_light
+from gpu import GpuError, Steps, bounced_paths, missing_light
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
@@ -21,7 +20,7 @@ class TruncatedLight:
     def __init__(self, renderer: Renderer) -> None:
         self.shares: dict[int, float] | None = None  # by bounces; None: not known yet
         self._renderer = renderer
-        self._steps: Generator[None, None, dict[int, float]] | None = None
+        self._steps: Steps[dict[int, float]] | None = None
         self._given_up = False
 
     def restart(self) -> None:
@@ -39,11 +38,11 @@ class TruncatedLight:
             limits = {*LIMITS, settings.max_bounces}
             if picture.samples * settings.width * settings.height < WORTH * bounced_paths(limits):
                 return False
-            self._steps = missing_light(self._renderer, picture.scene, settings, limits)
+            self._steps = Steps(missing_light(self._renderer, picture.scene, settings, limits))
         try:
-            next(self._steps)
-        except StopIteration as end:
-            self.shares, self._steps = end.value, None
+            self.shares = self._steps.step()
+            if self.shares is not None:
+                self._steps = None
         except GpuError as error:
             log.warning("could not measure light beyond the bounces error=%s", error)
             self._given_up, self._steps = True, None

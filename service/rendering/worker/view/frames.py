@@ -10,9 +10,10 @@ import numpy as np
 from gpu import picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
-from service.rendering.ipc.messages import Frame, FromRenderer, Image, Read, View, Want
+from service.rendering.ipc.messages import Frame, Image, Read, View, Want
+from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.residency import Residency
-from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.worker.helpers.kernel_wait import KernelWait
 from service.rendering.worker.progress.progress import ProgressTracker
 from service.rendering.worker.view.denoise_policy import Denoised, DenoisePolicy
 
@@ -28,23 +29,21 @@ class FrameSource:
 
     def __init__(
         self,
+        context: WorkerContext,
         number: int,
-        send: Callable[[FromRenderer], None],
         residency: Residency,
         tracker: ProgressTracker,
         denoising: DenoisePolicy,
         finish: Callable[[], None],
-        compiler: CompileClient | None,
     ) -> None:
         """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
         self.want: Want | None = None
         self.scale: float | None = None  # of what there is to see
         self.owes_done = False
         self.denoising = denoising
-        self._number, self._send, self._finish = number, send, finish
+        self._number, self._send, self._finish = number, context.send, finish
         self._residency, self._tracker = residency, tracker
-        self._compiler = compiler
-        self._compiling = False  # the kernel of the AOVs of the first hit
+        self._wait = KernelWait(context.compiler)  # for the kernel of the AOVs of the first hit
         self._served: tuple[object, ...] = ()
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
@@ -60,9 +59,8 @@ class FrameSource:
 
     def part(self) -> None:
         """The pictures are leaving the device."""
-        self._guided, self._compiling = None, False
-        if self._compiler is not None:
-            self._compiler.forget(self._hear_compiled)
+        self._guided = None
+        self._wait.forget()
 
     def forget(self) -> None:
         """Nothing is there any more, which is what who waits for a reading is given."""
@@ -81,7 +79,7 @@ class FrameSource:
     @property
     def due(self) -> bool:
         """There is a step to be done."""
-        return self.awaited and not self._compiling
+        return self.awaited and not self._wait.compiling
 
     def step(self) -> bool:
         """Does it; whether there was one."""
@@ -192,17 +190,13 @@ class FrameSource:
 
     def _waits(self, picture: Picture) -> bool:
         """Whether the kernel for the AOVs of the first hit is being compiled, where others would wait for it."""
-        if self._compiler is None or picture.guided_yet:
+        if self._wait.compiler is None or picture.guided_yet:
             return False
         scene = picture.scene
         wanted = kernel_keys.kernel_key(scene.arrays, picture.settings, scene.flags, kernel_keys.GUIDES)
-        self._compiling = self._compiler.waits(wanted, self._hear_compiled)
-        if not self._compiling:
-            self._compiler.met(wanted)  # in a moment
-        return self._compiling
-
-    def _hear_compiled(self, milliseconds: float) -> None:
-        self._compiling = False
+        if not self._wait.begin(wanted):
+            self._wait.met(wanted)  # in a moment
+        return self._wait.compiling
 
     def _needs_guides(self, picture: Picture, view: View) -> bool:
         if view.aov not in GUIDES:

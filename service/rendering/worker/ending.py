@@ -1,0 +1,112 @@
+"""How a task's render comes to its end, and how its picture comes to the server, which keeps it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from service.rendering.ipc.messages import Checkpoint, Done, Progressed, Reason
+from service.rendering.worker.context import WorkerContext
+from service.rendering.worker.device.checkpoints import Checkpointer
+from service.rendering.worker.device.residency import Residency
+from service.rendering.worker.progress.progress import ProgressTracker
+from service.rendering.worker.view.frames import FrameSource
+
+if TYPE_CHECKING:
+    from gpu import Saved
+
+PROGRESS_S = 0.1  # between two reports of how far a render is
+
+
+class Ending:
+    """Ends the render when it has had enough. Done waits for the denoised picture, and for the server's copy."""
+
+    def __init__(
+        self,
+        context: WorkerContext,
+        number: int,
+        residency: Residency,
+        tracker: ProgressTracker,
+        frames: FrameSource,
+        answer: Callable[[], bool],
+    ) -> None:
+        """`answer` sends the frame that is wanted, which then comes before Done."""
+        self._number, self._send = number, context.send
+        self._residency, self._tracker, self._frames = residency, tracker, frames
+        self._answer = answer
+        self._server_keeps = context.forget is not None
+        self.checkpoints = Checkpointer(context.checkpoint_s)
+        self._reported = 0.0
+
+    @property
+    def kept(self) -> bool:
+        """Whether the server keeps this picture: it does those of renders, not those of streams."""
+        return self._server_keeps and not self._tracker.interactive
+
+    def checkpoint(self) -> bool:
+        """Do a step of saving the picture, where that is due; whether there was one."""
+        full, checkpoints = self._residency.full, self.checkpoints
+        if not checkpoints.under_way:
+            if not self.kept or self._tracker.reason is not None or not checkpoints.due(full):
+                return False
+            checkpoints.begin(full)
+        saved = checkpoints.step()
+        if saved is not None and self._tracker.reason is not None:
+            self._say_done(saved)
+        elif saved is not None:
+            progress = self._tracker.progress(self._residency)
+            self._send(Checkpoint(self._number, self._tracker.generation, progress, saved))
+        return True
+
+    def end_if_reached(self) -> bool:
+        """End where the first limit is reached; whether it is."""
+        reason = self._tracker.enough(self._residency)
+        if reason is not None:
+            self.end(reason)
+        return reason is not None
+
+    def end(self, reason: Reason) -> None:
+        """End now, for this reason."""
+        residency, tracker, frames = self._residency, self._tracker, self._frames
+        residency.wake()
+        tracker.clock.pause()
+        tracker.reason = reason
+        residency.rests()
+        if residency.loaded is not None:
+            noise = tracker.meter.read(residency.full, fresh=True)
+            wanted = frames.denoising.covers("color", noise) and frames.scale == 1.0 and reason != "stopped"
+            frames.owes_done = wanted and frames.denoising.has(residency.full.samples) is None
+        if not frames.owes_done:
+            self.finish()
+
+    def finish(self) -> None:
+        """Say that the render has ended; where the server keeps the picture, once it has been saved."""
+        self._frames.owes_done = False
+        if self.kept and self._residency.loaded is not None and self._residency.full.samples:
+            self.checkpoints.begin(self._residency.full)
+        else:
+            self._say_done(None)
+
+    def _say_done(self, saved: Saved | None) -> None:
+        reason = self._tracker.reason
+        assert reason is not None
+        self._answer()
+        progress = self._tracker.progress(self._residency)
+        self._send(Done(self._number, self._tracker.generation, reason, progress, self.warnings, saved))
+
+    @property
+    def warnings(self) -> list[str]:
+        """What the user should know of the picture."""
+        warnings = list(self._residency.full.warnings) if self._residency.loaded is not None else []
+        why = self._frames.denoising.warning
+        return warnings + ([why] if why else [])
+
+    def report(self) -> None:
+        """Say how far a render is, now and then; who watches a stream learns it with each frame."""
+        now = time.monotonic()
+        due = not self._tracker.interactive and now - self._reported >= PROGRESS_S
+        if due and self._residency.full.samples:
+            self._reported = now
+            progress = self._tracker.progress(self._residency)
+            self._send(Progressed(self._number, self._tracker.generation, progress))
