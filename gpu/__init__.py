@@ -3,6 +3,7 @@
 renderer    the one way in: load a scene, take a picture of it
 arrays      a scene as finished arrays, which the service makes
 settings    the choices that change pixels
+steps       work that is done in steps
 errors      what can go wrong on the GPU
 context     a headless OpenGL context
 denoise     Open Image Denoise over pixels that were read back; public, without GL

@@ -44,7 +44,7 @@ LAYERS = [
     {"service.cli"},
 ]
 GPU_LAYERS = [
-    {"gpu.layout", "gpu.errors", "gpu.settings", "gpu.jit", "gpu.denoise"},
+    {"gpu.layout", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise"},
     {"gpu.tables", "gpu.accel"},
     {"gpu.arrays", "gpu.context", "gpu.footprint"},
     {"gpu.kernels"},
@@ -62,7 +62,7 @@ LOOKS_INTO_GPU = {
     "service.commands": RUNS_KERNELS,
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
 }
-WITHOUT_GL = ("gpu.layout", "gpu.accel", "gpu.tables", "gpu.errors", "gpu.settings", "gpu.jit", "gpu.denoise")
+WITHOUT_GL = ("gpu.layout", "gpu.accel", "gpu.tables", "gpu.errors", "gpu.settings", "gpu.steps", "gpu.jit", "gpu.denoise")
 OFFLINE = "gpu.tables.build"
 SHARED_BY_PROCESSES = ("service.rendering.ipc", "service.rendering.priority")  # by the server's and the renderer's
 ERRORS = ("gpu.errors", "service.problems")

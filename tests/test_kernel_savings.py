@@ -18,6 +18,7 @@ from gpu.kernels import features
 from service.cli import main
 from service.rendering.ipc.messages import Done, KernelMeasured, MeasureKernel, StopRule, Update
 from service.rendering.supervisor.supervisor import Supervisor
+from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.kernel_savings import NO_KERNEL, NO_PICTURE, KernelSavings
 from tests.extremes.scenes import LONG
 from tests.serving import SCENE, SMALL, Server
@@ -43,7 +44,7 @@ class Elsewhere:
         self.told: Any = None
         self.there = False
 
-    def waits(self, key: KernelKey, told: Any) -> bool:
+    def waits(self, key: KernelKey, told: Any, alone: bool = False) -> bool:
         self.asked.append(key)
         self.told = told
         return not self.there
@@ -61,7 +62,7 @@ def test_it_is_measured_between_slices(gpu: Renderer, more: None) -> None:
     picture = gpu.picture(scene, RenderSettings(40, 30, clamp=3.0))
     picture.trace(60.0, 4)
     before = picture.read()
-    savings = KernelSavings(7, said.append, gpu, compiler)  # type: ignore[arg-type]
+    savings = KernelSavings(WorkerContext(gpu, said.append, None, compiler), 7)  # type: ignore[arg-type]
     assert not savings.due
     savings.ask()
     savings.step(picture)
@@ -94,7 +95,7 @@ def test_what_cannot_be_had_is_told(gpu: Renderer, more: None) -> None:
     scene = gpu.load(arrays_of("plain"))
     picture = gpu.picture(scene, RenderSettings(16, 16))
     for compiler, shown, why in ((None, picture, NO_KERNEL), (Elsewhere(), None, NO_PICTURE)):
-        savings = KernelSavings(1, said.append, gpu, compiler)  # type: ignore[arg-type]
+        savings = KernelSavings(WorkerContext(gpu, said.append, None, compiler), 1)  # type: ignore[arg-type]
         savings.ask()
         savings.step(shown)
         assert said.pop() == KernelMeasured(1, why) and not savings.due
