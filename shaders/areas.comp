@@ -2,7 +2,7 @@
 // summed over the pixels, and how many samples they have. Rows of the moments are bound, from the first of an area on.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
-#include "spread.glsl"
+#include "luminance_variance.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 seen[]; };
 uniform uvec2 size; // of the bound rows
@@ -17,7 +17,7 @@ void main() {
         vec4 own = vec4(equal(uvec4(y & 3u), uvec4(0u, 1u, 2u, 3u)));
         do {
             vec4 moment = moments[y * size.x + x];
-            if (moment.w > 1.0) sum += own * spread_luminance(moment.rgb) / (moment.w - 1.0);
+            if (moment.w > 1.0) sum += own * luminance_variance(moment.rgb) / (moment.w - 1.0);
             counts = max(counts, own * moment.w);
         } while (++x < right);
     } while (++y < low);

@@ -1,11 +1,5 @@
 // What a path meets that sends light by itself: emission, ambient, what lies at infinity; and what it counts for.
 
-// Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
-float arriving_weight(float a, float b) {
-    float r = b / a;
-    return 1.0 / (1.0 + r * r);
-}
-
 #if HAS_SUN_DISKS
 // What the disks of directional lights send along d, each weighed against finding it by direct sampling. `pdf` is the
 // density of d.
@@ -16,7 +10,7 @@ vec3 arriving_disks(vec3 d, float pdf) {
         Light l = light_load(frame.sun_first + i);
         vec3 c = directional_light_radiance(l, d);
 #if ESTIMATOR == ESTIMATOR_MIS
-        c *= arriving_weight(pdf, directional_light_pdf(l) * l.probability);
+        c *= power_heuristic(pdf, directional_light_pdf(l) * l.probability);
 #endif
         if (i < frame.sun_count) sum += c; // a kernel with every flag raised may have no disk
     } while (++i < frame.sun_count);
@@ -33,7 +27,7 @@ vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
     vec4 l = environment_radiance(d);
     arriving = l.rgb;
 #if ESTIMATOR == ESTIMATOR_MIS
-    arriving *= arriving_weight(pdf, l.a * frame.environment_probability);
+    arriving *= power_heuristic(pdf, l.a * frame.environment_probability);
 #endif
 #endif
 #if HAS_SUN_DISKS
@@ -44,7 +38,7 @@ vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
 #endif
 
 // Emission towards the side the ray came from: the outward one, unless the material has both shine.
-vec3 arriving_emission(Point at, vec3 d) {
+vec3 arriving_emission(SurfacePoint at, vec3 d) {
 #if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
     bool both = material_pick(at.material).emission_sides == 2u;
     if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at);
@@ -60,7 +54,7 @@ vec3 arriving_emission(Point at, vec3 d) {
 }
 
 // blinn_phong's radiance without a cause: from both sides, and no light to anything that picks lights.
-vec3 arriving_ambient(Point at) {
+vec3 arriving_ambient(SurfacePoint at) {
 #if HAS_AMBIENT && HAS_TEXTURES
     return texture_ambient(at);
 #elif HAS_AMBIENT

@@ -1,18 +1,19 @@
 // The models: which lobes, with what weights. Directions in the shading frame; f includes |cos theta_i|.
 #include "fresnel.glsl"
-#include "microfacet.glsl"
-#include "lobes/diffuse.glsl"
-#include "lobes/sheen.glsl"
-#include "lobes/specular.glsl"
-#include "lobes/clearcoat.glsl"
+#include "ggx.glsl"
+#include "lobes/lambert.glsl"
+#include "lobes/disney/diffuse.glsl"
+#include "lobes/disney/sheen.glsl"
+#include "lobes/disney/specular.glsl"
+#include "lobes/disney/clearcoat.glsl"
 #include "lobes/metal_rough.glsl"
 #include "lobes/blinn_phong.glsl"
 #include "energy.glsl"
-#include "lobes/matte.glsl"
-#include "lobes/fabric.glsl"
-#include "lobes/coat.glsl"
-#include "lobes/scattered.glsl"
-#include "lobes/facets.glsl"
+#include "lobes/principled/diffuse.glsl"
+#include "lobes/principled/sheen_charlie.glsl"
+#include "lobes/principled/clearcoat.glsl"
+#include "lobes/principled/multiscatter.glsl"
+#include "lobes/principled/microfacet.glsl"
 
 struct Scatter {
     vec3 f;    // BSDF times |cos theta_i|
@@ -30,9 +31,9 @@ LobeWeights bsdf_weights(Surface s, vec3 wo) {
     LobeWeights w = LobeWeights(1.0, 0.0, 0.0);
 #if HAS_DISNEY
     if (s.model == MODEL_DISNEY) {
-        w = LobeWeights(diffuse_weight(s), specular_weight(s, wo), 0.0);
+        w = LobeWeights(disney_diffuse_weight(s), disney_specular_weight(s, wo), 0.0);
 #if HAS_CLEARCOAT
-        w.clearcoat = clearcoat_weight(s, wo);
+        w.clearcoat = disney_clearcoat_weight(s, wo);
 #endif
         float inv = 1.0 / (w.diffuse + w.specular + w.clearcoat);
         w = LobeWeights(w.diffuse * inv, w.specular * inv, w.clearcoat * inv);
@@ -59,27 +60,27 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #else
     if (wo.z <= 0.0 || wi.z <= 0.0) return Scatter(vec3(0.0), 0.0);
 #endif
-    Scatter r = Scatter(diffuse_lambert(s), diffuse_pdf(wi));
+    Scatter r = Scatter(lambert_eval(s), lambert_pdf(wi));
 #if HAS_DISNEY
     if (s.model == MODEL_DISNEY) {
         LobeWeights w = bsdf_weights(s, wo);
         vec3 wm = normalize(wo + wi);
         float cos_d = dot(wi, wm);
-        r.f = diffuse_disney(s, wo, wi, cos_d);
-        r.pdf = w.diffuse * diffuse_pdf(wi);
+        r.f = disney_diffuse_eval(s, wo, wi, cos_d);
+        r.pdf = w.diffuse * lambert_pdf(wi);
 #if HAS_SHEEN
-        r.f += sheen_eval(s, cos_d);
+        r.f += disney_sheen_eval(s, cos_d);
 #endif
         vec3 wm_t = wm, wo_t = wo;
 #if HAS_ANISOTROPIC
         wm_t = bsdf_turn(s, wm);
         wo_t = bsdf_turn(s, wo);
 #endif
-        r.f += specular_eval(s, wo, wi, wm_t, cos_d);
-        r.pdf += w.specular * specular_pdf(s, wo_t, wm_t);
+        r.f += disney_specular_eval(s, wo, wi, wm_t, cos_d);
+        r.pdf += w.specular * disney_specular_pdf(s, wo_t, wm_t);
 #if HAS_CLEARCOAT
-        r.f += clearcoat_eval(s, wo, wi, wm, cos_d);
-        r.pdf += w.clearcoat * clearcoat_pdf(s, wm, cos_d);
+        r.f += disney_clearcoat_eval(s, wo, wi, wm, cos_d);
+        r.pdf += w.clearcoat * disney_clearcoat_pdf(s, wm, cos_d);
 #endif
     }
 #endif
@@ -107,10 +108,10 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 }
 
 #if HAS_PRINCIPLED_LOBES
-struct Sampled {
+struct BsdfSample {
     vec3 wi;
-    bool specular; // from a perfectly specular lobe: `there` is its f and its chance, in place of bsdf_eval's
-    Scatter there;
+    bool is_delta; // from a perfectly specular lobe: `scatter` is its f and its chance, in place of bsdf_eval's
+    Scatter scatter;
 #if HAS_COAT_NORMALS
     bool coated;   // from the coat, which reflects though wi lie below the base's normal
 #endif
@@ -119,7 +120,7 @@ struct Sampled {
 
 // Direction for light to come from; may lie below the surface, where bsdf_eval gives pdf 0.
 vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    vec3 wi = diffuse_sample(u);
+    vec3 wi = lambert_sample(u);
 #if HAS_DISNEY
     if (s.model == MODEL_DISNEY) {
         LobeWeights w = bsdf_weights(s, wo);
@@ -127,13 +128,13 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if HAS_ANISOTROPIC
         wo_t = bsdf_turn(s, wo);
 #endif
-        vec3 mirrored = specular_sample(s, wo_t, u);
+        vec3 mirrored = disney_specular_sample(s, wo_t, u);
 #if HAS_ANISOTROPIC
         mirrored = bsdf_turn_back(s, mirrored);
 #endif
         if (u_lobe >= w.diffuse) wi = mirrored;
 #if HAS_CLEARCOAT
-        vec3 coat = clearcoat_sample(s, wo, u);
+        vec3 coat = disney_clearcoat_sample(s, wo, u);
         if (u_lobe >= w.diffuse + w.specular) wi = coat;
 #endif
     }
@@ -148,22 +149,22 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 }
 
 #if HAS_PRINCIPLED_LOBES
-Sampled bsdf_pick(Surface s, vec3 wo, float u_lobe, vec2 u) {
+BsdfSample bsdf_pick(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if HAS_COAT_NORMALS
-    Sampled r = Sampled(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0), false);
-    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.specular, r.there, r.coated);
+    BsdfSample r = BsdfSample(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0), false);
+    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.is_delta, r.scatter, r.coated);
 #else
-    Sampled r = Sampled(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0));
-    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.specular, r.there);
+    BsdfSample r = BsdfSample(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0));
+    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.is_delta, r.scatter);
 #endif
     return r;
 }
 
 // As with the other models uniform over the hemisphere, or over the sphere where the material transmits.
-Sampled bsdf_pick_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    Sampled r = bsdf_pick(s, wo, u_lobe, u);
-    float rest = s.model == MODEL_PRINCIPLED ? 1.0 - principled_specular(s, wo) : 1.0;
-    if (!r.specular) {
+BsdfSample bsdf_pick_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    BsdfSample r = bsdf_pick(s, wo, u_lobe, u);
+    float rest = s.model == MODEL_PRINCIPLED ? 1.0 - principled_delta_chance(s, wo) : 1.0;
+    if (!r.is_delta) {
 #if HAS_COAT_NORMALS
         r.coated = false;
 #endif
@@ -175,7 +176,7 @@ Sampled bsdf_pick_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
             pdf *= 0.5;
         }
 #endif
-        r.there = Scatter(bsdf_eval(s, wo, r.wi).f, pdf * rest);
+        r.scatter = Scatter(bsdf_eval(s, wo, r.wi).f, pdf * rest);
     }
     return r;
 }

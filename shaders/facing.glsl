@@ -2,7 +2,7 @@
 
 // A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation, or a map, can turn it away
 // at a silhouette; it is then bent back until it is just in view, which loses no light to black rims.
-vec3 facing_normal(Point at, vec3 wo_w) {
+vec3 facing_normal(SurfacePoint at, vec3 wo_w) {
     vec3 n = dot(at.ng, wo_w) < 0.0 ? -at.ns : at.ns;
 #if HAS_SMOOTH_NORMALS || HAS_NORMAL_MAPS
     float c = dot(n, wo_w);
@@ -14,9 +14,9 @@ vec3 facing_normal(Point at, vec3 wo_w) {
 #if HAS_TRANSMISSION
 // The square of the index on wi's side, over the camera's. What comes from infinity comes from outside, even where an
 // open sheet of glass leads there.
-float facing_dense(float dense, float wi_z, Surface s, float t) {
-    if (wi_z < 0.0) dense /= s.eta * s.eta;
-    return t == INFINITY_T ? max(dense, 1.0) : dense;
+float facing_eta_scale(float eta_scale, float wi_z, Surface s, float t) {
+    if (wi_z < 0.0) eta_scale /= s.eta * s.eta;
+    return t == INFINITY_T ? max(eta_scale, 1.0) : eta_scale;
 }
 #endif
 
@@ -34,7 +34,7 @@ bool facing_agrees(float shading, float geometric) {
 // surface were a mirror to it: nothing is lost, and nothing gained. It is the idea of [Schuessler, Heitz, Hanika,
 // Dachsbacher 2017, "Microfacet-based normal mapping"] with the tangent facet laid flat, of one further scattering.
 // So v has the sum of two directions of the lobe: itself and its image below. Light that is refracted folds likewise.
-Scatter facing_folded(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool mapped) {
+Scatter normal_map_eval(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool mapped) {
     Scatter sum = Scatter(vec3(0.0), 0.0);
     float side = dot(v, front);
     vec3 w = v;
@@ -47,7 +47,7 @@ Scatter facing_folded(Surface s, Basis basis, vec3 wo, vec3 v, vec3 front, bool 
         w = v - 2.0 * side * front;
         more = k == 0u && mapped && dot(w, basis.z) * side > 0.0;
 #if HAS_COAT_NORMALS
-        Scatter c = principled_coat(s, wo, wi);
+        Scatter c = principled_coat_eval(s, wo, wi);
         if (side > 0.0) sum = Scatter(sum.f + c.f, sum.pdf + c.pdf);
         more = more || (k == 0u && mapped && side > 0.0 && dot(frame_to_local(basis, w), s.coat.z) > 0.0);
 #endif

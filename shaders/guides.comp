@@ -11,7 +11,7 @@ layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec2 met[]; }; // ind
 #include "shapes.glsl"
 #include "texture.glsl"
 #include "camera.glsl"
-#include "passing.glsl"
+#include "transparency.glsl"
 
 void main() {
     uvec2 pixel;
@@ -23,13 +23,13 @@ void main() {
         Sampler rng = sobol_begin(pixel, frame.sample_first + i, 0u);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
-        Point at;
-        Nearest n = passing_nearest(o, d, NONE, 0u, rng, at);
+        SurfacePoint at;
+        Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
         if (frame.sample_first + i == 0u) {
             uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
-            met[slot] = n.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
+            met[slot] = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
         }
-        if (n.id != NONE) {
+        if (hit.id != NONE) {
 #if HAS_TEXTURES
             vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
             texture_look(at, texels);
@@ -45,7 +45,7 @@ void main() {
             if (m.model == MODEL_PRINCIPLED) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));
 #endif
             albedo += vec4(seen, 1.0);
-            normal += vec4(dot(at.ng, d) > 0.0 ? -at.ns : at.ns, n.t);
+            normal += vec4(dot(at.ng, d) > 0.0 ? -at.ns : at.ns, hit.t);
         }
     } while (++i < frame.sample_count);
     albedos[slot] = albedo;

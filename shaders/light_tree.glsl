@@ -3,7 +3,7 @@
 // section 12.6.3]. gpu/light_tree.py makes the tree.
 
 // A point that light is sampled for.
-struct Asker {
+struct LightContext {
     vec3 p;
 #if HAS_LIGHT_TREE
     vec3 n;       // unit; no light counts that comes from behind it ...
@@ -38,15 +38,15 @@ vec2 light_tree_less(vec2 a, vec2 b) {
 }
 
 // x: a bound on what a node's lights give, times y, the square of their distance. p is on the tree's grid.
-vec2 light_tree_importance(uvec4 node, vec3 p, Asker at) {
+vec2 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
     vec3 to = vec3(node.x & 0xffffu, node.x >> 16u, node.y & 0xffffu) - p;
     float radius = uintBitsToFloat(((node.y & 0xff0000u) << 4u) + (123u << 23u));
     float d2 = dot(to, to), r2 = radius * radius;
     float inv = inversesqrt(max(d2, 1e-30)), sin_ball = min(radius * inv, 1.0);
     vec2 ball = vec2(light_tree_sine(sin_ball), sin_ball); // the angle that the ball around them fills
-    float cos_in = dot(to, at.n) * inv;
+    float cos_in = dot(to, context.n) * inv;
 #if HAS_TRANSMISSION
-    if (at.through) cos_in = abs(cos_in);
+    if (context.through) cos_in = abs(cos_in);
 #endif
     cos_in = light_tree_less(vec2(cos_in, light_tree_sine(cos_in)), ball).x;
 #if HAS_QUAD_LIGHTS || HAS_TRIANGLE_LIGHTS || HAS_SPOT_LIGHTS
@@ -66,16 +66,16 @@ vec2 light_tree_importance(uvec4 node, vec3 p, Asker at) {
 
 // The chance of coming down the tree to a light: to the one that `code` leads to, or, `told`, to the one whose trail
 // it is. `near`: there is anything to do. The codes of a node are an interval, which its children share.
-float light_tree_walk(bool near, bool told, uint code, uint trail, Asker at, out uint found) {
+float light_tree_walk(bool near, bool told, uint code, uint trail, LightContext context, out uint found) {
     uvec4 head = light_tree_head(), grid = texelFetch(light_tree_words, ivec2(1, 0), 0);
-    vec3 p = (at.p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
+    vec3 p = (context.p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
     int rest = int(code) - int(head.y), width = int(head.x - head.y);
     uint pair = 1u, depth = 0u;
     bool more = near;
     found = 0u;
     do {
         uvec4 a = light_tree_fetch(2u * pair), b = light_tree_fetch(2u * pair + 1u);
-        vec2 x = light_tree_importance(a, p, at), y = light_tree_importance(b, p, at);
+        vec2 x = light_tree_importance(a, p, context), y = light_tree_importance(b, p, context);
         float first = x.x * y.y, second = y.x * x.y; // gpu/light_tree.py keeps them inside float32
         // Neither seems to matter, as where only their parent's bounds reach: by intensity alone.
         bool lost = !(first + second > 0.0);

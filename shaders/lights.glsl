@@ -26,8 +26,8 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 
 #if HAS_LIGHT_TREE
 // All 32 bits: a light among many has a chance too small for the 24 of a float. `probability` of what is drawn is all
-// that it is picked with at `at`.
-Light lights_pick(uint bits, Asker at) {
+// that it is picked with there.
+Light lights_pick(uint bits, LightContext context) {
     uvec4 head = light_tree_head();
     uint code = bits >> 2u, far = frame.light_count - head.w;
     bool near = code < head.x, even = code < head.y;
@@ -35,7 +35,7 @@ Light lights_pick(uint bits, Asker at) {
     uint i = head.w + min(uint(x), far - 1u), first = near ? (even ? code >> head.z : 0u) : i;
     Light drawn = light_pick(first);
     uint found;
-    float chance = light_tree_walk(near, even, code, drawn.alias, at, found);
+    float chance = light_tree_walk(near, even, code, drawn.alias, context, found);
     uint other = fract(x) >= drawn.threshold ? drawn.alias : i;
     Light l = light_pick(near ? (even ? first : found) : other);
     if (near) l.probability += chance;
@@ -69,7 +69,7 @@ Quad lights_quad(uint i) {
 struct Emitter {
     vec3 radiance;
     uint sides; // 1: the outward one shines; 2: both do
-    float veil; // the chance that a ray passes through
+    float transparency; // the chance that a ray passes through
 };
 
 Emitter lights_emitter(Light l) {
@@ -78,7 +78,7 @@ Emitter lights_emitter(Light l) {
     Material m = material_pick(l.material);
     e.radiance = m.emission;
 #if HAS_TEXTURED_LIGHTS
-    e.radiance = vec3(1.0); // by the place that is sampled: lights_glow
+    e.radiance = vec3(1.0); // by the place that is sampled: lights_emission
 #endif
 #if HAS_EMISSION_BOTH
     e.sides = m.emission_sides;
@@ -88,9 +88,9 @@ Emitter lights_emitter(Light l) {
     e.radiance *= m.opacity;
 #endif
 #if HAS_TEXTURED_LIGHTS
-    e.veil = m.opacity < 1.0 ? 1.0 : 0.0; // by the place that is passed: lights_glow
+    e.transparency = m.opacity < 1.0 ? 1.0 : 0.0; // by the place that is passed: lights_emission
 #else
-    e.veil = 1.0 - m.opacity;
+    e.transparency = 1.0 - m.opacity;
 #endif
 #endif
 #endif
@@ -99,17 +99,17 @@ Emitter lights_emitter(Light l) {
 
 #if HAS_TEXTURED_LIGHTS
 // The emission of the place that was sampled, by the share of it that is there.
-vec3 lights_glow(LightSample s, vec3 p) {
+vec3 lights_emission(LightSample s, vec3 p) {
     vec3 q = p + s.t * s.wi;
-    Nearest n = Nearest(0.0, s.id, vec2(0.0));
+    Hit hit = Hit(0.0, s.id, vec2(0.0));
 #if HAS_TRIANGLE_LIGHTS
     if (s.id >> LEAF_KIND_SHIFT == SHAPE_TRIANGLE) {
         Triangle tri = triangle_pick(s.id & LEAF_FIRST_MASK);
         vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, w = q - tri.v0, c = cross(e1, e2);
-        n.uv = vec2(dot(cross(w, e2), c), dot(cross(e1, w), c)) / dot(c, c);
+        hit.uv = vec2(dot(cross(w, e2), c), dot(cross(e1, w), c)) / dot(c, c);
     }
 #endif
-    Point at = shapes_point(n, q, vec3(0.0, 0.0, 1.0));
+    SurfacePoint at = shapes_point(hit, q, vec3(0.0, 0.0, 1.0));
     float share = 1.0;
 #if HAS_EMISSION_BOTH && HAS_OPACITY && (HAS_SPHERE_LIGHTS || HAS_ELLIPSOID_LIGHTS)
     // The inside of a ball's far half, through what is open of the near one.
@@ -125,7 +125,7 @@ vec3 lights_glow(LightSample s, vec3 p) {
         near = 2.0 * dot(f, g) / dot(g, g) - s.t;
     }
 #endif
-    Point through = shapes_point(n, p + near * s.wi, vec3(0.0, 0.0, 1.0));
+    SurfacePoint through = shapes_point(hit, p + near * s.wi, vec3(0.0, 0.0, 1.0));
     if (near > 0.0 && dot(s.wi, at.ng) > 0.0) share = 1.0 - texture_opacity(through);
 #endif
 #if HAS_OPACITY
@@ -136,13 +136,13 @@ vec3 lights_glow(LightSample s, vec3 p) {
 }
 #endif
 
-// at: who asks; the bits of one number choose the light, those of two more the direction.
-LightSample lights_sample(Asker at, uint pick_bits, uvec2 bits) {
+// context: who asks; the bits of one number choose the light, those of two more the direction.
+LightSample lights_sample(LightContext context, uint pick_bits, uvec2 bits) {
     LightSample s = lights_none();
-    vec3 p = at.p;
+    vec3 p = context.p;
     vec2 u = sobol_units(bits);
 #if HAS_LIGHT_TREE
-    Light l = lights_pick(pick_bits, at);
+    Light l = lights_pick(pick_bits, context);
 #else
     Light l = lights_pick(sobol_unit(pick_bits));
 #endif
@@ -161,7 +161,7 @@ LightSample lights_sample(Asker at, uint pick_bits, uvec2 bits) {
     Emitter e = lights_emitter(l);
 #if HAS_SPHERE_LIGHTS
     if (l.kind == LIGHT_SPHERE) {
-        s = sphere_light_sample(sphere_pick(l.index), p, u, e.sides, e.veil);
+        s = sphere_light_sample(sphere_pick(l.index), p, u, e.sides, e.transparency);
         s.id = (SHAPE_SPHERE << LEAF_KIND_SHIFT) | l.index;
     }
 #endif
@@ -179,43 +179,43 @@ LightSample lights_sample(Asker at, uint pick_bits, uvec2 bits) {
 #endif
 #if HAS_ELLIPSOID_LIGHTS
     if (l.kind == LIGHT_ELLIPSOID) {
-        s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u, e.sides, e.veil);
+        s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u, e.sides, e.transparency);
         s.id = (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | l.index;
     }
 #endif
 #if HAS_EMISSION
     if (l.kind >= LIGHT_SPHERE) s.radiance *= e.radiance;
 #if HAS_TEXTURED_LIGHTS
-    if (l.kind >= LIGHT_SPHERE && s.pdf > 0.0) s.radiance *= lights_glow(s, p);
+    if (l.kind >= LIGHT_SPHERE && s.pdf > 0.0) s.radiance *= lights_emission(s, p);
 #endif
 #endif
     s.pdf *= l.probability;
     return s;
 }
 
-// Density of lights_sample for who asks and the direction wi, which met the emitting shape n.id at distance n.t.
-float lights_pdf(uint light, Nearest n, Point at, Asker asker, vec3 wi) {
+// Density of lights_sample for who asks and the direction wi, which met the emitting shape hit.id at distance hit.t.
+float lights_pdf(uint light, Hit hit, SurfacePoint at, LightContext context, vec3 wi) {
 #if HAS_EMISSION
-    vec3 p = asker.p;
+    vec3 p = context.p;
     Light l = light_pick(light);
 #if HAS_LIGHT_TREE
     uint same;
-    l.probability += light_tree_walk(light != NONE && light_tree_head().x > 0u, true, 0u, l.alias, asker, same);
+    l.probability += light_tree_walk(light != NONE && light_tree_head().x > 0u, true, 0u, l.alias, context, same);
 #endif
     Emitter e = lights_emitter(l);
-    uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK; // as the light has them, without a load
+    uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK; // as the light has them, without a load
     float pdf = 0.0;
 #if HAS_SPHERE_LIGHTS
-    if (kind == SHAPE_SPHERE) pdf = sphere_light_pdf(sphere_pick(index), p, e.sides, e.veil);
+    if (kind == SHAPE_SPHERE) pdf = sphere_light_pdf(sphere_pick(index), p, e.sides, e.transparency);
 #endif
 #if HAS_QUAD_LIGHTS
-    if (kind == SHAPE_QUAD) pdf = quad_light_pdf(lights_quad(index), p, n.t, wi, e.sides);
+    if (kind == SHAPE_QUAD) pdf = quad_light_pdf(lights_quad(index), p, hit.t, wi, e.sides);
 #endif
 #if HAS_TRIANGLE_LIGHTS
-    if (kind == SHAPE_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(index), p, n.t, at.ng, wi, e.sides);
+    if (kind == SHAPE_TRIANGLE) pdf = triangle_light_pdf(triangle_pick(index), p, hit.t, at.ng, wi, e.sides);
 #endif
 #if HAS_ELLIPSOID_LIGHTS
-    if (kind == SHAPE_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(index), n.t, at, wi, e.sides);
+    if (kind == SHAPE_ELLIPSOID) pdf = ellipsoid_light_pdf(ellipsoid_pick(index), hit.t, at, wi, e.sides);
 #endif
     return pdf * l.probability;
 #else

@@ -34,9 +34,9 @@ Medium medium_at_camera() {
     uint skip = NONE, layer = 0u, side = 0u;
     bool more;
     do {
-        Nearest n = shapes_nearest(o, d, skip);
-        Point at = shapes_point(n, o, d);
-        more = n.id != NONE && layer < MEDIUM_LAYERS;
+        Hit hit = shapes_nearest(o, d, skip);
+        SurfacePoint at = shapes_point(hit, o, d);
+        more = hit.id != NONE && layer < MEDIUM_LAYERS;
 #if HAS_TEXTURES
         vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
         texture_look(at, texels);

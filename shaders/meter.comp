@@ -2,11 +2,11 @@
 // pixels errs, as far as its samples and its neighbours' say. 0: sums over all pixels, and the metered pixels' values.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
-#include "spread.glsl"
+#include "luminance_variance.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 
 // Of the luminance, times (n - 1) of the sum's n samples.
-float meter_spread(uint slot) { return spread_luminance(moments[slot].rgb); }
+float meter_variance(uint slot) { return luminance_variance(moments[slot].rgb); }
 
 #if METER_WEIGH
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };
@@ -22,7 +22,7 @@ void main() {
     uint y = low.y;
     do {
         uint x = low.x;
-        do sum += meter_spread(y * size.x + x);
+        do sum += meter_variance(y * size.x + x);
         while (++x < high.x);
     } while (++y < high.y);
     weights[b.y * blocks.x + b.x] = sum / float((high.x - low.x) * (high.y - low.y));
@@ -48,7 +48,7 @@ void main() {
     if (k < count) {
         do {
             float n = moments[k].w;
-            result.xy += vec2(meter_luminance(k), n > 1.0 ? meter_spread(k) / (n * (n - 1.0)) : 0.0);
+            result.xy += vec2(meter_luminance(k), n > 1.0 ? meter_variance(k) / (n * (n - 1.0)) : 0.0);
             k += uint(METER_LINE) * lines;
         } while (k < count);
     }

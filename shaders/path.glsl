@@ -1,14 +1,15 @@
-// The estimator: light carried back along one camera path. meet.glsl tells what it has met, step.glsl takes it on.
+// The estimator: light carried back along one camera path. interaction.glsl tells what it has met, path_extend.glsl
+// takes it on.
 #include "surface.glsl"
 #include "bsdf.glsl"
 #include "lights.glsl"
-#include "passing.glsl"
+#include "transparency.glsl"
 #include "medium.glsl"
 #include "arriving.glsl"
 #include "facing.glsl"
-#include "step.glsl"
-#include "meet.glsl"
-#include "mirror.glsl"
+#include "path_extend.glsl"
+#include "interaction.glsl"
+#include "delta_chain.glsl"
 
 bool path_was_cut; // the last path: by the driver
 
@@ -23,75 +24,75 @@ vec4 path_sky(vec3 d) {
     vec4 sky = vec4(0.0);
 #if HAS_ENVIRONMENT
     if (frame.environment_background != 0u)
-        sky = vec4(path_clamp(share * arriving_outside(d, PATH_CERTAIN, false), false), 1.0);
+        sky = vec4(path_clamp(share * arriving_outside(d, PDF_DELTA, false), false), 1.0);
 #endif
     return sky;
 }
 
-// A path from the camera at what it meets first, `n`; its alpha: 1: a surface, or a background that is shown.
+// A path from the camera at what it meets first, `hit`; its alpha: 1: a surface, or a background that is shown.
 #if HAS_ATTENUATION
-float path_begin(vec3 o, vec3 d, Nearest n, Point at, Medium medium, out Path path) {
+float path_begin(vec3 o, vec3 d, Hit hit, SurfacePoint at, Medium medium, out Path path) {
 #else
-float path_begin(vec3 o, vec3 d, Nearest n, Point at, out Path path) {
+float path_begin(vec3 o, vec3 d, Hit hit, SurfacePoint at, out Path path) {
 #endif
     float alpha = 0.0;
     path.d = d;
-    path.n = n;
+    path.hit = hit;
     path.at = at;
-    path.alive = n.id != NONE;
-    path.color = vec3(0.0);
+    path.alive = hit.id != NONE;
+    path.radiance = vec3(0.0);
     path.throughput = vec3(1.0);
     path.bounce = 0u;
     if (path.alive) {
-        path.color = arriving_emission(path.at, d) + arriving_ambient(path.at);
+        path.radiance = arriving_emission(path.at, d) + arriving_ambient(path.at);
         alpha = 1.0;
     }
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
-    path.left = false;
-    path.left_pdf = PATH_CERTAIN;
+    path.escaped = false;
+    path.escaped_pdf = PDF_DELTA;
 #endif
 #if HAS_ENVIRONMENT
     if (!path.alive && frame.environment_background != 0u) {
         alpha = 1.0;
-        path.left = true;
+        path.escaped = true;
     }
 #endif
     path.alive = path.alive && frame.max_bounces > 0u;
 #if HAS_ATTENUATION
     path.medium = medium;
-    path.throughput = medium_share(medium, path.n.t);
-    path.color *= path.throughput;
+    path.throughput = medium_share(medium, path.hit.t);
+    path.radiance *= path.throughput;
 #endif
 #if HAS_TRANSMISSION
-    path.dense = 1.0;
+    path.eta_scale = 1.0;
 #endif
     return alpha;
 }
 
 // The light that a path finds, to its end.
-vec3 path_go(Sampler rng, Path path) {
-    vec3 before = path.color; // light of all bounces but the last
+vec3 path_radiance(Sampler rng, Path path) {
+    vec3 before = path.radiance; // light of all bounces but the last
     if (path.alive) {
         do {
-            Met here;
+            Interaction here;
 #if HAS_MIRRORS
             bool mirrored;
             do {
-                here = meet(path);
-                mirrored = mirror_only(here);
+                here = interaction_make(path);
+                mirrored = delta_chain_takes(here);
                 if (mirrored) {
-                    before = path.color;
-                    mirror_step(here, rng, path);
+                    before = path.radiance;
+                    delta_chain_step(here, rng, path);
                     mirrored = path.alive && path.bounce < frame.max_bounces;
                 }
             } while (mirrored);
             if (!path.alive || path.bounce >= frame.max_bounces) break;
-            before = path.color;
+            before = path.radiance;
 #else
-            before = path.color;
-            here = meet(path);
+            before = path.radiance;
+            here = interaction_make(path);
 #endif
-            Surface s = meet_surface(here);
+            Surface s = interaction_surface(here);
             Basis basis = here.basis;
             vec3 front = here.front, wo = here.wo;
             uint pair = PAIR_BOUNCE + path.bounce * PAIRS_A_BOUNCE;
@@ -109,12 +110,12 @@ vec3 path_go(Sampler rng, Path path) {
             vec3 facing = basis.z;
 #endif
 #if HAS_TRANSMISSION
-            Asker asker = Asker(from, facing, surface_transmits(here.m));
+            LightContext context = LightContext(from, facing, surface_transmits(here.m));
 #else
-            Asker asker = Asker(from, facing, false);
+            LightContext context = LightContext(from, facing, false);
 #endif
 #else
-            Asker asker = Asker(from);
+            LightContext context = LightContext(from);
 #endif
             float share = 1.0; // of a light's sample; the density of finding the light by chance counts as much less
 #if HAS_LIGHTS
@@ -131,7 +132,7 @@ vec3 path_go(Sampler rng, Path path) {
             Sampler part = rng;
             uint pick_bits = choice_bits.x;
 #endif
-            LightSample light = lights_sample(asker, pick_bits, sobol_bits(part, pair + PAIR_LIGHT));
+            LightSample light = lights_sample(context, pick_bits, sobol_bits(part, pair + PAIR_LIGHT));
 #if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
             bool wanted = light.pdf > 0.0 && !light.extended;
 #else
@@ -140,7 +141,7 @@ vec3 path_go(Sampler rng, Path path) {
             vec3 wi = frame_to_local(basis, light.wi);
 #if HAS_NORMAL_MAPS
             float side = here.mapped ? dot(light.wi, front) : wi.z;
-            Scatter f = facing_folded(s, basis, wo, light.wi, front, here.mapped);
+            Scatter f = normal_map_eval(s, basis, wo, light.wi, front, here.mapped);
             wanted = wanted && (here.mapped || facing_agrees(wi.z, dot(light.wi, front)));
             wanted = wanted && max_component(f.f * light.radiance) > 0.0;
 #else
@@ -148,19 +149,19 @@ vec3 path_go(Sampler rng, Path path) {
             wanted = wanted && facing_agrees(wi.z, dot(light.wi, front)) && max_component(f.f * light.radiance) > 0.0;
 #endif
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
-            wanted = wanted && light.id != path.n.id; // rounding may put a point on a ball's inside outside of it
+            wanted = wanted && light.id != path.hit.id; // rounding may put a point on a ball's inside outside of it
 #endif
             float weight = 1.0;
 #if ESTIMATOR == ESTIMATOR_MIS
-            if (light.extended) weight = arriving_weight(light.pdf, share * f.pdf);
+            if (light.extended) weight = power_heuristic(light.pdf, share * f.pdf);
 #endif
             if (wanted) {
                 vec3 c = path.throughput * (f.f * light.radiance * (weight / light.pdf));
 #if HAS_TRANSMISSION
 #if HAS_NORMAL_MAPS
-                c *= facing_dense(path.dense, side, s, light.t);
+                c *= facing_eta_scale(path.eta_scale, side, s, light.t);
 #else
-                c *= facing_dense(path.dense, wi.z, s, light.t);
+                c *= facing_eta_scale(path.eta_scale, wi.z, s, light.t);
 #endif
 #endif
 #if HAS_ATTENUATION
@@ -169,12 +170,12 @@ vec3 path_go(Sampler rng, Path path) {
 #endif
                 uvec2 skip = uvec2(flat_id, light.id);
 #if HAS_OPACITY
-                c *= passing_share(shapes_leave(path.at, light.wi), light.wi, light.t, skip);
+                c *= transparency_share(shapes_leave(path.at, light.wi), light.wi, light.t, skip);
                 bool hidden = false;
 #else
                 bool hidden = shapes_occluded(shapes_leave(path.at, light.wi), light.wi, light.t, skip);
 #endif
-                if (!hidden) path.color += path_clamp(c, path.bounce > 0u) * share;
+                if (!hidden) path.radiance += path_clamp(c, path.bounce > 0u) * share;
             }
 #if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
             } while (++turn < asked);
@@ -182,22 +183,22 @@ vec3 path_go(Sampler rng, Path path) {
 #endif
 #if ESTIMATOR == ESTIMATOR_UNIFORM
 #if HAS_PRINCIPLED_LOBES
-            Sampled picked = bsdf_pick_uniform(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
+            BsdfSample picked = bsdf_pick_uniform(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
             vec3 wi_next = picked.wi;
-            Scatter next = picked.there;
+            Scatter next = picked.scatter;
 #else
             vec3 wi_next = sampling_hemisphere(sobol_pair(rng, pair + PAIR_BSDF));
             Scatter next = bsdf_eval(s, wo, wi_next);
             next.pdf = 0.5 * INV_PI;
 #endif
 #elif HAS_PRINCIPLED_LOBES
-            Sampled picked = bsdf_pick(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
+            BsdfSample picked = bsdf_pick(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
             vec3 wi_next = picked.wi;
 #if HAS_NORMAL_MAPS
-            Scatter next = picked.there;
+            Scatter next = picked.scatter;
 #else
             Scatter next = bsdf_eval(s, wo, wi_next);
-            if (picked.specular) next = picked.there;
+            if (picked.is_delta) next = picked.scatter;
 #endif
 #else
             vec3 wi_next = bsdf_sample(s, wo, choice.y, sobol_pair(rng, pair + PAIR_BSDF));
@@ -210,7 +211,7 @@ vec3 path_go(Sampler rng, Path path) {
             vec3 d = frame_to_world(basis, wi_next);
 #if HAS_NORMAL_MAPS
 #if HAS_PRINCIPLED_LOBES
-            bool certain = picked.specular;
+            bool certain = picked.is_delta;
 #else
             bool certain = false;
 #endif
@@ -230,7 +231,7 @@ vec3 path_go(Sampler rng, Path path) {
 #endif
             float across = dot(d, front);
             if (here.mapped && across * lobe < 0.0) d -= 2.0 * across * front;
-            Scatter folded = facing_folded(s, basis, wo, d, front, here.mapped);
+            Scatter folded = normal_map_eval(s, basis, wo, d, front, here.mapped);
 #if ESTIMATOR == ESTIMATOR_UNIFORM
             if (!certain) next.f = folded.f;
 #else
@@ -243,40 +244,40 @@ vec3 path_go(Sampler rng, Path path) {
 #endif
             float found_pdf = share * next.pdf;
 #if HAS_PRINCIPLED_LOBES
-            if (picked.specular) found_pdf = PATH_CERTAIN;
+            if (picked.is_delta) found_pdf = PDF_DELTA;
 #endif
 #if ESTIMATOR != ESTIMATOR_LIGHT
             bool counts = true;
 #elif HAS_PRINCIPLED_LOBES
-            bool counts = picked.specular;
+            bool counts = picked.is_delta;
 #else
             bool counts = false;
 #endif
 #if HAS_ATTENUATION
-            meet_crossing(here, d, path);
+            interaction_cross(here, d, path);
 #endif
 #if HAS_NORMAL_MAPS
-            step_on(d, next, found_pdf, counts, side_next, s, rng, path);
+            path_extend(d, next, found_pdf, counts, side_next, s, rng, path);
 #else
-            step_on(d, next, found_pdf, counts, wi_next.z, s, rng, path);
+            path_extend(d, next, found_pdf, counts, wi_next.z, s, rng, path);
 #endif
             float found = counts ? 1.0 : 0.0;
 #if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
-            float light_pdf = lights_pdf(path.at.light, path.n, path.at, asker, d);
-            if (path.at.light != NONE) found = arriving_weight(found_pdf, light_pdf);
+            float light_pdf = lights_pdf(path.at.light, path.hit, path.at, context, d);
+            if (path.at.light != NONE) found = power_heuristic(found_pdf, light_pdf);
 #endif
-            step_gather(found, path);
+            path_add_emission(found, path);
         } while (path.alive && path.bounce < frame.max_bounces);
     }
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
-    vec3 arriving = arriving_outside(path.d, path.left_pdf, path.bounce > 0u);
+    vec3 arriving = arriving_outside(path.d, path.escaped_pdf, path.bounce > 0u);
 #if HAS_TRANSMISSION
-    arriving *= max(path.dense, 1.0);
+    arriving *= max(path.eta_scale, 1.0);
 #endif
-    if (path.left) path.color += path_clamp(path.throughput * arriving, path.bounce > 1u);
+    if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
 #endif
     // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word.
     path_was_cut = path.alive && path.bounce < frame.max_bounces;
-    if (path_was_cut) path.color = before; // what the last bounce has met may not be there
-    return path.color;
+    if (path_was_cut) path.radiance = before; // what the last bounce has met may not be there
+    return path.radiance;
 }

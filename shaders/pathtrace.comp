@@ -64,8 +64,8 @@ void main() {
     do {
         Sampler rng;
         vec3 o, d;
-        Nearest n;
-        Point at;
+        Hit hit;
+        SurfacePoint at;
 #if HAS_OPEN_VIEW
         // On to a sample that meets something, in a loop of its own: a machine that runs both sides of every `if` would
         // go through all that follows for the pixels of the sky.
@@ -74,9 +74,9 @@ void main() {
 #endif
             rng = sobol_begin(pixel, first + i, replicate);
             camera_ray(pixel, rng, o, d);
-            n = passing_nearest(o, d, NONE, 0u, rng, at);
+            hit = transparency_nearest(o, d, NONE, 0u, rng, at);
 #if HAS_OPEN_VIEW
-            missed = n.id == NONE;
+            missed = hit.id == NONE;
 #if HAS_ATTENUATION
             if (missed) add(path_sky(d, medium));
 #else
@@ -85,15 +85,15 @@ void main() {
             if (missed) i++;
             missed = missed && i < count;
         } while (missed);
-        if (n.id == NONE) break; // out of samples, or the driver has ended the loop
+        if (hit.id == NONE) break; // out of samples, or the driver has ended the loop
 #endif
         Path path;
 #if HAS_ATTENUATION
-        float alpha = path_begin(o, d, n, at, medium, path);
+        float alpha = path_begin(o, d, hit, at, medium, path);
 #else
-        float alpha = path_begin(o, d, n, at, path);
+        float alpha = path_begin(o, d, hit, at, path);
 #endif
-        add(vec4(path_go(rng, path), alpha));
+        add(vec4(path_radiance(rng, path), alpha));
         if (path_was_cut) break; // as this loop is by now
     } while (++i < count);
     if (i < count) atomicAdd(path_cut, count - i);

@@ -1,20 +1,20 @@
-// The production model: coat over sheen over a base that is mixed of metal, matte under a dielectric, and glass. Each
+// The production model: coat over sheen over a base that is mixed of metal, diffuse under a dielectric, and glass. Each
 // layer leaves 1 - max(E(o), E(i)) of its albedo E to what is under it, which is reciprocal and gains nothing
 // [Kulla & Conty 2017, section 4]. Departs from the 2012 course notes where their terms gain or lose light.
 #if HAS_PRINCIPLED
 
 // Chances of picking each lobe, summing to one.
 struct PrincipledWeights {
-    float matte;   // with what scatters between facets, above
-    float through; // that, below
-    float facets;
+    float diffuse;   // with what scatters between facets, above
+    float diffuse_below; // that, below
+    float microfacet;
     float sheen;
     float coat;
 };
 
 // What the layers above the base leave to it, between one direction outside and, where both are outside, another.
 float principled_layers(Surface s, float coat_i, float sheen_i) {
-    return (1.0 - max(s.coat_kept, coat_i)) * (1.0 - max(s.sheen_kept, sheen_i));
+    return (1.0 - max(s.coat_albedo, coat_i)) * (1.0 - max(s.sheen_albedo, sheen_i));
 }
 
 #if HAS_COAT_NORMALS
@@ -24,15 +24,15 @@ float principled_coat_cosine(Surface s, vec3 w) { return dot(s.coat.z, w); }
 #define principled_coat_cosine(s, w) w.z
 #endif
 
-float principled_coat_kept(Surface s, float c) {
+float principled_coat_albedo(Surface s, float c) {
 #if HAS_CLEARCOAT
-    return coat_kept(s, c);
+    return principled_clearcoat_albedo(s, c);
 #else
     return 0.0;
 #endif
 }
 
-float principled_sheen_kept(Surface s, float c) {
+float principled_sheen_albedo(Surface s, float c) {
 #if HAS_SHEEN
     return max_component(s.sheen) * energy_sheen(c, s.sheen_roughness);
 #else
@@ -40,8 +40,8 @@ float principled_sheen_kept(Surface s, float c) {
 #endif
 }
 
-vec4 principled_kept(Surface s, vec3 w) {
-    return energy_albedo(bsdf_turn(s, w), s.mirror ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+vec4 principled_albedo(Surface s, vec3 w) {
+    return energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
 }
 
 // `behind`: the surface is seen from the inner side of its geometry.
@@ -56,78 +56,78 @@ void principled_side(bool behind, inout Surface s) {
 void principled_face(vec3 wo, bool behind, inout Surface s) {
     if (s.model != MODEL_PRINCIPLED) return;
     principled_side(behind, s);
-    s.kept = principled_kept(s, wo);
-    s.kept_mean = energy_mean(s.mirror ? 0.0 : s.roughness, s.aspect, s.eta_outside);
+    s.albedo = principled_albedo(s, wo);
+    s.albedo_mean = energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
     // The layers lie on the outer side.
-    s.coat_kept = s.inside ? 0.0 : principled_coat_kept(s, principled_coat_cosine(s, wo));
-    s.sheen_kept = s.inside ? 0.0 : principled_sheen_kept(s, wo.z);
+    s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
+    s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);
 }
 
 // What comes back of light lost between facets: metal and dielectric as mixed.
-vec3 principled_share(Surface s) {
-    vec3 metal = scattered_share(s.base_color + (1.0 - s.base_color) / 21.0, s.kept_mean.x);
-    vec3 tinted = scattered_share(facets_tinted(s, fresnel_mean(s.eta_outside)), s.kept_mean.x);
+vec3 principled_multiscatter(Surface s) {
+    vec3 metal = multiscatter_fresnel(s.base_color + (1.0 - s.base_color) / 21.0, s.albedo_mean.x);
+    vec3 tinted = multiscatter_fresnel(microfacet_tinted(s, fresnel_mean(s.eta_outside)), s.albedo_mean.x);
     return mix(tinted * (1.0 - s.transmission), metal, s.metallic);
 }
 
 PrincipledWeights principled_weights(Surface s, vec3 wo) {
-    float clear = scattered_share(fresnel_mean(s.eta_outside), s.kept_mean.x);
+    float clear = multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x);
     PrincipledWeights w;
-    w.matte = matte_weight(s, scattered_kept(s.kept, clear))
-            + (1.0 - s.kept.x) * luminance(principled_share(s));
-    w.through = 0.0;
-    float facets = luminance(facets_fresnel(s, wo.z));
+    w.diffuse = principled_diffuse_weight(s, multiscatter_albedo(s.albedo, clear))
+            + (1.0 - s.albedo.x) * luminance(principled_multiscatter(s));
+    w.diffuse_below = 0.0;
+    float microfacet = luminance(microfacet_fresnel(s, wo.z));
 #if HAS_TRANSMISSION
-    facets += luminance(facets_through(s, wo.z));
-    if (scattered_glass(s)) {
+    microfacet += luminance(microfacet_transmittance(s, wo.z));
+    if (multiscatter_glass(s)) {
         float glass = (1.0 - s.metallic) * s.transmission;
-        float t = scattered_through(s), lost = glass * scattered_near(s, s.kept);
-        w.matte += lost * (1.0 - t);
-        w.through = lost * t * luminance(s.base_color);
-        facets *= 1.0 - lost;
+        float t = multiscatter_transmit_chance(s), lost = glass * multiscatter_near(s, s.albedo);
+        w.diffuse += lost * (1.0 - t);
+        w.diffuse_below = lost * t * luminance(s.base_color);
+        microfacet *= 1.0 - lost;
         // Where nearly all directions are wholly reflected, all of a rough lobe is nearly diffuse, and light stays for
         // many bounces: facets that lead nowhere would make weights grow with each.
         float share = s.inside ? s.eta * s.eta : 1.0; // of the directions inside, those that lead out
-        float spread = 0.6 * glass * sqr(sqr(s.roughness * (1.0 - share))) * facets;
-        facets -= spread;
-        w.matte += spread * (1.0 - share);
-        w.through += spread * share * luminance(s.base_color);
+        float spread = 0.6 * glass * sqr(sqr(s.roughness * (1.0 - share))) * microfacet;
+        microfacet -= spread;
+        w.diffuse += spread * (1.0 - share);
+        w.diffuse_below += spread * share * luminance(s.base_color);
     }
 #endif
     // The floor keeps the lobe sampled where it is faint from here: it rises to 1 towards grazing.
-    w.facets = max(0.05, facets);
+    w.microfacet = max(0.05, microfacet);
     float under = principled_layers(s, 0.0, 0.0);
-    w.matte *= under;
-    w.through *= under;
-    w.facets *= under;
+    w.diffuse *= under;
+    w.diffuse_below *= under;
+    w.microfacet *= under;
     w.sheen = 0.0;
     w.coat = 0.0;
 #if HAS_SHEEN
-    w.sheen = s.sheen_kept;
+    w.sheen = s.sheen_albedo;
 #endif
 #if HAS_CLEARCOAT
-    w.coat = s.coat_kept;
+    w.coat = s.coat_albedo;
 #endif
-    float inv = 1.0 / (w.matte + w.through + w.facets + w.sheen + w.coat);
-    return PrincipledWeights(w.matte * inv, w.through * inv, w.facets * inv, w.sheen * inv, w.coat * inv);
+    float inv = 1.0 / (w.diffuse + w.diffuse_below + w.microfacet + w.sheen + w.coat);
+    return PrincipledWeights(w.diffuse * inv, w.diffuse_below * inv, w.microfacet * inv, w.sheen * inv, w.coat * inv);
 }
 
 #if HAS_TRANSMISSION
 Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) {
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
     vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
-    vec3 f = scattered_transmit(s, principled_kept(s, wi));
-    float pdf = w.through * INV_PI * -wi.z;
-    vec3 wm = facets_between(s, wo_t, wi_t);
-    if (!s.mirror && !s.straight) {
-        pdf += w.facets * facets_transmit_folded(s, wo_t, wi_t);
+    vec3 f = multiscatter_transmit(s, principled_albedo(s, wi));
+    float pdf = w.diffuse_below * INV_PI * -wi.z;
+    vec3 wm = microfacet_half_vector(s, wo_t, wi_t);
+    if (!s.is_delta && !s.index_matched) {
+        pdf += w.microfacet * microfacet_transmit_folded(s, wo_t, wi_t);
         if (wm.z > 0.0) {
-            f += facets_transmit(s, wo_t, wi_t, wm);
-            pdf += w.facets * facets_transmit_pdf(s, wo_t, wi_t, wm);
+            f += microfacet_transmit(s, wo_t, wi_t, wm);
+            pdf += w.microfacet * microfacet_transmit_pdf(s, wo_t, wi_t, wm);
         }
     }
-    float coat_i = s.inside ? principled_coat_kept(s, principled_coat_cosine(s, wi)) : 0.0;
-    float sheen_i = s.inside ? principled_sheen_kept(s, wi.z) : 0.0;
+    float coat_i = s.inside ? principled_coat_albedo(s, principled_coat_cosine(s, wi)) : 0.0;
+    float sheen_i = s.inside ? principled_sheen_albedo(s, wi.z) : 0.0;
     return Scatter(f * principled_layers(s, coat_i, sheen_i), pdf);
 }
 #endif
@@ -143,29 +143,30 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     wi_t = bsdf_turn(s, wi);
     wm_t = bsdf_turn(s, wm);
 #endif
-    float clear = scattered_share(fresnel_mean(s.eta_outside), s.kept_mean.x);
-    vec4 kept_i = principled_kept(s, wi);
-    vec3 f = matte_eval(s, wo.z, wi.z, scattered_kept(s.kept, clear), scattered_kept(kept_i, clear),
-                        scattered_kept(s.kept_mean, clear));
-    f += scattered_reflect(s, kept_i, principled_share(s));
-    float pdf = w.matte * INV_PI * wi.z;
-    if (!s.mirror) {
-        f += facets_reflect(s, wo_t, wi_t, wm_t, cos_d);
-        pdf += w.facets * facets_reflect_pdf(s, wo_t, wm_t, cos_d);
+    float clear = multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x);
+    vec4 albedo_i = principled_albedo(s, wi);
+    vec3 f = principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
+                                     multiscatter_albedo(albedo_i, clear), multiscatter_albedo(s.albedo_mean, clear));
+    f += multiscatter_reflect(s, albedo_i, principled_multiscatter(s));
+    float pdf = w.diffuse * INV_PI * wi.z;
+    if (!s.is_delta) {
+        f += microfacet_reflect(s, wo_t, wi_t, wm_t, cos_d);
+        pdf += w.microfacet * microfacet_reflect_pdf(s, wo_t, wm_t, cos_d);
 #if HAS_TRANSMISSION
-        pdf += w.facets * facets_reflect_folded(s, wo_t, wi_t);
+        pdf += w.microfacet * microfacet_reflect_folded(s, wo_t, wi_t);
 #endif
     }
     if (!s.inside) {
-        float coat_i = principled_coat_kept(s, principled_coat_cosine(s, wi)), sheen_i = principled_sheen_kept(s, wi.z);
+        float coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
+        float sheen_i = principled_sheen_albedo(s, wi.z);
         f *= principled_layers(s, coat_i, sheen_i);
 #if HAS_SHEEN
-        f += fabric_eval(s, wo, wi) * (1.0 - max(s.coat_kept, coat_i));
-        pdf += w.sheen * fabric_pdf();
+        f += sheen_charlie_eval(s, wo, wi) * (1.0 - max(s.coat_albedo, coat_i));
+        pdf += w.sheen * sheen_charlie_pdf();
 #endif
 #if HAS_CLEARCOAT && !HAS_COAT_NORMALS
-        f += coat_eval(s, wo, wi, wm, cos_d);
-        pdf += w.coat * coat_pdf(s, wo, wm);
+        f += principled_clearcoat_eval(s, wo, wi, wm, cos_d);
+        pdf += w.coat * principled_clearcoat_pdf(s, wo, wm);
 #endif
     }
 #if HAS_TRANSMISSION
@@ -176,87 +177,89 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
 
 #if HAS_COAT_NORMALS
 // The coat alone, with the cosine: it may send light where the base's normal sees none.
-Scatter principled_coat(Surface s, vec3 wo, vec3 wi) {
+Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
     vec3 o = frame_to_local(s.coat, wo), i = frame_to_local(s.coat, wi);
     if (s.model != MODEL_PRINCIPLED || s.inside || o.z <= 0.0 || i.z <= 0.0) return Scatter(vec3(0.0), 0.0);
     vec3 wm = normalize(o + i);
-    return Scatter(vec3(coat_eval(s, o, i, wm, dot(o, wm)) * i.z), principled_weights(s, wo).coat * coat_pdf(s, o, wm));
+    float f = principled_clearcoat_eval(s, o, i, wm, dot(o, wm)) * i.z;
+    return Scatter(vec3(f), principled_weights(s, wo).coat * principled_clearcoat_pdf(s, o, wm));
 }
 #endif
 
-// A direction, and whether a perfectly specular lobe gave it: then `there` is its reflectance and its chance.
-vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool specular, out Scatter there
+// A direction, and whether a perfectly specular lobe gave it: then `scatter` is its reflectance and its chance.
+vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool is_delta, out Scatter scatter
 #if HAS_COAT_NORMALS
     , out bool coated
 #endif
 ) {
     PrincipledWeights w = principled_weights(s, wo);
-    there = Scatter(vec3(0.0), 0.0);
-    specular = false;
+    scatter = Scatter(vec3(0.0), 0.0);
+    is_delta = false;
     vec3 wi = sampling_cosine(u);
-    float v = u_lobe - w.matte;
+    float v = u_lobe - w.diffuse;
 #if HAS_TRANSMISSION
     if (v >= 0.0) wi.z = -wi.z;
-    v -= w.through;
+    v -= w.diffuse_below;
 #endif
-    vec3 facet = bsdf_turn_back(s, facets_sample(s, bsdf_turn(s, wo), clamp(v / w.facets, 0.0, 0.9999999), u));
+    vec3 facet = bsdf_turn_back(s, microfacet_sample(s, bsdf_turn(s, wo), clamp(v / w.microfacet, 0.0, 0.9999999), u));
     if (v >= 0.0) {
         wi = facet;
         bool below = facet.z < 0.0;
-        float chance = facets_choice(s, wo.z);
-        specular = s.mirror;
-        vec3 f = facets_fresnel(s, wo.z);
+        float chance = microfacet_reflect_chance(s, wo.z);
+        is_delta = s.is_delta;
+        vec3 f = microfacet_fresnel(s, wo.z);
 #if HAS_TRANSMISSION
-        if (below && s.straight) specular = true;
+        if (below && s.index_matched) is_delta = true;
         if (below) {
-            f = facets_through(s, wo.z);
+            f = microfacet_transmittance(s, wo.z);
             chance = 1.0 - chance;
         }
 #endif
-        float coat_i = s.coat_kept, sheen_i = s.sheen_kept; // a mirror's wi has wo's cosine
+        float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // a mirror's wi has wo's cosine
 #if HAS_TRANSMISSION
         if (below && s.inside) {
-            coat_i = principled_coat_kept(s, principled_coat_cosine(s, wi));
-            sheen_i = principled_sheen_kept(s, wi.z);
+            coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
+            sheen_i = principled_sheen_albedo(s, wi.z);
         }
 #endif
-        if (specular) there = Scatter(f * principled_layers(s, coat_i, sheen_i), w.facets * chance);
+        if (is_delta) scatter = Scatter(f * principled_layers(s, coat_i, sheen_i), w.microfacet * chance);
     }
-    v -= w.facets;
+    v -= w.microfacet;
 #if HAS_SHEEN
     if (v >= 0.0 && w.sheen > 0.0) {
-        wi = fabric_sample(u);
-        specular = false;
+        wi = sheen_charlie_sample(u);
+        is_delta = false;
     }
     v -= w.sheen;
 #endif
 #if HAS_CLEARCOAT
 #if HAS_COAT_NORMALS
-    vec3 coat = frame_to_world(s.coat, coat_sample(s, frame_to_local(s.coat, wo), u));
+    vec3 coat = frame_to_world(s.coat, principled_clearcoat_sample(s, frame_to_local(s.coat, wo), u));
     coated = v >= 0.0 && w.coat > 0.0;
 #else
-    vec3 coat = coat_sample(s, wo, u);
+    vec3 coat = principled_clearcoat_sample(s, wo, u);
 #endif
     if (v >= 0.0 && w.coat > 0.0) {
         wi = coat;
-        specular = s.coat_mirror;
-        if (specular) there = Scatter(vec3(s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), COAT_ETA)), w.coat);
+        is_delta = s.coat_is_delta;
+        float f = s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), CLEARCOAT_ETA);
+        if (is_delta) scatter = Scatter(vec3(f), w.coat);
     }
 #endif
     return wi;
 }
 
 // The chance that principled_sample's direction comes from a perfectly specular lobe.
-float principled_specular(Surface s, vec3 wo) {
+float principled_delta_chance(Surface s, vec3 wo) {
     PrincipledWeights w = principled_weights(s, wo);
     float p = 0.0;
-    float chance = facets_choice(s, wo.z);
+    float chance = microfacet_reflect_chance(s, wo.z);
 #if HAS_TRANSMISSION
-    if (s.straight) p = w.facets * (1.0 - chance);
+    if (s.index_matched) p = w.microfacet * (1.0 - chance);
 #endif
-    if (s.mirror) p = w.facets;
+    if (s.is_delta) p = w.microfacet;
 #if HAS_CLEARCOAT
-    if (s.coat_mirror) p += w.coat;
+    if (s.coat_is_delta) p += w.coat;
 #endif
     return p;
 }

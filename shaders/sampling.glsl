@@ -49,6 +49,12 @@ float sampling_angle(float y, float x) {
     return x < 0.0 ? PI - angle : angle;
 }
 
+// Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
+float power_heuristic(float a, float b) {
+    float r = b / a;
+    return 1.0 / (1.0 + r * r);
+}
+
 // Offset in the pixel, importance-sampled from the reconstruction filter, so that every sample weighs one
 // [Ernst, Stamminger, Greiner 2006]. The table holds the inverse of the half profile's distribution, in pixels, at
 // 1 - (1 - k / n)^4: dense in the tail, where the inverse is steep.

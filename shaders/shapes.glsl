@@ -1,7 +1,7 @@
 // Nearest hit and any hit. Shapes of a kind that is few stand in a loop of constant length, which compilers unroll:
 // their numbers are then loaded once for all lanes (on llvmpipe a tenth of the time of a load by varying index).
 // Kinds that are many go through the tree, but for their few largest, which would stand in every ray's way there.
-struct Point {
+struct SurfacePoint {
     vec3 p;
     vec3 error;   // bound on p's distance from the surface, per axis
     vec3 ng;      // geometric normal, unit, outward
@@ -29,71 +29,72 @@ struct Point {
 #include "shapes/triangle.glsl"
 #include "traverse.glsl"
 
-void shapes_take(uint kind, uint index, float t, vec2 uv, uvec2 skip, inout Nearest n) {
+void shapes_take(uint kind, uint index, float t, vec2 uv, uvec2 skip, inout Hit hit) {
     uint id = (kind << LEAF_KIND_SHIFT) | index;
-    if (t < n.t && id != skip.x && id != skip.y) n = Nearest(t, id, uv);
+    if (t < hit.t && id != skip.x && id != skip.y) hit = Hit(t, id, uv);
 }
 
-void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Nearest n) {
+void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
     Shear shear = triangle_shear(o, d);
 #if HAS_SPHERES
     for (uint i = 0u; i < uint(SPHERE_LOOP); i++) {
-        shapes_take(SHAPE_SPHERE, i, sphere_hit(sphere_load(i), o, d, n.t), n.uv, skip, n);
+        shapes_take(SHAPE_SPHERE, i, sphere_hit(sphere_load(i), o, d, hit.t), hit.uv, skip, hit);
     }
 #endif
 #if HAS_QUADS
     for (uint i = 0u; i < uint(QUAD_LOOP); i++) {
-        shapes_take(SHAPE_QUAD, i, quad_hit(quad_load(i), o, d, n.t), n.uv, skip, n);
+        shapes_take(SHAPE_QUAD, i, quad_hit(quad_load(i), o, d, hit.t), hit.uv, skip, hit);
     }
 #endif
 #if HAS_BOXES
     for (uint i = 0u; i < uint(BOX_LOOP); i++) {
-        shapes_take(SHAPE_BOX, i, box_hit(box_load(i), o, d, n.t), n.uv, skip, n);
+        shapes_take(SHAPE_BOX, i, box_hit(box_load(i), o, d, hit.t), hit.uv, skip, hit);
     }
 #endif
 #if HAS_ELLIPSOIDS
     for (uint i = 0u; i < uint(ELLIPSOID_LOOP); i++) {
-        shapes_take(SHAPE_ELLIPSOID, i, ellipsoid_hit(ellipsoid_load(i), o, d, n.t), n.uv, skip, n);
+        shapes_take(SHAPE_ELLIPSOID, i, ellipsoid_hit(ellipsoid_load(i), o, d, hit.t), hit.uv, skip, hit);
     }
 #endif
 #if HAS_TRIANGLES
     for (uint i = 0u; i < uint(TRIANGLE_LOOP); i++) {
-        vec2 uv = n.uv;
-        float t = triangle_hit(triangle_load(i), shear, d, n.t, uv);
-        shapes_take(SHAPE_TRIANGLE, i, t, uv, skip, n);
+        vec2 uv = hit.uv;
+        float t = triangle_hit(triangle_load(i), shear, d, hit.t, uv);
+        shapes_take(SHAPE_TRIANGLE, i, t, uv, skip, hit);
     }
 #endif
 #if HAS_BVH
-    traverse_tree(o, d, shear, skip, any, n);
+    traverse_tree(o, d, shear, skip, any, hit);
 #endif
 }
 
-// Nearest hit along o + t d, t in (0, infinity); n.id is NONE where nothing is met. `skip` is the flat shape that
+// Nearest hit along o + t d, t in (0, infinity); hit.id is NONE where nothing is met. `skip` is the flat shape that
 // the ray leaves.
-Nearest shapes_nearest(vec3 o, vec3 d, uint skip) {
-    Nearest n = Nearest(INFINITY_T, NONE, vec2(0.0));
-    shapes_intersect(o, d, uvec2(skip, NONE), false, n);
-    return n;
+Hit shapes_nearest(vec3 o, vec3 d, uint skip) {
+    Hit hit = Hit(INFINITY_T, NONE, vec2(0.0));
+    shapes_intersect(o, d, uvec2(skip, NONE), false, hit);
+    return hit;
 }
 
 // Whether anything stands in (0, t_max). `skip`: the flat shape that the ray leaves, and the lamp that it goes to. A
 // lamp is convex and was picked where it is seen, so it never hides that place; but near a sphere's rim the
 // distance to it is known to no better than the square root of a rounding.
 bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
-    Nearest n = Nearest(t_max, NONE, vec2(0.0));
-    shapes_intersect(o, d, skip, true, n);
-    return n.id != NONE;
+    Hit hit = Hit(t_max, NONE, vec2(0.0));
+    shapes_intersect(o, d, skip, true, hit);
+    return hit.id != NONE;
 }
 
-Point shapes_point(Nearest n, vec3 o, vec3 d) {
-    uint kind = n.id >> LEAF_KIND_SHIFT, index = n.id & LEAF_FIRST_MASK;
-    vec3 p = o + n.t * d;
+SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
+    uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK;
+    vec3 p = o + hit.t * d;
 #if HAS_TEXTURES
-    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0), vec4(1.0));
+    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
+                                  vec4(1.0));
 #elif HAS_ANISOTROPIC
-    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
+    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
 #else
-    Point r = Point(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
+    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
 #endif
     // llvmpipe reads all kinds, whichever was met: an index of another kind's array may be out of range, which
     // robust buffer access turns into 0.
@@ -101,7 +102,7 @@ Point shapes_point(Nearest n, vec3 o, vec3 d) {
     if (kind == SHAPE_SPHERE) r = sphere_point(sphere_pick(index), p);
 #endif
 #if HAS_QUADS || HAS_BVH_QUADS
-    if (kind == SHAPE_QUAD) r = quad_point(quad_pick(index), p, n.id);
+    if (kind == SHAPE_QUAD) r = quad_point(quad_pick(index), p, hit.id);
 #endif
 #if HAS_BOXES || HAS_BVH_BOXES
     if (kind == SHAPE_BOX) r = box_point(box_pick(index), p);
@@ -110,23 +111,23 @@ Point shapes_point(Nearest n, vec3 o, vec3 d) {
     if (kind == SHAPE_ELLIPSOID) r = ellipsoid_point(ellipsoid_pick(index), p);
 #endif
 #if HAS_INSTANCES
-    // Of what is in an instance, below NONE. Asked as `n.id != NONE && ...` a driver takes n.id for NONE in lanes that
-    // have left the loop of passing.glsl (Mesa 22.3).
-    bool within = int(n.id) < -1;
+    // Ids of triangles in instances are negative and below NONE. Written as `hit.id != NONE && ...` this goes wrong: a
+    // driver (Mesa 22.3) takes hit.id for NONE in lanes that have left the loop of transparency.glsl.
+    bool within = int(hit.id) < -1;
     if (within || kind == SHAPE_TRIANGLE) {
         Instance it = instance_none();
         if (within) {
-            it = instance_load(instance_number(n.id));
-            index = it.first + instance_triangle(n.id);
+            it = instance_load(instance_number(hit.id));
+            index = it.first + instance_triangle(hit.id);
         }
-        r = triangle_point(triangle_pick(index), n.uv, index, n.id, it);
+        r = triangle_point(triangle_pick(index), hit.uv, index, hit.id, it);
         if (within) {
             r.material = it.material;
             r.shape = it.shape;
         }
     }
 #elif HAS_TRIANGLES || HAS_BVH_TRIANGLES
-    if (kind == SHAPE_TRIANGLE) r = triangle_point(triangle_pick(index), n.uv, index, n.id);
+    if (kind == SHAPE_TRIANGLE) r = triangle_point(triangle_pick(index), hit.uv, index, hit.id);
 #endif
     return r;
 }
@@ -139,7 +140,7 @@ float shapes_next(float x, bool up) { // the float after x
 
 // Where a ray leaves p towards w: beyond the error of p along the geometric normal, rounded away from the
 // surface [Pharr, Jakob, Humphreys 2023, section 6.8].
-vec3 shapes_leave(Point s, vec3 w) {
+vec3 shapes_leave(SurfacePoint s, vec3 w) {
     float d = dot(abs(s.ng), s.error);
     vec3 by = dot(w, s.ng) < 0.0 ? -d * s.ng : d * s.ng;
     vec3 o = s.p + by;

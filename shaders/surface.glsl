@@ -19,16 +19,16 @@ struct Surface {
     float eta_outside;     // index inside over outside
     float eta;             // index beyond the surface over index on wo's side
     bool inside;           // wo is inside a body that transmits
-    bool mirror;           // the base is perfectly smooth
-    bool straight;         // the index is 1: rays pass as if nothing were there
-    bool coat_mirror;
+    bool is_delta;           // the base is perfectly smooth
+    bool index_matched;         // the index is 1: rays pass as if nothing were there
+    bool coat_is_delta;
     vec3 specular_color;
     float aspect;          // of the specular lobe, 1 where it is round
     float sheen_roughness;
-    vec4 kept;             // energy_albedo at wo
-    vec4 kept_mean;
-    float coat_kept;       // share of light that the coat and the sheen keep from what is under them, at wo
-    float sheen_kept;
+    vec4 albedo;             // energy_albedo at wo
+    vec4 albedo_mean;
+    float coat_albedo;       // share of light that the coat and the sheen keep from what is under them, at wo
+    float sheen_albedo;
 #if HAS_COAT_NORMALS
     Basis coat;            // the coat's own frame, in the shading frame
 #endif
@@ -46,15 +46,15 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
     s.specular_color = m.specular_color * mix(vec3(1.0), tint, m.specular_tint);
     float f0 = sqrt(0.08 * m.specular);
     s.eta_outside = m.ior >= 1.0 ? m.ior : (1.0 + f0) / (1.0 - f0);
-    s.straight = s.eta_outside < 1.0001;
-    if (s.straight) s.eta_outside = 1.0;
+    s.index_matched = s.eta_outside < 1.0001;
+    if (s.index_matched) s.eta_outside = 1.0;
     s.eta = s.eta_outside;
     s.transmission = 0.0;
     s.inside = false;
 #if HAS_TRANSMISSION
     s.transmission = m.transmission;
 #endif
-    s.mirror = m.roughness < SURFACE_LEAST_ROUGHNESS;
+    s.is_delta = m.roughness < SURFACE_LEAST_ROUGHNESS;
     s.aspect = 1.0;
 #if HAS_ANISOTROPIC
     s.aspect = sqrt(1.0 - 0.9 * m.anisotropic);
@@ -70,9 +70,9 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
     s.sheen *= 1.0 - m.metallic;
     s.sheen_roughness = max(m.sheen_roughness, ENERGY_LEAST_SHEEN_ROUGHNESS);
 #endif
-    s.coat_mirror = false;
+    s.coat_is_delta = false;
 #if HAS_CLEARCOAT
-    s.coat_mirror = m.clearcoat_roughness >= 0.0 && m.clearcoat_roughness < SURFACE_LEAST_ROUGHNESS;
+    s.coat_is_delta = m.clearcoat_roughness >= 0.0 && m.clearcoat_roughness < SURFACE_LEAST_ROUGHNESS;
     float rough = max(m.clearcoat_roughness, SURFACE_LEAST_ROUGHNESS);
     s.alpha_coat = m.clearcoat_roughness >= 0.0 ? rough * rough : mix(0.1, 0.001, m.clearcoat_gloss);
 #endif

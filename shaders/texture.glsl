@@ -56,7 +56,7 @@ void texture_axis(float x, uint n, uint flags, out int a, out int b, out float s
     if (b > last) b = stays ? last : 0;
 }
 
-vec4 texture_sample(TextureSlot s, Point at) {
+vec4 texture_sample(TextureSlot s, SurfacePoint at) {
     vec2 uv = at.uv;
 #if HAS_UVS_1
     if ((s.flags & TEXTURE_SLOT_UV_1) != 0u) uv = at.uv_1;
@@ -82,7 +82,7 @@ vec4 texture_sample(TextureSlot s, Point at) {
 }
 
 // The texels of all slots that a surface is made from.
-void texture_look(Point at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
+void texture_look(SurfacePoint at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     texels[0] = vec4(0.0);
     for (uint k = 0u; k < uint(TEXTURE_SURFACE_SLOTS); k++) {
         texels[k] = texture_sample(texture_slot_pick(at.material, k), at);
@@ -90,7 +90,7 @@ void texture_look(Point at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
 }
 
 // The material as it is there.
-Material texture_material(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
+Material texture_material(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     Material m = material_pick(at.material);
     texture_members(at.material, texels, m);
 #if HAS_VERTEX_COLORS
@@ -100,7 +100,7 @@ Material texture_material(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) 
 }
 
 // The chance that a ray meets the surface there. An alpha's cutoff is compared with the filtered texel.
-float texture_opacity(Point at) {
+float texture_opacity(SurfacePoint at) {
     Material m = material_pick(at.material);
     float opacity = m.opacity;
 #if TEXTURE_OPACITY >= 0
@@ -118,7 +118,7 @@ float texture_opacity(Point at) {
     return opacity;
 }
 
-vec3 texture_emission(Point at) {
+vec3 texture_emission(SurfacePoint at) {
     vec3 emission = material_pick(at.material).emission;
 #if TEXTURE_EMISSION >= 0
     texture_use_emission(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_EMISSION)), at), emission);
@@ -126,7 +126,7 @@ vec3 texture_emission(Point at) {
     return emission;
 }
 
-vec3 texture_ambient(Point at) {
+vec3 texture_ambient(SurfacePoint at) {
     vec3 ambient = material_pick(at.material).ambient;
 #if TEXTURE_AMBIENT >= 0
     texture_use_ambient(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_AMBIENT)), at), ambient);
@@ -137,7 +137,7 @@ vec3 texture_ambient(Point at) {
 #if HAS_NORMAL_MAPS
 // The shading normal n bent as a normal map has it: red along growing u, green along growing v, blue outwards. They are
 // the image's own: where it is turned or mirrored on the surface, so are its bumps. Scaling leaves their slopes.
-vec3 texture_bent(Point at, vec3 n, vec4 texel, TextureSlot s, float strength) {
+vec3 texture_bent(SurfacePoint at, vec3 n, vec4 texel, TextureSlot s, float strength) {
     vec3 t = 2.0 * texel.xyz - 1.0;
     vec2 u = s.turn.xz, v = s.turn.yw;
     t.xy = vec2(dot(t.xy, u) * inversesqrt(max(dot(u, u), 1e-30)), dot(t.xy, v) * inversesqrt(max(dot(v, v), 1e-30)));
@@ -151,7 +151,7 @@ vec3 texture_bent(Point at, vec3 n, vec4 texel, TextureSlot s, float strength) {
 }
 
 // The base's shading normal, outward; whether a map bent it.
-bool texture_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
+bool texture_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
     bool mapped = false;
 #if TEXTURE_NORMAL >= 0
     TextureUse use = texture_use_pick(at.material, TEXTURE_NORMAL_USE);
@@ -163,7 +163,7 @@ bool texture_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout 
 }
 
 // The coat's own.
-bool texture_coat_normal(Point at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
+bool texture_coat_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
     bool mapped = false;
 #if TEXTURE_COAT_NORMAL >= 0
     TextureUse use = texture_use_pick(at.material, TEXTURE_COAT_NORMAL_USE);

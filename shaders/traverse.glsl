@@ -16,7 +16,7 @@ const float TRAVERSE_SLACK = 1.0000007;
 // What stands nearer to a lamp than 2^-16 of the distance casts no shadow from there.
 const float TRAVERSE_REACH = 0.9999847;
 
-struct Nearest {
+struct Hit {
     float t;
     uint id; // kind << 28 | index; of what is in an instance see instance_id
     vec2 uv; // barycentric, triangles only
@@ -42,40 +42,40 @@ struct Within {
     uint material;
 };
 
-void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, Within at, uvec2 skip, inout Nearest n) {
+void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, Within at, uvec2 skip, inout Hit hit) {
     uint id = at.number != NONE ? instance_id(at.number, index) : (kind << LEAF_KIND_SHIFT) | index;
 #else
-void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 skip, inout Nearest n) {
+void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 skip, inout Hit hit) {
     uint id = (kind << LEAF_KIND_SHIFT) | index;
 #endif
-    float t = n.t;
-    vec2 uv = n.uv;
+    float t = hit.t;
+    vec2 uv = hit.uv;
 #if HAS_BVH_SPHERES
-    if (kind == SHAPE_SPHERE) t = sphere_hit(sphere_tree_load(index), o, d, n.t);
+    if (kind == SHAPE_SPHERE) t = sphere_hit(sphere_tree_load(index), o, d, hit.t);
 #endif
 #if HAS_BVH_QUADS
-    if (kind == SHAPE_QUAD) t = quad_hit(quad_tree_load(index), o, d, n.t);
+    if (kind == SHAPE_QUAD) t = quad_hit(quad_tree_load(index), o, d, hit.t);
 #endif
 #if HAS_BVH_BOXES
-    if (kind == SHAPE_BOX) t = box_hit(box_tree_load(index), o, d, n.t);
+    if (kind == SHAPE_BOX) t = box_hit(box_tree_load(index), o, d, hit.t);
 #endif
 #if HAS_BVH_ELLIPSOIDS
-    if (kind == SHAPE_ELLIPSOID) t = ellipsoid_hit(ellipsoid_tree_load(index), o, d, n.t);
+    if (kind == SHAPE_ELLIPSOID) t = ellipsoid_hit(ellipsoid_tree_load(index), o, d, hit.t);
 #endif
 #if HAS_INSTANCES
     if (kind == SHAPE_TRIANGLE) {
         Triangle tri = triangle_tree_load(at.first + index);
         if (at.number != NONE) tri.material = at.material;
-        t = triangle_hit(tri, shear, d, n.t, uv);
+        t = triangle_hit(tri, shear, d, hit.t, uv);
     }
 #elif HAS_BVH_TRIANGLES
-    if (kind == SHAPE_TRIANGLE) t = triangle_hit(triangle_tree_load(index), shear, d, n.t, uv);
+    if (kind == SHAPE_TRIANGLE) t = triangle_hit(triangle_tree_load(index), shear, d, hit.t, uv);
 #endif
-    if (t < n.t && id != skip.x && id != skip.y) n = Nearest(t, id, uv);
+    if (t < hit.t && id != skip.x && id != skip.y) hit = Hit(t, id, uv);
 }
 
-// Nearest hit, or with `any` just some hit, before n.t.
-void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Nearest n) {
+// Nearest hit, or with `any` just some hit, before hit.t.
+void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Hit hit) {
     vec3 safe = mix(d, vec3(1e-20), lessThan(abs(d), vec3(1e-20)));
     vec3 inv = 1.0 / safe;
     vec3 scale = frame.node_scale * inv, bias = (frame.node_origin - o) * inv;
@@ -83,16 +83,16 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
     uvec3 swap_far = 16u - swap;
     uint octant = (safe.x < 0.0 ? 1u : 0u) | (safe.y < 0.0 ? 2u : 0u) | (safe.z < 0.0 ? 4u : 0u);
     uint i = octant * frame.node_count;
-    uint end = i + (any && n.id != NONE ? 0u : frame.node_count); // the loops may have met something already
+    uint end = i + (any && hit.id != NONE ? 0u : frame.node_count); // the loops may have met something already
     uint treelets = 8u * frame.node_count;
     uint after = 0u, last = NONE; // where to go on after a treelet, and where it ends; NONE: in none
     bool more;
-    float start = n.t;
+    float start = hit.t;
 #if HAS_INSTANCES
     // In an instance o and d are the ray in its space: t is the same there. The rest: where the scene's tree goes on.
     vec3 o_w = o, d_w = d;
     Within at = Within(NONE, frame.node_first, 0u, 0u);
-    bool ended = any && n.id != NONE; // before it began
+    bool ended = any && hit.id != NONE; // before it began
     uint on = 0u, on_after = 0u, on_last = NONE;
 #endif
     float reach = any && skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
@@ -112,7 +112,7 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
             vec3 lo = vec3((w.xyz >> swap) & 0xffffu) * scale + bias;
             vec3 hi = vec3((w.xyz >> swap_far) & 0xffffu) * scale + bias;
             float near = max(max(lo.x, lo.y), max(lo.z, 0.0));
-            float far = min(min(min(hi.x, hi.y), hi.z) * TRAVERSE_SLACK, n.t * reach);
+            float far = min(min(min(hi.x, hi.y), hi.z) * TRAVERSE_SLACK, hit.t * reach);
             bool met = near <= far;
             bool is_leaf = (w.w & LEAF_BIT) != 0u;
 #if HAS_INSTANCES
@@ -147,9 +147,9 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
             LeafRange range = traverse_range(leaf);
             do {
 #if HAS_INSTANCES
-                traverse_test(range.kind, range.index, o, d, shear, at, skip, n);
+                traverse_test(range.kind, range.index, o, d, shear, at, skip, hit);
 #else
-                traverse_test(range.kind, range.index, o, d, shear, skip, n);
+                traverse_test(range.kind, range.index, o, d, shear, skip, hit);
 #endif
                 range.index++;
                 if (range.index == range.end) {
@@ -157,10 +157,10 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
                     earlier = 0u;
                     range = traverse_range(leaf);
                 }
-            } while (leaf != 0u && !(any && n.t < start));
+            } while (leaf != 0u && !(any && hit.t < start));
         }
 #if HAS_INSTANCES
-    } while (more && met_instance == NONE && !(any && n.t < start));
+    } while (more && met_instance == NONE && !(any && hit.t < start));
     // All lanes change trees together: in the loop above it would be done, masked, with every leaf.
     bool enters = met_instance != NONE;
     if (enters || (!more && at.number != NONE)) {
@@ -190,8 +190,8 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Near
         last = enters ? NONE : on_last;
         more = i < end || last != NONE;
     }
-    } while (more && !(any && n.t < start));
+    } while (more && !(any && hit.t < start));
 #else
-    } while (more && !(any && n.t < start));
+    } while (more && !(any && hit.t < start));
 #endif
 }

@@ -1,13 +1,13 @@
 // An ellipsoid, sampled uniformly over the unit sphere it is an image of. An area element of that sphere with
 // normal n grows by |det A| |A^-T n| under the map A. Its inside is seen from inside, and through the near half where a
-// ray may pass that, with the chance `veil`.
+// ray may pass that, with the chance `transparency`.
 float ellipsoid_light_density(Solid s, vec3 q) { // per area
     mat3 axes = solid_axes(s);
     vec3 n = q.x * s.row_x + q.y * s.row_y + q.z * s.row_z;
     return 1.0 / (4.0 * PI * abs(determinant(axes)) * length(n));
 }
 
-float ellipsoid_light_pdf(Solid s, float t, Point at, vec3 wi, uint sides) {
+float ellipsoid_light_pdf(Solid s, float t, SurfacePoint at, vec3 wi, uint sides) {
     float c = -dot(wi, at.ng);
 #if HAS_EMISSION_BOTH
     if (sides == 2u) c = abs(c);
@@ -15,16 +15,16 @@ float ellipsoid_light_pdf(Solid s, float t, Point at, vec3 wi, uint sides) {
     return c > 0.0 ? ellipsoid_light_density(s, normalize(solid_rows(s, at.p - s.center))) * t * t / c : 0.0;
 }
 
-LightSample ellipsoid_light_sample(Solid s, vec3 p, vec2 u, uint sides, float veil) {
+LightSample ellipsoid_light_sample(Solid s, vec3 p, vec2 u, uint sides, float transparency) {
     vec3 q = sampling_sphere(u);
-    Point at = solid_point(s, q, q);
+    SurfacePoint at = solid_point(s, q, q);
     vec3 side = at.ng;
     float share = 1.0;
 #if HAS_EMISSION_BOTH
     if (sides == 2u) {
         side = p - at.p;
         vec3 f = solid_rows(s, p - s.center);
-        if (dot(side, at.ng) < 0.0 && dot(f, f) > 1.0) share = veil;
+        if (dot(side, at.ng) < 0.0 && dot(f, f) > 1.0) share = transparency;
     }
 #endif
     vec3 to = shapes_leave(at, side) - p;

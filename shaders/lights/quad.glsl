@@ -77,7 +77,7 @@ LightSample quad_light_sample(Quad q, vec3 p, vec2 u, uint sides) {
     QuadView w = quad_light_view(q, p);
     if (!quad_light_shines(q, p, sides)) return lights_none();
     vec2 place = w.s > 0.0 ? quad_light_place(w, u) : u;
-    Point at;
+    SurfacePoint at;
     at.p = q.origin + place.x * q.u + place.y * q.v;
     at.ng = q.normal;
     at.error = gamma_error(6.0) * (abs(q.origin) + abs(q.u) + abs(q.v));

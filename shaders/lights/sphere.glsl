@@ -1,6 +1,6 @@
 // A sphere seen from outside: uniform over the cone it fills [Pharr, Jakob, Humphreys 2023, section 6.2.4]. From
-// inside, where that side shines too: uniform over all directions. `veil` is the chance that a ray passes through
-// the surface: the inside of the far half is then seen through the near one, and gets half of the samples.
+// inside, where that side shines too: uniform over all directions. `transparency` is the chance that a ray passes
+// through the surface: the inside of the far half is then seen through the near one, and gets half of the samples.
 
 // 1 - cos of the cone's half angle, without cancelling for small or far spheres; 2 from inside.
 float sphere_light_cap(Sphere s, vec3 p) {
@@ -9,15 +9,15 @@ float sphere_light_cap(Sphere s, vec3 p) {
     return sin2 < 1.0 ? sin2 / (1.0 + sqrt(1.0 - sin2)) : 2.0;
 }
 
-float sphere_light_density(float cap, uint sides, float veil) {
-    return (sides == 2u && veil > 0.0 && cap < 2.0 ? 0.5 : 1.0) / (TWO_PI * cap);
+float sphere_light_density(float cap, uint sides, float transparency) {
+    return (sides == 2u && transparency > 0.0 && cap < 2.0 ? 0.5 : 1.0) / (TWO_PI * cap);
 }
 
-float sphere_light_pdf(Sphere s, vec3 p, uint sides, float veil) {
-    return sphere_light_density(sphere_light_cap(s, p), sides, veil);
+float sphere_light_pdf(Sphere s, vec3 p, uint sides, float transparency) {
+    return sphere_light_density(sphere_light_cap(s, p), sides, transparency);
 }
 
-LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float veil) {
+LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float transparency) {
     float cap = sphere_light_cap(s, p);
     bool inside = cap == 2.0;
     if (inside && sides == 1u) return lights_none();
@@ -26,9 +26,9 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float veil
     float share = 1.0;
     bool far = inside;
 #if HAS_EMISSION_BOTH && HAS_OPACITY
-    if (!inside && sides == 2u && veil > 0.0) {
+    if (!inside && sides == 2u && transparency > 0.0) {
         far = u.x >= 0.5;
-        share = far ? veil : 1.0;
+        share = far ? transparency : 1.0;
         u.x = far ? 2.0 * u.x - 1.0 : 2.0 * u.x;
     }
 #endif
@@ -39,11 +39,11 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float veil
     vec3 wi = frame_to_world(b, vec3(r * cos(phi), r * sin(phi), cos_t));
     // Where the ray meets the sphere, from the triangle of p, the centre and that point.
     float reach = sqrt(max(0.0, s.radius * s.radius - d2 * sin2));
-    Point at;
+    SurfacePoint at;
     at.ng = normalize(wi * (sqrt(d2) * cos_t + (far ? reach : -reach)) - to);
     at.p = s.center + s.radius * at.ng;
     at.error = gamma_error(6.0) * (abs(s.center) + s.radius);
     vec3 target = shapes_leave(at, -wi);
-    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(share), sphere_light_density(cap, sides, veil), true,
+    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(share), sphere_light_density(cap, sides, transparency), true,
                        NONE);
 }

@@ -81,7 +81,7 @@ LightSample triangle_light_sample(Triangle tri, vec3 p, vec2 u, uint sides) {
         place = clamp(vec2(dot(o, r), dot(d, k)) * inv, vec2(0.0), vec2(1.0));
         place /= max(1.0, place.x + place.y);
     }
-    Point at = triangle_point(tri, place, 0u, NONE);
+    SurfacePoint at = triangle_point(tri, place, 0u, NONE);
     if (!triangle_light_shines(tri, p, at.ng, sides)) return lights_none();
     vec3 to = shapes_leave(at, p - at.p) - p;
     float t = length(to);

@@ -14,16 +14,16 @@ vec3 blinn_phong_eval(Surface s, vec3 wi, vec3 wm) {
 }
 
 // Chance of the diffuse lobe: the highlight sends back at most 8 / (n + 2) of its colour, and never above 2.
-float blinn_phong_matte(Surface s) {
-    float matte = luminance(s.base_color);
+float blinn_phong_diffuse_chance(Surface s) {
+    float diffuse = luminance(s.base_color);
     float shine = luminance(s.phong) * min(2.0, 8.0 / (s.shininess + 2.0));
-    return matte + shine > 0.0 ? matte / (matte + shine) : 1.0;
+    return diffuse + shine > 0.0 ? diffuse / (diffuse + shine) : 1.0;
 }
 
 // Half vectors of density (n + 1) / (2 pi) z^n.
 float blinn_phong_pdf(Surface s, vec3 wi, vec3 wm, float cos_d) {
     float half_pdf = (s.shininess + 1.0) * (0.5 * INV_PI) * blinn_phong_power(wm, s.shininess);
-    return mix(half_pdf / (4.0 * max(cos_d, 1e-6)), diffuse_pdf(wi), blinn_phong_matte(s));
+    return mix(half_pdf / (4.0 * max(cos_d, 1e-6)), lambert_pdf(wi), blinn_phong_diffuse_chance(s));
 }
 
 vec3 blinn_phong_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
@@ -33,5 +33,5 @@ vec3 blinn_phong_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     float r = sqrt(sin2), phi = TWO_PI * u.x;
     vec3 wm = vec3(r * cos(phi), r * sin(phi), sqrt(1.0 - sin2));
     vec3 mirrored = 2.0 * dot(wo, wm) * wm - wo;
-    return u_lobe < blinn_phong_matte(s) ? diffuse_sample(u) : mirrored;
+    return u_lobe < blinn_phong_diffuse_chance(s) ? lambert_sample(u) : mirrored;
 }

@@ -3,20 +3,20 @@
 
 vec3 metal_rough_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
-    return (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color + specular_eval(s, wo, wi, wm, cos_d);
+    return (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color + disney_specular_eval(s, wo, wi, wm, cos_d);
 }
 
 // Chance of the diffuse lobe.
-float metal_rough_matte(Surface s, vec3 wo) {
-    float matte = (1.0 - s.metallic) * luminance(s.base_color);
-    return matte / (matte + specular_weight(s, wo));
+float metal_rough_diffuse_chance(Surface s, vec3 wo) {
+    float diffuse = (1.0 - s.metallic) * luminance(s.base_color);
+    return diffuse / (diffuse + disney_specular_weight(s, wo));
 }
 
 float metal_rough_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
-    return mix(specular_pdf(s, wo, wm), diffuse_pdf(wi), metal_rough_matte(s, wo));
+    return mix(disney_specular_pdf(s, wo, wm), lambert_pdf(wi), metal_rough_diffuse_chance(s, wo));
 }
 
 vec3 metal_rough_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    vec3 mirrored = specular_sample(s, wo, u);
-    return u_lobe < metal_rough_matte(s, wo) ? diffuse_sample(u) : mirrored;
+    vec3 mirrored = disney_specular_sample(s, wo, u);
+    return u_lobe < metal_rough_diffuse_chance(s, wo) ? lambert_sample(u) : mirrored;
 }

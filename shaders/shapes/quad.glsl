@@ -10,8 +10,8 @@ float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
     return inside && t > 0.0 && t < t_max ? t : t_max;
 }
 
-Point quad_point(Quad q, vec3 p, uint id) {
-    Point r;
+SurfacePoint quad_point(Quad q, vec3 p, uint id) {
+    SurfacePoint r;
     vec3 w = p - q.origin;
     r.p = p - dot(w, q.normal) * q.normal; // onto the plane: what is left is the rounding of this line
     r.error = gamma_error(8.0) * (abs(q.origin) + abs(w) + abs(p));

@@ -13,8 +13,8 @@ vec3 solid_error(Solid s, mat3 axes) {
     return gamma_error(16.0) * (abs(s.center) + abs(axes[0]) + abs(axes[1]) + abs(axes[2]));
 }
 
-Point solid_point(Solid s, vec3 q, vec3 n) {
-    Point r;
+SurfacePoint solid_point(Solid s, vec3 q, vec3 n) {
+    SurfacePoint r;
     mat3 axes = solid_axes(s);
     r.p = s.center + axes * q;
     r.error = solid_error(s, axes);
@@ -49,9 +49,9 @@ float ellipsoid_hit(Solid s, vec3 o, vec3 d, float t_max) {
     return disc >= 0.0 && t > 0.0 && t < t_max ? t : t_max;
 }
 
-Point ellipsoid_point(Solid s, vec3 p) {
+SurfacePoint ellipsoid_point(Solid s, vec3 p) {
     vec3 q = normalize(solid_rows(s, p - s.center));
-    Point r = solid_point(s, q, q);
+    SurfacePoint r = solid_point(s, q, q);
 #if HAS_ANISOTROPIC || HAS_TEXTURES
     vec3 t = dot(q.xz, q.xz) > 0.0 ? vec3(q.z, 0.0, -q.x) : vec3(1.0, 0.0, 0.0);
     r.tangent = solid_axes(s) * t;
@@ -72,7 +72,7 @@ float box_hit(Solid s, vec3 o, vec3 d, float t_max) {
     return near <= far && t > 0.0 && t < t_max ? t : t_max;
 }
 
-Point box_point(Solid s, vec3 p) {
+SurfacePoint box_point(Solid s, vec3 p) {
     vec3 q = solid_rows(s, p - s.center);
     vec3 a = abs(q);
     float m = max(a.x, max(a.y, a.z));
@@ -83,7 +83,7 @@ Point box_point(Solid s, vec3 p) {
     vec3 edge = vec3(dot(abs(s.row_x), error), dot(abs(s.row_y), error), dot(abs(s.row_z), error));
     vec3 room = max(vec3(0.0), 1.0 - edge);
     q = mix(clamp(q, -room, room), n, notEqual(n, vec3(0.0)));
-    Point r = solid_point(s, q, n);
+    SurfacePoint r = solid_point(s, q, n);
 #if HAS_ANISOTROPIC || HAS_TEXTURES
     // u to the right seen from outside: faces of x along -z or +z, of y along +x, of z along +x or -x.
     vec3 t = n.x != 0.0 ? vec3(0.0, 0.0, -n.x) : n.y != 0.0 ? vec3(1.0, 0.0, 0.0) : vec3(n.z, 0.0, 0.0);

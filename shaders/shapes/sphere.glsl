@@ -34,8 +34,8 @@ vec2 sphere_uv(vec3 n) {
 }
 #endif
 
-Point sphere_point(Sphere s, vec3 p) {
-    Point r;
+SurfacePoint sphere_point(Sphere s, vec3 p) {
+    SurfacePoint r;
     r.ng = normalize(p - s.center);
     r.p = s.center + s.radius * r.ng;
     r.error = gamma_error(6.0) * (abs(s.center) + s.radius);

@@ -73,7 +73,7 @@ ivec2 triangle_corner(uint index, uint k) {
 }
 
 // Texture coordinates and vertex colours at the weights b.
-void triangle_detail(uint index, vec3 b, inout Point r) {
+void triangle_detail(uint index, vec3 b, inout SurfacePoint r) {
     r.uv = vec2(0.0);
     r.uv_1 = vec2(0.0);
     r.color = vec4(1.0);
@@ -111,8 +111,8 @@ vec3 triangle_tangent(uint normal, uint bits, uint k) {
 #endif
 
 #if HAS_INSTANCES
-Point triangle_point(Triangle tri, vec2 uv, uint index, uint id, Instance it) {
-    Point r;
+SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id, Instance it) {
+    SurfacePoint r;
     mat3 axes = instance_axes(it);
     tri.v0 = axes * tri.v0;
     tri.v1 = axes * tri.v1;
@@ -122,8 +122,8 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id, Instance it) {
     r.ng = across / twice_area;
     r.error = gamma_error(7.0) * (abs(tri.v0) + abs(tri.v1) + abs(tri.v2)) + ULP * it.error;
 #else
-Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
-    Point r;
+SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
+    SurfacePoint r;
     vec3 e1 = tri.v1 - tri.v0, e2 = tri.v2 - tri.v0, across = cross(e1, e2);
     float twice_area = length(across);
     r.ng = across / twice_area;
@@ -182,7 +182,7 @@ Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
 }
 
 #if HAS_INSTANCES
-Point triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
+SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     return triangle_point(tri, uv, index, id, instance_none());
 }
 #endif

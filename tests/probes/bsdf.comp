@@ -24,11 +24,11 @@ void main() {
     principled_face(wo, INSIDE == 1, s);
 #endif
 #if SAMPLE && HAS_PRINCIPLED
-    Sampled picked = bsdf_pick(s, wo, ask.x, ask.yz);
+    BsdfSample picked = bsdf_pick(s, wo, ask.x, ask.yz);
     vec3 wi = picked.wi;
     Scatter f = bsdf_eval(s, wo, wi);
-    if (picked.specular) {
-        f = picked.there;
+    if (picked.is_delta) {
+        f = picked.scatter;
         specular = 1.0;
     }
 #elif SAMPLE

@@ -17,7 +17,7 @@ uniform uint count;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    Asker at = Asker(p, n, through != 0u);
+    LightContext at = LightContext(p, n, through != 0u);
 #if SAMPLE
     Light l = lights_pick(asks[i].x, at);
     answers[i] = vec4(float(l.index), l.probability, 0.0, 0.0);

@@ -15,14 +15,14 @@ void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
     vec3 o = origins[i].xyz, d = directions[i].xyz;
-    Nearest n = shapes_nearest(o, d, NONE);
-    Point at = shapes_point(n, o, d);
+    Hit hit = shapes_nearest(o, d, NONE);
+    SurfacePoint at = shapes_point(hit, o, d);
     vec3 side = dot(at.ng, d) < 0.0 ? at.ng : -at.ng;
     vec3 w = aways[i].xyz;
     w = normalize(dot(w, side) < 0.0 ? -w : w);
-    Nearest again = shapes_nearest(shapes_leave(at, w), w, at.flat_id);
-    bool met = n.id != NONE;
-    hits[i] = vec4(at.ng, met ? n.t : -1.0);
+    Hit again = shapes_nearest(shapes_leave(at, w), w, at.flat_id);
+    bool met = hit.id != NONE;
+    hits[i] = vec4(at.ng, met ? hit.t : -1.0);
     places[i] = vec4(at.p, at.tangent.x);
-    leaves[i] = vec4(met && again.id != NONE ? 1.0 : 0.0, float(n.id >> LEAF_KIND_SHIFT), at.tangent.yz);
+    leaves[i] = vec4(met && again.id != NONE ? 1.0 : 0.0, float(hit.id >> LEAF_KIND_SHIFT), at.tangent.yz);
 }

@@ -13,7 +13,7 @@ uniform uint count;
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    Point at = shapes_point(Nearest(0.0, NONE, vec2(0.0)), vec3(0.0), vec3(0.0, 0.0, 1.0));
+    SurfacePoint at = shapes_point(Hit(0.0, NONE, vec2(0.0)), vec3(0.0), vec3(0.0, 0.0, 1.0));
     at.uv = asks[i].xy;
     at.uv_1 = asks[i].zw;
     answers[i] = vec4(texture_emission(at), texture_opacity(at));

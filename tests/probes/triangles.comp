@@ -20,7 +20,7 @@ void main() {
     LightSample s = triangle_light_sample(tri, p, asks[i].xy, sides);
     answers[i] = vec4(s.wi, s.pdf);
 #else
-    Point at = triangle_point(tri, asks[i].xy, 0u, NONE);
+    SurfacePoint at = triangle_point(tri, asks[i].xy, 0u, NONE);
     vec3 to = at.p - p;
     float t = length(to);
     answers[i] = vec4(to / t, triangle_light_pdf(tri, p, t, at.ng, to / t, sides));

@@ -1,5 +1,5 @@
 // Second moment of the luminance from those of the channels: as if they went together, which they nearly do.
-float spread_luminance(vec3 moments) {
+float luminance_variance(vec3 moments) {
     float s = dot(sqrt(max(moments, vec3(0.0))), vec3(0.2126, 0.7152, 0.0722));
     return s * s;
 }

@@ -1,10 +1,8 @@
-// Light that went in and came out where it went in: the matte part of `diffuse` and `disney`.
+// Light that went in and came out where it went in, as `disney` has it.
 // Both sides of wo and wi are positive here: bsdf.glsl has seen to it.
 
-vec3 diffuse_lambert(Surface s) { return s.base_color * INV_PI; }
-
 // Retro-reflective diffuse with its flattened variant for thin subsurface [Burley 2012, section 5.3].
-vec3 diffuse_disney(Surface s, vec3 wo, vec3 wi, float cos_d) {
+vec3 disney_diffuse_eval(Surface s, vec3 wo, vec3 wi, float cos_d) {
     float fi = fresnel_schlick(wi.z), fo = fresnel_schlick(wo.z);
     float fss90 = cos_d * cos_d * s.roughness;
     float fd90 = 0.5 + 2.0 * fss90;
@@ -17,6 +15,6 @@ vec3 diffuse_disney(Surface s, vec3 wo, vec3 wi, float cos_d) {
     return INV_PI * f * s.base_color * (1.0 - s.metallic);
 }
 
-float diffuse_weight(Surface s) { return (1.0 - s.metallic) * (luminance(s.base_color) + 0.1 * max_component(s.sheen)); }
-vec3 diffuse_sample(vec2 u) { return sampling_cosine(u); }
-float diffuse_pdf(vec3 wi) { return wi.z * INV_PI; }
+float disney_diffuse_weight(Surface s) {
+    return (1.0 - s.metallic) * (luminance(s.base_color) + 0.1 * max_component(s.sheen));
+}

@@ -1,5 +1,5 @@
 // What a path meets, before it is asked how it scatters: frame, material, bodies.
-struct Met {
+struct Interaction {
     vec3 wo;     // in the frame
     bool behind; // seen from the inner side of the geometry
     vec3 front;  // geometric normal on the viewer's side
@@ -17,8 +17,8 @@ struct Met {
 #endif
 };
 
-Met meet(inout Path path) {
-    Met here;
+Interaction interaction_make(inout Path path) {
+    Interaction here;
     vec3 wo_w = -path.d;
     here.behind = dot(path.at.ng, wo_w) < 0.0;
     here.front = here.behind ? -path.at.ng : path.at.ng;
@@ -27,7 +27,7 @@ Met meet(inout Path path) {
     texture_look(path.at, texels);
 #endif
 #if HAS_COAT_NORMALS
-    Point coat_at = path.at;
+    SurfacePoint coat_at = path.at;
     bool coat_mapped = texture_coat_normal(path.at, texels, coat_at.ns);
     here.coat = facing_normal(coat_at, wo_w);
 #endif
@@ -60,7 +60,7 @@ Met meet(inout Path path) {
     if (clear && here.behind && path.medium.depth < 0.5) {
         // The back of an open sheet: as if there had been a body all along.
         path.medium = medium_entered(path.medium, rate);
-        if (path.bounce == 0u) path.throughput = medium_share(path.medium, path.n.t);
+        if (path.bounce == 0u) path.throughput = medium_share(path.medium, path.hit.t);
     }
     here.beyond = path.medium;
     if (clear && here.behind) here.beyond = medium_left(path.medium, rate);
@@ -69,7 +69,7 @@ Met meet(inout Path path) {
     return here;
 }
 
-Surface meet_surface(Met here) {
+Surface interaction_surface(Interaction here) {
     Surface s = surface_make(here.m, here.tangent);
 #if HAS_COAT_NORMALS
     s.coat = frame_basis(frame_to_local(here.basis, here.coat));
@@ -82,7 +82,7 @@ Surface meet_surface(Met here) {
 
 #if HAS_ATTENUATION
 // A path that goes on towards d: on which side.
-void meet_crossing(Met here, vec3 d, inout Path path) {
+void interaction_cross(Interaction here, vec3 d, inout Path path) {
     if ((dot(path.at.ng, d) < 0.0) != here.behind) path.medium = here.beyond;
 }
 #endif

@@ -1,0 +1,19 @@
+// Reflection from the base surface: GTR2, Schlick, masking with the course notes' remapped roughness.
+
+vec3 disney_specular_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
+    vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
+    float g = ggx_smith(wi.z, s.alpha_mask) * ggx_smith(wo.z, s.alpha_mask);
+    return g * f * ggx_d(wm, s.alpha);
+}
+
+// The floor keeps the lobe sampled where spec0 is 0: its reflectance still rises to 1 towards grazing.
+float disney_specular_weight(Surface s, vec3 wo) {
+    return max(0.05, luminance(mix(s.spec0, vec3(1.0), fresnel_schlick(wo.z))));
+}
+
+vec3 disney_specular_sample(Surface s, vec3 wo, vec2 u) {
+    vec3 wm = ggx_visible_normal(wo, s.alpha, u);
+    return 2.0 * dot(wo, wm) * wm - wo;
+}
+
+float disney_specular_pdf(Surface s, vec3 wo, vec3 wm) { return ggx_visible_pdf(wo, wm, s.alpha); }

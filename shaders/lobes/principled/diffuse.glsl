@@ -1,0 +1,24 @@
+// The diffuse base under a rough dielectric: what the boundary keeps in neither direction [Kulla & Conty 2017; Ashikhmin
+// & Shirley 2000], and a flatter variant for thin subsurface. `albedo`: the share that
+// the boundary reflects, at wo, wi and on average.
+#if HAS_PRINCIPLED
+
+// Albedo of the density 1 / (2 (c + c')) over c' [Seeliger 1888]: 1 - c ln(1 + 1 / c).
+float principled_diffuse_seeliger(float c) { return c > 0.0 ? 1.0 - c * log(1.0 + 1.0 / c) : 1.0; }
+
+vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, float albedo_o, float albedo_i, float albedo_mean) {
+    float f = (1.0 - albedo_o) * (1.0 - albedo_i) / max(1.0 - albedo_mean, 1e-6);
+#if HAS_SUBSURFACE
+    // Single scattering of a half-space, brought to an albedo of 1 at every angle as Kulla & Conty do for microfacets.
+    const float mean = 0.409137; // of principled_diffuse_seeliger, cosine-weighted: 4/3 - 4/3 ln 2
+    float lost_o = 1.0 - principled_diffuse_seeliger(cos_o), lost_i = 1.0 - principled_diffuse_seeliger(cos_i);
+    float even = 0.5 / (cos_o + cos_i) + lost_o * lost_i / (1.0 - mean);
+    f = mix(f, even * (1.0 - max(albedo_o, albedo_i)), s.subsurface);
+#endif
+    return (1.0 - s.metallic) * (1.0 - s.transmission) * INV_PI * f * s.base_color;
+}
+
+float principled_diffuse_weight(Surface s, float albedo_o) {
+    return (1.0 - s.metallic) * (1.0 - s.transmission) * luminance(s.base_color) * (1.0 - albedo_o);
+}
+#endif

@@ -1,0 +1,70 @@
+// What a ray passes through without being scattered: shapes that hide from the camera, and surfaces by the chance that
+// they are not met.
+const uint PAIR_TRANSPARENCY = 0x8000u; // beyond the pairs of any path; then TRANSPARENCY_MAX a bounce
+const uint TRANSPARENCY_MAX = 4096u;    // layers; a ray that has met so many ends on the next
+
+// Nearest thing that the ray meets, hit.t from o. `bounce`: how often the path was scattered before; 0: a camera ray.
+Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, out SurfacePoint at) {
+#if HAS_OPACITY || HAS_HIDDEN_SHAPES
+    Hit hit;
+    float before = 0.0;
+    uint layer = 0u;
+    bool passes;
+    do {
+        hit = shapes_nearest(o, d, skip);
+        at = shapes_point(hit, o, d);
+        passes = false;
+#if HAS_HIDDEN_SHAPES
+        passes = bounce == 0u && (at.shape & HIDDEN) != 0u;
+#endif
+#if HAS_OPACITY
+        float u = sobol_pair(rng, PAIR_TRANSPARENCY + bounce * TRANSPARENCY_MAX + layer).x;
+#if HAS_TEXTURES
+        passes = passes || u >= texture_opacity(at);
+#else
+        passes = passes || u >= material_pick(at.material).opacity;
+#endif
+#endif
+        passes = passes && hit.id != NONE && layer < TRANSPARENCY_MAX;
+        hit.t += before;
+        if (passes) {
+            before = hit.t;
+            o = shapes_leave(at, d);
+            skip = at.flat_id;
+        }
+        layer++;
+    } while (passes);
+#else
+    Hit hit = shapes_nearest(o, d, skip);
+    at = shapes_point(hit, o, d);
+#endif
+    return hit;
+}
+
+#if HAS_OPACITY
+// Share of light that comes through all surfaces in (0, t_max): the mean of what the ray above would meet. `skip` as
+// in shapes_occluded.
+float transparency_share(vec3 o, vec3 d, float t_max, uvec2 skip) {
+    float share = 1.0;
+    uint layer = 0u;
+    bool more;
+    do {
+        Hit hit = Hit(t_max, NONE, vec2(0.0));
+        shapes_intersect(o, d, skip, false, hit);
+        SurfacePoint at = shapes_point(hit, o, d);
+        more = hit.id != NONE;
+        if (more) {
+#if HAS_TEXTURES
+            share *= layer < TRANSPARENCY_MAX ? 1.0 - texture_opacity(at) : 0.0;
+#else
+            share *= layer < TRANSPARENCY_MAX ? 1.0 - material_pick(at.material).opacity : 0.0;
+#endif
+            o = shapes_leave(at, d);
+            skip.x = at.flat_id;
+            t_max -= hit.t;
+        }
+        layer++;
+    } while (more && share > 0.0);
+    return share;
+}
+#endif
