@@ -18,7 +18,15 @@ vec3 arriving_disks(vec3 d, float pdf) {
 }
 #endif
 
-#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+// Whether the camera sees an environment where it sees nothing else.
+bool arriving_background() {
+#if HAS_ENVIRONMENT
+    return frame.environment_background != 0u;
+#else
+    return false;
+#endif
+}
+
 // What arrives from infinity along d, weighed against finding it by direct sampling; `pdf` is the density of d. Disks
 // are not for the camera to see.
 vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
@@ -35,7 +43,6 @@ vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
 #endif
     return arriving;
 }
-#endif
 
 // Emission towards the side the ray came from: the outward one, unless the material has both shine.
 vec3 arriving_emission(SurfacePoint at, vec3 d) {

@@ -20,6 +20,23 @@ struct Scatter {
     float pdf; // of bsdf_sample for this wi, per solid angle
 };
 
+// A direction in the shading frame for light to come from; it may lie below the surface, where bsdf_eval gives pdf 0.
+struct LobeSample {
+    vec3 wi;
+    bool is_delta;   // from a perfectly specular lobe, whose value and chance stand in `scatter`
+    Scatter scatter;
+    bool coated;     // from the coat, which reflects though wi lie below the base's normal
+};
+
+// What became of it in world space.
+struct BsdfSample {
+    vec3 d;
+    Scatter scatter;
+    float side; // the cosine that decides on which side of the surface d is
+    bool is_delta;
+    bool valid;
+};
+
 struct LobeWeights {
     float diffuse;
     float specular;
@@ -107,19 +124,7 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
     return r;
 }
 
-#if HAS_PRINCIPLED_LOBES
-struct BsdfSample {
-    vec3 wi;
-    bool is_delta; // from a perfectly specular lobe: `scatter` is its f and its chance, in place of bsdf_eval's
-    Scatter scatter;
-#if HAS_COAT_NORMALS
-    bool coated;   // from the coat, which reflects though wi lie below the base's normal
-#endif
-};
-#endif
-
-// Direction for light to come from; may lie below the surface, where bsdf_eval gives pdf 0.
-vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
+LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     vec3 wi = lambert_sample(u);
 #if HAS_DISNEY
     if (s.model == MODEL_DISNEY) {
@@ -145,39 +150,31 @@ vec3 bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if HAS_BLINN_PHONG
     if (s.model == MODEL_BLINN_PHONG) wi = blinn_phong_sample(s, wo, u_lobe, u);
 #endif
-    return wi;
-}
-
+    LobeSample r = LobeSample(wi, false, Scatter(vec3(0.0), 0.0), false);
 #if HAS_PRINCIPLED_LOBES
-BsdfSample bsdf_pick(Surface s, vec3 wo, float u_lobe, vec2 u) {
-#if HAS_COAT_NORMALS
-    BsdfSample r = BsdfSample(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0), false);
-    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.is_delta, r.scatter, r.coated);
-#else
-    BsdfSample r = BsdfSample(bsdf_sample(s, wo, u_lobe, u), false, Scatter(vec3(0.0), 0.0));
-    if (s.model == MODEL_PRINCIPLED) r.wi = principled_sample(s, wo, u_lobe, u, r.is_delta, r.scatter);
+    if (s.model == MODEL_PRINCIPLED) r = principled_sample(s, wo, u_lobe, u);
 #endif
     return r;
 }
 
-// As with the other models uniform over the hemisphere, or over the sphere where the material transmits.
-BsdfSample bsdf_pick_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    BsdfSample r = bsdf_pick(s, wo, u_lobe, u);
-    float rest = s.model == MODEL_PRINCIPLED ? 1.0 - principled_delta_chance(s, wo) : 1.0;
+// Uniform over the hemisphere, or over the sphere where the material transmits; but perfectly specular lobes are sampled
+// as ever. `scatter` has only the density of such a direction.
+LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    LobeSample r = bsdf_sample(s, wo, u_lobe, u);
     if (!r.is_delta) {
-#if HAS_COAT_NORMALS
         r.coated = false;
-#endif
         r.wi = sampling_hemisphere(u);
-        float pdf = 0.5 * INV_PI;
+        r.scatter.pdf = 0.5 * INV_PI;
+#if HAS_PRINCIPLED_LOBES
+        float rest = s.model == MODEL_PRINCIPLED ? 1.0 - principled_delta_chance(s, wo) : 1.0;
 #if HAS_TRANSMISSION
         if (s.model == MODEL_PRINCIPLED && s.transmission > 0.0) {
             r.wi = sampling_sphere(u);
-            pdf *= 0.5;
+            r.scatter.pdf *= 0.5;
         }
 #endif
-        r.scatter = Scatter(bsdf_eval(s, wo, r.wi).f, pdf * rest);
+        r.scatter.pdf *= rest;
+#endif
     }
     return r;
 }
-#endif

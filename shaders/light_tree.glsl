@@ -5,10 +5,8 @@
 // A point that light is sampled for.
 struct LightContext {
     vec3 p;
-#if HAS_LIGHT_TREE
     vec3 n;       // unit; no light counts that comes from behind it ...
     bool through; // ... unless the surface transmits
-#endif
 };
 
 #if HAS_LIGHT_TREE

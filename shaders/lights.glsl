@@ -42,9 +42,9 @@ Light lights_pick(uint bits, LightContext context) {
     return l;
 }
 #else
-Light lights_pick(float u) {
+Light lights_pick(uint bits, LightContext context) {
 #if HAS_MANY_LIGHTS
-    float x = u * float(frame.light_count);
+    float x = sobol_unit(bits) * float(frame.light_count);
     uint i = min(uint(x), frame.light_count - 1u);
     Light drawn = light_pick(i); // two of its words: a load of the whole would cost as much again
     return light_pick(x - float(i) >= drawn.threshold ? drawn.alias : i);
@@ -141,11 +141,7 @@ LightSample lights_sample(LightContext context, uint pick_bits, uvec2 bits) {
     LightSample s = lights_none();
     vec3 p = context.p;
     vec2 u = sobol_units(bits);
-#if HAS_LIGHT_TREE
     Light l = lights_pick(pick_bits, context);
-#else
-    Light l = lights_pick(sobol_unit(pick_bits));
-#endif
 #if HAS_POINT_LIGHTS
     if (l.kind == LIGHT_POINT) s = point_light_sample(l, p);
 #endif

@@ -1,11 +1,24 @@
 // Bodies that absorb. Their rates add up, so that it does not matter in which order nested or overlapping bodies are
 // entered and left, and what is in two bodies loses light to both.
-#if HAS_ATTENUATION
 struct Medium {
+#if HAS_ATTENUATION
     vec3 rate;   // of attenuation along the ray, 1/m: the sum of those of the bodies around
     float depth; // how many transmitting bodies that are
+#else
+    float unused; // so that every kernel can pass one on
+#endif
 };
 
+// What is left of light after t metres.
+vec3 medium_share(Medium m, float t) {
+#if HAS_ATTENUATION
+    return exp(-m.rate * t);
+#else
+    return vec3(1.0);
+#endif
+}
+
+#if HAS_ATTENUATION
 const float MEDIUM_WALL = 1e20; // a rate above lets nothing through, and would round away the others in a sum
 const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below goes through at most
 // Off the camera's axes, where meshes like to have their edges.
@@ -18,9 +31,6 @@ Medium medium_left(Medium m, vec3 rate) {
     if (m.depth > 1.5) return Medium(max(m.rate - rate, vec3(0.0)), m.depth - 1.0);
     return Medium(vec3(0.0), 0.0);
 }
-
-// What is left of light after t metres.
-vec3 medium_share(Medium m, float t) { return exp(-m.rate * t); }
 
 // What the camera is in: whose surface a straight line leaves more often than it enters it. Opaque things do not
 // matter. The line goes backwards, where there is least; if that says inside, so must a second one, forwards: an open
@@ -76,4 +86,6 @@ Medium medium_at_camera() {
     } while (more);
     return Medium(min(first.rate, sum.rate), min(first.depth, sum.depth));
 }
+#else
+Medium medium_at_camera() { return Medium(0.0); }
 #endif

@@ -1,31 +1,28 @@
-// A step of a path: from where it is scattered to what it meets next.
+// A path, and its step from the surface where it is scattered to what it meets next.
 struct Path {
     vec3 d;
-    Hit hit; // what d meets, hit.id NONE: nothing
-    SurfacePoint at;  // there
+    Hit hit;              // what d meets; hit.id is NONE where it meets nothing
+    SurfacePoint at;      // there
     vec3 throughput;
-    vec3 radiance; // light found so far
+    vec3 radiance;        // found so far
+    vec3 radiance_before; // found before the last bounce
     uint bounce;
-    bool alive; // there is a surface to scatter at
-#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+    bool alive;           // there is a surface to scatter at
+    // What light found along d is weighed with: d's density per solid angle, and whether such light counts at all.
+    float found_pdf;
+    bool counts;
     // A path leaves the scene once at most: what arrives from there is asked for once, when all its neighbours ended.
     bool escaped;
-    float escaped_pdf;
-#endif
-#if HAS_TRANSMISSION
     // Radiance over the square of the index is what passes a boundary unchanged: `eta_scale` is that square here over
     // that at the camera, kept apart so that roulette does not see it.
     float eta_scale;
-#endif
-#if HAS_ATTENUATION
     Medium medium;
-#endif
 };
 
-// Of a new path's throughput: a path that carries less may end by chance. Below 1, for the variance of ending paths costs
+// The share of a new path's throughput below which it may end by chance. Below 1, for the variance of ending paths costs
 // more than the time they take: 1/2 leaves a sixth less error after equal time in a white box, a third by glass.
 const float ROULETTE_THRESHOLD = 0.5;
-// Stands for the density of a direction that only a mirror could have taken.
+// Stands for the density of a direction that only a perfectly specular lobe could have taken.
 const float PDF_DELTA = 1e30;
 
 vec3 path_clamp(vec3 c, bool indirect) {
@@ -36,61 +33,61 @@ vec3 path_clamp(vec3 c, bool indirect) {
     return c;
 }
 
-// On towards d, which was sampled with `next`, to the nearest surface. `found_pdf`: what light found there is weighed
-// with; `counts`: whether it does at all; `side`: of d, in the shading frame.
-void path_extend(vec3 d, Scatter next, float found_pdf, bool counts, float side, Surface s, Sampler rng,
-                 inout Path path) {
-    path.d = d;
-    path.throughput *= next.f / (path.alive ? next.pdf : 1.0);
+bool path_continues(Path path) { return path.alive && path.bounce < frame.max_bounces; }
+
+// Ends paths that carry little by chance, and makes the others carry more.
+void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
+    if (path.bounce >= frame.roulette_depth && path.bounce < frame.max_bounces) {
+        float survive = min(1.0, reach / ROULETTE_THRESHOLD);
+        if (sobol_pair(rng, pair + PAIR_ROULETTE).x >= survive) path.alive = false;
+        path.throughput /= survive > 0.0 ? survive : 1.0;
+    }
+}
+
+// Finds what the ray from o meets.
+void path_trace(vec3 o, uint skip, Sampler rng, inout Path path) {
+    path.hit.id = NONE;
+#if HAS_OPACITY
+    if (path.alive) path.hit = transparency_nearest(o, path.d, skip, path.bounce, rng, path.at);
+#else
+    if (path.alive) path.hit = shapes_nearest(o, path.d, skip);
+    path.at = shapes_point(path.hit, o, path.d);
+#endif
+}
+
+// Takes the path on to the nearest surface in the direction `next`. `share` is that of one sample of a light
+// (direct.glsl): finding a light by chance counts as much less.
+void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Path path) {
+    path.alive = next.valid;
+    path.d = next.d;
+    path.found_pdf = next.is_delta ? PDF_DELTA : share * next.scatter.pdf;
+    path.counts = ESTIMATOR != ESTIMATOR_LIGHT || next.is_delta;
+    path.throughput *= next.scatter.f / (path.alive ? next.scatter.pdf : 1.0);
     float reach = max_component(path.throughput);
     path.alive = path.alive && reach > 0.0;
     if (path.alive && !(reach < 1e6)) {
         atomicAdd(path_ended, 1u);
         path.alive = false;
     }
-    uint pair = PAIR_BOUNCE + path.bounce * PAIRS_A_BOUNCE, flat_id = path.at.flat_id;
+    uint pair = sobol_bounce_pair(path.bounce);
     path.bounce++;
-    if (path.bounce >= frame.roulette_depth && path.bounce < frame.max_bounces) {
-        float survive = min(1.0, reach / ROULETTE_THRESHOLD);
-        if (sobol_pair(rng, pair + PAIR_ROULETTE).x >= survive) path.alive = false;
-        path.throughput /= survive > 0.0 ? survive : 1.0;
-    }
-    vec3 o = shapes_leave(path.at, d);
-    path.hit.id = NONE;
-#if HAS_TRANSMISSION
-    path.eta_scale = facing_eta_scale(path.eta_scale, side, s, 0.0);
-#endif
-#if HAS_OPACITY
-    if (path.alive) path.hit = transparency_nearest(o, d, flat_id, path.bounce, rng, path.at);
-#else
-    if (path.alive) path.hit = shapes_nearest(o, d, flat_id);
-    path.at = shapes_point(path.hit, o, d);
-#endif
-#if HAS_ATTENUATION
+    path_roulette(rng, pair, reach, path);
+    path.eta_scale = facing_eta_scale(path.eta_scale, next.side, s, 0.0);
+    path_trace(shapes_leave(path.at, next.d), path.at.flat_id, rng, path);
     path.throughput *= medium_share(path.medium, path.hit.t);
-#endif
     bool met = path.hit.id != NONE;
-#if HAS_ENVIRONMENT || HAS_SUN_DISKS
-    path.escaped = path.alive && !met && counts;
-    path.escaped_pdf = found_pdf;
-#endif
+    path.escaped = path.alive && !met && path.counts;
     path.alive = path.alive && met;
 }
 
-// What shines where the path has come to, `weight` of its emission.
+// Adds `weight` of the emission of the surface that the path has come to, and its ambient light.
 void path_add_emission(float weight, inout Path path) {
 #if HAS_EMISSION
-    vec3 arriving = arriving_emission(path.at, path.d) * weight;
-#if HAS_TRANSMISSION
-    arriving *= path.eta_scale;
-#endif
+    vec3 arriving = arriving_emission(path.at, path.d) * weight * path.eta_scale;
     if (path.alive) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
 #endif
 #if HAS_AMBIENT
-    vec3 ambient = arriving_ambient(path.at);
-#if HAS_TRANSMISSION
-    ambient *= path.eta_scale;
-#endif
+    vec3 ambient = arriving_ambient(path.at) * path.eta_scale;
     if (path.alive) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u);
 #endif
 }

@@ -57,9 +57,7 @@ void main() {
 #else
     uint first = frame.sample_first, count = frame.sample_count;
 #endif
-#if HAS_ATTENUATION
     Medium medium = medium_at_camera();
-#endif
     uint i = 0u;
     do {
         Sampler rng;
@@ -77,22 +75,14 @@ void main() {
             hit = transparency_nearest(o, d, NONE, 0u, rng, at);
 #if HAS_OPEN_VIEW
             missed = hit.id == NONE;
-#if HAS_ATTENUATION
             if (missed) add(path_sky(d, medium));
-#else
-            if (missed) add(path_sky(d));
-#endif
             if (missed) i++;
             missed = missed && i < count;
         } while (missed);
         if (hit.id == NONE) break; // out of samples, or the driver has ended the loop
 #endif
         Path path;
-#if HAS_ATTENUATION
-        float alpha = path_begin(o, d, hit, at, medium, path);
-#else
-        float alpha = path_begin(o, d, hit, at, path);
-#endif
+        float alpha = path_begin(d, hit, at, medium, path);
         add(vec4(path_radiance(rng, path), alpha));
         if (path_was_cut) break; // as this loop is by now
     } while (++i < count);

@@ -17,11 +17,15 @@ float principled_layers(Surface s, float coat_i, float sheen_i) {
     return (1.0 - max(s.coat_albedo, coat_i)) * (1.0 - max(s.sheen_albedo, sheen_i));
 }
 
+// Into the coat's own frame and back, where its normal is not that of what is under it.
 #if HAS_COAT_NORMALS
-// The coat's own frame, where its normal is not that of what is under it.
 float principled_coat_cosine(Surface s, vec3 w) { return dot(s.coat.z, w); }
+vec3 principled_coat_to_local(Surface s, vec3 w) { return frame_to_local(s.coat, w); }
+vec3 principled_coat_from_local(Surface s, vec3 w) { return frame_to_world(s.coat, w); }
 #else
-#define principled_coat_cosine(s, w) w.z
+float principled_coat_cosine(Surface s, vec3 w) { return w.z; }
+vec3 principled_coat_to_local(Surface s, vec3 w) { return w; }
+vec3 principled_coat_from_local(Surface s, vec3 w) { return w; }
 #endif
 
 float principled_coat_albedo(Surface s, float c) {
@@ -178,7 +182,7 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_COAT_NORMALS
 // The coat alone, with the cosine: it may send light where the base's normal sees none.
 Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
-    vec3 o = frame_to_local(s.coat, wo), i = frame_to_local(s.coat, wi);
+    vec3 o = principled_coat_to_local(s, wo), i = principled_coat_to_local(s, wi);
     if (s.model != MODEL_PRINCIPLED || s.inside || o.z <= 0.0 || i.z <= 0.0) return Scatter(vec3(0.0), 0.0);
     vec3 wm = normalize(o + i);
     float f = principled_clearcoat_eval(s, o, i, wm, dot(o, wm)) * i.z;
@@ -186,67 +190,57 @@ Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
 }
 #endif
 
-// A direction, and whether a perfectly specular lobe gave it: then `scatter` is its reflectance and its chance.
-vec3 principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u, out bool is_delta, out Scatter scatter
-#if HAS_COAT_NORMALS
-    , out bool coated
-#endif
-) {
-    PrincipledWeights w = principled_weights(s, wo);
-    scatter = Scatter(vec3(0.0), 0.0);
-    is_delta = false;
-    vec3 wi = sampling_cosine(u);
-    float v = u_lobe - w.diffuse;
+// The microfacet lobe, which is picked with the chance `weight`.
+LobeSample principled_sample_microfacet(Surface s, vec3 wo, float v, vec2 u, float weight) {
+    vec3 wi = bsdf_turn_back(s, microfacet_sample(s, bsdf_turn(s, wo), v, u));
+    LobeSample r = LobeSample(wi, s.is_delta, Scatter(vec3(0.0), 0.0), false);
+    float chance = microfacet_reflect_chance(s, wo.z);
+    vec3 f = microfacet_fresnel(s, wo.z);
+    float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // a mirror's wi has wo's cosine
 #if HAS_TRANSMISSION
-    if (v >= 0.0) wi.z = -wi.z;
-    v -= w.diffuse_below;
-#endif
-    vec3 facet = bsdf_turn_back(s, microfacet_sample(s, bsdf_turn(s, wo), clamp(v / w.microfacet, 0.0, 0.9999999), u));
-    if (v >= 0.0) {
-        wi = facet;
-        bool below = facet.z < 0.0;
-        float chance = microfacet_reflect_chance(s, wo.z);
-        is_delta = s.is_delta;
-        vec3 f = microfacet_fresnel(s, wo.z);
-#if HAS_TRANSMISSION
-        if (below && s.index_matched) is_delta = true;
-        if (below) {
-            f = microfacet_transmittance(s, wo.z);
-            chance = 1.0 - chance;
-        }
-#endif
-        float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // a mirror's wi has wo's cosine
-#if HAS_TRANSMISSION
-        if (below && s.inside) {
+    if (wi.z < 0.0) {
+        if (s.index_matched) r.is_delta = true;
+        f = microfacet_transmittance(s, wo.z);
+        chance = 1.0 - chance;
+        if (s.inside) {
             coat_i = principled_coat_albedo(s, principled_coat_cosine(s, wi));
             sheen_i = principled_sheen_albedo(s, wi.z);
         }
-#endif
-        if (is_delta) scatter = Scatter(f * principled_layers(s, coat_i, sheen_i), w.microfacet * chance);
     }
+#endif
+    if (r.is_delta) r.scatter = Scatter(f * principled_layers(s, coat_i, sheen_i), weight * chance);
+    return r;
+}
+
+LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    PrincipledWeights w = principled_weights(s, wo);
+    LobeSample r = LobeSample(sampling_cosine(u), false, Scatter(vec3(0.0), 0.0), false);
+    float v = u_lobe - w.diffuse;
+#if HAS_TRANSMISSION
+    if (v >= 0.0) r.wi.z = -r.wi.z;
+    v -= w.diffuse_below;
+#endif
+    LobeSample facet = principled_sample_microfacet(s, wo, clamp(v / w.microfacet, 0.0, 0.9999999), u, w.microfacet);
+    if (v >= 0.0) r = facet;
     v -= w.microfacet;
 #if HAS_SHEEN
     if (v >= 0.0 && w.sheen > 0.0) {
-        wi = sheen_charlie_sample(u);
-        is_delta = false;
+        r.wi = sheen_charlie_sample(u);
+        r.is_delta = false;
     }
     v -= w.sheen;
 #endif
 #if HAS_CLEARCOAT
-#if HAS_COAT_NORMALS
-    vec3 coat = frame_to_world(s.coat, principled_clearcoat_sample(s, frame_to_local(s.coat, wo), u));
-    coated = v >= 0.0 && w.coat > 0.0;
-#else
-    vec3 coat = principled_clearcoat_sample(s, wo, u);
-#endif
-    if (v >= 0.0 && w.coat > 0.0) {
-        wi = coat;
-        is_delta = s.coat_is_delta;
+    vec3 coat = principled_coat_from_local(s, principled_clearcoat_sample(s, principled_coat_to_local(s, wo), u));
+    r.coated = v >= 0.0 && w.coat > 0.0;
+    if (r.coated) {
+        r.wi = coat;
+        r.is_delta = s.coat_is_delta;
         float f = s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), CLEARCOAT_ETA);
-        if (is_delta) scatter = Scatter(vec3(f), w.coat);
+        if (r.is_delta) r.scatter = Scatter(vec3(f), w.coat);
     }
 #endif
-    return wi;
+    return r;
 }
 
 // The chance that principled_sample's direction comes from a perfectly specular lobe.

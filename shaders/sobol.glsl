@@ -20,6 +20,9 @@ const uint PAIR_LIGHT = 1u;
 const uint PAIR_BSDF = 2u;
 const uint PAIR_ROULETTE = 3u;
 
+// The first pair of a bounce.
+uint sobol_bounce_pair(uint bounce) { return PAIR_BOUNCE + bounce * PAIRS_A_BOUNCE; }
+
 struct Sampler {
     uint seed;           // of this pixel or block, picture and replicate
     uint index;          // of the sample

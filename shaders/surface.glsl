@@ -77,6 +77,7 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
     s.alpha_coat = m.clearcoat_roughness >= 0.0 ? rough * rough : mix(0.1, 0.001, m.clearcoat_gloss);
 #endif
 }
+#endif
 
 // What share of light is left after each metre inside, as a rate: transmittance is exp(-rate t).
 vec3 surface_attenuation(Material m) {
@@ -93,7 +94,6 @@ bool surface_transmits(Material m) {
     return false;
 #endif
 }
-#endif
 
 Surface surface_make(Material m, vec2 tangent) {
     Surface s;

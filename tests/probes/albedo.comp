@@ -25,9 +25,9 @@ void main() {
     uint k = 0u;
     do {
         Sampler rng = sobol_begin(uvec2(i, 7u), k, 0u);
-        BsdfSample picked = bsdf_pick(s, wo, sobol_pair(rng, 0u).x, sobol_pair(rng, 1u));
-        Scatter f = bsdf_eval(s, wo, picked.wi);
-        if (picked.is_delta) f = picked.scatter;
+        LobeSample lobe = bsdf_sample(s, wo, sobol_pair(rng, 0u).x, sobol_pair(rng, 1u));
+        Scatter f = bsdf_eval(s, wo, lobe.wi);
+        if (lobe.is_delta) f = lobe.scatter;
         vec3 w = f.pdf > 0.0 ? f.f / f.pdf : vec3(0.0);
         finite = finite && !any(isnan(w)) && !any(isinf(w)) && !isnan(f.pdf) && min(w.x, min(w.y, w.z)) >= 0.0;
         sum += w;

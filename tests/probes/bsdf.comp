@@ -23,17 +23,14 @@ void main() {
 #if HAS_PRINCIPLED
     principled_face(wo, INSIDE == 1, s);
 #endif
-#if SAMPLE && HAS_PRINCIPLED
-    BsdfSample picked = bsdf_pick(s, wo, ask.x, ask.yz);
-    vec3 wi = picked.wi;
+#if SAMPLE
+    LobeSample lobe = bsdf_sample(s, wo, ask.x, ask.yz);
+    vec3 wi = lobe.wi;
     Scatter f = bsdf_eval(s, wo, wi);
-    if (picked.is_delta) {
-        f = picked.scatter;
+    if (lobe.is_delta) {
+        f = lobe.scatter;
         specular = 1.0;
     }
-#elif SAMPLE
-    vec3 wi = bsdf_sample(s, wo, ask.x, ask.yz);
-    Scatter f = bsdf_eval(s, wo, wi);
 #else
     vec3 wi = ask.xyz;
     Scatter f = bsdf_eval(s, wo, wi);

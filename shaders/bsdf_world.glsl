@@ -1,0 +1,46 @@
+// The BSDF in world space: where normal maps fold it (normal_map.glsl), and where each estimator samples it.
+
+Scatter bsdf_eval_world(Surface s, Interaction here, vec3 wi_w) {
+#if HAS_NORMAL_MAPS
+    return normal_map_eval(s, here, wi_w);
+#else
+    return bsdf_eval(s, here.wo, frame_to_local(here.basis, wi_w));
+#endif
+}
+
+// As the estimator samples.
+LobeSample bsdf_sample_local(Surface s, vec3 wo, float u_lobe, vec2 u) {
+#if ESTIMATOR == ESTIMATOR_UNIFORM
+    return bsdf_sample_uniform(s, wo, u_lobe, u);
+#else
+    return bsdf_sample(s, wo, u_lobe, u);
+#endif
+}
+
+// Value and density of the direction d, which `lobe` became.
+Scatter bsdf_scatter_world(Surface s, Interaction here, LobeSample lobe, vec3 d) {
+#if HAS_NORMAL_MAPS
+    Scatter scatter = normal_map_eval(s, here, d);
+#else
+    Scatter scatter = bsdf_eval(s, here.wo, lobe.wi);
+#endif
+#if ESTIMATOR == ESTIMATOR_UNIFORM
+    scatter.pdf = lobe.scatter.pdf;
+#endif
+    if (lobe.is_delta) scatter = lobe.scatter;
+    return scatter;
+}
+
+BsdfSample bsdf_sample_world(Surface s, Interaction here, Sampler rng, uint bounce) {
+    uint pair = sobol_bounce_pair(bounce);
+    float u_lobe = sobol_pair(rng, pair + PAIR_CHOICE).y;
+    LobeSample lobe = bsdf_sample_local(s, here.wo, u_lobe, sobol_pair(rng, pair + PAIR_BSDF));
+    BsdfSample r;
+    r.d = normal_map_direction(here, lobe);
+    r.scatter = bsdf_scatter_world(s, here, lobe, r.d);
+    r.side = here.mapped ? dot(r.d, here.front) : lobe.wi.z;
+    r.is_delta = lobe.is_delta;
+    bool agrees = here.mapped ? normal_map_keeps(s, lobe) : facing_agrees(lobe.wi.z, dot(r.d, here.front));
+    r.valid = r.scatter.pdf > 0.0 && agrees;
+    return r;
+}

@@ -1,0 +1,99 @@
+// Next event estimation: lights are sampled at each surface, and weighed against paths that find them by chance
+// [Veach 1997, section 9.2.4].
+
+// From where the surface asks the lights.
+LightContext direct_context(Interaction here, Path path) {
+    LightContext context;
+    context.p = path.at.p;
+#if HAS_EMISSION_BOTH
+    context.p = shapes_leave(path.at, here.front); // inside or outside of the very shape that shines
+#endif
+    context.n = here.mapped ? here.front : here.basis.z; // a lobe that folds reaches all that is in front
+    context.through = surface_transmits(here.m);
+    return context;
+}
+
+// How often the lights are sampled at one surface, as a power of two. More often where it is the light that is noisy: a
+// third more time for each doubling, and a third of the error of a matte ball. After the first bounce four samples would
+// cost more than they tell.
+uint direct_doublings(Surface s, Path path) {
+#if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
+    return environment_varies() && surface_is_broad(s) ? (path.bounce == 0u ? 2u : 1u) : 0u;
+#else
+    return 0u;
+#endif
+}
+
+// The share that each of these samples has; the density of finding the light by chance counts as much less.
+float direct_share(Surface s, Path path) { return 1.0 / float(1u << direct_doublings(s, path)); }
+
+// Whether the estimator takes that light from here.
+bool direct_counts(LightSample light, Path path) {
+    bool counts = light.pdf > 0.0;
+#if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
+    counts = counts && !light.extended;
+#endif
+#if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
+    counts = counts && light.id != path.hit.id; // rounding may put a point on a ball's inside outside of it
+#endif
+    return counts;
+}
+
+// The weight of a light's sample, whose direction the BSDF would have sampled with density found_pdf.
+float direct_weight(LightSample light, float found_pdf) {
+    float weight = 1.0;
+#if ESTIMATOR == ESTIMATOR_MIS
+    if (light.extended) weight = power_heuristic(light.pdf, found_pdf);
+#endif
+    return weight;
+}
+
+// The weight of emission that the path has found by chance; `context` is that of the surface before.
+float direct_found_weight(LightContext context, Path path) {
+    float weight = path.counts ? 1.0 : 0.0;
+#if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
+    float light_pdf = lights_pdf(path.at.light, path.hit, path.at, context, path.d);
+    if (path.at.light != NONE) weight = power_heuristic(path.found_pdf, light_pdf);
+#endif
+    return weight;
+}
+
+// Whether anything of the light comes through; c loses what surfaces on the way take.
+bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
+    uvec2 skip = uvec2(at.flat_id, light.id);
+    vec3 o = shapes_leave(at, light.wi);
+#if HAS_OPACITY
+    c *= transparency_share(o, light.wi, light.t, skip);
+    return true;
+#else
+    return !shapes_occluded(o, light.wi, light.t, skip);
+#endif
+}
+
+// Adds one sample of one light.
+void direct_add(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
+    uint pair = sobol_bounce_pair(path.bounce);
+    uint pick_bits = sobol_bits(rng, pair + PAIR_CHOICE).x;
+    LightSample light = lights_sample(context, pick_bits, sobol_bits(rng, pair + PAIR_LIGHT));
+    Scatter f = bsdf_eval_world(s, here, light.wi);
+    bool counts = direct_counts(light, path) && interaction_agrees(here, light.wi);
+    if (counts && max_component(f.f * light.radiance) > 0.0) {
+        vec3 c = path.throughput * (f.f * light.radiance * (direct_weight(light, share * f.pdf) / light.pdf));
+        c *= facing_eta_scale(path.eta_scale, interaction_side(here, light.wi), s, light.t);
+        c *= medium_share(interaction_medium(here, path, light.wi), light.t);
+        if (direct_arrives(path.at, light, c)) path.radiance += path_clamp(c, path.bounce > 0u) * share;
+    }
+}
+
+// Adds what lights send to the surface and on along the path.
+void direct_lighting(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
+#if HAS_LIGHTS
+#if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
+    uint doublings = direct_doublings(s, path), turn = 0u;
+    do direct_add(s, here, context, share, sobol_part(rng, turn, doublings), path);
+    while (++turn < (1u << doublings));
+#else
+    direct_add(s, here, context, share, rng, path);
+#endif
+#endif
+}
