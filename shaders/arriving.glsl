@@ -1,7 +1,7 @@
-// What a path meets that sends light by itself: emission, ambient, what lies at infinity; and what it counts for.
+// Light that a path finds by chance: emission and ambient light of surfaces, and what arrives from infinity.
 
 #if HAS_SUN_DISKS
-// What the disks of directional lights send along d, each weighed against finding it by direct sampling. `pdf` is the
+// Radiance along d from the disks of directional lights, each weighted against sampling it directly. `pdf` is the
 // density of d.
 vec3 arriving_disks(vec3 d, float pdf) {
     vec3 sum = vec3(0.0);
@@ -18,7 +18,7 @@ vec3 arriving_disks(vec3 d, float pdf) {
 }
 #endif
 
-// Whether the camera sees an environment where it sees nothing else.
+// Whether the camera sees the environment where it sees no surface.
 bool arriving_background() {
 #if HAS_ENVIRONMENT
     return frame.environment_background != 0u;
@@ -27,8 +27,8 @@ bool arriving_background() {
 #endif
 }
 
-// What arrives from infinity along d, weighed against finding it by direct sampling; `pdf` is the density of d. Disks
-// are not for the camera to see.
+// Radiance from infinity along d, weighted against sampling it directly; `pdf` is the density of d. The camera does not
+// see the disks of directional lights: they count where the path was `scattered`.
 vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
     vec3 arriving = vec3(0.0);
 #if HAS_ENVIRONMENT
@@ -44,7 +44,7 @@ vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
     return arriving;
 }
 
-// Emission towards the side the ray came from: the outward one, unless the material has both shine.
+// Emission towards the side that a ray along d came from: the outward side, unless both sides of the material shine.
 vec3 arriving_emission(SurfacePoint at, vec3 d) {
 #if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
     bool both = material_pick(at.material).emission_sides == 2u;
@@ -60,7 +60,7 @@ vec3 arriving_emission(SurfacePoint at, vec3 d) {
     return vec3(0.0);
 }
 
-// blinn_phong's radiance without a cause: from both sides, and no light to anything that picks lights.
+// Ambient radiance, which blinn_phong adds without a cause: both sides send it, and it is never sampled as a light.
 vec3 arriving_ambient(SurfacePoint at) {
 #if HAS_AMBIENT && HAS_TEXTURES
     return texture_ambient(at);

@@ -1,4 +1,4 @@
-// The models: which lobes, with what weights. Directions in the shading frame; f includes |cos theta_i|.
+// The material models: which lobes each of them has, and with what weights. Directions are in the shading frame.
 #include "fresnel.glsl"
 #include "ggx.glsl"
 #include "lobes/lambert.glsl"
@@ -17,24 +17,24 @@
 
 struct Scatter {
     vec3 f;    // BSDF times |cos theta_i|
-    float pdf; // of bsdf_sample for this wi, per solid angle
+    float pdf; // with which bsdf_sample gives this wi, per solid angle
 };
 
-// A direction in the shading frame for light to come from; it may lie below the surface, where bsdf_eval gives pdf 0.
+// A sampled direction in the shading frame. It may lie below the surface, where bsdf_eval gives pdf 0.
 struct LobeSample {
     vec3 wi;
-    bool is_delta;   // from a perfectly specular lobe, whose value and chance stand in `scatter`
-    Scatter scatter;
-    bool coated;     // from the coat, which reflects though wi lie below the base's normal
+    bool is_delta;   // a perfectly specular lobe gave it ...
+    Scatter scatter; // ... whose reflectance and chance these are
+    bool coated;     // the coat gave it, which reflects even where wi lies below the base's normal
 };
 
-// What became of it in world space.
+// The direction in world space that a path goes on to.
 struct BsdfSample {
     vec3 d;
     Scatter scatter;
-    float side; // the cosine that decides on which side of the surface d is
-    bool is_delta;
-    bool valid;
+    float side;    // its sign says on which side of the surface d is
+    bool is_delta; // a perfectly specular lobe gave it
+    bool valid;    // false: the path ends
 };
 
 struct LobeWeights {
@@ -43,7 +43,7 @@ struct LobeWeights {
     float clearcoat;
 };
 
-// Chances of picking each lobe, summing to one.
+// The chances of picking each lobe; they sum to one.
 LobeWeights bsdf_weights(Surface s, vec3 wo) {
     LobeWeights w = LobeWeights(1.0, 0.0, 0.0);
 #if HAS_DISNEY
@@ -59,7 +59,7 @@ LobeWeights bsdf_weights(Surface s, vec3 wo) {
     return w;
 }
 
-// The specular lobe's own frame, its x along the tangent.
+// Into the specular lobe's own frame, whose x is the tangent, and back.
 vec3 bsdf_turn(Surface s, vec3 w) {
     return vec3(dot(s.tangent, w.xy), s.tangent.x * w.y - s.tangent.y * w.x, w.z);
 }
@@ -157,8 +157,8 @@ LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     return r;
 }
 
-// Uniform over the hemisphere, or over the sphere where the material transmits; but perfectly specular lobes are sampled
-// as ever. `scatter` has only the density of such a direction.
+// Samples uniformly over the hemisphere, or over the sphere where the material transmits; perfectly specular lobes are
+// sampled as always. Of a uniform direction `scatter` has only the density.
 LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
     LobeSample r = bsdf_sample(s, wo, u_lobe, u);
     if (!r.is_delta) {

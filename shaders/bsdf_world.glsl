@@ -1,4 +1,4 @@
-// The BSDF in world space: where normal maps fold it (normal_map.glsl), and where each estimator samples it.
+// The BSDF in world space, with what normal maps fold (normal_map.glsl), sampled as the estimator wants it.
 
 Scatter bsdf_eval_world(Surface s, Interaction here, vec3 wi_w) {
 #if HAS_NORMAL_MAPS
@@ -8,7 +8,7 @@ Scatter bsdf_eval_world(Surface s, Interaction here, vec3 wi_w) {
 #endif
 }
 
-// As the estimator samples.
+// Samples a direction in the shading frame as the estimator does.
 LobeSample bsdf_sample_local(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #if ESTIMATOR == ESTIMATOR_UNIFORM
     return bsdf_sample_uniform(s, wo, u_lobe, u);
@@ -17,7 +17,7 @@ LobeSample bsdf_sample_local(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
 }
 
-// Value and density of the direction d, which `lobe` became.
+// The value and the density of the world direction d that `lobe` was turned into.
 Scatter bsdf_scatter_world(Surface s, Interaction here, LobeSample lobe, vec3 d) {
 #if HAS_NORMAL_MAPS
     Scatter scatter = normal_map_eval(s, here, d);

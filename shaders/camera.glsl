@@ -1,4 +1,4 @@
-// Thin-lens camera. Row 0 is the top of the picture, its right is to the right.
+// The ray of a thin-lens camera through a pixel. Row 0 is the top of the picture; columns count from the left.
 void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
     vec2 at = vec2(pixel) + 0.5 + sampling_filter(sobol_pair(rng, PAIR_PIXEL));
     vec2 half_size = 0.5 * vec2(frame.resolution);
@@ -14,7 +14,7 @@ void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
     d = normalize(through);
 }
 
-// The pixel of this invocation, and whether there is one.
+// Finds the pixel of this invocation; false where there is none.
 bool camera_pixel(out uvec2 pixel, out uint slot) {
     uvec2 g = gl_GlobalInvocationID.xy;
     pixel = frame.tile_origin + g;

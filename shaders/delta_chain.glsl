@@ -1,7 +1,8 @@
-// Surfaces that only mirror or refract: no light can be asked for there, so a path goes on at once. On a machine that
-// runs both sides of every `if`, a loop of their own spares all paths what only the others need.
+// Surfaces that only mirror or refract: no light can be sampled there, so a path goes on at once. On a machine that
+// runs both sides of every `if`, a loop of their own saves such paths the work that only other surfaces need.
 
 #if HAS_MIRRORS
+// Whether a surface only mirrors or refracts.
 bool delta_chain_takes(Interaction here) {
     Material m = here.m;
     bool whole = m.metallic >= 1.0;
@@ -12,7 +13,7 @@ bool delta_chain_takes(Interaction here) {
         && m.clearcoat <= 0.0 && m.sheen <= 0.0;
 }
 
-// As principled_sample does it where there is nothing else to pick.
+// Scatters as principled_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Sampler rng, inout Path path) {
     Surface s = surface_make(here.m, here.tangent);
     principled_side(here.behind, s);
@@ -34,7 +35,7 @@ void delta_chain_step(Interaction here, Sampler rng, inout Path path) {
 }
 #endif
 
-// Takes a path on to the first surface that does more, or to its end.
+// Takes a path on to the first surface that does more, or to the path's end. Returns the last surface that it meets.
 Interaction delta_chain(Sampler rng, inout Path path) {
     Interaction here;
 #if HAS_MIRRORS
@@ -55,7 +56,7 @@ Interaction delta_chain(Sampler rng, inout Path path) {
     return here;
 }
 
-// Whether it has ended the path.
+// Whether delta_chain has ended the path.
 bool delta_chain_ended(Path path) {
 #if HAS_MIRRORS
     return !path_continues(path);

@@ -1,21 +1,21 @@
-// Next event estimation: lights are sampled at each surface, and weighed against paths that find them by chance
+// Next event estimation: lights are sampled at each surface and weighted against paths that find them by chance
 // [Veach 1997, section 9.2.4].
 
-// From where the surface asks the lights.
+// The point for which lights are sampled.
 LightContext direct_context(Interaction here, Path path) {
     LightContext context;
     context.p = path.at.p;
 #if HAS_EMISSION_BOTH
-    context.p = shapes_leave(path.at, here.front); // inside or outside of the very shape that shines
+    context.p = shapes_leave(path.at, here.front); // on its side of the surface, which may belong to a light
 #endif
     context.n = here.mapped ? here.front : here.basis.z; // a lobe that folds reaches all that is in front
     context.through = surface_transmits(here.m);
     return context;
 }
 
-// How often the lights are sampled at one surface, as a power of two. More often where it is the light that is noisy: a
-// third more time for each doubling, and a third of the error of a matte ball. After the first bounce four samples would
-// cost more than they tell.
+// How often the lights are sampled at one surface, as a power of two. Surfaces whose noise comes from the light take
+// more samples: a doubling costs a third more time and leaves a third of a matte ball's error. After the first bounce
+// four samples would cost more than they are worth.
 uint direct_doublings(Surface s, Path path) {
 #if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
     return environment_varies() && surface_is_broad(s) ? (path.bounce == 0u ? 2u : 1u) : 0u;
@@ -24,10 +24,10 @@ uint direct_doublings(Surface s, Path path) {
 #endif
 }
 
-// The share that each of these samples has; the density of finding the light by chance counts as much less.
+// The share of each of these samples in their mean; the density of finding the light by chance counts that much less.
 float direct_share(Surface s, Path path) { return 1.0 / float(1u << direct_doublings(s, path)); }
 
-// Whether the estimator takes that light from here.
+// Whether the estimator counts that sample of a light.
 bool direct_counts(LightSample light, Path path) {
     bool counts = light.pdf > 0.0;
 #if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
@@ -39,7 +39,7 @@ bool direct_counts(LightSample light, Path path) {
     return counts;
 }
 
-// The weight of a light's sample, whose direction the BSDF would have sampled with density found_pdf.
+// The weight of a light's sample; found_pdf is the density with which the BSDF would have given its direction.
 float direct_weight(LightSample light, float found_pdf) {
     float weight = 1.0;
 #if ESTIMATOR == ESTIMATOR_MIS
@@ -48,7 +48,7 @@ float direct_weight(LightSample light, float found_pdf) {
     return weight;
 }
 
-// The weight of emission that the path has found by chance; `context` is that of the surface before.
+// The weight of emission that the path has found by chance; `context` is that of the surface where it came from.
 float direct_found_weight(LightContext context, Path path) {
     float weight = path.counts ? 1.0 : 0.0;
 #if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
@@ -58,7 +58,7 @@ float direct_found_weight(LightContext context, Path path) {
     return weight;
 }
 
-// Whether anything of the light comes through; c loses what surfaces on the way take.
+// Whether the light is visible; surfaces on the way that let a share of it through take the rest from c.
 bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
     uvec2 skip = uvec2(at.flat_id, light.id);
     vec3 o = shapes_leave(at, light.wi);
@@ -85,7 +85,7 @@ void direct_add(Surface s, Interaction here, LightContext context, float share, 
     }
 }
 
-// Adds what lights send to the surface and on along the path.
+// Adds the light that the surface receives from lights and sends on along the path.
 void direct_lighting(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
 #if HAS_LIGHTS
 #if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)

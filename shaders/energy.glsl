@@ -1,10 +1,10 @@
-// Tables of what lobes send back, made by gpu/energy_tables.py: interpolated in all their axes by the sampler.
+// Tables of the lobes' albedos, which gpu/energy_tables.py makes. The texture unit interpolates along all their axes.
 #if HAS_PRINCIPLED
 layout(binding = ENERGY_ALBEDO_TEXTURE) uniform sampler3D energy_albedo_table; // cosine, roughness, eta
 layout(binding = ENERGY_MEAN_TEXTURE) uniform sampler3D energy_mean_table;     // roughness, round or aspect, eta
 layout(binding = ENERGY_SHEEN_TEXTURE) uniform sampler3D energy_sheen_table;   // cosine, sheen roughness
 
-// Texture coordinate of a place 0..1 between the middles of the first and last of n texels.
+// The texture coordinate of a place 0..1 between the middles of the first and the last of n texels.
 float energy_place(float x, int n) { return (clamp(x, 0.0, 1.0) * float(n - 1) + 0.5) / float(n); }
 
 float energy_eta(float eta) {
@@ -20,7 +20,7 @@ float energy_aspect(float aspect) { return clamp(log(aspect) / log(ENERGY_LEAST_
 // cosine, azimuth and in turn eta, roughness and in turn aspect
 layout(binding = ENERGY_STRETCHED_TEXTURE) uniform sampler3D energy_stretched_table;
 
-// energy_albedo of a stretched lobe: w in the lobe's own frame.
+// energy_albedo of a stretched lobe; w is in the lobe's own frame.
 vec4 energy_stretched(vec3 w, float roughness, float aspect, float eta) {
     vec2 a = abs(w.xy);
     float azimuth = a.x + a.y > 0.0 ? atan(a.x, a.y) * (2.0 * INV_PI) : 1.0; // from the short axis
@@ -42,8 +42,9 @@ vec4 energy_stretched(vec3 w, float roughness, float aspect, float eta) {
 }
 #endif
 
-// Shares of the light from w (in the lobe's own frame) that one scattering by a microfacet surface: reflects where
-// all is reflected; reflects by eta's Fresnel, never too low; loses where glass is entered; where it is left.
+// Four shares of the light from w, in the lobe's own frame, after one scattering by microfacets. x: it is reflected, if
+// all facets reflect everything. y: it is reflected by facets of index eta, never too low. z and w: it is lost between
+// the facets of glass, seen from outside and from inside.
 vec4 energy_albedo(vec3 w, float roughness, float aspect, float eta) {
 #if HAS_ANISOTROPIC
     if (aspect < 1.0) return energy_stretched(w, roughness, aspect, eta);
@@ -53,7 +54,7 @@ vec4 energy_albedo(vec3 w, float roughness, float aspect, float eta) {
     return texture(energy_albedo_table, vec3(x, energy_place(energy_roughness(roughness), n.y), z));
 }
 
-// Their cosine-weighted means.
+// The cosine-weighted means of these shares.
 vec4 energy_mean(float roughness, float aspect, float eta) {
     ivec3 n = textureSize(energy_mean_table, 0);
     float y = 0.5; // round lobes have a row of their own
@@ -64,6 +65,7 @@ vec4 energy_mean(float roughness, float aspect, float eta) {
     return texture(energy_mean_table, vec3(x, y / float(n.y), energy_place(energy_eta(eta), n.z)));
 }
 
+// The albedo of a white sheen from a direction of cosine c.
 float energy_sheen(float c, float roughness) {
     ivec3 n = textureSize(energy_sheen_table, 0);
     float y = energy_place((roughness - ENERGY_LEAST_SHEEN_ROUGHNESS) / (1.0 - ENERGY_LEAST_SHEEN_ROUGHNESS), n.y);

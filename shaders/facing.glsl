@@ -1,7 +1,7 @@
-// The surface where a path scatters: its normal as the viewer sees it, and what a map that bends it asks for.
+// Sides: the shading normal as the viewer sees it, and what a direction's side of a surface decides.
 
-// A shading normal that the viewer sees, on the viewer's side of the surface. Interpolation, or a map, can turn it away
-// at a silhouette; it is then bent back until it is just in view, which loses no light to black rims.
+// The shading normal on the viewer's side of the surface. At a silhouette interpolation or a map can turn it away from
+// the viewer; it is then bent back until it is just in view, as black rims would lose light.
 vec3 facing_normal(SurfacePoint at, vec3 wo_w) {
     vec3 n = dot(at.ng, wo_w) < 0.0 ? -at.ns : at.ns;
 #if HAS_SMOOTH_NORMALS || HAS_NORMAL_MAPS
@@ -11,8 +11,8 @@ vec3 facing_normal(SurfacePoint at, vec3 wo_w) {
     return n;
 }
 
-// The square of the index on wi's side, over the camera's. What comes from infinity comes from outside, even where an
-// open sheet of glass leads there.
+// The square of the refractive index on wi's side over that at the camera, from its value `eta_scale` on wo's side.
+// Light that comes from infinity, t = INFINITY_T, comes from outside, even where an open sheet of glass leads there.
 float facing_eta_scale(float eta_scale, float wi_z, Surface s, float t) {
 #if HAS_TRANSMISSION
     if (wi_z < 0.0) eta_scale /= s.eta * s.eta;

@@ -1,4 +1,4 @@
-// The shading frame: z along the shading normal; x and y any tangents. [Duff et al. 2017]
+// The shading frame: z is the shading normal, x and y are any tangents [Duff et al. 2017].
 struct Basis {
     vec3 x;
     vec3 y;

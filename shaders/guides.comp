@@ -1,5 +1,5 @@
-// Entry: albedo, normal and depth of the first hit, over the same camera rays as the picture's first samples; and which
-// shape and material the first of them met.
+// Entry: albedo, normal and depth of the first hit, over the same camera rays as the picture's first samples, and the
+// shape and the material that the first of these rays met.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit

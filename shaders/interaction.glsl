@@ -1,23 +1,23 @@
-// What a path meets, before it is asked how it scatters: frame, material, bodies.
+// The point where a path meets a surface: its frame, its material and the bodies on both sides.
 struct Interaction {
-    vec3 wo;       // in the frame
-    bool behind;   // seen from the inner side of the geometry
-    vec3 front;    // geometric normal on the viewer's side
-    Basis basis;
-    vec2 tangent;
+    vec3 wo;       // in the shading frame
+    bool behind;   // it is seen from the inner side of the geometry
+    vec3 front;    // the geometric normal on the viewer's side
+    Basis basis;   // the shading frame
+    vec2 tangent;  // the direction in it that anisotropy stretches along
     Material m;
-    bool mapped;   // a normal map has bent a normal
+    bool mapped;   // a normal map bends the normal of the base or of the coat
     vec3 coat;     // the coat's own normal, as the viewer sees it; only with HAS_COAT_NORMALS
-    Medium beyond; // on the other side
+    Medium beyond; // what lies on the other side
 };
 
-// The bodies on both sides of the surface.
+// Finds the bodies on both sides of the surface.
 void interaction_media(inout Interaction here, inout Path path) {
 #if HAS_ATTENUATION
     vec3 rate = surface_attenuation(here.m);
     bool clear = surface_transmits(here.m);
     if (clear && here.behind && path.medium.depth < 0.5) {
-        // The back of an open sheet: as if there had been a body all along.
+        // This is the back of an open sheet: the path is taken to have been inside a body all along.
         path.medium = medium_entered(path.medium, rate);
         if (path.bounce == 0u) path.throughput = medium_share(path.medium, path.hit.t);
     }
@@ -29,14 +29,14 @@ void interaction_media(inout Interaction here, inout Path path) {
 #endif
 }
 
-// Direction that anisotropy stretches along.
+// Finds the direction that anisotropy stretches along.
 void interaction_tangent(SurfacePoint at, inout Interaction here) {
     here.tangent = vec2(1.0, 0.0);
 #if HAS_ANISOTROPIC
     vec2 along = vec2(dot(at.tangent, here.basis.x), dot(at.tangent, here.basis.y));
     float along2 = dot(along, along);
     if (along2 > 0.0) here.tangent = along * inversesqrt(along2);
-    // From u towards v, from whichever side it is seen: else a body's inside would not be its outside's mirror.
+    // The angle turns from u towards v on both sides: else the inside of a body would not mirror its outside.
     here.m.anisotropic_rotation *= here.behind ? -at.handed : at.handed;
 #endif
 }
@@ -81,22 +81,22 @@ Surface interaction_surface(Interaction here) {
     return s;
 }
 
-// The cosine of a direction with the normal that decides on which side it is.
+// The cosine between a direction and the normal that decides on which side of the surface it is.
 float interaction_side(Interaction here, vec3 wi_w) {
     return here.mapped ? dot(wi_w, here.front) : dot(wi_w, here.basis.z);
 }
 
-// Whether light from wi_w arrives on one side of the shading normal and of the surface itself.
+// Whether wi_w is on the same side of the shading normal and of the surface itself.
 bool interaction_agrees(Interaction here, vec3 wi_w) {
     return here.mapped || facing_agrees(dot(wi_w, here.basis.z), dot(wi_w, here.front));
 }
 
-// The medium on the side that a ray towards wi_w goes to.
+// The medium that a ray towards wi_w goes through.
 Medium interaction_medium(Interaction here, Path path, vec3 wi_w) {
     Medium medium = path.medium;
     if ((dot(path.at.ng, wi_w) < 0.0) != here.behind) medium = here.beyond;
     return medium;
 }
 
-// Tells the path in which medium it goes on towards d.
+// Sets the medium through which the path goes on towards d.
 void interaction_cross(Interaction here, vec3 d, inout Path path) { path.medium = interaction_medium(here, path, d); }

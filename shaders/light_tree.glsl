@@ -1,11 +1,11 @@
-// Which of many bounded lights: down a binary tree, at each pair of nodes to the one that may matter more, by what its
-// lights can give at most where they are asked for [Conty Estevez & Kulla 2018; Pharr, Jakob, Humphreys 2023,
-// section 12.6.3]. gpu/light_tree.py makes the tree.
+// Picks one of many bounded lights by a walk down a binary tree. At each pair of nodes the chances follow bounds on
+// what the lights of either can contribute at most at the shaded point [Conty Estevez & Kulla 2018; Pharr, Jakob,
+// Humphreys 2023, section 12.6.3]. gpu/light_tree.py makes the tree.
 
-// A point that light is sampled for.
+// A point for which lights are sampled.
 struct LightContext {
     vec3 p;
-    vec3 n;       // unit; no light counts that comes from behind it ...
+    vec3 n;       // its normal, unit: light from behind it does not count ...
     bool through; // ... unless the surface transmits
 };
 
@@ -30,12 +30,12 @@ float light_tree_intensity(uvec4 node) { return uintBitsToFloat(((node.z >> 21u)
 
 float light_tree_sine(float c) { return sqrt(max(0.0, 1.0 - c * c)); }
 
-// Cosine and sine of the angle a - b, of 0 where b is larger; a and b, 0..pi, by theirs.
+// The cosine and the sine of the angle max(a - b, 0), from those of a and b, which lie in 0..pi.
 vec2 light_tree_less(vec2 a, vec2 b) {
     return a.x >= b.x ? vec2(1.0, 0.0) : vec2(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y);
 }
 
-// x: a bound on what a node's lights give, times y, the square of their distance. p is on the tree's grid.
+// x is a bound on the contribution of a node's lights times y, the square of their distance. p is on the tree's grid.
 vec2 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
     vec3 to = vec3(node.x & 0xffffu, node.x >> 16u, node.y & 0xffffu) - p;
     float radius = uintBitsToFloat(((node.y & 0xff0000u) << 4u) + (123u << 23u));
@@ -56,14 +56,15 @@ vec2 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
     float edge = float((node.z >> 16u) & 31u) * (1.0 / 31.0);
     if (cos_out < 1.0 - edge * edge) cos_out = 0.0;
 #else
-    float cos_out = 1.0; // all shine into all directions
+    float cos_out = 1.0; // all lights shine in all directions
 #endif
     float share = d2 <= r2 ? 1.0 : max(cos_in, 0.0) * max(cos_out, 0.0);
     return vec2(light_tree_intensity(node) * share, max(d2, r2));
 }
 
-// The chance of coming down the tree to a light: to the one that `code` leads to, or, `told`, to the one whose trail
-// it is. `near`: there is anything to do. The codes of a node are an interval, which its children share.
+// The chance of coming down the tree to a light: to the one that `code` leads to, which is `found`, or with `told` to
+// the one that `trail` leads to. `near` is false where the light is not in the tree. The codes of a node are an
+// interval, which its children share out.
 float light_tree_walk(bool near, bool told, uint code, uint trail, LightContext context, out uint found) {
     uvec4 head = light_tree_head(), grid = texelFetch(light_tree_words, ivec2(1, 0), 0);
     vec3 p = (context.p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
@@ -75,7 +76,7 @@ float light_tree_walk(bool near, bool told, uint code, uint trail, LightContext 
         uvec4 a = light_tree_fetch(2u * pair), b = light_tree_fetch(2u * pair + 1u);
         vec2 x = light_tree_importance(a, p, context), y = light_tree_importance(b, p, context);
         float first = x.x * y.y, second = y.x * x.y; // gpu/light_tree.py keeps them inside float32
-        // Neither seems to matter, as where only their parent's bounds reach: by intensity alone.
+        // Neither bound says that light arrives, though that of the parent did: the chances follow intensity alone.
         bool lost = !(first + second > 0.0);
         if (lost) {
             first = light_tree_intensity(a);

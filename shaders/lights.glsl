@@ -1,10 +1,10 @@
-// Pick a light and a direction towards it; and the density with which that would have happened.
+// Picks a light and a direction towards it, and tells the density with which a direction would have been picked.
 struct LightSample {
-    vec3 wi;       // world, towards the light, from the point given
-    float t;       // how far; INFINITY_T for the environment
-    vec3 radiance; // arriving, not yet divided by pdf; for a point light divided by d^2; of a shape's sample: the share
-                   // of its emission that gets out of the shape itself
-    float pdf;     // per solid angle, picking included; 0: nothing comes
+    vec3 wi;       // towards the light, in world space
+    float t;       // the distance; INFINITY_T for what lies at infinity
+    vec3 radiance; // arriving, not divided by pdf; of a point light divided by d^2; while a shape's sample is made, the
+                   // share of its emission that leaves the shape itself
+    float pdf;     // per solid angle, with the chance of picking the light; 0: there is no sample
     bool extended; // false: only direct sampling finds this light
     uint id;       // the shape that shines, or NONE
 };
@@ -25,8 +25,8 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 #include "light_tree.glsl"
 
 #if HAS_LIGHT_TREE
-// All 32 bits: a light among many has a chance too small for the 24 of a float. `probability` of what is drawn is all
-// that it is picked with there.
+// Picks a light by all 32 bits, as one among many has a chance too small for the 24 bits of a float. `probability` of
+// the light that comes back is the whole chance of picking it from there.
 Light lights_pick(uint bits, LightContext context) {
     uvec4 head = light_tree_head();
     uint code = bits >> 2u, far = frame.light_count - head.w;
@@ -46,7 +46,7 @@ Light lights_pick(uint bits, LightContext context) {
 #if HAS_MANY_LIGHTS
     float x = sobol_unit(bits) * float(frame.light_count);
     uint i = min(uint(x), frame.light_count - 1u);
-    Light drawn = light_pick(i); // two of its words: a load of the whole would cost as much again
+    Light drawn = light_pick(i); // two of its words are used: loading all of it would cost as much again
     return light_pick(x - float(i) >= drawn.threshold ? drawn.alias : i);
 #else
     return light_load(0u);
@@ -55,7 +55,7 @@ Light lights_pick(uint bits, LightContext context) {
 #endif
 
 #if HAS_QUAD_LIGHTS
-// Loads at a constant place where there is one emitting quad, as in many a room: a third of a frame's time there.
+// Loads from a constant place where only one quad emits, as in many a room: this saves a third of a frame's time there.
 Quad lights_quad(uint i) {
 #if QUAD_LAMP >= 0
     return quad_load(uint(QUAD_LAMP));
@@ -65,7 +65,7 @@ Quad lights_quad(uint i) {
 }
 #endif
 
-// What lights_sample and lights_pdf ask a shape's material.
+// What lights_sample and lights_pdf need of a shape's material.
 struct Emitter {
     vec3 radiance;
     uint sides; // 1: the outward one shines; 2: both do
@@ -78,7 +78,7 @@ Emitter lights_emitter(Light l) {
     Material m = material_pick(l.material);
     e.radiance = m.emission;
 #if HAS_TEXTURED_LIGHTS
-    e.radiance = vec3(1.0); // by the place that is sampled: lights_emission
+    e.radiance = vec3(1.0); // it depends on the place that is sampled: see lights_emission
 #endif
 #if HAS_EMISSION_BOTH
     e.sides = m.emission_sides;
@@ -88,7 +88,7 @@ Emitter lights_emitter(Light l) {
     e.radiance *= m.opacity;
 #endif
 #if HAS_TEXTURED_LIGHTS
-    e.transparency = m.opacity < 1.0 ? 1.0 : 0.0; // by the place that is passed: lights_emission
+    e.transparency = m.opacity < 1.0 ? 1.0 : 0.0; // it depends on the place that is passed: see lights_emission
 #else
     e.transparency = 1.0 - m.opacity;
 #endif
@@ -98,7 +98,7 @@ Emitter lights_emitter(Light l) {
 }
 
 #if HAS_TEXTURED_LIGHTS
-// The emission of the place that was sampled, by the share of it that is there.
+// The emission of the place that was sampled, times the opacity there.
 vec3 lights_emission(LightSample s, vec3 p) {
     vec3 q = p + s.t * s.wi;
     Hit hit = Hit(0.0, s.id, vec2(0.0));
@@ -112,7 +112,7 @@ vec3 lights_emission(LightSample s, vec3 p) {
     SurfacePoint at = shapes_point(hit, q, vec3(0.0, 0.0, 1.0));
     float share = 1.0;
 #if HAS_EMISSION_BOTH && HAS_OPACITY && (HAS_SPHERE_LIGHTS || HAS_ELLIPSOID_LIGHTS)
-    // The inside of a ball's far half, through what is open of the near one.
+    // The inside of a ball's far half is seen through the near half, as far as that is transparent.
     uint index = s.id & LEAF_FIRST_MASK, kind = s.id >> LEAF_KIND_SHIFT;
     float near = 0.0;
 #if HAS_SPHERE_LIGHTS
@@ -136,7 +136,8 @@ vec3 lights_emission(LightSample s, vec3 p) {
 }
 #endif
 
-// context: who asks; the bits of one number choose the light, those of two more the direction.
+// Samples a light for the point `context`. The bits of one random number choose the light, those of two more the
+// direction.
 LightSample lights_sample(LightContext context, uint pick_bits, uvec2 bits) {
     LightSample s = lights_none();
     vec3 p = context.p;
@@ -189,7 +190,8 @@ LightSample lights_sample(LightContext context, uint pick_bits, uvec2 bits) {
     return s;
 }
 
-// Density of lights_sample for who asks and the direction wi, which met the emitting shape hit.id at distance hit.t.
+// The density with which lights_sample gives the direction wi, in which `context` sees the emitting shape hit.id at the
+// distance hit.t.
 float lights_pdf(uint light, Hit hit, SurfacePoint at, LightContext context, vec3 wi) {
 #if HAS_EMISSION
     vec3 p = context.p;

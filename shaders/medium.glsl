@@ -1,15 +1,15 @@
-// Bodies that absorb. Their rates add up, so that it does not matter in which order nested or overlapping bodies are
-// entered and left, and what is in two bodies loses light to both.
+// Bodies that absorb light. Their rates add up, so that nested or overlapping bodies may be entered and left in any
+// order; a ray that is in two bodies loses light to both.
 struct Medium {
 #if HAS_ATTENUATION
-    vec3 rate;   // of attenuation along the ray, 1/m: the sum of those of the bodies around
-    float depth; // how many transmitting bodies that are
+    vec3 rate;   // of attenuation, 1/m: the sum over all bodies around the ray
+    float depth; // the number of these bodies
 #else
-    float unused; // so that every kernel can pass one on
+    float unused; // a struct must have a member; every kernel passes media on
 #endif
 };
 
-// What is left of light after t metres.
+// The share of light that is left after t metres.
 vec3 medium_share(Medium m, float t) {
 #if HAS_ATTENUATION
     return exp(-m.rate * t);
@@ -19,22 +19,22 @@ vec3 medium_share(Medium m, float t) {
 }
 
 #if HAS_ATTENUATION
-const float MEDIUM_WALL = 1e20; // a rate above lets nothing through, and would round away the others in a sum
-const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below goes through at most
-// Off the camera's axes, where meshes like to have their edges.
+const float MEDIUM_WALL = 1e20; // 1/m: a rate above lets nothing through and would round away the others in a sum
+const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below passes at most
+// The direction of the search, off the camera's axes, where meshes tend to have their edges.
 const vec3 MEDIUM_SEARCH = vec3(0.1371, 0.0713, -1.0);
 
 Medium medium_entered(Medium m, vec3 rate) { return Medium(m.rate + rate, m.depth + 1.0); }
 
-// With the last body goes all rate: a texture may have given it another one where it was entered.
+// Leaving the last body leaves no rate at all: a texture may have given the body another rate where it was entered.
 Medium medium_left(Medium m, vec3 rate) {
     if (m.depth > 1.5) return Medium(max(m.rate - rate, vec3(0.0)), m.depth - 1.0);
     return Medium(vec3(0.0), 0.0);
 }
 
-// What the camera is in: whose surface a straight line leaves more often than it enters it. Opaque things do not
-// matter. The line goes backwards, where there is least; if that says inside, so must a second one, forwards: an open
-// sheet is no body.
+// The medium around the camera: that of the bodies whose surface a straight line leaves more often than it enters.
+// Opaque shapes do not count. The line goes backwards, where there is least to meet. If it says that the camera is in a
+// body, a second line forwards must agree, as an open sheet is no body.
 Medium medium_at_camera() {
     vec3 d = normalize(MEDIUM_SEARCH.x * frame.camera_right + MEDIUM_SEARCH.y * frame.camera_up
                      + MEDIUM_SEARCH.z * frame.camera_forward);

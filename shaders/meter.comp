@@ -1,18 +1,19 @@
-// Entry: what the noise meter asks of the accumulators, of which a part is bound. METER_WEIGH 1: how much each block of
-// pixels errs, as far as its samples and its neighbours' say. 0: sums over all pixels, and the metered pixels' values.
+// Entry: what the noise meter needs of the accumulators, of which a part is bound. METER_WEIGH 1 computes how much each
+// block of pixels errs, as far as its own samples and its neighbours' tell; 0 computes sums over all pixels, and the
+// values of the metered pixels.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 #include "luminance_variance.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 
-// Of the luminance, times (n - 1) of the sum's n samples.
+// The variance of the luminance times n - 1, of n samples.
 float meter_variance(uint slot) { return luminance_variance(moments[slot].rgb); }
 
 #if METER_WEIGH
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };
 uniform uvec2 size; // of the bound rows
 uniform uint block; // pixels a side
-uniform uint rim;   // pixels around it that count too: where few samples found a thin edge, its neighbours lie on it
+uniform uint rim;   // pixels around it that count, too: where few samples found a thin edge, its neighbours lie on it
 
 void main() {
     uvec2 b = gl_GlobalInvocationID.xy, blocks = (size + block - 1u) / block;

@@ -1,7 +1,8 @@
-// A lobe about a normal that a map has bent reaches below the surface. What it sends there comes back up, as if the
-// surface were a mirror to it: nothing is lost, and nothing gained. It is the idea of [Schuessler, Heitz, Hanika,
-// Dachsbacher 2017, "Microfacet-based normal mapping"] with the tangent facet laid flat, of one further scattering.
-// So v has the sum of two directions of the lobe: itself and its image below. Light that is refracted folds likewise.
+// A lobe about a normal that a map has bent reaches below the surface. The light that it sends there comes back up, as
+// if the surface mirrored it, so that nothing is lost and nothing gained: the idea of [Schuessler, Heitz, Hanika,
+// Dachsbacher 2017, "Microfacet-based normal mapping"] with the tangent facet laid flat and one further scattering.
+// A direction v thus has the sum of two directions of the lobe, itself and its image below the surface. Refracted light
+// is folded likewise.
 
 #if HAS_NORMAL_MAPS
 // The folded BSDF towards v, in world space.
@@ -29,7 +30,7 @@ Scatter normal_map_eval(Surface s, Interaction here, vec3 v) {
 }
 #endif
 
-// Whether the folded lobe has that direction at all.
+// Whether the folded lobe has that direction.
 bool normal_map_keeps(Surface s, LobeSample lobe) {
 #if HAS_TRANSMISSION
     bool keeps = lobe.wi.z != 0.0 && (lobe.wi.z > 0.0 || s.transmission > 0.0);
@@ -43,7 +44,7 @@ bool normal_map_keeps(Surface s, LobeSample lobe) {
 vec3 normal_map_direction(Interaction here, LobeSample lobe) {
     vec3 d = frame_to_world(here.basis, lobe.wi);
 #if ESTIMATOR == ESTIMATOR_UNIFORM
-    // Uniform about the surface itself, where nothing folds.
+    // Uniform directions are drawn about the surface itself, where nothing needs folding.
     if (here.mapped && !lobe.is_delta) d = frame_to_world(frame_basis(here.front), lobe.wi);
 #endif
     float across = dot(d, here.front);

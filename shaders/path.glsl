@@ -24,8 +24,8 @@ vec4 path_sky(vec3 d, Medium medium) {
     return sky;
 }
 
-// Begins a path that leaves the camera along d and meets `hit` first. Returns its alpha: 1 where it meets a surface or a
-// background that is shown.
+// Begins a path that leaves the camera along d and meets `hit` first. Returns its alpha: 1 where it meets a surface or
+// a background that is shown.
 float path_begin(vec3 d, Hit hit, SurfacePoint at, Medium medium, out Path path) {
     bool met = hit.id != NONE;
     path.d = d;
@@ -50,8 +50,8 @@ float path_begin(vec3 d, Hit hit, SurfacePoint at, Medium medium, out Path path)
 vec3 path_finish(Path path) {
     vec3 arriving = arriving_outside(path.d, path.found_pdf, path.bounce > 0u) * max(path.eta_scale, 1.0);
     if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
-    // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word. What such a path met last may
-    // not be there.
+    // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word. What such a path met last
+    // may not be there.
     path_was_cut = path_continues(path);
     return path_was_cut ? path.radiance_before : path.radiance;
 }

@@ -8,21 +8,23 @@ struct Path {
     vec3 radiance_before; // found before the last bounce
     uint bounce;
     bool alive;           // there is a surface to scatter at
-    // What light found along d is weighed with: d's density per solid angle, and whether such light counts at all.
+    // Light that is found along d is weighted by d's density per solid angle; `counts` says whether it is added at all.
     float found_pdf;
     bool counts;
-    // A path leaves the scene once at most: what arrives from there is asked for once, when all its neighbours ended.
+    // The path has left the scene. It does so at most once, so that light from infinity is added once, by path_finish,
+    // when all neighbouring lanes have ended, too.
     bool escaped;
-    // Radiance over the square of the index is what passes a boundary unchanged: `eta_scale` is that square here over
-    // that at the camera, kept apart so that roulette does not see it.
+    // The square of the refractive index here over that at the camera. Radiance over this square passes a boundary
+    // unchanged; the factor is not part of the throughput, so that roulette does not see it.
     float eta_scale;
     Medium medium;
 };
 
-// The share of a new path's throughput below which it may end by chance. Below 1, for the variance of ending paths costs
-// more than the time they take: 1/2 leaves a sixth less error after equal time in a white box, a third by glass.
+// A throughput below this may end the path by chance. It is below 1 because the variance of ended paths costs more than
+// the time that they would take: with 1/2 the error after equal time is a sixth less in a white box, a third less with
+// glass.
 const float ROULETTE_THRESHOLD = 0.5;
-// Stands for the density of a direction that only a perfectly specular lobe could have taken.
+// The density of a direction that a perfectly specular lobe gave, in place of infinity.
 const float PDF_DELTA = 1e30;
 
 vec3 path_clamp(vec3 c, bool indirect) {
@@ -35,7 +37,7 @@ vec3 path_clamp(vec3 c, bool indirect) {
 
 bool path_continues(Path path) { return path.alive && path.bounce < frame.max_bounces; }
 
-// Ends paths that carry little by chance, and makes the others carry more.
+// Russian roulette: ends paths that carry little by chance, and scales up those that survive.
 void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
     if (path.bounce >= frame.roulette_depth && path.bounce < frame.max_bounces) {
         float survive = min(1.0, reach / ROULETTE_THRESHOLD);
@@ -55,8 +57,8 @@ void path_trace(vec3 o, uint skip, Sampler rng, inout Path path) {
 #endif
 }
 
-// Takes the path on to the nearest surface in the direction `next`. `share` is that of one sample of a light
-// (direct.glsl): finding a light by chance counts as much less.
+// Takes the path on to the nearest surface in the direction `next`. Where a light is sampled 1 / share times
+// (direct.glsl), the density of finding it by chance counts only that share.
 void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Path path) {
     path.alive = next.valid;
     path.d = next.d;
@@ -66,7 +68,7 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     float reach = max_component(path.throughput);
     path.alive = path.alive && reach > 0.0;
     if (path.alive && !(reach < 1e6)) {
-        atomicAdd(path_ended, 1u);
+        atomicAdd(path_ended, 1u); // a throughput that is huge or NaN
         path.alive = false;
     }
     uint pair = sobol_bounce_pair(path.bounce);
@@ -80,7 +82,7 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     path.alive = path.alive && met;
 }
 
-// Adds `weight` of the emission of the surface that the path has come to, and its ambient light.
+// Adds the ambient light of the surface that the path has come to, and its emission times `weight`.
 void path_add_emission(float weight, inout Path path) {
 #if HAS_EMISSION
     vec3 arriving = arriving_emission(path.at, path.d) * weight * path.eta_scale;

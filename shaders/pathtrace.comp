@@ -1,13 +1,13 @@
-// Entry: samples [sample_first, sample_first + sample_count) of each pixel of a tile, added one by one, in order.
-// ADAPTIVE: of each area listed, those that its pixels are short of.
+// Entry: adds samples [sample_first, sample_first + sample_count) of each pixel of a tile, one by one, in order. With
+// ADAPTIVE it adds those that the pixels of the listed areas are short of.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 layout(std430, binding = SLOT_SUM) buffer sum_buffer { vec4 sums[]; };
 layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 compensations[]; };
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };
 layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
-    uint path_ended; // by their throughput
-    uint path_cut;   // by the driver: see path.glsl
+    uint path_ended; // paths that their throughput has ended
+    uint path_cut;   // samples that the driver has cut: see path.glsl
 };
 #include "constants.glsl"
 #include "sobol.glsl"
@@ -21,8 +21,8 @@ layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
 precise vec4 sum, lost;
 vec4 moment; // w: samples
 
-// Kahan's compensated sum for the picture; Welford's second moment about its mean. Relative error after a million samples
-// 4e-8, where a plain sum has 9e-5 and a running average 4e-4.
+// Adds to Kahan's compensated sum, which is the picture, and to Welford's second moment about its mean. After a million
+// samples the relative error is 4e-8; a plain sum has 9e-5 and a running average 4e-4.
 void add(vec4 color) {
     vec3 before = moment.w > 0.0 ? sum.rgb / moment.w : vec3(0.0);
     precise vec4 x = color - lost;
@@ -47,7 +47,7 @@ void main() {
     lost = compensations[slot];
     moment = moments[slot];
     uint replicate = frame.replicate;
-    if (replicate != 0u) { // the meter's buffers say where, and which of a pixel's (gpu/meter.py)
+    if (replicate != 0u) { // the meter's buffers name the pixel, and the replicate among the pixel's (gpu/meter.py)
         replicate += uint(fract(moment.x) * float(METER_REPLICATES));
         pixel = uvec2(moment.xy);
     }
@@ -65,8 +65,8 @@ void main() {
         Hit hit;
         SurfacePoint at;
 #if HAS_OPEN_VIEW
-        // On to a sample that meets something, in a loop of its own: a machine that runs both sides of every `if` would
-        // go through all that follows for the pixels of the sky.
+        // Samples of the sky are skipped in a loop of their own: a machine that runs both sides of every `if` would run
+        // all that follows for them, too.
         bool missed;
         do {
 #endif

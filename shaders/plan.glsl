@@ -1,9 +1,9 @@
-// ADAPTIVE: which pixels a dispatch takes, and how many samples each shall have (gpu/plan.py).
+// Adaptive sampling: which pixels a dispatch renders, and how many samples each of them shall have (gpu/plan.py).
 #if ADAPTIVE
 layout(std430, binding = SLOT_NORMAL) readonly buffer plan_buffer { uvec4 plan_counts[]; }; // by area and class of rows
 layout(std430, binding = SLOT_OUTPUT) readonly buffer work_buffer { uint plan_work[]; }; // areas: x, y << 16
 
-// The pixel of this invocation, and whether there is one. tile_size.x is the number of areas.
+// Finds the pixel of this invocation; false where there is none. tile_size.x is the number of areas.
 bool plan_pixel(out uvec2 pixel, out uint slot) {
     uint area = gl_WorkGroupID.x < frame.tile_size.x ? plan_work[gl_WorkGroupID.x] : 0xffffffffu;
     pixel = 8u * uvec2(area & 0xffffu, area >> 16u) + gl_LocalInvocationID.xy;
@@ -11,7 +11,7 @@ bool plan_pixel(out uvec2 pixel, out uint slot) {
     return all(lessThan(pixel, frame.resolution));
 }
 
-// Of the samples that the pixel is short of after `had`, as many as this dispatch takes.
+// How many samples this dispatch adds to a pixel that has had `had`.
 uint plan_due(uvec2 pixel, uint had) {
     uvec2 area = pixel >> 3u;
     uint wanted = plan_counts[area.y * ((frame.resolution.x + 7u) >> 3u) + area.x][pixel.y & 3u];

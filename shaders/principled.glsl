@@ -1,23 +1,23 @@
-// The production model: coat over sheen over a base that is mixed of metal, diffuse under a dielectric, and glass. Each
-// layer leaves 1 - max(E(o), E(i)) of its albedo E to what is under it, which is reciprocal and gains nothing
-// [Kulla & Conty 2017, section 4]. Departs from the 2012 course notes where their terms gain or lose light.
+// The production model: a coat over a sheen over a base that mixes metal, a diffuse material under a dielectric, and
+// glass. A layer of albedo E leaves 1 - max(E(o), E(i)) of the light to what is under it, which is reciprocal and gains
+// nothing [Kulla & Conty 2017, section 4]. The model departs from the 2012 course notes where those gain or lose light.
 #if HAS_PRINCIPLED
 
-// Chances of picking each lobe, summing to one.
+// The chances of picking each lobe; they sum to one.
 struct PrincipledWeights {
-    float diffuse;   // with what scatters between facets, above
-    float diffuse_below; // that, below
+    float diffuse;       // diffuse light and light between microfacets that leaves above the surface
+    float diffuse_below; // light between microfacets that leaves below it
     float microfacet;
     float sheen;
     float coat;
 };
 
-// What the layers above the base leave to it, between one direction outside and, where both are outside, another.
+// The share of light that the layers leave to the base: between wo and wi, or by wo alone where only one is outside.
 float principled_layers(Surface s, float coat_i, float sheen_i) {
     return (1.0 - max(s.coat_albedo, coat_i)) * (1.0 - max(s.sheen_albedo, sheen_i));
 }
 
-// Into the coat's own frame and back, where its normal is not that of what is under it.
+// Into the coat's own frame and back; its normal may differ from that of the base.
 #if HAS_COAT_NORMALS
 float principled_coat_cosine(Surface s, vec3 w) { return dot(s.coat.z, w); }
 vec3 principled_coat_to_local(Surface s, vec3 w) { return frame_to_local(s.coat, w); }
@@ -48,7 +48,7 @@ vec4 principled_albedo(Surface s, vec3 w) {
     return energy_albedo(bsdf_turn(s, w), s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
 }
 
-// `behind`: the surface is seen from the inner side of its geometry.
+// Sets what depends on the side that the surface is seen from; `behind` is the inner side of its geometry.
 void principled_side(bool behind, inout Surface s) {
 #if HAS_TRANSMISSION
     s.inside = behind && s.transmission > 0.0 && s.metallic < 1.0;
@@ -56,18 +56,18 @@ void principled_side(bool behind, inout Surface s) {
 #endif
 }
 
-// The surface as seen from wo.
+// Completes the surface with what depends on wo.
 void principled_face(vec3 wo, bool behind, inout Surface s) {
     if (s.model != MODEL_PRINCIPLED) return;
     principled_side(behind, s);
     s.albedo = principled_albedo(s, wo);
     s.albedo_mean = energy_mean(s.is_delta ? 0.0 : s.roughness, s.aspect, s.eta_outside);
-    // The layers lie on the outer side.
+    // The layers lie on the outer side only.
     s.coat_albedo = s.inside ? 0.0 : principled_coat_albedo(s, principled_coat_cosine(s, wo));
     s.sheen_albedo = s.inside ? 0.0 : principled_sheen_albedo(s, wo.z);
 }
 
-// What comes back of light lost between facets: metal and dielectric as mixed.
+// The share that comes back of the light that single scattering loses between microfacets of the mixed base.
 vec3 principled_multiscatter(Surface s) {
     vec3 metal = multiscatter_fresnel(s.base_color + (1.0 - s.base_color) / 21.0, s.albedo_mean.x);
     vec3 tinted = multiscatter_fresnel(microfacet_tinted(s, fresnel_mean(s.eta_outside)), s.albedo_mean.x);
@@ -89,16 +89,16 @@ PrincipledWeights principled_weights(Surface s, vec3 wo) {
         w.diffuse += lost * (1.0 - t);
         w.diffuse_below = lost * t * luminance(s.base_color);
         microfacet *= 1.0 - lost;
-        // Where nearly all directions are wholly reflected, all of a rough lobe is nearly diffuse, and light stays for
-        // many bounces: facets that lead nowhere would make weights grow with each.
-        float share = s.inside ? s.eta * s.eta : 1.0; // of the directions inside, those that lead out
+        // Where nearly all directions are totally reflected, a rough lobe as a whole is nearly diffuse and light stays
+        // inside for many bounces: microfacets that lead nowhere would make the weights grow with each bounce.
+        float share = s.inside ? s.eta * s.eta : 1.0; // of the directions inside that lead out
         float spread = 0.6 * glass * sqr(sqr(s.roughness * (1.0 - share))) * microfacet;
         microfacet -= spread;
         w.diffuse += spread * (1.0 - share);
         w.diffuse_below += spread * share * luminance(s.base_color);
     }
 #endif
-    // The floor keeps the lobe sampled where it is faint from here: it rises to 1 towards grazing.
+    // The floor of 0.05 keeps the lobe sampled where it is faint from here, as it rises to 1 towards grazing angles.
     w.microfacet = max(0.05, microfacet);
     float under = principled_layers(s, 0.0, 0.0);
     w.diffuse *= under;
@@ -136,7 +136,7 @@ Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) 
 }
 #endif
 
-// f without the cosine of wi; perfectly specular parts apart.
+// f lacks the cosine of wi, and perfectly specular lobes.
 Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     PrincipledWeights w = principled_weights(s, wo);
     vec3 wm = normalize(wo + wi);
@@ -180,7 +180,7 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
 }
 
 #if HAS_COAT_NORMALS
-// The coat alone, with the cosine: it may send light where the base's normal sees none.
+// The coat alone, with the cosine: it may reflect light to where the base's normal sees none.
 Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
     vec3 o = principled_coat_to_local(s, wo), i = principled_coat_to_local(s, wi);
     if (s.model != MODEL_PRINCIPLED || s.inside || o.z <= 0.0 || i.z <= 0.0) return Scatter(vec3(0.0), 0.0);
@@ -190,13 +190,13 @@ Scatter principled_coat_eval(Surface s, vec3 wo, vec3 wi) {
 }
 #endif
 
-// The microfacet lobe, which is picked with the chance `weight`.
+// Samples the microfacet lobe, which is picked with the chance `weight`.
 LobeSample principled_sample_microfacet(Surface s, vec3 wo, float v, vec2 u, float weight) {
     vec3 wi = bsdf_turn_back(s, microfacet_sample(s, bsdf_turn(s, wo), v, u));
     LobeSample r = LobeSample(wi, s.is_delta, Scatter(vec3(0.0), 0.0), false);
     float chance = microfacet_reflect_chance(s, wo.z);
     vec3 f = microfacet_fresnel(s, wo.z);
-    float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // a mirror's wi has wo's cosine
+    float coat_i = s.coat_albedo, sheen_i = s.sheen_albedo; // in a mirror wi has the cosine of wo
 #if HAS_TRANSMISSION
     if (wi.z < 0.0) {
         if (s.index_matched) r.is_delta = true;
@@ -243,7 +243,7 @@ LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     return r;
 }
 
-// The chance that principled_sample's direction comes from a perfectly specular lobe.
+// The chance that principled_sample picks a perfectly specular lobe.
 float principled_delta_chance(Surface s, vec3 wo) {
     PrincipledWeights w = principled_weights(s, wo);
     float p = 0.0;

@@ -1,4 +1,4 @@
-// Entry: accumulator -> exposed, tone-mapped, sRGB-encoded picture, straight alpha.
+// Entry: turns the accumulator into an exposed, tone-mapped, sRGB-encoded picture with straight alpha.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 #include "constants.glsl"
@@ -15,7 +15,7 @@ layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 pixe
 #else
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { uint pixels[]; };
 #endif
-uniform uint count; // of the pixels that are bound, whatever rows they stand in
+uniform uint count; // of the pixels that are bound, in whatever rows
 uniform float exposure; // factor
 
 vec3 resolve_srgb(vec3 c) { // IEC 61966-2-1

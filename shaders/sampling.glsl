@@ -1,6 +1,6 @@
 // Maps from the unit square to the shapes that are sampled.
 
-// Unit disk, areas kept, squares to circles [Shirley & Chiu 1997].
+// The unit disk: areas are preserved, squares become circles [Shirley & Chiu 1997].
 vec2 sampling_disk(vec2 u) {
     vec2 s = 2.0 * u - 1.0;
     bool wide = abs(s.x) > abs(s.y);
@@ -11,20 +11,20 @@ vec2 sampling_disk(vec2 u) {
     return r * (wide ? vec2(major, minor) : vec2(minor, major));
 }
 
-// Hemisphere about +z, density cos(theta) / pi [Malley].
+// The hemisphere about +z with density cos(theta) / pi [Malley].
 vec3 sampling_cosine(vec2 u) {
     vec2 d = sampling_disk(u);
     return vec3(d, sqrt(max(0.0, 1.0 - dot(d, d))));
 }
 
-// Hemisphere about +z, density 1 / (2 pi).
+// The hemisphere about +z with density 1 / (2 pi).
 vec3 sampling_hemisphere(vec2 u) {
     float r = sqrt(max(0.0, 1.0 - u.x * u.x));
     float phi = TWO_PI * u.y;
     return vec3(r * cos(phi), r * sin(phi), u.x);
 }
 
-// Sphere, density 1 / (4 pi).
+// The sphere with density 1 / (4 pi).
 vec3 sampling_sphere(vec2 u) {
     float z = 1.0 - 2.0 * u.x;
     float r = sqrt(max(0.0, 4.0 * u.x * (1.0 - u.x))); // 1 - z^2 without cancelling
@@ -32,15 +32,15 @@ vec3 sampling_sphere(vec2 u) {
     return vec3(r * cos(phi), r * sin(phi), z);
 }
 
-// Triangle, uniform: barycentric weights of its second and third vertex [Heitz 2019, low distortion].
+// A triangle, uniformly: the barycentric weights of its second and third vertex [Heitz 2019, low distortion].
 vec2 sampling_triangle(vec2 u) {
     vec2 b = u * 0.5;
     float d = u.y - u.x;
     return d > 0.0 ? vec2(b.x, b.y + d * 0.5) .xy : vec2(b.x - d * 0.5, b.y);
 }
 
-// Angle of (x, y) with y >= 0, within 7e-7 of itself: an odd polynomial fitted to atan's relative error on [0, 1].
-// Cheaper than atan(y, x), which knows all quadrants.
+// The angle of (x, y) with y >= 0, to a relative error of 7e-7: an odd polynomial, fitted to atan on [0, 1]. It is
+// cheaper than atan(y, x), which handles all quadrants.
 float sampling_angle(float y, float x) {
     float a = abs(x), r = min(a, y) / max(a, y), q = r * r;
     float angle = 0.0838723022 + q * (-0.0370138848 + q * 0.00786364667);
@@ -49,15 +49,15 @@ float sampling_angle(float y, float x) {
     return x < 0.0 ? PI - angle : angle;
 }
 
-// Power heuristic, exponent 2 [Veach 1997, section 9.2.4]; a and b may be huge, so by their ratio.
+// The power heuristic with exponent 2 [Veach 1997, section 9.2.4]. It takes the ratio, as a and b may be huge.
 float power_heuristic(float a, float b) {
     float r = b / a;
     return 1.0 / (1.0 + r * r);
 }
 
-// Offset in the pixel, importance-sampled from the reconstruction filter, so that every sample weighs one
+// An offset in the pixel, importance-sampled from the reconstruction filter, so that every sample has weight one
 // [Ernst, Stamminger, Greiner 2006]. The table holds the inverse of the half profile's distribution, in pixels, at
-// 1 - (1 - k / n)^4: dense in the tail, where the inverse is steep.
+// 1 - (1 - k / n)^4, which is dense in the tail, where the inverse is steep.
 layout(std140, binding = FILTER_BLOCK) uniform filter_block { vec4 filter_table[FILTER_TABLE_SIZE + 1]; };
 
 float sampling_filter_axis(float u) {

@@ -1,6 +1,7 @@
-// Nearest hit and any hit. Shapes of a kind that is few stand in a loop of constant length, which compilers unroll:
-// their numbers are then loaded once for all lanes (on llvmpipe a tenth of the time of a load by varying index).
-// Kinds that are many go through the tree, but for their few largest, which would stand in every ray's way there.
+// The nearest hit, and whether there is any. Where a kind has few shapes, they are tested in a loop of constant length,
+// which compilers unroll: a shape's numbers are then loaded once for all lanes, in a tenth of the time that llvmpipe
+// takes for a load by a varying index. Kinds with many shapes are in the tree, except for their few largest shapes,
+// which would be in every ray's way there.
 struct SurfacePoint {
     vec3 p;
     vec3 error;   // bound on p's distance from the surface, per axis
@@ -8,16 +9,16 @@ struct SurfacePoint {
     vec3 ns;      // shading normal, unit, outward
     vec3 tangent; // any length
     uint material;
-    uint light;   // or NONE
-    uint flat_id; // the shape, where a ray that leaves it cannot meet it again, else NONE
-    uint shape;   // in the scene document, with its bits
+    uint light;   // the index of the light that it belongs to, or NONE
+    uint flat_id; // the shape's id, if a ray that leaves the shape cannot meet it again; else NONE
+    uint shape;   // its index in the scene document, with the bits SINGLE_SIDED and HIDDEN
 #if HAS_TEXTURES || HAS_ANISOTROPIC
     float handed; // -1 where v grows against cross(ns, tangent)
 #endif
 #if HAS_TEXTURES
     vec2 uv;      // texture coordinates, v up
-    vec2 uv_1;    // of a mesh's second set
-    vec4 color;   // of a mesh's vertices
+    vec2 uv_1;    // the second set of a mesh
+    vec4 color;   // the vertex colour of a mesh
 #endif
 };
 
@@ -68,17 +69,17 @@ void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
 #endif
 }
 
-// Nearest hit along o + t d, t in (0, infinity); hit.id is NONE where nothing is met. `skip` is the flat shape that
-// the ray leaves.
+// The nearest hit along o + t d, t in (0, infinity); hit.id is NONE where nothing is met. `skip` is the flat_id of the
+// shape that the ray leaves.
 Hit shapes_nearest(vec3 o, vec3 d, uint skip) {
     Hit hit = Hit(INFINITY_T, NONE, vec2(0.0));
     shapes_intersect(o, d, uvec2(skip, NONE), false, hit);
     return hit;
 }
 
-// Whether anything stands in (0, t_max). `skip`: the flat shape that the ray leaves, and the lamp that it goes to. A
-// lamp is convex and was picked where it is seen, so it never hides that place; but near a sphere's rim the
-// distance to it is known to no better than the square root of a rounding.
+// Whether anything stands in (0, t_max). `skip` is the flat_id of the shape that the ray leaves and the id of the lamp
+// that it goes to. A lamp is convex, and the place was picked where it is seen, so that a lamp never hides it; but near
+// a sphere's rim the distance is only as good as the square root of a rounding.
 bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
     Hit hit = Hit(t_max, NONE, vec2(0.0));
     shapes_intersect(o, d, skip, true, hit);
@@ -89,15 +90,15 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
     uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK;
     vec3 p = o + hit.t * d;
 #if HAS_TEXTURES
-    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
-                                  vec4(1.0));
+    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0),
+                                  vec2(0.0), vec4(1.0));
 #elif HAS_ANISOTROPIC
     SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
 #else
     SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
 #endif
-    // llvmpipe reads all kinds, whichever was met: an index of another kind's array may be out of range, which
-    // robust buffer access turns into 0.
+    // llvmpipe reads all kinds, whichever was met: the index may be out of another kind's range, which robust buffer
+    // access turns into 0.
 #if HAS_SPHERES || HAS_BVH_SPHERES
     if (kind == SHAPE_SPHERE) r = sphere_point(sphere_pick(index), p);
 #endif
@@ -132,14 +133,15 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
     return r;
 }
 
-float shapes_next(float x, bool up) { // the float after x
+// The next float above x, or below.
+float shapes_next(float x, bool up) {
     if (x == 0.0) return up ? 1.4e-45 : -1.4e-45;
     int i = floatBitsToInt(x);
     return intBitsToFloat((x > 0.0) == up ? i + 1 : i - 1);
 }
 
-// Where a ray leaves p towards w: beyond the error of p along the geometric normal, rounded away from the
-// surface [Pharr, Jakob, Humphreys 2023, section 6.8].
+// The origin of a ray that leaves the point towards w: beyond the point's error along the geometric normal, rounded
+// away from the surface [Pharr, Jakob, Humphreys 2023, section 6.8].
 vec3 shapes_leave(SurfacePoint s, vec3 w) {
     float d = dot(abs(s.ng), s.error);
     vec3 by = dot(w, s.ng) < 0.0 ? -d * s.ng : d * s.ng;

@@ -1,14 +1,14 @@
-// Random numbers: for sample `index` of a pixel, dimension pair `pair`, two numbers in [0, 1).
+// Random numbers: sample `index` of a pixel has two numbers in [0, 1) for each dimension pair `pair`.
 //
 // SAMPLER 0: pairs of the first two Sobol' dimensions, Owen-scrambled by hashing, each pair with its own
 // shuffle of the sample order [Burley 2020, "Practical hash-based Owen scrambling"; hash of Vegdahl 2021].
 // Both the sequence and its scramble stay (0, 2)-sequences, so every 2^k samples are stratified in every way.
 // SAMPLER 1: independent numbers, for comparison.
 //
-// Neighbours' errors shall cancel, for an eye or a filter sees the mean of several pixels: blue noise. A block of 4 x 4
-// pixels shares its scrambles, and each of its pixels shifts the digits before they are scrambled. To the pixel itself
-// that is one more scramble, as good as any other, at any number of samples; between pixels it decides whose points
-// fall into whose gaps. Not with ADAPTIVE, whose unbiased counts want rows that know nothing of each other.
+// The errors of neighbours shall cancel (blue noise), as an eye or a filter sees the mean of several pixels. A block of
+// 4 x 4 pixels shares its scrambles, and each of its pixels shifts the digits before they are scrambled. For the pixel
+// itself that is one more scramble, as good as any other, at any number of samples; between pixels it decides whose
+// points fall into whose gaps. ADAPTIVE goes without, as its unbiased counts need rows that are independent.
 // The pairs a path uses are fixed places (PAIR_*), so no feature shifts the numbers of another.
 
 const uint PAIR_PIXEL = 0u;
@@ -40,7 +40,7 @@ uint sobol_hash(uint x) {
     return (w >> 22u) ^ w;
 }
 
-// Owen scramble of a number whose bits come mirrored, least significant digit last.
+// The Owen scramble of a number whose bits come mirrored, least significant digit last.
 uint sobol_scramble(uint x, uint seed) {
     x ^= x * 0x3d20adeau;
     x += seed;
@@ -64,16 +64,17 @@ uint sobol_pascal(uint v) {
 float sobol_unit(uint x) { return float(x >> 8u) * 5.9604645e-8; } // 2^-24: never rounds up to 1
 
 #if SAMPLER == 0 && !ADAPTIVE
-// Shifts of the first eight digits of x and y by the bits of a pixel's place: its column and row in its 2 x 2, and theirs
-// in the block. They were searched for: of 2^64, those that leave least of blurred errors of steps, ramps and blobs on
-// the square, at 1, 2, 4, ... 256 samples (a half after a blur of one pixel, a third of two).
+// Shifts of the first eight digits of x and y by the bits of a pixel's place: its column and row in its square of 2 x
+// 2, and those of the square in the block. They were found by a search among 2^64: they leave the least error of steps,
+// ramps and blobs on the square after blurring, at 1, 2, 4, ... 256 samples: a half after a blur of one pixel, a third
+// of two.
 const uvec2 SOBOL_COLUMN = uvec2(0xadu, 0xb6u), SOBOL_ROW = uvec2(0xf6u, 0x6du);
 const uvec2 SOBOL_QUAD_COLUMN = uvec2(0xbcu, 0xa2u), SOBOL_QUAD_ROW = uvec2(0x05u, 0xc5u);
 
-// Of two bits.
+// The shift by two bits.
 uvec2 sobol_apart(uint bits, uvec2 column, uvec2 row) { return (-(bits & 1u) & column) ^ (-(bits >> 1u & 1u) & row); }
 
-// One of four places, the first kept and the others passed round: else all that lie above each other would err alike.
+// One of four places: the first stays and the others rotate, else all places above each other would err alike.
 uint sobol_place(uint place, uint turn) { return place == 0u ? 0u : (place - 1u + (turn & 7u)) % 3u + 1u; }
 #endif
 
@@ -81,7 +82,7 @@ uint sobol_seed(uvec2 at, uint replicate) {
     return sobol_hash(at.x ^ sobol_hash(at.y ^ sobol_hash(frame.seed ^ sobol_hash(replicate))));
 }
 
-// `replicate`: which of the independent scrambles; 0 is the picture's own.
+// `replicate` names one of the independent scrambles; 0 is the picture's own.
 Sampler sobol_begin(uvec2 pixel, uint index, uint replicate) {
     uint own = sobol_seed(pixel, replicate);
 #if SAMPLER == 0 && !ADAPTIVE
@@ -89,7 +90,7 @@ Sampler sobol_begin(uvec2 pixel, uint index, uint replicate) {
     uint block = sobol_seed(pixel >> 2u, 0x9e3779b9u);
     uvec2 apart = sobol_apart(sobol_place(in_quad, block >> 3u * quad), SOBOL_COLUMN, SOBOL_ROW)
         ^ sobol_apart(sobol_place(quad, block >> 12u), SOBOL_QUAD_COLUMN, SOBOL_QUAD_ROW);
-    // Beyond the digits that were chosen each pixel has its own.
+    // Beyond these eight digits each pixel has its own.
     uvec2 shift = apart | uvec2(own, sobol_hash(own ^ 0x5bd1e995u)) << 8u;
     return Sampler(replicate == 0u ? block : own, index, bitfieldReverse(index), shift, 2u * quad);
 #else
@@ -107,8 +108,8 @@ uvec2 sobol_bits(Sampler s, uint pair) {
     uint seed_y = sobol_hash(seed ^ 0x02e5be93u);
     uvec2 digits = uvec2(shuffled, sobol_pascal(shuffled));
 #if SAMPLER == 0 && !ADAPTIVE
-    // The four 2 x 2 of a block change places from pair to pair: where an error is of two pairs together, points that
-    // lie apart in both would do the same twice.
+    // The four squares of a block change places from pair to pair: where an error depends on two pairs, points that lie
+    // apart in both alike would do the same twice.
     digits ^= s.shift ^ sobol_apart(seed >> s.quad, SOBOL_COLUMN, SOBOL_ROW);
 #endif
     uint x = bitfieldReverse(sobol_scramble(digits.x, seed_x));
@@ -121,8 +122,8 @@ uvec2 sobol_bits(Sampler s, uint pair) {
     return uvec2(x, y);
 }
 
-// The k-th of the samples, a power of two, of a sequence of as many times more, that stand for this one: as well spread
-// as those. Without doublings this one itself.
+// The k-th of the 2^doublings samples that replace this one, in a sequence that is as many times longer and as well
+// distributed. Without doublings it is this sample itself.
 Sampler sobol_part(Sampler s, uint k, uint doublings) {
     s.index = (s.index << doublings) | k;
     s.index_reversed = bitfieldReverse(s.index);

@@ -1,4 +1,4 @@
-// What a material is at a point of a surface, ready for the lobes. Here, and only here, roughness becomes alpha.
+// A material at a point of a surface, ready for the lobes. Here, and only here, roughness becomes alpha.
 struct Surface {
     uint model;
     vec3 base_color;
@@ -19,27 +19,27 @@ struct Surface {
     float eta_outside;     // index inside over outside
     float eta;             // index beyond the surface over index on wo's side
     bool inside;           // wo is inside a body that transmits
-    bool is_delta;           // the base is perfectly smooth
-    bool index_matched;         // the index is 1: rays pass as if nothing were there
+    bool is_delta;         // the base is perfectly smooth
+    bool index_matched;    // the index is 1: rays pass as if nothing were there
     bool coat_is_delta;
     vec3 specular_color;
     float aspect;          // of the specular lobe, 1 where it is round
     float sheen_roughness;
     vec4 albedo;             // energy_albedo at wo
-    vec4 albedo_mean;
-    float coat_albedo;       // share of light that the coat and the sheen keep from what is under them, at wo
-    float sheen_albedo;
+    vec4 albedo_mean;      // energy_mean
+    float coat_albedo;     // the share of light from wo that the coat keeps from what is under it
+    float sheen_albedo;    // the same of the sheen
 #if HAS_COAT_NORMALS
     Basis coat;            // the coat's own frame, in the shading frame
 #endif
 #endif
 };
 
-// A lobe narrower than this is a mirror.
+// A roughness below this is a mirror.
 const float SURFACE_LEAST_ROUGHNESS = 0.01;
 
 #if HAS_PRINCIPLED
-// The part of `principled` that the direction does not change; principled_face adds the rest.
+// Sets what `principled` has whatever the direction; principled_face adds the rest.
 void surface_principled(Material m, vec2 tangent, inout Surface s) {
     float largest = max_component(m.base_color);
     vec3 tint = largest > 0.0 ? m.base_color / largest : vec3(1.0);
@@ -79,7 +79,7 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
 }
 #endif
 
-// What share of light is left after each metre inside, as a rate: transmittance is exp(-rate t).
+// The rate at which light is absorbed inside, 1/m: transmittance is exp(-rate t).
 vec3 surface_attenuation(Material m) {
 #if HAS_ATTENUATION
     if (m.attenuation_distance > 0.0) return min(-log(m.attenuation_color) / m.attenuation_distance, vec3(1e30));
@@ -87,6 +87,7 @@ vec3 surface_attenuation(Material m) {
     return vec3(0.0);
 }
 
+// Whether light passes through the surface.
 bool surface_transmits(Material m) {
 #if HAS_TRANSMISSION
     return m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0;
@@ -149,8 +150,8 @@ Surface surface_make(Material m, vec2 tangent) {
     return s;
 }
 
-// Whether its noise comes from where the light is rather than from where it sends its paths: not of mirrors, more or
-// less, nor of glass, whose paths find the light themselves.
+// Whether the noise of the surface comes from the light rather than from where its paths go. It does not for metals
+// that nearly mirror, nor for glass, whose paths find the light by themselves.
 bool surface_is_broad(Surface s) {
     bool narrow = s.metallic > 0.5 && s.roughness < 0.25;
 #if HAS_TRANSMISSION

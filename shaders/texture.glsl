@@ -1,11 +1,11 @@
-// What textures and vertex colours make of a material at a point. Texels of all images stand one after another, row 0
-// first, in one texture for bytes and one for floats; they are filtered here, so that any size, wrap and number of them
-// costs no more than four fetches, and sRGB is decoded before it is filtered.
+// Textures and vertex colours, and the material that they make at a point. The texels of all images stand one after
+// another, row 0 first, in one texture for bytes and one for floats. They are filtered here: images of any number, size
+// and wrap cost no more than four fetches, and sRGB is decoded before it is filtered.
 #if HAS_TEXTURES
 ivec2 texture_place(uint at) { return ivec2(at & (TEXTURE_ROW - 1u), at / TEXTURE_ROW); }
 
-// IEC 61966-2-1 inverted: above the straight part a polynomial fitted to the 245 bytes there, off by 1.2e-5 of the value
-// at most. Twelve powers for each look at a texture would cost more than its fetches.
+// IEC 61966-2-1 inverted. Above the straight part it is a polynomial fitted to the 245 bytes there, with a relative
+// error of at most 1.2e-5: twelve powers for each sample of a texture would cost more than its fetches.
 vec3 texture_decoded(vec3 c) {
     vec3 y = -0.196990575 * c + 0.831461812;
     y = y * c - 1.50289935;
@@ -41,7 +41,7 @@ vec4 texture_texel(TextureSlot s, int x, int y) {
     return c;
 }
 
-// One axis: the two texels around x (0..1, or anything where it repeats) and the share of the second.
+// One axis: the two texels around x and the share of the second. x is 0..1, or anything where the texture repeats.
 void texture_axis(float x, uint n, uint flags, out int a, out int b, out float share) {
     bool clamps = (flags & TEXTURE_SLOT_CLAMP) != 0u, mirrors = (flags & TEXTURE_SLOT_MIRROR) != 0u;
     float folded = x - 2.0 * floor(0.5 * x);
@@ -51,7 +51,7 @@ void texture_axis(float x, uint n, uint flags, out int a, out int b, out float s
     share = t - low;
     a = int(low);
     b = a + 1;
-    bool stays = clamps || mirrors; // a mirrored image's border texel meets itself
+    bool stays = clamps || mirrors; // the border texel of a mirrored image is its own neighbour
     if (a < 0) a = stays ? 0 : last;
     if (b > last) b = stays ? last : 0;
 }
@@ -81,7 +81,7 @@ vec4 texture_sample(TextureSlot s, SurfacePoint at) {
     return c;
 }
 
-// The texels of all slots that a surface is made from.
+// Samples all slots that a surface is made from.
 void texture_look(SurfacePoint at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     texels[0] = vec4(0.0);
     for (uint k = 0u; k < uint(TEXTURE_SURFACE_SLOTS); k++) {
@@ -89,7 +89,7 @@ void texture_look(SurfacePoint at, out vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)
     }
 }
 
-// The material as it is there.
+// The material at the point.
 Material texture_material(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)]) {
     Material m = material_pick(at.material);
     texture_members(at.material, texels, m);
@@ -99,12 +99,13 @@ Material texture_material(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS
     return m;
 }
 
-// The chance that a ray meets the surface there. An alpha's cutoff is compared with the filtered texel.
+// The chance that a ray meets the surface at the point. An alpha cutoff is compared with the filtered texel.
 float texture_opacity(SurfacePoint at) {
     Material m = material_pick(at.material);
     float opacity = m.opacity;
 #if TEXTURE_OPACITY >= 0
-    texture_use_opacity(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_OPACITY)), at), opacity);
+    TextureSlot slot = texture_slot_pick(at.material, uint(TEXTURE_OPACITY));
+    texture_use_opacity(at.material, texture_sample(slot, at), opacity);
 #endif
 #if HAS_VERTEX_COLORS
     opacity *= at.color.a;
@@ -121,7 +122,8 @@ float texture_opacity(SurfacePoint at) {
 vec3 texture_emission(SurfacePoint at) {
     vec3 emission = material_pick(at.material).emission;
 #if TEXTURE_EMISSION >= 0
-    texture_use_emission(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_EMISSION)), at), emission);
+    TextureSlot slot = texture_slot_pick(at.material, uint(TEXTURE_EMISSION));
+    texture_use_emission(at.material, texture_sample(slot, at), emission);
 #endif
     return emission;
 }
@@ -129,14 +131,15 @@ vec3 texture_emission(SurfacePoint at) {
 vec3 texture_ambient(SurfacePoint at) {
     vec3 ambient = material_pick(at.material).ambient;
 #if TEXTURE_AMBIENT >= 0
-    texture_use_ambient(at.material, texture_sample(texture_slot_pick(at.material, uint(TEXTURE_AMBIENT)), at), ambient);
+    TextureSlot slot = texture_slot_pick(at.material, uint(TEXTURE_AMBIENT));
+    texture_use_ambient(at.material, texture_sample(slot, at), ambient);
 #endif
     return ambient;
 }
 
 #if HAS_NORMAL_MAPS
-// The shading normal n bent as a normal map has it: red along growing u, green along growing v, blue outwards. They are
-// the image's own: where it is turned or mirrored on the surface, so are its bumps. Scaling leaves their slopes.
+// The shading normal n, bent as a normal map says: red along growing u, green along growing v, blue outwards. u and v
+// are the image's own: where it is turned or mirrored on the surface, so are its bumps. Scaling keeps their slopes.
 vec3 texture_bent(SurfacePoint at, vec3 n, vec4 texel, TextureSlot s, float strength) {
     vec3 t = 2.0 * texel.xyz - 1.0;
     vec2 u = s.turn.xz, v = s.turn.yw;
@@ -150,7 +153,7 @@ vec3 texture_bent(SurfacePoint at, vec3 n, vec4 texel, TextureSlot s, float stre
     return x2 > 1e-30 && r2 > 0.0 ? r * inversesqrt(r2) : n;
 }
 
-// The base's shading normal, outward; whether a map bent it.
+// Bends the base's outward shading normal n; false where no map does.
 bool texture_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
     bool mapped = false;
 #if TEXTURE_NORMAL >= 0
@@ -162,7 +165,7 @@ bool texture_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)],
     return mapped;
 }
 
-// The coat's own.
+// Bends the coat's likewise.
 bool texture_coat_normal(SurfacePoint at, vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)], inout vec3 n) {
     bool mapped = false;
 #if TEXTURE_COAT_NORMAL >= 0

@@ -1,9 +1,10 @@
-// What a ray passes through without being scattered: shapes that hide from the camera, and surfaces by the chance that
-// they are not met.
-const uint PAIR_TRANSPARENCY = 0x8000u; // beyond the pairs of any path; then TRANSPARENCY_MAX a bounce
-const uint TRANSPARENCY_MAX = 4096u;    // layers; a ray that has met so many ends on the next
+// Surfaces that a ray passes without being scattered: shapes that hide from the camera, and others by the chance that
+// their opacity leaves.
+const uint PAIR_TRANSPARENCY = 0x8000u; // the first, beyond the pairs of any path; each bounce has TRANSPARENCY_MAX
+const uint TRANSPARENCY_MAX = 4096u;    // layers that a ray passes at most; it ends on the next one
 
-// Nearest thing that the ray meets, hit.t from o. `bounce`: how often the path was scattered before; 0: a camera ray.
+// The nearest surface that the ray does not pass; hit.t is its distance from o. `bounce` is how often the path was
+// scattered before: 0 for a camera ray.
 Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, out SurfacePoint at) {
 #if HAS_OPACITY || HAS_HIDDEN_SHAPES
     Hit hit;
@@ -42,7 +43,7 @@ Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, ou
 }
 
 #if HAS_OPACITY
-// Share of light that comes through all surfaces in (0, t_max): the mean of what the ray above would meet. `skip` as
+// The share of light that passes all surfaces in (0, t_max), which is the mean of what the rays above do. `skip` is as
 // in shapes_occluded.
 float transparency_share(vec3 o, vec3 d, float t_max, uvec2 skip) {
     float share = 1.0;

@@ -1,24 +1,24 @@
-// The tree, threaded: one depth-first order for each octant of ray directions, nearer children first, so that a
-// walk needs no stack: a missed box names where to go on, a met one goes on at the next node. Small subtrees, treelets,
-// are kept once for all octants, and walked in one order; a register remembers where to go on after. Boxes are 16-bit
-// coordinates on the scene's grid, rounded outwards.
+// The tree is threaded: it has one depth-first order for each octant of ray directions, nearer children first, so that
+// a walk needs no stack. A missed box names the node where the walk goes on; after a met one it goes on at the next
+// node. Small subtrees, treelets, are stored once for all octants and walked in one order; a register remembers where
+// the walk goes on after them. Boxes are 16-bit coordinates on the scene's grid, rounded outwards.
 //
 // An instance is a leaf of the scene's tree with a tree of its own, through which the ray goes in its space.
 //
-// Two loops, one to find leaves and one to test them: llvmpipe runs both sides of every `if`, but ends loops early.
-// A ray that has met a leaf walks on to a second one, for its neighbours have still to meet their first: of a mesh's
-// bounces 1.7 times fewer turns of the outer loop, for 4 % more boxes.
+// One loop finds leaves and another tests them, as llvmpipe runs both sides of every `if`, but ends loops early. A ray
+// that has met a leaf walks on to a second one while its neighbours have still to meet their first: in a mesh's bounces
+// this takes 1.7 times fewer turns of the outer loop, for 4 % more boxes.
 
-// Far distances grow by this against rounding in the slab test [Ize 2013]: 1 + 2 gamma(3), rounded up.
+// The factor by which far distances grow against rounding in the slab test [Ize 2013]: 1 + 2 gamma(3), rounded up.
 const float TRAVERSE_SLACK = 1.0000007;
-// Share of the way to a lamp at which boxes are still entered. Its own box and its neighbours', a whole step of the
-// grid larger than they are, would else be walked down by every shadow ray: half the time of a room with 1 000 lamps.
-// What stands nearer to a lamp than 2^-16 of the distance casts no shadow from there.
+// The share of the way to a lamp up to which boxes are entered. Else every shadow ray would walk down the boxes of the
+// lamp and its neighbours, which are a whole step of the grid larger than the lamps: half the time of a room with 1 000
+// lamps. A shape nearer to a lamp than 2^-16 of the distance casts no shadow.
 const float TRAVERSE_REACH = 0.9999847;
 
 struct Hit {
     float t;
-    uint id; // kind << 28 | index; of what is in an instance see instance_id
+    uint id; // kind << 28 | index; in an instance: see instance_id
     vec2 uv; // barycentric, triangles only
 };
 
@@ -34,7 +34,7 @@ LeafRange traverse_range(uint leaf) {
 }
 
 #if HAS_INSTANCES
-// Which tree a walk is in: an instance's, or where its number is NONE the scene's.
+// The tree that a walk is in: that of an instance, or the scene's where `number` is NONE.
 struct Within {
     uint number;
     uint node_first;
@@ -74,7 +74,7 @@ void traverse_test(uint kind, uint index, vec3 o, vec3 d, Shear shear, uvec2 ski
     if (t < hit.t && id != skip.x && id != skip.y) hit = Hit(t, id, uv);
 }
 
-// Nearest hit, or with `any` just some hit, before hit.t.
+// Finds the nearest hit before hit.t, or with `any` some hit.
 void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Hit hit) {
     vec3 safe = mix(d, vec3(1e-20), lessThan(abs(d), vec3(1e-20)));
     vec3 inv = 1.0 / safe;
@@ -85,24 +85,25 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Hit 
     uint i = octant * frame.node_count;
     uint end = i + (any && hit.id != NONE ? 0u : frame.node_count); // the loops may have met something already
     uint treelets = 8u * frame.node_count;
-    uint after = 0u, last = NONE; // where to go on after a treelet, and where it ends; NONE: in none
+    uint after = 0u, last = NONE; // where the walk goes on after a treelet, and where that ends; NONE: it is in none
     bool more;
     float start = hit.t;
 #if HAS_INSTANCES
-    // In an instance o and d are the ray in its space: t is the same there. The rest: where the scene's tree goes on.
+    // In an instance o and d are the ray in the instance's space, where t is the same. `on` and its kin say where the
+    // walk goes on in the scene's tree.
     vec3 o_w = o, d_w = d;
     Within at = Within(NONE, frame.node_first, 0u, 0u);
-    bool ended = any && hit.id != NONE; // before it began
+    bool ended = any && hit.id != NONE; // the walk ended before it began
     uint on = 0u, on_after = 0u, on_last = NONE;
 #endif
     float reach = any && skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
 #if HAS_INSTANCES
-    uint met_instance = NONE; // where a stretch of the walk ends; else at the end of a tree
+    uint met_instance = NONE; // the instance that ends a stretch of the walk; NONE: the end of a tree does
     do {
     met_instance = NONE;
 #endif
     do {
-        uint leaf = 0u, earlier = 0u; // the last two that were met
+        uint leaf = 0u, earlier = 0u; // the last two leaves that were met
         do {
 #if HAS_INSTANCES
             uvec4 w = node_words[at.node_first + i];
@@ -161,7 +162,7 @@ void traverse_tree(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Hit 
         }
 #if HAS_INSTANCES
     } while (more && met_instance == NONE && !(any && hit.t < start));
-    // All lanes change trees together: in the loop above it would be done, masked, with every leaf.
+    // All lanes change trees together: inside the loop above every leaf would pay for it, masked.
     bool enters = met_instance != NONE;
     if (enters || (!more && at.number != NONE)) {
         Instance it = instance_load(met_instance);

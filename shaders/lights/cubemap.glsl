@@ -1,7 +1,7 @@
-// Six square faces in one texture, 3 x 2: px nx py, then ny pz nz. On a face a runs right and b down, -1..1. The
-// density of a texel is per unit of the face's plane at distance 1; r^3 turns it into one over directions.
+// Six square faces in one texture of 3 x 2: px nx py, then ny pz nz. On a face a runs right and b down, -1..1. The
+// density of a texel is per unit of area in the face's plane at distance 1; r^3 turns it into one per solid angle.
 
-// Face and (a, b) of a direction: OpenGL's table.
+// (a, b) and the face of a direction, by OpenGL's table.
 vec3 cubemap_place(vec3 d) {
     vec3 m = abs(d);
     bool along_x = m.x >= m.y && m.x >= m.z, along_y = !along_x && m.y >= m.z;
@@ -19,7 +19,7 @@ vec3 cubemap_direction(vec2 ab, uint face) {
     return vec3(side * ab.x, -ab.y, side);
 }
 
-// Radiance, bilinear within the face, and density per steradian.
+// The radiance, filtered bilinearly within the face, and the density per steradian.
 vec4 cubemap_radiance(vec3 d) {
     vec3 place = cubemap_place(d);
     int n = max(textureSize(environment_texels, 0).y / 2, 1);
@@ -38,7 +38,7 @@ vec4 cubemap_radiance(vec3 d) {
     return vec4(mix(mix(a.rgb, b.rgb, f.x), mix(e.rgb, g.rgb, f.x), f.y), here * r2 * sqrt(r2));
 }
 
-// Towards the place `inside` texels from a block's corner, which is a texel of the texture.
+// The direction towards the place that lies `inside` texels from a block's corner, a texel of the texture.
 vec3 cubemap_point(vec2 corner, vec2 inside) {
     float n = float(textureSize(environment_texels, 0).y / 2);
     uint column = (corner.x >= n ? 1u : 0u) + (corner.x >= 2.0 * n ? 1u : 0u), row = corner.y >= n ? 1u : 0u;

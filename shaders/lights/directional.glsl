@@ -1,8 +1,8 @@
-// Light from infinity: parallel, or uniform over a disk of directions with radiance E / (pi sin^2 a), whose irradiance
-// on a surface that faces its middle is E.
+// Light from infinity: parallel, or uniform over a disk of directions of half angle a with radiance E / (pi sin^2 a),
+// whose irradiance on a surface that faces the disk's middle is E.
 float directional_light_pdf(Light l) { return 1.0 / (TWO_PI * l.spread); }
 
-// Radiance from direction wi, which must be unit; half the square of a difference is 1 - cos without cancelling.
+// The radiance from direction wi, which must be unit. Half the square of a difference is 1 - cos without cancelling.
 vec3 directional_light_radiance(Light l, vec3 wi) {
     vec3 off = wi + l.direction;
     return 0.5 * dot(off, off) <= l.spread ? l.intensity : vec3(0.0);

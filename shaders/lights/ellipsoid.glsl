@@ -1,6 +1,6 @@
-// An ellipsoid, sampled uniformly over the unit sphere it is an image of. An area element of that sphere with
-// normal n grows by |det A| |A^-T n| under the map A. Its inside is seen from inside, and through the near half where a
-// ray may pass that, with the chance `transparency`.
+// An ellipsoid, sampled uniformly over the unit sphere that it is an image of. An area element of that sphere with
+// normal n grows by |det A| |A^-T n| under the map A. The ellipsoid's inner side is seen from inside, and through the
+// near half where a ray may pass that, with the chance `transparency`.
 float ellipsoid_light_density(Solid s, vec3 q) { // per area
     mat3 axes = solid_axes(s);
     vec3 n = q.x * s.row_x + q.y * s.row_y + q.z * s.row_z;

@@ -1,5 +1,6 @@
-// Light from infinity. An image is latitude-longitude, drawn block by block of texels from equal cells (gpu/cells.py);
-// inside a block the direction is uniform in longitude and in the cosine of its colatitude, and its density constant.
+// Light from infinity. An image is in latitude and longitude. It is sampled by cells of equal chance, each of which
+// names a block of texels (gpu/cells.py); inside a block the direction is uniform in longitude and in the cosine of its
+// colatitude, and its density is constant.
 
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
     vec2 cs = frame.environment_turn;
@@ -28,7 +29,7 @@ vec4 environment_image(vec3 d) {
     return vec4(radiance, at.y == y0 ? (at.x == x0 ? a.a : b.a) : (at.x == x0 ? e.a : g.a));
 }
 
-// Radiance from world direction w, and the density of environment_light_sample there.
+// The radiance from the world direction w, and the density with which environment_light_sample gives it.
 vec4 environment_radiance(vec3 w) {
 #if HAS_ENVIRONMENT
     vec3 d = environment_turn(w);
@@ -52,7 +53,7 @@ vec4 environment_radiance(vec3 w) {
 #endif
 }
 
-// Whether it is not the same from everywhere.
+// Whether the environment differs between directions.
 bool environment_varies() { return textureSize(environment_texels, 0).x > 1; }
 
 LightSample environment_light_sample(uvec2 bits) {
@@ -66,17 +67,18 @@ LightSample environment_light_sample(uvec2 bits) {
 #endif
 #if HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE
     uvec2 size = uvec2(textureSize(environment_texels, 0));
-    // All 32 bits: a float's 24 would leave a large map three for the place inside the block.
+    // All 32 bits count: the 24 of a float would leave a large map three bits for the place inside the block.
     uint i, low;
     umulExtended(bits.x, uint(environment_cell_words.length()), i, low);
     EnvironmentCell e = environment_cell_load(i);
     vec2 corner = vec2(e.corner & 0xffffu, e.corner >> 16u), block = vec2(e.size & 0xffffu, e.size >> 16u);
-    // What is left of the first number is uniform again: it places the direction inside the block.
+    // The rest of the first number is uniform again and places the direction inside the block.
     float v = (float(i - e.first) + sobol_unit(low)) / float(e.count);
 #endif
 #if HAS_ENVIRONMENT_IMAGE
     float phi = (corner.x + block.x * u.y) / float(size.x) * TWO_PI - PI;
-    // The block's band between two colatitudes, uniform in cosine; near a pole by sines, without cancelling.
+    // The block lies between two colatitudes and is uniform in the cosine, written in sines, which do not cancel at a
+    // pole.
     float top = corner.y / float(size.y) * PI, bottom = (corner.y + block.y) / float(size.y) * PI;
     float s0 = sqr(sin(0.5 * top)), s1 = sqr(sin(0.5 * bottom));
     float h = mix(s0, s1, v); // sin^2 of half the colatitude

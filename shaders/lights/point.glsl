@@ -1,4 +1,4 @@
-// A point of intensity I: radiance I / d^2, with a pdf of 1 in place of its delta.
+// A point of intensity I gives radiance I / d^2; its pdf is 1 in place of a delta.
 LightSample point_light_sample(Light l, vec3 p) {
     vec3 to = l.position - p;
     float d2 = dot(to, to);

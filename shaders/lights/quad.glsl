@@ -1,8 +1,8 @@
-// A parallelogram that shines along its normal, or along both. A rectangle is sampled uniformly over the solid angle
-// that it fills [Urena, Fajardo, King 2013]; it is sampled by area where that is small, as fp32 has no digits for a
-// place inside it then, and where it is no rectangle.
+// A parallelogram that shines on one side, or on both. A rectangle is sampled uniformly over the solid angle that it
+// fills [Urena, Fajardo, King 2013]. Other shapes are sampled by area, and so are rectangles of small solid angle,
+// where fp32 has no digits left for a place inside them.
 
-// sr: below, the place that a rounding of the angles moves is a thousandth of the rectangle.
+// The solid angle, in sr, below which a rounding of the angles moves a place by a thousandth of the rectangle.
 const float QUAD_LIGHT_LEAST = 2e-3;
 
 // A rectangle as p sees it: the ranges of its coordinates along u and v from p, its plane's distance, and its solid
@@ -54,8 +54,8 @@ float quad_light_pdf(Quad q, vec3 p, float t, vec3 wi, uint sides) {
     return s > 0.0 ? 1.0 / s : quad_light_area_pdf(q, t, wi);
 }
 
-// Place along u and v, 0..1, uniform over the solid angle. The paper's k, the sum of two angles between the planes
-// through the edges, is made as its cosine and sine: exact where arc cosines are not.
+// The place along u and v, 0..1, uniform over the solid angle. The paper's k, the sum of two angles between the planes
+// through the edges, is made as its cosine and sine, which are exact where arc cosines are not.
 vec2 quad_light_place(QuadView w, vec2 u) {
     float z2 = w.z * w.z, a0 = w.y0 * w.y0 + z2, a1 = w.y1 * w.y1 + z2;
     float r0 = inversesqrt(a0), r1 = inversesqrt(a1);

@@ -1,8 +1,9 @@
-// A sphere seen from outside: uniform over the cone it fills [Pharr, Jakob, Humphreys 2023, section 6.2.4]. From
-// inside, where that side shines too: uniform over all directions. `transparency` is the chance that a ray passes
-// through the surface: the inside of the far half is then seen through the near one, and gets half of the samples.
+// A sphere. From outside it is sampled uniformly over the cone that it fills [Pharr, Jakob, Humphreys 2023, section
+// 6.2.4]; from inside, where the inner side shines, too, uniformly over all directions. `transparency` is the chance
+// that a ray passes through the surface: the inside of the far half is then seen through the near one, and gets half of
+// the samples.
 
-// 1 - cos of the cone's half angle, without cancelling for small or far spheres; 2 from inside.
+// 1 - cos of the cone's half angle, which does not cancel for small or far spheres; 2 from inside.
 float sphere_light_cap(Sphere s, vec3 p) {
     vec3 to = s.center - p;
     float sin2 = s.radius * s.radius / dot(to, to);
@@ -37,13 +38,13 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float tran
     float phi = TWO_PI * u.y, r = sqrt(max(sin2, 0.0));
     Basis b = frame_basis(d2 > 0.0 ? to * inversesqrt(d2) : vec3(0.0, 0.0, 1.0));
     vec3 wi = frame_to_world(b, vec3(r * cos(phi), r * sin(phi), cos_t));
-    // Where the ray meets the sphere, from the triangle of p, the centre and that point.
+    // The ray meets the sphere at a corner of the triangle whose others are p and the centre.
     float reach = sqrt(max(0.0, s.radius * s.radius - d2 * sin2));
     SurfacePoint at;
     at.ng = normalize(wi * (sqrt(d2) * cos_t + (far ? reach : -reach)) - to);
     at.p = s.center + s.radius * at.ng;
     at.error = gamma_error(6.0) * (abs(s.center) + s.radius);
     vec3 target = shapes_leave(at, -wi);
-    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(share), sphere_light_density(cap, sides, transparency), true,
-                       NONE);
+    float pdf = sphere_light_density(cap, sides, transparency);
+    return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(share), pdf, true, NONE);
 }

@@ -1,6 +1,6 @@
 // A point of intensity I inside a cone that fades by smoothstep in the cosine between its half angles. With D along
 // the beam and |D|^2 = 1 / (2 (cos inner - cos outer)), |D - |D| w|^2 is (1 - cos) / (cos inner - cos outer) for a
-// direction w of light: no cosine is taken from 1, so that narrow beams keep their rim in fp32.
+// direction w of light. No cosine is subtracted from 1, so that narrow beams keep their rim in fp32.
 LightSample spot_light_sample(Light l, vec3 p) {
     LightSample s = point_light_sample(l, p);
     vec3 off = l.direction + length(l.direction) * s.wi;

@@ -1,7 +1,7 @@
-// The sky's sun: a disk of even radiance in the space of the environment, picked with a share of its own and uniform
-// in its cone. What is below the horizon is behind the ground.
+// The sun of the sky: a disk of even radiance in the environment's space. It is picked with a share of its own and
+// sampled uniformly over its cone. The part below the horizon is behind the ground.
 
-// 1 - cos is taken from the difference of the directions: cos itself knows a disk this small to no better than .5 %.
+// 1 - cos is taken from the difference of the directions, as cos itself is 0.5 % off for a disk this small.
 bool sun_holds(vec3 d) {
     vec3 off = d - frame.environment_sun;
     return dot(off, off) < 2.0 * frame.environment_sun_cap;
@@ -13,7 +13,7 @@ vec3 sun_sample(vec2 u) {
     return frame_to_world(frame_basis(frame.environment_sun), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
 }
 
-// The first of the two random numbers, stretched again to all 32 bits where the sun was not picked.
+// The first of the two random numbers, stretched to all 32 bits again where the sun was not picked.
 uint sun_rest(uint bits, uint cut) {
     uint x = bits - cut;
     float stretch = frame.environment_sun_share / (1.0 - frame.environment_sun_share);

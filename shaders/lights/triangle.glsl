@@ -1,7 +1,8 @@
-// One triangle of an emitting mesh, sampled uniformly over the solid angle that it fills [Arvo 1995]; by area where
-// that is small, as fp32 has no digits for a place inside it then.
+// One triangle of an emitting mesh, sampled uniformly over the solid angle that it fills [Arvo 1995], or by area where
+// that angle is small, as fp32 has no digits left for a place inside it then.
 
-const float TRIANGLE_LIGHT_LEAST = 5e-3; // sr: below, roundings move a place by more than a hundredth of the triangle
+// The solid angle, in sr, below which roundings move a place by more than a hundredth of the triangle.
+const float TRIANGLE_LIGHT_LEAST = 5e-3;
 
 float triangle_light_area(Triangle t) { return 0.5 * length(cross(t.v1 - t.v0, t.v2 - t.v0)); }
 
@@ -51,7 +52,7 @@ float triangle_light_pdf(Triangle tri, vec3 p, float t, vec3 ng, vec3 wi, uint s
     return s > 0.0 ? 1.0 / s : triangle_light_area_pdf(tri, t, ng, wi);
 }
 
-// Direction, uniform over the solid angle. Arvo's u and v are differences of cosines: taken by half angles, as the
+// A direction, uniform over the solid angle. Arvo's u and v are differences of cosines: written in half angles, as the
 // squares of sines, they keep their digits for small triangles.
 vec3 triangle_light_direction(TriangleView w, vec2 u) {
     float h = 0.5 * u.x * w.s, sh = sin(h), ch = cos(h);

@@ -1,6 +1,7 @@
-// The classic highlight about the half vector [Blinn 1977], not normalised: f cos = (diffuse cos + specular z^n) / pi.
+// The classic highlight about the half vector [Blinn 1977]; it is not normalised: f cos = (diffuse cos + specular z^n)
+// / pi.
 
-// wm.z^n. Near the top by the sine, as z itself would be rounded: at n = 1e6 that would be 6 % off.
+// wm.z^n. Near the pole it is taken from the sine, as z itself is rounded: at n = 1e6 that would be 6 % off.
 float blinn_phong_power(vec3 wm, float n) {
     float x = dot(wm.xy, wm.xy); // sin^2
     float series = -x * (1.0 + x * (0.5 + x * (1.0 / 3.0 + x * (0.25 + x * 0.2)))); // log(1 - x)
@@ -8,19 +9,20 @@ float blinn_phong_power(vec3 wm, float n) {
     return exp(0.5 * n * log_cos2);
 }
 
-// Without the cosine, so that bsdf_eval may put it back.
+// Lacks the cosine, which bsdf_eval multiplies back.
 vec3 blinn_phong_eval(Surface s, vec3 wi, vec3 wm) {
     return INV_PI * (s.base_color + s.phong * (blinn_phong_power(wm, s.shininess) / wi.z));
 }
 
-// Chance of the diffuse lobe: the highlight sends back at most 8 / (n + 2) of its colour, and never above 2.
+// The chance of picking the diffuse lobe. The highlight reflects at most 8 / (n + 2) times its colour, and never over
+// 2.
 float blinn_phong_diffuse_chance(Surface s) {
     float diffuse = luminance(s.base_color);
     float shine = luminance(s.phong) * min(2.0, 8.0 / (s.shininess + 2.0));
     return diffuse + shine > 0.0 ? diffuse / (diffuse + shine) : 1.0;
 }
 
-// Half vectors of density (n + 1) / (2 pi) z^n.
+// Half vectors have the density (n + 1) / (2 pi) z^n.
 float blinn_phong_pdf(Surface s, vec3 wi, vec3 wm, float cos_d) {
     float half_pdf = (s.shininess + 1.0) * (0.5 * INV_PI) * blinn_phong_power(wm, s.shininess);
     return mix(half_pdf / (4.0 * max(cos_d, 1e-6)), lambert_pdf(wi), blinn_phong_diffuse_chance(s));

@@ -1,5 +1,5 @@
-// Lambertian reflection: the model `diffuse`, and a part of others.
-// Both sides of wo and wi are positive here: bsdf.glsl has seen to it.
+// Lambertian reflection: the model `diffuse`, and a part of others. bsdf.glsl has checked that wo.z and wi.z are
+// positive.
 vec3 lambert_eval(Surface s) { return s.base_color * INV_PI; }
 vec3 lambert_sample(vec2 u) { return sampling_cosine(u); }
 float lambert_pdf(vec3 wi) { return wi.z * INV_PI; }

@@ -1,12 +1,12 @@
-// The core BRDF of glTF 2.0, its appendix B simplified: Lambert under GGX, by what Fresnel leaves [Khronos 2021].
-// The highlight is lobes/specular.glsl with one alpha for distribution and masking.
+// The core BRDF of glTF 2.0, a simplified appendix B: Lambert under GGX, by the share that Fresnel leaves [Khronos
+// 2021]. The highlight is lobes/disney/specular.glsl with one alpha for distribution and masking.
 
 vec3 metal_rough_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
     return (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color + disney_specular_eval(s, wo, wi, wm, cos_d);
 }
 
-// Chance of the diffuse lobe.
+// The chance of picking the diffuse lobe.
 float metal_rough_diffuse_chance(Surface s, vec3 wo) {
     float diffuse = (1.0 - s.metallic) * luminance(s.base_color);
     return diffuse / (diffuse + disney_specular_weight(s, wo));

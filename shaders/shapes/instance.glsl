@@ -1,5 +1,5 @@
-// Triangles with a tree of their own under an affine map. A ray is met in their space, its direction not of unit
-// length, so that t is the same in both; what it has met is brought back here.
+// Instances: triangles with a tree of their own under an affine map. A ray is intersected in their space, where its
+// direction is not of unit length, so that t is the same in both spaces; these functions bring back what it met.
 #if HAS_INSTANCES
 uint instance_id(uint number, uint triangle) { return INSTANCED | (number << frame.instance_shift) | triangle; }
 
@@ -7,7 +7,7 @@ uint instance_number(uint id) { return (id & ~INSTANCED) >> frame.instance_shift
 
 uint instance_triangle(uint id) { return id & ((1u << frame.instance_shift) - 1u); }
 
-// The scene's own triangles, as if there were one of all.
+// The identity: the scene's own triangles as one instance.
 Instance instance_none() {
     Instance r;
     r.row_x = r.axis_x = vec3(1.0, 0.0, 0.0);
@@ -24,10 +24,10 @@ vec3 instance_rows(Instance s, vec3 v) { return vec3(dot(s.row_x, v), dot(s.row_
 
 mat3 instance_axes(Instance s) { return mat3(s.axis_x, s.axis_y, vec3(s.axis_z_x, s.axis_z_y, s.axis_z_z)); }
 
-// A normal, by the inverse transpose; unit, and outward where it was.
+// A normal under the inverse transpose: unit, and outward if n is.
 vec3 instance_normal(Instance s, vec3 n) { return normalize(n.x * s.row_x + n.y * s.row_y + n.z * s.row_z); }
 
-// A tangent, in the plane of the normal that becomes of n; unit.
+// A tangent in the plane of the normal that n is mapped to; unit.
 vec3 instance_tangent(Instance s, vec3 n, vec3 tangent) {
     vec3 t = instance_axes(s) * tangent, across = instance_normal(s, n);
     return normalize(t - dot(t, across) * across);

@@ -1,5 +1,6 @@
-// Parallelogram: hit in (0, t_max), or t_max. It reaches beyond its edges by the rounding of a hit, so that no ray
-// slips out between two that share an edge: whichever is met less obliquely has the hit inside that bound.
+// The hit of a parallelogram in (0, t_max), or t_max. The quad reaches beyond its edges by the rounding of a hit, so
+// that no ray slips through between two quads that share an edge: the one that is met less obliquely has the hit
+// inside.
 float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
     vec3 w = q.origin - o;
     float t = dot(w, q.normal) / dot(d, q.normal); // parallel: infinite or NaN, refused below
@@ -13,9 +14,9 @@ float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
 SurfacePoint quad_point(Quad q, vec3 p, uint id) {
     SurfacePoint r;
     vec3 w = p - q.origin;
-    r.p = p - dot(w, q.normal) * q.normal; // onto the plane: what is left is the rounding of this line
+    r.p = p - dot(w, q.normal) * q.normal; // onto the plane: the error left is the rounding of this line
     r.error = gamma_error(8.0) * (abs(q.origin) + abs(w) + abs(p));
-    // Off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
+    // The point keeps off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
     vec2 at = vec2(dot(w, q.dual_u), dot(w, q.dual_v)), size = vec2(q.u_length, q.v_length);
     vec2 edge = min(vec2(max_component(r.error)), 0.5 * size);
     vec2 by = clamp(at, edge, size - edge) - at;

@@ -1,9 +1,9 @@
-// Affine images of the unit sphere (ellipsoid) and of the cube [-1, 1]^3 (box), met in their own space, where the
-// ray's direction is not of unit length, so that t is the same in both.
+// Affine images of the unit sphere (ellipsoid) and of the cube [-1, 1]^3 (box). Rays are intersected in the solid's own
+// space, where their direction is not of unit length, so that t is the same in both spaces.
 
 vec3 solid_rows(Solid s, vec3 v) { return vec3(dot(s.row_x, v), dot(s.row_y, v), dot(s.row_z, v)); }
 
-// Columns of world_from_object, from the rows of its inverse.
+// The columns of world_from_object, from the rows of its inverse.
 mat3 solid_axes(Solid s) {
     vec3 x = cross(s.row_y, s.row_z), y = cross(s.row_z, s.row_x), z = cross(s.row_x, s.row_y);
     return mat3(x, y, z) / dot(s.row_x, x);
@@ -77,20 +77,20 @@ SurfacePoint box_point(Solid s, vec3 p) {
     vec3 a = abs(q);
     float m = max(a.x, max(a.y, a.z));
     vec3 n = a.x == m ? vec3(sign(q.x), 0.0, 0.0) : a.y == m ? vec3(0.0, sign(q.y), 0.0) : vec3(0.0, 0.0, sign(q.z));
-    // Exactly on the face, and off its edges by the error of the point: else a ray that leaves a corner inside could
-    // begin behind the other wall.
+    // The point lies exactly on the face and keeps off its edges by its error: else a ray that leaves a corner inside
+    // could begin behind the other wall.
     vec3 error = solid_error(s, solid_axes(s));
     vec3 edge = vec3(dot(abs(s.row_x), error), dot(abs(s.row_y), error), dot(abs(s.row_z), error));
     vec3 room = max(vec3(0.0), 1.0 - edge);
     q = mix(clamp(q, -room, room), n, notEqual(n, vec3(0.0)));
     SurfacePoint r = solid_point(s, q, n);
 #if HAS_ANISOTROPIC || HAS_TEXTURES
-    // u to the right seen from outside: faces of x along -z or +z, of y along +x, of z along +x or -x.
+    // u grows to the right as seen from outside: on faces of x along -z or +z, of y along +x, of z along +x or -x.
     vec3 t = n.x != 0.0 ? vec3(0.0, 0.0, -n.x) : n.y != 0.0 ? vec3(1.0, 0.0, 0.0) : vec3(n.z, 0.0, 0.0);
     r.tangent = solid_axes(s) * t;
 #endif
 #if HAS_TEXTURES
-    // v up with +y; on the top along -z, on the bottom along +z.
+    // v grows with +y; on the top along -z, on the bottom along +z.
     vec3 b = n.y != 0.0 ? vec3(0.0, 0.0, -n.y) : vec3(0.0, 1.0, 0.0);
     r.uv = clamp(0.5 + 0.5 * vec2(dot(q, t), dot(q, b)), 0.0, 1.0);
 #endif

@@ -1,5 +1,5 @@
-// |p - c|^2 - r^2. Of a ball so vast that p stands on it like on a plain, from what float64 has made of the centre
-// and the radius together: neither knows them to a metre where they are 10 000 km.
+// |p - c|^2 - r^2. For a ball so vast that p stands on it like on a plain, it is taken from s.power, which float64 has
+// made of the centre and the radius together: a float32 of 10 000 km is good to a metre only.
 float sphere_power(Sphere s, vec3 p) {
     vec3 f = p - s.center;
 #if HAS_VAST_SPHERES
@@ -8,8 +8,8 @@ float sphere_power(Sphere s, vec3 p) {
     return dot(f, f) - s.radius * s.radius;
 }
 
-// Nearest root of |o + t d - c| = r in (0, t_max), or t_max [Haines et al. 2019, "Precision improvements for
-// ray/sphere intersection"]: the discriminant from the closest approach, the roots without cancelling.
+// The nearest root of |o + t d - c| = r in (0, t_max), or t_max [Haines et al. 2019, "Precision improvements for
+// ray/sphere intersection"]: the discriminant comes from the closest approach, and the roots do not cancel.
 float sphere_hit(Sphere s, vec3 o, vec3 d, float t_max) {
     vec3 f = o - s.center;
     float b = -dot(f, d);
@@ -27,7 +27,7 @@ float sphere_hit(Sphere s, vec3 o, vec3 d, float t_max) {
 }
 
 #if HAS_TEXTURES
-// Of a place on the unit sphere: u eastwards from -z, v from the lower pole.
+// The texture coordinates of a place on the unit sphere: u grows eastwards from -z, v from the lower pole.
 vec2 sphere_uv(vec3 n) {
     float u = n.x == 0.0 && n.z == 0.0 ? 0.0 : atan(n.x, n.z);
     return vec2(0.5 + u * (0.5 * INV_PI), 1.0 - acos(clamp(n.y, -1.0, 1.0)) * INV_PI);
@@ -51,7 +51,7 @@ SurfacePoint sphere_point(Sphere s, vec3 p) {
     r.shape = s.shape;
     r.flat_id = NONE;
 #if HAS_ANISOTROPIC || HAS_TEXTURES
-    // Along growing u = 1/2 + atan2(x, z) / 2 pi; at a pole any direction serves.
+    // The tangent points along growing u = 1/2 + atan2(x, z) / 2 pi; at a pole any direction serves.
     vec3 n = frame_rotate(vec4(-s.rotation.xyz, s.rotation.w), r.ng);
     vec3 t = dot(n.xz, n.xz) > 0.0 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0);
     r.tangent = frame_rotate(s.rotation, t);

@@ -1,7 +1,8 @@
-// Watertight test: shared edges are evaluated alike from both sides, so no ray slips between two triangles
-// [Woop, Benthin, Wald 2013].
+// The intersection test is watertight: shared edges are evaluated alike from both sides, so that no ray slips between
+// two triangles [Woop, Benthin, Wald 2013].
 
-struct Shear { // the ray's own part, made once
+// The part of the test that depends on the ray alone.
+struct Shear {
     vec3 o;
     vec3 s; // shear in x and y, scale in z
     uint axis;
@@ -19,7 +20,7 @@ Shear triangle_shear(vec3 o, vec3 d) {
     return s;
 }
 
-// Hit in (0, t_max) with the barycentric weights of v1 and v2 in uv, or t_max.
+// The hit in (0, t_max), with the barycentric weights of v1 and v2 in uv, or t_max.
 float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
     vec3 a = triangle_axes(tri.v0 - s.o, s.axis);
     vec3 b = triangle_axes(tri.v1 - s.o, s.axis);
@@ -37,7 +38,7 @@ float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
 #if HAS_SINGLE_SIDED
     bool single = (tri.shape & SINGLE_SIDED) != 0u;
 #if HAS_TRANSMISSION
-    Material m = material_load(tri.material); // a body that is left must have a back
+    Material m = material_load(tri.material); // a ray can only leave a body that has a back
     if (m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0) single = false;
 #endif
     if (single) {
@@ -72,7 +73,7 @@ ivec2 triangle_corner(uint index, uint k) {
     return ivec2(at & (TEXTURE_ROW - 1u), at / TEXTURE_ROW);
 }
 
-// Texture coordinates and vertex colours at the weights b.
+// Interpolates texture coordinates and vertex colours at the weights b.
 void triangle_detail(uint index, vec3 b, inout SurfacePoint r) {
     r.uv = vec2(0.0);
     r.uv_1 = vec2(0.0);
@@ -96,8 +97,8 @@ void triangle_detail(uint index, vec3 b, inout SurfacePoint r) {
 #endif
 
 #if HAS_TANGENTS
-// The tangent of the k-th corner, whose normal has these bits: an angle in that normal's plane, from the x of the frame
-// of [Duff et al. 2017]. The frame's side is told by the bits, which round to the same on every device.
+// The tangent of the k-th corner, whose normal has these bits. It is coded as an angle in that normal's plane, from the
+// x of the frame of [Duff et al. 2017]. The bits decide on the frame's sign, as they are the same on every device.
 vec3 triangle_tangent(uint normal, uint bits, uint k) {
     vec3 n = triangle_decode(normal);
     vec2 e = abs(unpackSnorm2x16(normal));
@@ -129,7 +130,7 @@ SurfacePoint triangle_point(Triangle tri, vec2 uv, uint index, uint id) {
     r.ng = across / twice_area;
     r.error = gamma_error(7.0) * (abs(tri.v0) + abs(tri.v1) + abs(tri.v2));
 #endif
-    // Off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
+    // The point keeps off the edges by that error: else a ray that leaves a corner could begin behind the other wall.
     vec3 edge = vec3(length(e2 - e1), length(e2), length(e1)) * (max_component(r.error) / twice_area);
     vec3 b = max(vec3(1.0 - uv.x - uv.y, uv), min(edge, vec3(1.0 / 3.0)));
     b /= b.x + b.y + b.z;

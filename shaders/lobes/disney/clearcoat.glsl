@@ -1,13 +1,13 @@
 // A second, thin, isotropic layer of polyurethane: GTR1 with its long tail [Burley 2012, section 5.6].
 
-// GTR1 (Berry) density of wm, 1/sr [Burley 2012, eq. 4], with t as sin^2 + alpha^2 cos^2 for the same reason.
+// The GTR1 (Berry) density of wm, 1/sr [Burley 2012, eq. 4], with t as sin^2 + alpha^2 cos^2, which does not cancel.
 float disney_clearcoat_gtr1(vec3 wm, float alpha) {
     float a2 = alpha * alpha;
     float t = dot(wm.xy, wm.xy) + a2 * wm.z * wm.z;
     return (a2 - 1.0) / (PI * log(a2) * t);
 }
 
-// Normal with density gtr1(wm) cos(theta_m) [Burley 2012, eq. 5], its sine taken without cancelling.
+// A normal with density gtr1(wm) cos(theta_m) [Burley 2012, eq. 5]; its sine is taken without cancelling.
 vec3 disney_clearcoat_gtr1_normal(float alpha, vec2 u) {
     float a2 = alpha * alpha;
     float sin2 = clamp((exp(log(a2) * (1.0 - u.y)) - a2) / (1.0 - a2), 0.0, 1.0);

@@ -1,4 +1,4 @@
-// Reflection from the base surface: GTR2, Schlick, masking with the course notes' remapped roughness.
+// Reflection from the base: GGX, Schlick's Fresnel term, and masking by the course notes' remapped roughness.
 
 vec3 disney_specular_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
@@ -6,7 +6,8 @@ vec3 disney_specular_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     return g * f * ggx_d(wm, s.alpha);
 }
 
-// The floor keeps the lobe sampled where spec0 is 0: its reflectance still rises to 1 towards grazing.
+// The floor of 0.05 keeps the lobe sampled where spec0 is 0, as its reflectance still rises to 1 towards grazing
+// angles.
 float disney_specular_weight(Surface s, vec3 wo) {
     return max(0.05, luminance(mix(s.spec0, vec3(1.0), fresnel_schlick(wo.z))));
 }

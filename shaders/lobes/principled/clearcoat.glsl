@@ -1,4 +1,4 @@
-// A thin layer of lacquer, index 1.5: GGX, or a mirror. What it does not reflect goes on to the base.
+// A thin layer of lacquer of index 1.5: GGX, or a mirror. The light that it does not reflect goes on to the base.
 #if HAS_PRINCIPLED && HAS_CLEARCOAT
 const float CLEARCOAT_ETA = 1.5;
 

@@ -1,9 +1,9 @@
-// The diffuse base under a rough dielectric: what the boundary keeps in neither direction [Kulla & Conty 2017; Ashikhmin
-// & Shirley 2000], and a flatter variant for thin subsurface. `albedo`: the share that
-// the boundary reflects, at wo, wi and on average.
+// The diffuse base under a rough dielectric has the light that the boundary reflects neither on its way in nor on its
+// way out [Kulla & Conty 2017; Ashikhmin & Shirley 2000]; a flatter variant is for thin subsurface. The `albedo` are
+// the shares that the boundary reflects, at wo, at wi and on average.
 #if HAS_PRINCIPLED
 
-// Albedo of the density 1 / (2 (c + c')) over c' [Seeliger 1888]: 1 - c ln(1 + 1 / c).
+// The albedo of the density 1 / (2 (c + c')) over c' [Seeliger 1888]: 1 - c ln(1 + 1 / c).
 float principled_diffuse_seeliger(float c) { return c > 0.0 ? 1.0 - c * log(1.0 + 1.0 / c) : 1.0; }
 
 vec3 principled_diffuse_eval(Surface s, float cos_o, float cos_i, float albedo_o, float albedo_i, float albedo_mean) {

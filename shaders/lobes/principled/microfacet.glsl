@@ -1,8 +1,9 @@
-// One microfacet of the base: reflection off metal and dielectric, refraction through the dielectric. wo, wi and wm in
-// the lobe's own frame (bsdf_turn). Transmitted radiance is over the square of the index: path.glsl puts it back.
+// The microfacets of the base: metal and dielectric reflect, the dielectric refracts. wo, wi and wm are in the lobe's
+// own frame (bsdf_turn). Transmitted radiance is divided by the square of the index; facing_eta_scale multiplies it
+// back.
 #if HAS_PRINCIPLED
 
-// The dielectric's reflectance, tinted: F0 by the colour, 1 stays 1, and never above the clear one.
+// The tinted reflectance of the dielectric: the colour multiplies F0, 1 stays 1, and none is above the untinted one.
 vec3 microfacet_tinted(Surface s, float f) {
     float f0 = fresnel_normal(s.eta_outside);
     return max(vec3(0.0), f - (1.0 - s.specular_color) * (f0 / (1.0 - f0) * (1.0 - f)));
@@ -20,10 +21,10 @@ vec3 microfacet_transmittance(Surface s, float c) {
     return (1.0 - s.metallic) * s.transmission * (1.0 - fresnel_dielectric(c, s.eta)) * s.base_color;
 }
 
-// Chance of reflecting rather than refracting at a facet met at cosine c.
+// The chance of reflecting rather than refracting at a facet that is met at cosine c.
 float microfacet_reflect_chance(Surface s, float c) {
 #if HAS_TRANSMISSION
-    if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not hang on the facet
+    if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not depend on the facet
     float r = luminance(microfacet_fresnel(s, c)), t = luminance(microfacet_transmittance(s, c));
     return t > 0.0 ? r / (r + t) : 1.0;
 #else
@@ -40,7 +41,7 @@ float microfacet_reflect_pdf(Surface s, vec3 wo, vec3 wm, float cos_d) {
 }
 
 #if HAS_TRANSMISSION
-// The facet that refracts wo into wi; z = 0 where there is none.
+// The normal of the facet that refracts wo into wi; its z is 0 where there is none.
 vec3 microfacet_half_vector(Surface s, vec3 wo, vec3 wi) {
     vec3 h = wo + s.eta * wi;
     float l = dot(h, h);
@@ -49,13 +50,13 @@ vec3 microfacet_half_vector(Surface s, vec3 wo, vec3 wi) {
     return dot(wo, wm) > 0.0 && dot(wi, wm) < 0.0 ? wm : vec3(0.0);
 }
 
-// Solid angle of facets per solid angle of wi, times 4 cos of wo at the facet [Walter et al. 2007, eq. 17].
+// The solid angle of facet normals per solid angle of wi, times 4 cos of wo at the facet [Walter et al. 2007, eq. 17].
 float microfacet_jacobian(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     float c = dot(wo, wm), e = s.eta * dot(wi, wm);
     return 4.0 * c * abs(e) * s.eta / sqr(c + e);
 }
 
-// [Walter et al. 2007, eq. 21] without the cosine of wi; masking across the surface is the product of both sides'.
+// [Walter et al. 2007, eq. 21] without the cosine of wi; the masking of the two sides is multiplied.
 vec3 microfacet_transmit(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     float g = 1.0 / ((abs(wo.z) + ggx_stretch(wo, s.alpha)) * (abs(wi.z) + ggx_stretch(wi, s.alpha)));
     return microfacet_transmittance(s, dot(wo, wm)) * (g * ggx_d(wm, s.alpha) * microfacet_jacobian(s, wo, wi, wm));
@@ -66,14 +67,12 @@ float microfacet_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     return ggx_visible_pdf(wo, wm, s.alpha) * microfacet_jacobian(s, wo, wi, wm)
          * (1.0 - microfacet_reflect_chance(s, c));
 }
-#endif
 
-#if HAS_TRANSMISSION
 vec3 microfacet_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
 
 bool microfacet_folds(Surface s) { return s.transmission > 0.0 && s.metallic < 1.0; }
 
-// Density of wi as the image of a direction on the wrong side.
+// The density of wi as the image of a direction on the wrong side of the surface.
 float microfacet_reflect_folded(Surface s, vec3 wo, vec3 wi) {
     vec3 wm = wo + microfacet_image(wi);
     if (wm.z <= 0.0 || !microfacet_folds(s)) return 0.0;
@@ -87,8 +86,9 @@ float microfacet_transmit_folded(Surface s, vec3 wo, vec3 wi) {
 }
 #endif
 
-// Reflected or refracted at a visible facet, by v. Where the one ends below the surface, or the other above it, light
-// meets another facet: with glass, where many such losses would add up, its image on the right side stands for that.
+// A direction reflected or refracted at a visible facet; v decides which. Where the reflected one ends below the
+// surface, or the refracted one above it, light meets another facet. With glass, where many such losses would add up,
+// the image on the right side of the surface stands for that.
 vec3 microfacet_sample(Surface s, vec3 wo, float v, vec2 u) {
     vec3 wm = s.is_delta ? vec3(0.0, 0.0, 1.0) : ggx_visible_normal(wo, s.alpha, u);
     float c = dot(wo, wm);

@@ -1,28 +1,30 @@
 // Light that leaves the microfacets after more than one of them [Kulla & Conty 2017, "Revisiting physically based
-// shading at Imageworks"]: per side, what single scattering loses at wo times what it loses at wi. The `albedo` are
-// energy_albedo's four shares, at wo (in s), at wi and on average. Sampled with the diffuse lobe, above and below.
+// shading at Imageworks"]: on each side the share that single scattering loses at wo times the share that it loses at
+// wi. The `albedo` are energy_albedo's four shares at wo (in s), at wi and on average. The diffuse lobes above and
+// below the surface sample this light.
 #if HAS_PRINCIPLED
-// Below, the tables' steps show in what is divided by it, and there is nothing to see.
+// The least mean loss to divide by: below it the steps of the tables would show, and there is nothing to see.
 const float MULTISCATTER_LEAST_LOSS = 5e-5;
 
-// Share of the lost light that comes back after all, from the mean of the Fresnel reflectance.
+// The share of the lost light that comes back after all; f is the mean Fresnel reflectance.
 vec3 multiscatter_fresnel(vec3 f, float albedo_mean) { return f * f * albedo_mean / (1.0 - f * (1.0 - albedo_mean)); }
 float multiscatter_fresnel(float f, float albedo_mean) { return multiscatter_fresnel(vec3(f), albedo_mean).x; }
 
-// What the boundary reflects in all, of untinted light.
+// The share of untinted light that the boundary reflects after any number of scatterings.
 float multiscatter_albedo(vec4 albedo, float share) { return min(1.0, albedo.y + share * (1.0 - albedo.x)); }
 
 #if HAS_TRANSMISSION
 bool multiscatter_glass(Surface s) { return !s.index_matched; }
 
-// Chance that lost light of a rough glass leaves on the other side. (1 - F) of both sides differ by eta^2, and so must
-// what both sides exchange: the lesser loss decides.
+// The chance that light lost between the facets of rough glass leaves on the other side. 1 - F of the two sides differ
+// by eta^2, and so must the light that they exchange: the lesser loss decides.
 float multiscatter_transmit_chance(Surface s) {
     float lost_a = s.albedo_mean.z, lost_b = s.albedo_mean.w;
     float t = (1.0 - fresnel_mean(s.eta_outside)) * min(lost_a, lost_b);
     return s.inside ? t / max(sqr(s.eta_outside) * lost_b, 1e-9) : t / max(lost_a, 1e-9);
 }
 
+// The loss on the side of wo, and the loss on the other side.
 float multiscatter_near(Surface s, vec4 albedo) { return s.inside ? albedo.w : albedo.z; }
 float multiscatter_far(Surface s, vec4 albedo) { return s.inside ? albedo.z : albedo.w; }
 

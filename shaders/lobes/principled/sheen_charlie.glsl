@@ -1,4 +1,4 @@
-// Sheen of fibres standing on the surface [Estevez & Kulla 2017].
+// The sheen of fibres that stand on the surface [Estevez & Kulla 2017].
 #if HAS_PRINCIPLED && HAS_SHEEN
 
 float sheen_charlie_fit(float c, float alpha) {
