@@ -24,8 +24,10 @@ struct Surface {
     bool coat_is_delta;
     vec3 specular_color;
     float aspect;          // of the specular lobe, 1 where it is round
-    float sheen_roughness;
-    vec4 albedo;             // energy_albedo at wo
+    float sheen_roughness; // for the tables
+    float alpha_sheen;
+    float coat_roughness;  // for the tables, 0 where the coat is a mirror
+    vec4 albedo;           // energy_albedo at wo
     vec4 albedo_mean;      // energy_mean
     float coat_albedo;     // the share of light from wo that the coat keeps from what is under it
     float sheen_albedo;    // the same of the sheen
@@ -69,12 +71,14 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
     s.sheen = m.sheen * (m.sheen_color.x >= 0.0 ? m.sheen_color : mix(vec3(1.0), tint, m.sheen_tint));
     s.sheen *= 1.0 - m.metallic;
     s.sheen_roughness = max(m.sheen_roughness, ENERGY_LEAST_SHEEN_ROUGHNESS);
+    s.alpha_sheen = s.sheen_roughness * s.sheen_roughness;
 #endif
     s.coat_is_delta = false;
 #if HAS_CLEARCOAT
     s.coat_is_delta = m.clearcoat_roughness >= 0.0 && m.clearcoat_roughness < SURFACE_LEAST_ROUGHNESS;
     float rough = max(m.clearcoat_roughness, SURFACE_LEAST_ROUGHNESS);
     s.alpha_coat = m.clearcoat_roughness >= 0.0 ? rough * rough : mix(0.1, 0.001, m.clearcoat_gloss);
+    s.coat_roughness = s.coat_is_delta ? 0.0 : sqrt(s.alpha_coat);
 #endif
 }
 #endif

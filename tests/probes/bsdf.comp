@@ -1,5 +1,6 @@
 // Evaluates or samples the BSDF of material 0: asks[i] is wi, or (u_lobe, u, u) with SAMPLE 1; behind `count` of them
-// stand the wo, one each or one for all. With INSIDE, wo is inside the body. Perfectly specular samples have directions[i].w = 1.
+// stand the wo, one each or one for all. With INSIDE, wo is inside the body. Perfectly specular samples have
+// directions[i].w = 1.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
 #include "constants.glsl"

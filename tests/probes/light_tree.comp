@@ -1,5 +1,5 @@
-// How lights are picked from a place: of the numbers asks[i].x, which light (by its `index`) and with what chance; or of
-// the light i, its chance, and the least importance of the nodes on the way to it.
+// How lights are picked from a place: of the numbers asks[i].x, which light (by its `index`) and with what chance; or
+// of the light i, its chance, and the least importance of the nodes on the way to it.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
 #include "constants.glsl"

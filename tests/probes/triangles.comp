@@ -1,4 +1,5 @@
-// Samples of triangle 0 as it is seen from `p`, for asks[i].xy, and the density that directions towards its places have.
+// Samples of triangle 0 as it is seen from `p`, for asks[i].xy, and the density that directions towards its places
+// have.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
 #include "constants.glsl"

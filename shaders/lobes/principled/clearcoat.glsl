@@ -10,8 +10,7 @@ float principled_clearcoat_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_
 }
 
 float principled_clearcoat_albedo(Surface s, float c) {
-    float roughness = s.coat_is_delta ? 0.0 : sqrt(s.alpha_coat);
-    return energy_albedo(vec3(0.0, 0.0, c), roughness, 1.0, CLEARCOAT_ETA).y * s.clearcoat;
+    return energy_albedo(vec3(0.0, 0.0, c), s.coat_roughness, 1.0, CLEARCOAT_ETA).y * s.clearcoat;
 }
 
 vec3 principled_clearcoat_sample(Surface s, vec3 wo, vec2 u) {

@@ -15,7 +15,7 @@ float sheen_charlie_mask(float c, float alpha) {
 }
 
 vec3 sheen_charlie_eval(Surface s, vec3 wo, vec3 wi) {
-    float alpha = s.sheen_roughness * s.sheen_roughness;
+    float alpha = s.alpha_sheen;
     vec3 wm = normalize(wo + wi);
     float sine = sqrt(dot(wm.xy, wm.xy));
     float d = (2.0 + 1.0 / alpha) * pow(sine, 1.0 / alpha) * (0.5 * INV_PI);
