@@ -3,19 +3,18 @@
 
 #if HAS_MIRRORS
 // Whether a surface only mirrors or refracts.
-bool delta_chain_takes(Interaction here) {
-    Material m = here.m;
+bool delta_chain_takes(Material m, bool mapped) {
     bool whole = m.metallic >= 1.0;
 #if HAS_TRANSMISSION
     whole = whole || m.transmission >= 1.0;
 #endif
-    return whole && !here.mapped && m.model == MODEL_PRINCIPLED && m.roughness < SURFACE_LEAST_ROUGHNESS
+    return whole && !mapped && m.model == MODEL_PRINCIPLED && m.roughness < SURFACE_LEAST_ROUGHNESS
         && m.clearcoat <= 0.0 && m.sheen <= 0.0;
 }
 
 // Scatters as principled_sample does where there is no other lobe to pick.
-void delta_chain_step(Interaction here, Sampler rng, inout Path path) {
-    Surface s = surface_make(here.m, here.tangent);
+void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {
+    Surface s = surface_make(m, here.tangent);
     principled_side(here.behind, s);
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_CHOICE).y;
     float chance = microfacet_reflect_chance(s, here.wo.z);
@@ -29,38 +28,29 @@ void delta_chain_step(Interaction here, Sampler rng, inout Path path) {
     next.side = wi.z;
     next.is_delta = true;
     next.valid = next.scatter.pdf > 0.0 && facing_agrees(wi.z, dot(next.d, here.front));
-    interaction_cross(here, next.d, path);
+    path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
     path_extend(next, 1.0, s, rng, path);
     path_add_emission(1.0, path);
 }
 #endif
 
-// Takes a path on to the first surface that does more, or to the path's end. Returns the last surface that it meets.
-Interaction delta_chain(Sampler rng, inout Path path) {
-    Interaction here;
+// Takes a path on to the first surface that does more; true where the path has ended on the way.
+bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Material m) {
 #if HAS_MIRRORS
     bool taken;
     do {
         path.radiance_before = path.radiance;
-        here = interaction_make(path);
-        taken = delta_chain_takes(here);
+        here = interaction_make(path, m);
+        taken = delta_chain_takes(m, here.mapped);
         if (taken) {
-            delta_chain_step(here, rng, path);
-            taken = path_continues(path);
+            delta_chain_step(here, m, rng, path);
+            taken = path.alive && path.bounce < frame.max_bounces;
         }
     } while (taken);
+    return !path.alive || path.bounce >= frame.max_bounces;
 #else
     path.radiance_before = path.radiance;
-    here = interaction_make(path);
-#endif
-    return here;
-}
-
-// Whether delta_chain has ended the path.
-bool delta_chain_ended(Path path) {
-#if HAS_MIRRORS
-    return !path_continues(path);
-#else
+    here = interaction_make(path, m);
     return false;
 #endif
 }

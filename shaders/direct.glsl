@@ -1,40 +1,37 @@
 // Next event estimation: lights are sampled at each surface and weighted against paths that find them by chance
 // [Veach 1997, section 9.2.4].
 
-// The point for which lights are sampled.
-LightContext direct_context(Interaction here, Path path) {
-    LightContext context;
-    context.p = path.at.p;
+// The point for which lights are sampled; `front` is the geometric normal on the viewer's side.
+LightContext direct_context(SurfacePoint at, vec3 front, vec3 facing, bool transmits) {
+    vec3 p = at.p;
 #if HAS_EMISSION_BOTH
-    context.p = shapes_leave(path.at, here.front); // on its side of the surface, which may belong to a light
+    p = shapes_leave(at, front); // on its side of the surface, which may belong to a light
 #endif
-    context.n = here.mapped ? here.front : here.basis.z; // a lobe that folds reaches all that is in front
-    context.through = surface_transmits(here.m);
-    return context;
+    return LightContext(p, facing, transmits);
 }
 
 // How often the lights are sampled at one surface, as a power of two. Surfaces whose noise comes from the light take
 // more samples: a doubling costs a third more time and leaves a third of a matte ball's error. After the first bounce
 // four samples would cost more than they are worth.
-uint direct_doublings(Surface s, Path path) {
+uint direct_doublings(Surface s, uint bounce) {
 #if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
-    return environment_varies() && surface_is_broad(s) ? (path.bounce == 0u ? 2u : 1u) : 0u;
+    return environment_varies() && surface_is_broad(s) ? (bounce == 0u ? 2u : 1u) : 0u;
 #else
     return 0u;
 #endif
 }
 
 // The share of each of these samples in their mean; the density of finding the light by chance counts that much less.
-float direct_share(Surface s, Path path) { return 1.0 / float(1u << direct_doublings(s, path)); }
+float direct_share(Surface s, uint bounce) { return 1.0 / float(1u << direct_doublings(s, bounce)); }
 
-// Whether the estimator counts that sample of a light.
-bool direct_counts(LightSample light, Path path) {
+// Whether the estimator counts that sample of a light, at a surface of the shape `id`.
+bool direct_counts(LightSample light, uint id) {
     bool counts = light.pdf > 0.0;
 #if ESTIMATOR == ESTIMATOR_BSDF || ESTIMATOR == ESTIMATOR_UNIFORM
     counts = counts && !light.extended;
 #endif
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
-    counts = counts && light.id != path.hit.id; // rounding may put a point on a ball's inside outside of it
+    counts = counts && light.id != id; // rounding may put a point on a ball's inside outside of it
 #endif
     return counts;
 }
@@ -70,17 +67,20 @@ bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
 #endif
 }
 
-// Adds one sample of one light.
+// Adds the light of one sample of one light.
 void direct_add(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
     uint pair = sobol_bounce_pair(path.bounce);
     uint pick_bits = sobol_bits(rng, pair + PAIR_CHOICE).x;
     LightSample light = lights_sample(context, pick_bits, sobol_bits(rng, pair + PAIR_LIGHT));
     Scatter f = bsdf_eval_world(s, here, light.wi);
-    bool counts = direct_counts(light, path) && interaction_agrees(here, light.wi);
-    if (counts && max_component(f.f * light.radiance) > 0.0) {
-        vec3 c = path.throughput * (f.f * light.radiance * (direct_weight(light, share * f.pdf) / light.pdf));
-        c *= facing_eta_scale(path.eta_scale, interaction_side(here, light.wi), s, light.t);
-        c *= medium_share(interaction_medium(here, path, light.wi), light.t);
+    float across = dot(light.wi, here.front), side = dot(light.wi, here.facing);
+    bool counts = direct_counts(light, path.hit.id) && (here.mapped || facing_agrees(side, across))
+        && max_component(f.f * light.radiance) > 0.0;
+    float weight = direct_weight(light, share * f.pdf);
+    if (counts) {
+        vec3 c = path.throughput * (f.f * light.radiance * (weight / light.pdf));
+        c *= facing_eta_scale(path.eta_scale, side, s, light.t);
+        c *= medium_share(interaction_medium(across < 0.0, path.medium, here.beyond), light.t);
         if (direct_arrives(path.at, light, c)) path.radiance += path_clamp(c, path.bounce > 0u) * share;
     }
 }
@@ -89,7 +89,7 @@ void direct_add(Surface s, Interaction here, LightContext context, float share, 
 void direct_lighting(Surface s, Interaction here, LightContext context, float share, Sampler rng, inout Path path) {
 #if HAS_LIGHTS
 #if (HAS_ENVIRONMENT_IMAGE || HAS_ENVIRONMENT_CUBE) && (ESTIMATOR == ESTIMATOR_MIS || ESTIMATOR == ESTIMATOR_LIGHT)
-    uint doublings = direct_doublings(s, path), turn = 0u;
+    uint doublings = direct_doublings(s, path.bounce), turn = 0u;
     do direct_add(s, here, context, share, sobol_part(rng, turn, doublings), path);
     while (++turn < (1u << doublings));
 #else

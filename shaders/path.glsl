@@ -48,11 +48,10 @@ float path_begin(vec3 d, Hit hit, SurfacePoint at, Medium medium, out Path path)
 
 // Ends a path: adds what it finds at infinity, where it has left the scene.
 vec3 path_finish(Path path) {
-    vec3 arriving = arriving_outside(path.d, path.found_pdf, path.bounce > 0u) * max(path.eta_scale, 1.0);
-    if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
+    path_add_escaped(path);
     // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word. What such a path met last
     // may not be there.
-    path_was_cut = path_continues(path);
+    path_was_cut = path.alive && path.bounce < frame.max_bounces;
     return path_was_cut ? path.radiance_before : path.radiance;
 }
 
@@ -60,17 +59,18 @@ vec3 path_finish(Path path) {
 vec3 path_radiance(Sampler rng, Path path) {
     if (path.alive) {
         do {
-            Interaction here = delta_chain(rng, path);
-            if (delta_chain_ended(path)) break;
-            Surface s = interaction_surface(here);
-            LightContext context = direct_context(here, path);
-            float share = direct_share(s, path);
+            Interaction here;
+            Material m;
+            if (delta_chain(rng, path, here, m)) break;
+            Surface s = interaction_surface(here, m);
+            LightContext context = direct_context(path.at, here.front, here.facing, here.transmits);
+            float share = direct_share(s, path.bounce);
             direct_lighting(s, here, context, share, rng, path);
             BsdfSample next = bsdf_sample_world(s, here, rng, path.bounce);
-            interaction_cross(here, next.d, path);
+            path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
             path_extend(next, share, s, rng, path);
             path_add_emission(direct_found_weight(context, path), path);
-        } while (path_continues(path));
+        } while (path.alive && path.bounce < frame.max_bounces);
     }
     return path_finish(path);
 }

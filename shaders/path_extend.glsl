@@ -35,8 +35,6 @@ vec3 path_clamp(vec3 c, bool indirect) {
     return c;
 }
 
-bool path_continues(Path path) { return path.alive && path.bounce < frame.max_bounces; }
-
 // Russian roulette: ends paths that carry little by chance, and scales up those that survive.
 void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
     if (path.bounce >= frame.roulette_depth && path.bounce < frame.max_bounces) {
@@ -91,5 +89,13 @@ void path_add_emission(float weight, inout Path path) {
 #if HAS_AMBIENT
     vec3 ambient = arriving_ambient(path.at) * path.eta_scale;
     if (path.alive) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u);
+#endif
+}
+
+// Adds what arrives from infinity, where the path has left the scene.
+void path_add_escaped(inout Path path) {
+#if HAS_ENVIRONMENT || HAS_SUN_DISKS
+    vec3 arriving = arriving_outside(path.d, path.found_pdf, path.bounce > 0u) * max(path.eta_scale, 1.0);
+    if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
 #endif
 }
