@@ -1,6 +1,6 @@
-// Entry: for each area of 8 x 8 pixels and each class of its rows (gpu/plan.py), the variance of a sample's luminance,
-// summed over the pixels, and the number of samples that they have. The rows of the moments are bound from the first
-// row of an area on.
+// Entry: for each area of 8 x 8 pixels and each class of its rows (gpu/picture/sample_plan.py), the variance of a
+// sample's luminance, summed over the pixels, and the number of samples that they have. The rows of the moments are
+// bound from the first row of an area on.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 #include "luminance_variance.glsl"

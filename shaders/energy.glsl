@@ -1,4 +1,5 @@
-// Tables of the lobes' albedos, which gpu/energy_tables.py makes. The texture unit interpolates along all their axes.
+// Tables of the lobes' albedos, which gpu/tables/build/energy_tables.py makes. The texture unit interpolates along all
+// their axes.
 #if HAS_PRINCIPLED
 layout(binding = ENERGY_ALBEDO_TEXTURE) uniform sampler3D energy_albedo_table; // cosine, roughness, eta
 layout(binding = ENERGY_MEAN_TEXTURE) uniform sampler3D energy_mean_table;     // roughness, round or aspect, eta

@@ -1,6 +1,6 @@
 // Picks one of many bounded lights by a walk down a binary tree. At each pair of nodes the chances follow bounds on
 // what the lights of either can contribute at most at the shaded point [Conty Estevez & Kulla 2018; Pharr, Jakob,
-// Humphreys 2023, section 12.6.3]. gpu/light_tree.py makes the tree.
+// Humphreys 2023, section 12.6.3]. gpu/accel/light_tree.py makes the tree.
 
 // A point for which lights are sampled.
 struct LightContext {
@@ -75,7 +75,7 @@ float light_tree_walk(bool near, bool told, uint code, uint trail, LightContext 
     do {
         uvec4 a = light_tree_fetch(2u * pair), b = light_tree_fetch(2u * pair + 1u);
         vec2 x = light_tree_importance(a, p, context), y = light_tree_importance(b, p, context);
-        float first = x.x * y.y, second = y.x * x.y; // gpu/light_tree.py keeps them inside float32
+        float first = x.x * y.y, second = y.x * x.y; // gpu/accel/light_tree.py keeps them inside float32
         // Neither bound says that light arrives, though that of the parent did: the chances follow intensity alone.
         bool lost = !(first + second > 0.0);
         if (lost) {

@@ -47,7 +47,7 @@ void main() {
     lost = compensations[slot];
     moment = moments[slot];
     uint replicate = frame.replicate;
-    if (replicate != 0u) { // the meter's buffers name the pixel, and the replicate among the pixel's (gpu/meter.py)
+    if (replicate != 0u) { // the meter's buffers name the pixel and its replicate (gpu/picture/noise_meter.py)
         replicate += uint(fract(moment.x) * float(METER_REPLICATES));
         pixel = uvec2(moment.xy);
     }

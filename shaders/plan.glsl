@@ -1,4 +1,5 @@
-// Adaptive sampling: which pixels a dispatch renders, and how many samples each of them shall have (gpu/plan.py).
+// Adaptive sampling: which pixels a dispatch renders, and how many samples each of them shall have
+// (gpu/picture/sample_plan.py).
 #if ADAPTIVE
 layout(std430, binding = SLOT_NORMAL) readonly buffer plan_buffer { uvec4 plan_counts[]; }; // by area and class of rows
 layout(std430, binding = SLOT_OUTPUT) readonly buffer work_buffer { uint plan_work[]; }; // areas: x, y << 16

@@ -1,6 +1,6 @@
 // Light from infinity. An image is in latitude and longitude. It is sampled by cells of equal chance, each of which
-// names a block of texels (gpu/cells.py); inside a block the direction is uniform in longitude and in the cosine of its
-// colatitude, and its density is constant.
+// names a block of texels (gpu/tables/environment_cells.py); inside a block the direction is uniform in longitude and
+// in the cosine of its colatitude, and its density is constant.
 
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
     vec2 cs = frame.environment_turn;
