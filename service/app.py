@@ -171,7 +171,7 @@ class _Server(uvicorn.Server):
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         if (reason := await self._state.gpu_missing()) is not None:
             log.error("did not start reason=%s", reason)
-            await self._state.supervisor.close()
+            await self._state.renderers.close()
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
@@ -204,16 +204,16 @@ class _Server(uvicorn.Server):
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own: AppState = app.state.sunbox
-    if own.supervisor.process_id is None:
-        own.supervisor.start()
+    if own.renderers.process_id is None:
+        own.renderers.start()
     own.assets.warm()
     warming = asyncio.create_task(
-        FirstFrame(own.supervisor, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run()
+        FirstFrame(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run()
     )
     yield
     warming.cancel()
     await own.farewell()
-    await own.supervisor.close()
+    await own.renderers.close()
     await asyncio.to_thread(own.assets.close)
     own.bodies.close()
 

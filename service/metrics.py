@@ -8,7 +8,7 @@ from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from service.problems import Unavailable
-from service.rendering.supervisor.statistics import Distribution
+from service.rendering.statistics import Distribution
 
 if TYPE_CHECKING:
     from prometheus_client.registry import Collector
@@ -60,8 +60,8 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
 
     class Sunbox(Collector):
         def collect(self) -> Iterator[Metric]:
-            seen = state.supervisor.statistics
-            renderer = state.supervisor.info or {}
+            seen = state.renderers.statistics
+            renderer = state.renderers.info or {}
             about = GaugeMetricFamily("sunbox_info", "Version and renderer.", labels=("version", "renderer"))
             about.add_metric((metadata.version("sunbox"), str(renderer.get("renderer", ""))), 1)
             yield about
@@ -105,7 +105,7 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
 
 def _resident(state: AppState) -> int:
     try:
-        with open(f"/proc/{state.supervisor.process_id}/statm") as sizes:
+        with open(f"/proc/{state.renderers.process_id}/statm") as sizes:
             return int(sizes.read().split()[1]) * PAGE
     except (OSError, ValueError, IndexError):
         return 0

@@ -10,8 +10,8 @@ from service.pack import Packed
 from service.problems import ServiceError, Unavailable
 from service.rendering.executors import packing
 from service.rendering.ipc.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
+from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
-from service.rendering.supervisor.supervisor import Supervisor
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -27,8 +27,8 @@ SOFTWARE = "The renderer runs on the processor, and SUNBOX_REQUIRE_GPU asks for 
 
 
 class Readiness:
-    def __init__(self, supervisor: Supervisor, reader: RequestReader, require_gpu: bool) -> None:
-        self._supervisor = supervisor
+    def __init__(self, renderers: Renderers, reader: RequestReader, require_gpu: bool) -> None:
+        self._renderers = renderers
         self._reader = reader
         self._require_gpu = require_gpu
         self._packed: Packed | None = None
@@ -39,7 +39,7 @@ class Readiness:
     async def check(self) -> None:
         """Raises Unavailable, saying why."""
         async with self._asking:  # who comes meanwhile gets the answer that is being made
-            renderer = await self._supervisor.ready(0)
+            renderer = await self._renderers.ready(0)
             if self._require_gpu and renderer.get("software"):
                 raise Unavailable(SOFTWARE.format(renderer=renderer["renderer"]), 30)
             if renderer is not self._renderer or time.monotonic() >= self._good_until:
@@ -52,18 +52,18 @@ class Readiness:
             if self._packed is None:
                 self._packed = await packing(lambda: self._reader.pack(self._reader.scene(SCENE)))
             settings = self._reader.settings(SETTINGS).for_gpu()
-            task = self._supervisor.open(probe, "server")
+            task = self._renderers.open(probe, "server")
         except ServiceError as error:
             raise Unavailable(f"Nothing can be rendered: {error}") from None
         try:
             stop = StopRule(max_samples=1)
-            await self._supervisor.send_scene(Update(task, 1, self._packed.arrays, settings, stop, interactive=True))
-            self._supervisor.send(Want(task, 1, View()))
+            await self._renderers.send_scene(Update(task, 1, self._packed.arrays, settings, stop, interactive=True))
+            self._renderers.send(Want(task, 1, View()))
             await asyncio.wait_for(probe.seen, PATIENCE_S)
         except TimeoutError:
             raise Unavailable(f"The renderer has not rendered anything for {PATIENCE_S:g} s.") from None
         finally:
-            self._supervisor.drop(task)
+            self._renderers.drop(task)
 
 
 class _Probe:

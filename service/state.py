@@ -20,9 +20,9 @@ from service.quality import priced
 from service.quota import Quota
 from service.readiness import SOFTWARE, Readiness
 from service.rendering.jobs.queue import RenderQueue
+from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.sessions import Sessions
-from service.rendering.supervisor.supervisor import Supervisor
 from service.traffic import Traffic
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
@@ -36,7 +36,7 @@ class AppState:
     config: Config
     assets: AssetStore
     reader: RequestReader
-    supervisor: Supervisor
+    renderers: Renderers
     documents: Documents
     quota: Quota
     renders: RenderQueue = field(default_factory=RenderQueue)
@@ -48,14 +48,14 @@ class AppState:
 
     def __post_init__(self) -> None:
         self.bodies = Bodies(self.config)
-        self.readiness = Readiness(self.supervisor, self.reader, self.config.require_gpu)
+        self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
-        self.sessions = Sessions(self.supervisor, self.reader, self.config.max_clients)
+        self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients)
 
     async def info(self) -> dict[str, Any]:
         """What GET /v1/info says. Waits for a renderer that is being started; null when there is none."""
         try:
-            renderer: dict[str, Any] | None = await self.supervisor.ready(STARTING_S)
+            renderer: dict[str, Any] | None = await self.renderers.ready(STARTING_S)
         except Unavailable:
             renderer = None
         return {
@@ -69,9 +69,9 @@ class AppState:
         """Why SUNBOX_REQUIRE_GPU forbids to start; None where nothing does. Waits for the renderer."""
         if not self.config.require_gpu:
             return None
-        self.supervisor.start()
+        self.renderers.start()
         try:
-            renderer = await self.supervisor.ready(GPU_S)
+            renderer = await self.renderers.ready(GPU_S)
         except Unavailable as error:
             return f"SUNBOX_REQUIRE_GPU is set, and there is no renderer: {error.detail}"
         return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 
-from service.rendering.supervisor.statistics import Distribution
+from service.rendering.statistics import Distribution
 
 METHODS = ("GET", "HEAD", "POST", "PUT", "DELETE", "OPTIONS", "WEBSOCKET")
 

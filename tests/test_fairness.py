@@ -11,7 +11,7 @@ import pytest
 from gpu import Renderer
 from service.pack import pack
 from service.rendering.ipc.messages import FromRenderer, Pause, StopRule, Update
-from service.rendering.supervisor.statistics import Kind
+from service.rendering.statistics import Kind
 from service.rendering.supervisor.supervisor import Supervisor
 from service.scene import parse_scene
 from tests.documents import Shelf

@@ -3,7 +3,9 @@
 requests     from what a caller wrote to what the renderer takes
 jobs         renders asked for over REST
 streams      scenes that are edited while they are watched
+renderers    what the server asks of its renderers, as a protocol
 supervisor   the renderer's process, kept alive
+statistics   counters and distributions, for /metrics
 ipc          what both processes say to each other
 worker       the renderer's process itself: the only room here that imports `gpu`
 executors    the threads of the server's slow work

@@ -12,8 +12,8 @@ from service.pack import warm_builder
 from service.problems import ServiceError
 from service.rendering.executors import packing
 from service.rendering.ipc.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
+from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
-from service.rendering.supervisor.supervisor import Supervisor
 
 SETTINGS = {"width": 64, "height": 64}
 
@@ -23,8 +23,8 @@ log = logging.getLogger(__name__)
 class FirstFrame:
     """A first picture that nobody asked for: `document` in the default settings, as a stream would have it."""
 
-    def __init__(self, supervisor: Supervisor, reader: RequestReader, document: Any) -> None:
-        self._supervisor = supervisor
+    def __init__(self, renderers: Renderers, reader: RequestReader, document: Any) -> None:
+        self._renderers = renderers
         self._reader = reader
         self._document = document
         self._seen = asyncio.Event()
@@ -35,20 +35,20 @@ class FirstFrame:
         try:
             packed = await packing(lambda: self._reader.pack(self._reader.scene(self._document)))
             settings = await packing(partial(self._reader.settings, SETTINGS))
-            task = self._supervisor.open(self, "server")
+            task = self._renderers.open(self, "server")
         except ServiceError as error:
             log.warning("did not warm up error=%s", error)
             return
         try:
             stop = StopRule(max_samples=1)
-            await self._supervisor.send_scene(
+            await self._renderers.send_scene(
                 Update(task, 1, packed.arrays, settings.for_gpu(), stop, interactive=True)
             )
-            self._supervisor.send(Want(task, 1, View()))
+            self._renderers.send(Want(task, 1, View()))
             await self._seen.wait()
             log.info("warmed up seconds=%.2f", time.monotonic() - began)
         finally:
-            self._supervisor.drop(task)
+            self._renderers.drop(task)
         await packing(warm_builder)
         log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
 

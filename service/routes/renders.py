@@ -157,11 +157,11 @@ async def _job(request: Request) -> Job:
     own: AppState = app_state(request)
     async with own.bodies.taken(request) as body:
         own.renders.admit(owner(request))
-        await own.supervisor.able(STARTING_S)
+        await own.renderers.able(STARTING_S)
         parsed: ParsedRequest = await own.bodies.parsed("request", body)
     packed = await packing(partial(own.reader.pack, parsed.scene))
     setup_s = time.monotonic() - began
-    return Job(own.supervisor, packed, parsed.settings, setup_s, owner(request), parsed.document)
+    return Job(own.renderers, packed, parsed.settings, setup_s, owner(request), parsed.document)
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:

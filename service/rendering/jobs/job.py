@@ -29,8 +29,8 @@ from service.rendering.ipc.messages import (
     Update,
     View,
 )
+from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import stop_rule, weight
-from service.rendering.supervisor.supervisor import Supervisor
 
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 
@@ -48,7 +48,7 @@ class Job:
 
     def __init__(
         self,
-        supervisor: Supervisor,
+        renderers: Renderers,
         packed: Packed,
         settings: ResolvedSettings,
         setup_s: float,
@@ -63,7 +63,7 @@ class Job:
         self.state: State = "queued"
         self.finished = asyncio.Event()
         self.bytes = settings.render_width * settings.render_height * PICTURE_BYTES + weight(packed) + len(document)
-        self._supervisor = supervisor
+        self._renderers = renderers
         self._packed: Packed | None = packed
         self._settings = settings
         self._warnings = list(packed.warnings)
@@ -85,13 +85,13 @@ class Job:
         if self._packed is None:
             return
         try:
-            self._task = self._supervisor.open(self, "render", self.owner or "anybody")
+            self._task = self._renderers.open(self, "render", self.owner or "anybody")
             arrays, self._packed = self._packed.arrays, None
             settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
             update = Update(self._task, 1, arrays, settings, stop, denoise=self._settings.denoise)
-            await self._supervisor.send_scene(update)
+            await self._renderers.send_scene(update)
             if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
-                self._supervisor.send(Stop(self._task))
+                self._renderers.send(Stop(self._task))
         except ServiceError as error:
             self._fail(error)
         await self.finished.wait()
@@ -102,13 +102,13 @@ class Job:
             return
         self.state, self._packed = "cancelled", None
         if self._task is not None:
-            self._supervisor.send(Stop(self._task))
+            self._renderers.send(Stop(self._task))
         self._finish()
 
     def release(self) -> None:
         """Forgets the picture."""
         if self._task is not None:
-            self._supervisor.drop(self._task)
+            self._renderers.drop(self._task)
             self._task = None
 
     def appraise(self) -> None:
@@ -117,7 +117,7 @@ class Job:
             self._appraised = ASKED
             self._answered.clear()
             if self._kernel is not None and self._task is not None:
-                self._supervisor.send(MeasureKernel(self._task))
+                self._renderers.send(MeasureKernel(self._task))
 
     async def settled(self, appraised: bool) -> None:
         """Returns when it is finished, and with `appraised` when that is answered."""
@@ -159,7 +159,7 @@ class Job:
             raise self._error or Conflict("There is no sample yet.")
         serial = next(self._serials)
         self._reads[serial] = asyncio.get_running_loop().create_future()
-        self._supervisor.send(Read(self._task, serial, view))
+        self._renderers.send(Read(self._task, serial, view))
         image = await self._reads[serial]
         if image.pixels is None:
             raise Conflict("There is no sample yet.")
@@ -220,7 +220,7 @@ class Job:
 
     def _fail(self, error: ServiceError) -> None:
         self.state = "failed"
-        self._supervisor.statistics.errors[answer(error).type] += 1
+        self._renderers.statistics.errors[answer(error).type] += 1
         self._forget(error)
         self._finish()
 

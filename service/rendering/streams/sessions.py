@@ -7,9 +7,9 @@ import logging
 import secrets
 
 from service.problems import NotFound, TooManyRequests
+from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.stream import Stream
-from service.rendering.supervisor.supervisor import Supervisor
 
 ID_BYTES = 32  # 256 bits: nobody guesses one
 KEPT_S = 60.0  # of the contract: how long a session waits for its client to come back
@@ -30,8 +30,8 @@ class Session:
 
 
 class Sessions:
-    def __init__(self, supervisor: Supervisor, reader: RequestReader, most: int) -> None:
-        self._supervisor = supervisor
+    def __init__(self, renderers: Renderers, reader: RequestReader, most: int) -> None:
+        self._renderers = renderers
         self._reader = reader
         self._most = most
         self._kept: dict[str, Session] = {}  # the longest left first, among those that are left
@@ -62,7 +62,7 @@ class Sessions:
         if (session is None or not session.connections) and not is_second and self.attended >= self._most:
             raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
         if session is None:
-            session = Session(Stream(self._supervisor, self._reader), owner)
+            session = Session(Stream(self._renderers, self._reader), owner)
             session.beside = first
             self._kept[session.id] = session
         if session.timer is not None:

@@ -15,11 +15,11 @@ from service.problems import Conflict, Internal, MalformedJson, ServiceError, an
 from service.rendering.executors import ClientExecutor, encoding
 from service.rendering.ipc.messages import Done, Failed, Frame, FromRenderer, Loaded, Pause, Resume, Stop, Update
 from service.rendering.jobs.job import error_of
+from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams import protocol
 from service.rendering.streams.edit_session import EditSession
 from service.rendering.streams.flow_control import FlowControl
-from service.rendering.supervisor.supervisor import Supervisor
 
 TAKEN_UP, LOST = 4409, 4500  # close codes
 WAITING = 64  # messages to take, or to send; more of them wait in the network
@@ -69,11 +69,11 @@ class Attendance:
 class Stream:
     """`hear` takes what the client says, `attend` sends it what there is; `run` works until it is cancelled."""
 
-    def __init__(self, supervisor: Supervisor, reader: RequestReader) -> None:
+    def __init__(self, renderers: Renderers, reader: RequestReader) -> None:
         self.ended: Closing | None = None  # for good, and why
-        self._supervisor = supervisor
-        self._task = supervisor.open(self)
-        self._flow = FlowControl(self._task, supervisor.send)
+        self._renderers = renderers
+        self._task = renderers.open(self)
+        self._flow = FlowControl(self._task, renderers.send)
         self._live = EditSession(reader, self._task)
         self._lane = ClientExecutor("stream")  # what this client asks to be parsed and packed waits for nobody else's
         self._paused = False  # by the client
@@ -110,7 +110,7 @@ class Stream:
             await self._handle_all()
         finally:
             self._flow.close()
-            self._supervisor.drop(self._task)
+            self._renderers.drop(self._task)
             self._lane.close()
             self._live.close()
 
@@ -126,7 +126,7 @@ class Stream:
             self._outbox = deque(said for said in self._outbox if said is not self._done)
             self._post(self._done)
         self._flow.attach()
-        self._supervisor.send(Pause(self._task) if self._paused else Resume(self._task))
+        self._renderers.send(Pause(self._task) if self._paused else Resume(self._task))
         return self._attendance
 
     async def attend(self, attendance: Attendance) -> None:
@@ -156,7 +156,7 @@ class Stream:
         self._attendance = None
         self._outbox = deque(item for item in self._outbox if not isinstance(item, Frame))
         self._flow.detach()
-        self._supervisor.send(Pause(self._task, away=True))
+        self._renderers.send(Pause(self._task, away=True))
 
     def end(self, code: int, reason: str) -> None:
         """For good: who attends is told, and who comes later too."""
@@ -240,11 +240,11 @@ class Stream:
         if update is None:
             return
         if update.scene is not None:
-            await self._supervisor.send_scene(update)
+            await self._renderers.send_scene(update)
         else:
-            self._supervisor.send(update)
+            self._renderers.send(update)
         if not self.attended:  # its task may not have been there to be paused
-            self._supervisor.send(Pause(self._task, away=True))
+            self._renderers.send(Pause(self._task, away=True))
         async with self._writing:
             self._done = None
             self._flow.update(update.generation, began)
@@ -260,7 +260,7 @@ class Stream:
             if message.type in ("pause", "resume"):
                 self._paused = message.type == "pause"
             if message.type == "stop" or self.attended:
-                self._supervisor.send(ORDERS[message.type](self._task))
+                self._renderers.send(ORDERS[message.type](self._task))
 
     async def _send_all(self, socket: Socket) -> None:
         """Raises TimeoutError when the client takes nothing any more."""
@@ -287,14 +287,14 @@ class Stream:
                 await asyncio.wait_for(socket.send_bytes(data), STALLED_S)
 
     def _count(self, data: bytes) -> None:
-        statistics = self._supervisor.statistics
+        statistics = self._renderers.statistics
         statistics.frames += 1
         statistics.frame_bytes += len(data)
         if (waited_s := self._flow.waited_s) is not None:
             statistics.first_frame_s.add(waited_s)
 
     def _refuse(self, error: ServiceError, generation: int | None) -> None:
-        self._supervisor.statistics.errors[answer(error).type] += 1
+        self._renderers.statistics.errors[answer(error).type] += 1
         self._post({"type": "error", "generation": generation, "problem": problem(error)})
 
     def _post(self, item: dict[str, Any] | Frame) -> None:

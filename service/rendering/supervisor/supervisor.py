@@ -9,7 +9,7 @@ import os
 import time
 from dataclasses import dataclass, field, replace
 from functools import partial
-from typing import Any, Protocol
+from typing import Any
 
 from service.problems import Unavailable
 from service.rendering.executors import sending, tending
@@ -34,9 +34,10 @@ from service.rendering.ipc.messages import (
     Update,
     Usage,
 )
+from service.rendering.renderers import Listener
+from service.rendering.statistics import Kind, Statistics
 from service.rendering.supervisor.process import Cause, Options, Process
 from service.rendering.supervisor.replay_log import ReplayLog
-from service.rendering.supervisor.statistics import Kind, Statistics
 
 TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
 BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start, ever
@@ -52,18 +53,6 @@ FAREWELL_S = 3.0  # for the renderer to end by itself; one slice on a slow machi
 log = logging.getLogger(__name__)
 
 
-class Listener(Protocol):
-    """Who opened a task hears what becomes of it, on the event loop."""
-
-    def heard(self, message: FromRenderer) -> None: ...
-
-    def again(self) -> None:
-        """The renderer was lost, and another one begins the task again."""
-
-    def lost(self, detail: str) -> None:
-        """There is no renderer for this task any more."""
-
-
 @dataclass
 class _Task:
     listener: Listener
@@ -76,6 +65,8 @@ class _Task:
 
 
 class Supervisor:
+    """One renderer's process; fulfils `Renderers`."""
+
     def __init__(self, options: Options | None = None) -> None:
         self.statistics = Statistics()
         self._options = options or Options()

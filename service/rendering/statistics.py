@@ -14,7 +14,6 @@ from typing import Literal
 Kind = Literal["stream", "render", "server"]  # whose work: a stream's, REST's, the server's own
 
 SECONDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
-KEPT = 1000  # latest values of a distribution, for its quantiles
 
 
 @dataclass
@@ -25,7 +24,6 @@ class Distribution:
     counts: list[int] = field(default_factory=list)
     count: int = 0
     total: float = 0.0
-    latest: list[float] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.counts = [0] * (len(self.bounds) + 1)
@@ -34,17 +32,10 @@ class Distribution:
         self.counts[bisect_left(self.bounds, value)] += 1
         self.count += 1
         self.total += value
-        self.latest.append(value)
-        del self.latest[:-KEPT]
 
     def cumulative(self) -> list[tuple[float, int]]:
         """(bound, how many values are at most that), as Prometheus has its buckets."""
         return list(zip(self.bounds, accumulate(self.counts), strict=False))
-
-    def quantile(self, share: float) -> float | None:
-        """Of the latest values; None before the first."""
-        ordered = sorted(self.latest)
-        return ordered[min(int(share * len(ordered)), len(ordered) - 1)] if ordered else None
 
 
 @dataclass

@@ -1,0 +1,61 @@
+"""What the server asks of its renderers: one supervised process today, a pool behind the same protocol later."""
+
+from __future__ import annotations
+
+from typing import Any, Protocol
+
+from service.rendering.ipc.messages import FromRenderer, ToRenderer, Update
+from service.rendering.statistics import Kind, Statistics
+
+
+class Listener(Protocol):
+    """Who opened a task hears what becomes of it, on the event loop."""
+
+    def heard(self, message: FromRenderer) -> None: ...
+
+    def again(self) -> None:
+        """The renderer was lost, and another one begins the task again."""
+
+    def lost(self, detail: str) -> None:
+        """There is no renderer for this task any more."""
+
+
+class Renderers(Protocol):
+    """For the event loop. Tasks are numbered; what a lost renderer had is begun again elsewhere."""
+
+    statistics: Statistics
+
+    @property
+    def info(self) -> dict[str, Any] | None:
+        """The device that renders; None while nothing can."""
+
+    @property
+    def process_id(self) -> int | None:
+        """The process that renders; None while there is none."""
+
+    def start(self) -> None:
+        """Start the processes; they are ready some tenths of a second later."""
+
+    async def close(self) -> None:
+        """End them, after what they are at."""
+
+    async def ready(self, timeout_s: float) -> dict[str, Any]:
+        """The device that renders, as soon as it does. Raises Unavailable with the reason why nothing does."""
+
+    async def able(self, timeout_s: float) -> None:
+        """Return when something renders, or did and is being replaced: then work can be taken. Raises Unavailable."""
+
+    def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
+        """The number of a new task, whose messages `listener` hears until `drop`. Raises Unavailable.
+
+        Tasks of one `client` share its part of the time; without a name each has its own.
+        """
+
+    def drop(self, task: int) -> None:
+        """End a task; its listener hears no more."""
+
+    def send(self, message: ToRenderer) -> None:
+        """Hand a message on; nothing happens when its task was lost or dropped."""
+
+    async def send_scene(self, update: Update) -> None:
+        """Like `send`, for a whole scene: it is copied to shared memory off the event loop."""
