@@ -20,6 +20,34 @@ from service.scene.texture import (
     ScalarTexture,
 )
 
+BaseColor = Annotated[
+    AnyReflectance,
+    hint(
+        "Base colour",
+        "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+        unit="",
+        widget="color",
+    ),
+]
+Metallic = Annotated[
+    AnyFraction,
+    hint(
+        "Metallic",
+        "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+        unit="",
+        widget="slider",
+    ),
+]
+Roughness = Annotated[
+    AnyFraction,
+    hint(
+        "Roughness",
+        "0 is polished, 1 is matte; its square is the width of the highlight.",
+        unit="",
+        widget="slider",
+    ),
+]
+
 
 class _Surface(Model):
     emission: Annotated[
@@ -82,15 +110,7 @@ class DisneyMaterial(_Surface):
     """The "principled" BRDF of Burley's 2012 course notes."""
 
     type: Literal["disney"]
-    base_color: Annotated[
-        AnyReflectance,
-        hint(
-            "Base colour",
-            "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
-            unit="",
-            widget="color",
-        ),
-    ] = (0.5, 0.5, 0.5)
+    base_color: BaseColor = (0.5, 0.5, 0.5)
     subsurface: Annotated[
         AnyFraction,
         hint(
@@ -100,15 +120,7 @@ class DisneyMaterial(_Surface):
             widget="slider",
         ),
     ] = 0.0
-    metallic: Annotated[
-        AnyFraction,
-        hint(
-            "Metallic",
-            "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
-            unit="",
-            widget="slider",
-        ),
-    ] = 0.0
+    metallic: Metallic = 0.0
     specular: Annotated[
         AnyFraction,
         hint(
@@ -127,15 +139,7 @@ class DisneyMaterial(_Surface):
             widget="slider",
         ),
     ] = 0.0
-    roughness: Annotated[
-        AnyFraction,
-        hint(
-            "Roughness",
-            "0 is polished, 1 is matte; its square is the width of the highlight.",
-            unit="",
-            widget="slider",
-        ),
-    ] = 0.5
+    roughness: Roughness = 0.5
     anisotropic: Annotated[
         AnyFraction,
         hint(
@@ -167,33 +171,9 @@ class MetalRoughMaterial(_Surface):
     """The core BRDF of glTF 2.0: a metal or a dielectric of index 1.5, without coat."""
 
     type: Literal["metal_rough"]
-    base_color: Annotated[
-        AnyReflectance,
-        hint(
-            "Base colour",
-            "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
-            unit="",
-            widget="color",
-        ),
-    ]
-    metallic: Annotated[
-        AnyFraction,
-        hint(
-            "Metallic",
-            "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
-            unit="",
-            widget="slider",
-        ),
-    ]
-    roughness: Annotated[
-        AnyFraction,
-        hint(
-            "Roughness",
-            "0 is polished, 1 is matte; its square is the width of the highlight.",
-            unit="",
-            widget="slider",
-        ),
-    ]
+    base_color: BaseColor
+    metallic: Metallic
+    roughness: Roughness
 
 
 class BlinnPhongMaterial(_Surface):
