@@ -9,6 +9,7 @@ pack               a document -> the renderer's arrays
 assets             meshes and images that scenes refer to
 images             pixels -> files
 presets            built-in scenes, materials and environments
+views              the names of AOVs and tone maps
 quality            quality presets, and settings with every knob resolved
 recipe             what a picture was made from, in its metadata
 rendering          what is wanted of the renderer, and the process that owns the GPU

@@ -13,6 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 
 from service.commands import CommandError
+from service.views import AOVS, DEFAULT_TONE_MAP, TONE_MAPS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -62,13 +63,17 @@ def _render(command: argparse.ArgumentParser) -> None:
     add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
     add("--seed", dest="set", action="append", type=_setting("seed"), metavar="N", help="the setting seed")
     add("--set", action="append", metavar="KEY=VALUE", help="any setting; its value in JSON or a bare word")
-    aovs = "albedo, normal, depth, variance, shape_id or material_id instead of color; all: each a layer of an .exr"
+    aovs = f"{_any_of(AOVS[1:])} instead of {AOVS[0]}; all: each a layer of an .exr"
     add("--aov", metavar="NAME", help=aovs)
     add("--exposure", metavar="STOPS", help="for .png (default: 0)")
-    curves = "for .png: linear, exponential, reinhard, aces, agx or pbr_neutral (default)"
-    add("--tone-map", metavar="NAME", help=curves)
+    curves = [f"{name} (default)" if name == DEFAULT_TONE_MAP else name for name in TONE_MAPS]
+    add("--tone-map", metavar="NAME", help=f"for .png: {_any_of(curves)}")
     add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
     _asset_root(command)
+
+
+def _any_of(names: Sequence[str]) -> str:
+    return f"{', '.join(names[:-1])} or {names[-1]}"
 
 
 def _info(command: argparse.ArgumentParser) -> None:

@@ -6,7 +6,7 @@ import json
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from importlib import metadata
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from pydantic import Field, TypeAdapter
 
@@ -14,17 +14,16 @@ from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings
 from service.scene.base import Model
 from service.scene.validation import validated
-
-Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id", "all"]
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOrAll, Bits, ToneMap
 
 
 class PictureView(Model):
     """How it was written. Linear formats take no notice of exposure and tone map, "all" is every AOV as a layer."""
 
-    aov: Aov = "color"
-    exposure: Annotated[float, Field(ge=-60, le=60)] = 0.0
-    tone_map: Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"] = "pbr_neutral"
-    bits: Literal[8, 16] = 8
+    aov: AovOrAll = "color"
+    exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
+    tone_map: ToneMap = DEFAULT_TONE_MAP
+    bits: Bits = 8
 
 
 class _Recipe(Model):

@@ -12,8 +12,7 @@ import numpy as np
 import pytest
 
 from service.rendering.ipc import channel
-from service.rendering.ipc.messages import Frame, Progress, StopRule, Update, Want
-from service.rendering.ipc.messages import View as PictureView
+from service.rendering.ipc.messages import Frame, Progress, StopRule, Update, View, Want
 
 
 @pytest.fixture
@@ -33,7 +32,7 @@ def open_descriptors() -> int:
 
 
 def test_small_message_needs_no_memory(ends: tuple[socket.socket, socket.socket]) -> None:
-    want = Want(3, 7, PictureView(exposure=1.5), anyway=True)
+    want = Want(3, 7, View(exposure=1.5), anyway=True)
     assert channel.encode(want)[1] == ()
     assert through(ends, want) == want
 

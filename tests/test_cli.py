@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 
 from gpu import settings as gpu_settings
+from service import images, views
 from service.cli import main
-from service.commands import render
 from service.commands.progress import ProgressLine, describe
 from service.images import read_metadata
 from service.rendering.ipc.messages import Progress
@@ -220,7 +220,8 @@ def test_info_names_the_renderer_and_the_scene(gpu: Any, scene: Path, capsys: py
 
 
 def test_choices_are_those_of_the_renderer() -> None:
-    assert (set(render.AOVS), set(render.TONE_MAPS)) == (set(gpu_settings.AOVS), set(gpu_settings.TONE_MAPS))
+    assert (views.AOVS, views.TONE_MAPS) == (gpu_settings.AOVS, gpu_settings.TONE_MAPS)
+    assert tuple(images.LAYERS) == views.AOVS and views.DEFAULT_TONE_MAP in views.TONE_MAPS
 
 
 def test_configuration_mistake_is_named(

@@ -6,7 +6,7 @@ import io
 import json
 import os
 import zlib
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
@@ -128,13 +128,30 @@ def test_npy_keeps_every_bit() -> None:
     assert read.dtype == np.float32 and np.array_equal(read, pixels)
 
 
+@pytest.mark.parametrize("channels", [1, 3, 4])
+def test_rgba32f_is_always_four_floats(channels: int) -> None:
+    pixels = linear(channels=channels)
+    read = np.frombuffer(images.encode(pixels, "rgba32f"), np.float32).reshape(*pixels.shape[:2], 4)
+    assert np.array_equal(read[..., :3], np.broadcast_to(pixels[..., :3], read[..., :3].shape))
+    assert np.array_equal(read[..., 3], pixels[..., 3] if channels == 4 else np.ones(pixels.shape[:2]))
+
+
+@pytest.mark.parametrize(
+    ("format", "bits", "encoding"),
+    [("png", 8, "u1"), ("png", 16, "f4"), ("jpeg", 8, "u1"), ("webp", 16, "u1"), ("exr", 16, "linear")],
+)
+def test_a_format_says_what_it_is_written_from(format: images.FileFormat, bits: int, encoding: str) -> None:
+    assert images.FORMATS[format].encoding(bits) == encoding
+
+
 def test_a_plane_without_channels_is_one_channel() -> None:
     assert np.load(io.BytesIO(images.encode(linear()[..., 0], "npy"))).shape == (21, 34, 1)
     assert read_hdr(images.encode(linear()[..., 0], "hdr")).shape == (21, 34, 3)
 
 
-def test_every_format_has_a_mime_type() -> None:
-    for format in images.MIME:
+def test_every_format_is_written() -> None:
+    assert set(get_args(images.FileFormat) + get_args(images.StreamFormat)) == set(images.FORMATS)
+    for format in images.FORMATS:
         assert images.encode(linear(), format)
     with pytest.raises(ValueError, match="bmp"):
         images.encode(linear(), "bmp")

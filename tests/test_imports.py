@@ -21,6 +21,7 @@ MOST_LINES = 400
 LAYERS = [
     {"service.problems", "service.shared_memory", "service.cpu_time", "service.confined"},
     {"service.config"},
+    {"service.views"},
     {"service.scene", "service.images"},
     {"service.quality", "service.presets", "service.assets"},
     {"service.recipe"},

@@ -25,16 +25,14 @@ from service.commands.documents import (
     refusals,
     source_assets,
 )
+from service.views import AOVS, LEAST_EXPOSURE, MOST_EXPOSURE, TONE_MAPS
 
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
+    from service.images import FileFormat
     from service.recipe import PictureView
-    from service.rendering.ipc.messages import Encoding
 
-FORMATS = ("png", "exr", "hdr", "npy")
-REPEATABLE = ("png", "exr")  # carry in their metadata what they were made from
-AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_id")
-TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
+FORMATS: tuple[FileFormat, ...] = ("png", "exr", "hdr", "npy")
 
 
 @dataclass(frozen=True)
@@ -42,8 +40,15 @@ class Output:
     """What to write where."""
 
     path: Path
-    format: str
+    format: FileFormat
     view: PictureView
+
+    @property
+    def is_repeatable(self) -> bool:
+        """Whether the file carries in its metadata what the picture was made from."""
+        from service import images
+
+        return images.FORMATS[self.format].has_metadata
 
 
 def run(arguments: argparse.Namespace) -> int:
@@ -64,7 +69,7 @@ def run(arguments: argparse.Namespace) -> int:
     with source_assets(source, arguments.asset_root, config) as assets:
         packed = pack_scene(source, assets, config)
         with refusals():
-            document, names = assets.by_id(source.document) if format in REPEATABLE else (None, {})
+            document, names = assets.by_id(source.document) if output.is_repeatable else (None, {})
         from gpu import GpuError, Renderer
         from service.commands.tracing import Interrupt, Tracing
         from service.quality import resolve
@@ -85,16 +90,16 @@ def run(arguments: argparse.Namespace) -> int:
             files.write(stats, (json.dumps(tracing.status(setup_s), indent=1) + "\n").encode())
         for warning in tracing.warnings:
             print(f"warning: {warning}", file=sys.stderr)
-        if format in REPEATABLE:
+        if output.is_repeatable:
             assets.keep(source.document)
     return 128 + interrupt.signal if interrupt.signal is not None else 0
 
 
-def _arguments(arguments: argparse.Namespace) -> tuple[Path, str, float | None]:
+def _arguments(arguments: argparse.Namespace) -> tuple[Path, FileFormat, float | None]:
     """Where to write, in which format, and the exposure where one is given."""
     path = Path(arguments.output)
-    format = path.suffix.lower().removeprefix(".")
-    if format not in FORMATS:
+    format = next((name for name in FORMATS if path.suffix.lower() == "." + name), None)
+    if format is None:
         raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join('.' + f for f in FORMATS)}")
     if arguments.aov is not None:
         _choose("--aov", arguments.aov, (*AOVS, "all"))
@@ -108,8 +113,9 @@ def _arguments(arguments: argparse.Namespace) -> tuple[Path, str, float | None]:
             exposure = float(arguments.exposure)
         except ValueError:
             exposure = math.nan
-        if not -60 <= exposure <= 60:
-            raise BadInput(f"--exposure {arguments.exposure!r}: must be a number of stops from -60 to 60")
+        if not LEAST_EXPOSURE <= exposure <= MOST_EXPOSURE:
+            within = f"from {LEAST_EXPOSURE} to {MOST_EXPOSURE}"
+            raise BadInput(f"--exposure {arguments.exposure!r}: must be a number of stops {within}")
     return files.writable(path), format, exposure
 
 
@@ -145,10 +151,10 @@ def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, st
     from service.rendering.ipc.messages import View
 
     view, made_from = output.view, None
-    if output.format in REPEATABLE:
+    if output.is_repeatable:
         made_from = recipe.write(document, tracing.settings, tracing.progress.samples, view, names)
     if view.aov == "all":
         return images.encode_layers({aov: tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}, made_from)
-    encoding: Encoding = "linear" if output.format != "png" else "f4" if view.bits == 16 else "u1"
+    encoding = images.FORMATS[output.format].encoding(view.bits)
     pixels = tracing.pixels(View(view.aov, view.exposure, view.tone_map, encoding))
     return images.encode(pixels, output.format, bits=view.bits, metadata=made_from)

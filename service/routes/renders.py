@@ -8,22 +8,23 @@ import time
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
-from typing import Annotated, Any, BinaryIO, Literal
+from typing import Annotated, Any, BinaryIO, get_args
 
 import numpy as np
 from fastapi import APIRouter, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
-from service import images, recipe
+from service import images, recipe, views
 from service.downloads import Downloads, FileAnswer, Written, disconnected, present
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.rendering.executors import packing, writing
-from service.rendering.ipc.messages import Encoding, View
+from service.rendering.ipc.messages import View
 from service.rendering.jobs.job import Job
 from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.routes import answers
 from service.routes.errors import GONE
 from service.state import STARTING_S, AppState, app_state, caller, owner
+from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 
@@ -37,7 +38,7 @@ Saving = Annotated[
         "of a core by llvmpipe). Answers bring it from then on."
     ),
 ]
-DISPLAYED = ("png", "jpeg", "webp")
+FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(images.FileFormat)))
 
 
 class Bits(IntEnum):
@@ -49,19 +50,18 @@ class ImageQuery(BaseModel):
     """How an image is written. EXR, npy and HDR hold linear values; exposure and tone map are for the others."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    format: Literal["png", "jpeg", "webp", "exr", "hdr", "npy"] = "png"
+    format: images.FileFormat = "png"
     bits: Bits = Bits.EIGHT
-    aov: recipe.Aov = "color"
-    exposure: Annotated[float, Field(ge=-60, le=60)] = 0.0
-    tone_map: Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"] = "pbr_neutral"
+    aov: AovOrAll = "color"
+    exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0
+    tone_map: ToneMap = DEFAULT_TONE_MAP
 
     def view(self) -> View:
-        if self.bits == Bits.SIXTEEN and self.format != "png":
+        if self.bits == Bits.SIXTEEN and 16 not in images.FORMATS[self.format].bits:
             raise InvalidDocument([FieldError("/bits", f"16 is for png; a {self.format} file has its own")])
         if self.aov == "all" and self.format != "exr":
             raise InvalidDocument([FieldError("/aov", "all is for exr: no other format holds more than one")])
-        encoding: Encoding = "linear" if self.format not in DISPLAYED else "f4" if self.bits == Bits.SIXTEEN else "u1"
-        return View(self.aov, self.exposure, self.tone_map, encoding)
+        return View(self.aov, self.exposure, self.tone_map, images.FORMATS[self.format].encoding(self.bits))
 
 
 @router.post(
@@ -70,7 +70,7 @@ class ImageQuery(BaseModel):
     description="Waits for the render's end; closing the connection cancels it.",
     openapi_extra=answers.RENDER_BODY,
     response_class=Response,
-    responses=answers.files(*images.MIME.values()) | answers.problems(400, 413, 415, 422, 429, 503),
+    responses=FILES | answers.problems(400, 413, 415, 422, 429, 503),
 )
 async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
     view = query.view()
@@ -136,7 +136,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving:
     "/renders/{id}/image",
     summary="The image so far",
     response_class=Response,
-    responses=answers.files(*images.MIME.values()) | answers.problems(404, 409, 410, 422),
+    responses=FILES | answers.problems(404, 409, 410, 422),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
     return await _image(request, app_state(request).renders.get(id, owner(request)), query, query.view())
@@ -185,7 +185,7 @@ async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> R
             downloads.admit(client, _most_bytes(job, query))
             written = await _written(downloads, job, query, view)
             downloads.keep(client, key, written)
-    return FileAnswer(written.file, images.MIME[query.format], {"cache-control": "no-store"}, held=written)
+    return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)
 
 
 async def _written(downloads: Downloads, job: Job, query: ImageQuery, view: View) -> Written:
@@ -199,21 +199,22 @@ async def _written(downloads: Downloads, job: Job, query: ImageQuery, view: View
     return await writing(lambda: downloads.write(partial(_write, layers, query, job, samples)))
 
 
-def _aovs(query: ImageQuery) -> list[str]:
-    return list(images.LAYERS) if query.aov == "all" else [query.aov]
+def _aovs(query: ImageQuery) -> list[Aov]:
+    return list(AOVS) if query.aov == "all" else [query.aov]
 
 
 def _most_bytes(job: Job, query: ImageQuery) -> int:
     """About as many as a file takes that can't be compressed."""
+    format = images.FORMATS[query.format]
     channels = sum(len(images.LAYERS[aov]) for aov in _aovs(query))
-    deep = query.format not in DISPLAYED
-    return job.settings.width * job.settings.height * channels * (4 if deep else query.bits // 8)
+    bits = query.bits if query.bits in format.bits else format.bits[0]
+    return job.settings.width * job.settings.height * channels * bits // 8
 
 
 def _write(layers: dict[str, np.ndarray], query: ImageQuery, job: Job, samples: int, file: BinaryIO) -> None:
-    bits: Literal[8, 16] = 16 if query.bits == Bits.SIXTEEN else 8
+    bits: views.Bits = 16 if query.bits == Bits.SIXTEEN else 8
     made_from = None
-    if query.format in ("png", "exr"):
+    if images.FORMATS[query.format].has_metadata:
         view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
         made_from = recipe.write_text(unfolded(job.document), job.settings, samples, view)
     if query.aov == "all":

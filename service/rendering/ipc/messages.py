@@ -7,8 +7,9 @@ from typing import Any, Literal
 
 import numpy as np
 
+from service.views import DEFAULT_TONE_MAP, Encoding
+
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
-Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
 EDITS = ("camera", "materials", "texture_words", "environment", "moved")  # what `Scene.edit` takes
 
@@ -28,7 +29,7 @@ class View:
 
     aov: str = "color"
     exposure: float = 0.0
-    tone_map: str = "pbr_neutral"
+    tone_map: str = DEFAULT_TONE_MAP
     encoding: Encoding = "u1"
 
 

@@ -6,46 +6,43 @@ import json
 import struct
 from typing import Annotated, Any, Literal
 
-import numpy as np
 from pydantic import Field, TypeAdapter
 
 from service import images
 from service.problems import TooLarge
-from service.rendering.ipc.messages import Encoding, Frame
-from service.rendering.ipc.messages import View as PictureView
+from service.rendering.ipc import messages
 from service.scene.base import Model, hint
 from service.scene.text import load_json, most_bytes
 from service.scene.validation import validated
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, ToneMap
 
 MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact
 QUALITY, LAST_QUALITY = 80, 90  # JPEG: 4:2:0 while it converges, 4:4:4 for the frame that stays
 MOST_FPS = 240
-RAW = "application/octet-stream"
 
 
 class View(Model):
     """How frames are to look; what a message leaves out stays as it was."""
 
-    format: Literal["jpeg", "webp", "png", "rgba32f"] = "jpeg"
+    format: images.StreamFormat = "jpeg"
     quality: Annotated[int, Field(ge=1, le=100)] | None = None
     exposure: Annotated[
         float,
-        Field(ge=-60, le=60),
+        Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE),
         hint("Exposure", "In stops: each doubles the brightness.", unit="stops", widget="slider", soft=(-10, 10)),
     ] = 0.0
     tone_map: Annotated[
-        Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"],
+        ToneMap,
         hint("Tone map", "How radiance beyond white is brought onto the screen."),
-    ] = "pbr_neutral"
-    aov: Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id"] = "color"
+    ] = DEFAULT_TONE_MAP
+    aov: Aov = "color"
     max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
-    bits: Annotated[Literal[8, 16], Field(description="Of a PNG's channels.")] = 8
+    bits: Annotated[Bits, Field(description="Of a PNG's channels.")] = 8
 
-    def for_renderer(self) -> PictureView:
-        deep = self.format == "png" and self.bits == 16
-        encoding: Encoding = "linear" if self.format == "rgba32f" else "f4" if deep else "u1"
-        return PictureView(self.aov, self.exposure, self.tone_map, encoding)
+    def for_renderer(self) -> messages.View:
+        encoding = images.FORMATS[self.format].encoding(self.bits)
+        return messages.View(self.aov, self.exposure, self.tone_map, encoding)
 
     def over(self, view: View) -> View:
         """`view` with what this one says."""
@@ -92,9 +89,10 @@ def parse(text: str) -> Message:
     return validated(_MESSAGE, load_json(text), "")
 
 
-def frame_bytes(frame: Frame, view: View, seq: int) -> bytes:
+def frame_bytes(frame: messages.Frame, view: View, seq: int) -> bytes:
     """A frame's message: header length, header, image. Takes milliseconds."""
-    mime, body = _encoded(frame, view)
+    quality = view.quality or (LAST_QUALITY if frame.last else QUALITY)
+    body = images.encode(frame.pixels, view.format, bits=view.bits, quality=quality)
     height, width = frame.pixels.shape[:2]
     progress = frame.progress
     header = {
@@ -103,7 +101,7 @@ def frame_bytes(frame: Frame, view: View, seq: int) -> bytes:
         "samples": progress.samples,
         "width": width,
         "height": height,
-        "mime": mime,
+        "mime": images.FORMATS[view.format].mime,
         "noise": progress.noise,
         "elapsed_s": progress.elapsed_s,
         "eta_s": progress.eta_s,
@@ -115,19 +113,3 @@ def frame_bytes(frame: Frame, view: View, seq: int) -> bytes:
         header["missing_light"] = progress.missing
     text = json.dumps(header, separators=(",", ":")).encode()
     return b"".join((struct.pack("<I", len(text)), text, body))
-
-
-def _encoded(frame: Frame, view: View) -> tuple[str, bytes]:
-    if view.format == "rgba32f":
-        return RAW, _rgba(frame.pixels).tobytes()
-    quality = view.quality or (LAST_QUALITY if frame.last else QUALITY)
-    return images.MIME[view.format], images.encode(frame.pixels, view.format, bits=view.bits, quality=quality)
-
-
-def _rgba(pixels: np.ndarray) -> np.ndarray:
-    """(height, width, 4) float32: other AOVs become opaque, a single channel grey."""
-    if pixels.shape[2] == 4:
-        return np.ascontiguousarray(pixels, np.float32)
-    out = np.ones((*pixels.shape[:2], 4), np.float32)
-    out[..., :3] = pixels
-    return out
