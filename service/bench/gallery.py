@@ -14,9 +14,12 @@ import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from service import presets
+
+if TYPE_CHECKING:
+    from playwright.sync_api import Browser
 
 OUT = Path(__file__).resolve().parents[2] / "web" / "gallery"
 STUDIO = {"type": "image", "asset": "hdri/studio.exr", "background": False}
@@ -123,34 +126,42 @@ def photograph_editor(sunbox: Path, names: list[str], port: int = 8765, wait_s: 
 
     flags = ["--no-sandbox", "--disable-dev-shm-usage"]
     with subprocess.Popen([sunbox, "serve", "--port", str(port)]) as server, sync_playwright() as playwright:
-        time.sleep(3)
-        browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=flags)
-        for name in names:
-            (width, height), scheme, acts = STATES[name]
-            page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)  # type: ignore[arg-type]
-            page.goto(f"http://127.0.0.1:{port}/")
-            page.wait_for_selector("#stage.live")
-            for act, what, value in acts:
-                if act == "key":
-                    page.keyboard.press(what)
-                elif act == "click":
-                    page.click(what)
-                elif act == "fill":
-                    page.fill(what, value)
-                    page.press(what, "Enter")
-                elif act == "lose":
-                    page.wait_for_timeout(1000 * wait_s)
-                    server.terminate()
-                    page.wait_for_selector(LOST)
-                    page.locator(":focus").evaluate("(field) => field.scrollIntoView({ block: 'center' })")
-                    wait_s = 0.5  # before it is tried again
-                else:
-                    page.select_option(what, value)
-            page.wait_for_timeout(1000 * wait_s)
-            page.screenshot(path=OUT / f"{name}.png")
-            page.close()
-        browser.close()
-        server.terminate()
+        try:
+            time.sleep(3)
+            browser = playwright.chromium.launch(executable_path="/usr/bin/chromium", args=flags)
+            _photograph(browser, server, names, port, wait_s)
+        finally:
+            server.terminate()
+
+
+def _photograph(
+    browser: Browser, server: subprocess.Popen[bytes], names: list[str], port: int, wait_s: float
+) -> None:
+    for name in names:
+        (width, height), scheme, acts = STATES[name]
+        page = browser.new_page(viewport={"width": width, "height": height}, color_scheme=scheme)  # type: ignore[arg-type]
+        page.goto(f"http://127.0.0.1:{port}/")
+        page.wait_for_selector("#stage.live")
+        for act, what, value in acts:
+            if act == "key":
+                page.keyboard.press(what)
+            elif act == "click":
+                page.click(what)
+            elif act == "fill":
+                page.fill(what, value)
+                page.press(what, "Enter")
+            elif act == "lose":
+                page.wait_for_timeout(1000 * wait_s)
+                server.terminate()
+                page.wait_for_selector(LOST)
+                page.locator(":focus").evaluate("(field) => field.scrollIntoView({ block: 'center' })")
+                wait_s = 0.5  # before it is tried again
+            else:
+                page.select_option(what, value)
+        page.wait_for_timeout(1000 * wait_s)
+        page.screenshot(path=OUT / f"{name}.png")
+        page.close()
+    browser.close()
 
 
 def main() -> int:
