@@ -8,7 +8,9 @@ ESTIMATORS = ("mis", "bsdf", "light", "uniform")
 SAMPLERS = ("sobol", "independent")
 FILTERS = ("box", "tent", "gaussian", "blackman_harris")
 TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
-AOVS = ("color", "albedo", "normal", "depth", "variance", "shape_id", "material_id")
+ID_AOVS = ("shape_id", "material_id")
+FIRST_HIT_AOVS = ("albedo", "normal", "depth", *ID_AOVS)  # traced apart from the picture, when first asked for
+AOVS = ("color", "albedo", "normal", "depth", "variance", *ID_AOVS)
 
 
 @dataclass(frozen=True)

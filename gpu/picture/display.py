@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from gpu.settings import ID_AOVS
+
 
 def srgb(linear: np.ndarray) -> np.ndarray:
     """sRGB encoding of 0..1 [IEC 61966-2-1]; clips."""
@@ -15,7 +17,7 @@ def srgb(linear: np.ndarray) -> np.ndarray:
 def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
     """(h, w, c) of an AOV as (h, w, 4) display values, opaque: albedo sRGB, normal .5 + .5 n, depth and variance
     divided by their maximum, ids in colours that tell neighbours apart."""
-    if aov in ("shape_id", "material_id"):
+    if aov in ID_AOVS:
         shown = _coloured(values)
     elif aov == "albedo":
         shown = srgb(values)

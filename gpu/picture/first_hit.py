@@ -11,9 +11,9 @@ import numpy as np
 from gpu import context as contexts
 from gpu.layout.bindings import Slot
 from gpu.picture.schedule import Tile
+from gpu.settings import ID_AOVS
 
 SAMPLES = 256  # they average at most so many
-IDS = ("shape_id", "material_id")
 _PIXELS = 1 << 16  # traced at once: 25 ms on llvmpipe in a large mesh
 
 
@@ -57,10 +57,10 @@ class FirstHit:
                 self.samples, self._row = self.samples + 1, 0
 
     def read(self, aov: str) -> np.ndarray:
-        """(height, width, channels) float32 of albedo, normal, depth, or one of IDS."""
-        if aov in IDS:
+        """(height, width, channels) float32 of albedo, normal, depth, or one of ID_AOVS."""
+        if aov in ID_AOVS:
             met = np.frombuffer(self.buffers[Slot.OUTPUT].read(), np.uint32)
-            ids: np.ndarray = met.reshape(self._size[1], self._size[0], 2)[..., IDS.index(aov), None]
+            ids: np.ndarray = met.reshape(self._size[1], self._size[0], 2)[..., ID_AOVS.index(aov), None]
             return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
         if aov != "depth":
             values = self._vectors(Slot.ALBEDO if aov == "albedo" else Slot.NORMAL)

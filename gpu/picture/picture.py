@@ -18,9 +18,9 @@ from gpu.picture import display, first_hit
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.passes import Passes
-from gpu.picture.readout import FIRST_HIT_AOVS, Readout
+from gpu.picture.readout import Readout
 from gpu.picture.saved import Saved
-from gpu.settings import RenderSettings
+from gpu.settings import FIRST_HIT_AOVS, RenderSettings
 
 PIECE_BYTES = 16 << 20  # of a saved buffer, read at once: some milliseconds, between which others have their turn
 

@@ -9,14 +9,12 @@ import numpy as np
 
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
-from gpu.picture import first_hit, noise_meter
+from gpu.picture import noise_meter
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.resolve import resolve
 from gpu.picture.schedule import Tile
-
-FIRST_HIT_AOVS = (*first_hit.IDS, "albedo", "normal", "depth")
 
 
 class Readout:

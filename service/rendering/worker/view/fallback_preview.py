@@ -10,13 +10,13 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from gpu import GpuError, OutOfMemory, scene_bytes
+from gpu import FIRST_HIT_AOVS, GpuError, OutOfMemory, scene_bytes
 from gpu.precompile import fallback
 from service.rendering.ipc.messages import Frame, FromRenderer, Progress, Want
 from service.rendering.worker.device.loaded_scene import KernelRequest
 from service.rendering.worker.device.resolution_ladder import FIRST_S, SCALES, SMALLEST_SIDE, ResolutionLadder
 from service.rendering.worker.helpers.compile_client import CompileClient
-from service.rendering.worker.view.frames import GUIDES, SLICE_S, pixels_of
+from service.rendering.worker.view.frames import SLICE_S, pixels_of
 
 if TYPE_CHECKING:
     from gpu import Renderer, RenderSettings, Scene, SceneArrays
@@ -122,7 +122,7 @@ class FallbackPreview:
 
     def answer(self, want: Want | None) -> bool:
         """Sends the frame that is wanted if there is something new to see in it."""
-        if want is None or self.scale is None or self._ladder is None or want.view.aov in GUIDES:
+        if want is None or self.scale is None or self._ladder is None or want.view.aov in FIRST_HIT_AOVS:
             return False
         picture = self._ladder.picture(self.scale)
         content = (self.generation, self.scale, picture.samples)

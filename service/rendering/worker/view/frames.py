@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import picture_bytes
+from gpu import FIRST_HIT_AOVS, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Frame, Image, Read, View, Want
@@ -20,7 +20,6 @@ from service.rendering.worker.view.denoise_policy import Denoised, DenoisePolicy
 if TYPE_CHECKING:
     from gpu import Picture
 
-GUIDES = ("albedo", "normal", "depth", "shape_id", "material_id")
 SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
 
 
@@ -199,7 +198,7 @@ class FrameSource:
         return self._wait.compiling
 
     def _needs_guides(self, picture: Picture, view: View) -> bool:
-        if view.aov not in GUIDES:
+        if view.aov not in FIRST_HIT_AOVS:
             return False
         if not picture.guided:
             more = picture_bytes(picture.settings, guided=True) - picture_bytes(picture.settings)
