@@ -22,7 +22,8 @@ test:
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest
+	.venv/bin/pytest -n 2 --dist loadfile -m 'not calm' --durations 20
+	.venv/bin/pytest -m calm
 
 extremes: setup
 	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/test_flags.py tests/test_furnace.py

@@ -178,6 +178,7 @@ def test_stats_say_what_became_of_it(gpu: Any, scene: Path, tmp_path: Path) -> N
     assert (settings["width"], settings["max_samples"], settings["filter"]) == (16, 4, "blackman_harris")
 
 
+@pytest.mark.calm
 def test_time_limit_ends_a_render_without_sample_limit(gpu: Any, scene: Path, tmp_path: Path) -> None:
     stats = tmp_path / "stats.json"
     size = ["--set", "width=64", "--set", "height=64", "--set", "time_limit=0.5"]

@@ -26,6 +26,7 @@ def connected(server: Server) -> Iterator[socket.socket]:
         yield connection
 
 
+@pytest.mark.calm
 def test_a_kept_connection_answers_at_once(server: Server) -> None:
     """Head and body in two packets wait for each other: 43 ms by the client's delayed acknowledgement."""
     address = urlsplit(server.url)
@@ -49,6 +50,7 @@ def test_head_and_body_come_in_one_piece(server: Server) -> None:
             assert head.startswith(b"HTTP/1.1 200") and body == b'{"status":"ok"}'
 
 
+@pytest.mark.calm
 def test_a_stream_answers_at_once(server: Server) -> None:
     with client(server) as stream:
         seconds = []

@@ -143,6 +143,7 @@ def resident(server: Server) -> int:
     return int(pages) * 4096
 
 
+@pytest.mark.calm
 def test_downloads_that_nobody_reads(server: Server) -> None:
     """They hold no memory, and nobody waits for them. In one piece each they took 20 MiB apiece."""
     settings = {"width": SIZE, "height": SIZE, "max_samples": 1}

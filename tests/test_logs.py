@@ -137,6 +137,7 @@ def test_libraries_speak_of_what_matters(untouched: None, capfd: pytest.CaptureF
     assert lines == ["Task exception was never retrieved; future: <Task>", "detail"]
 
 
+@pytest.mark.calm
 def test_a_sender_that_goes_away_is_no_error(server: Server) -> None:
     """Twenty of them once stopped the service for a minute: each cost seconds for a traceback with all locals."""
     written = server.log.read_text()

@@ -25,6 +25,8 @@ from websockets.exceptions import ConnectionClosed
 from gpu import Renderer
 from tests.serving import ENDLESS, SCENE, SMALL, Client, Server, client
 
+pytestmark = pytest.mark.calm
+
 MIB = 1 << 20
 PAGE = 4096
 # How long the others may have to wait, s: for an answer to /healthz, to a bad request, for their next frame.

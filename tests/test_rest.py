@@ -173,6 +173,7 @@ def test_no_image_before_the_first_sample(http: httpx.Client) -> None:
     assert is_problem(answer, 409)
 
 
+@pytest.mark.calm
 @pytest.mark.parametrize("limit", [0.2, 0.5])
 def test_time_limit_is_kept_and_ends_between_samples(http: httpx.Client, limit: float) -> None:
     id = start(http, {"width": 96, "height": 96, "time_limit": limit})["id"]

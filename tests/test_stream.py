@@ -147,6 +147,7 @@ def test_stop_is_followed_by_done(client: Client) -> None:
     assert client.finished()[0]["reason"] == "max_samples"
 
 
+@pytest.mark.calm
 @pytest.mark.parametrize(("limit", "value"), [("time_limit", 1.0), ("target_noise", 0.2)])
 def test_other_reasons_to_be_done(client: Client, limit: str, value: float) -> None:
     client.start(settings={"width": 64, "height": 64, limit: value})
