@@ -106,6 +106,7 @@ async def shown(supervisor: Supervisor, ears: Ears, task: int, generation: int) 
             supervisor.send(Want(task, serial, View(encoding="linear")))
 
 
+@pytest.mark.calm  # the kernel is compiled in time that nobody else wants
 def test_a_stream_sees_at_once_what_is_compiled_for(
     gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
