@@ -22,6 +22,14 @@ CHROMIUM = shutil.which("chromium") or "/usr/bin/chromium"
 PATIENCE_S = 60.0  # two cores that other tests may share
 
 
+@pytest.hookimpl(tryfirst=True)  # before markers choose
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """A browser, its server and its renderer need the machine for themselves."""
+    for item in items:
+        if item.path.is_relative_to(Path(__file__).parent):
+            item.add_marker(pytest.mark.calm)
+
+
 def free_port() -> int:
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))

@@ -61,7 +61,8 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     editor.page.click("#compare")
     editor.page.select_option("#comparison select[aria-label^=Turn]", "diffuse")
     labels = editor.page.locator(".variant")
-    editor.wait("both", lambda: labels.all_inner_texts() == ["A · Principled · 4 samples", "B · Diffuse · 4 samples"])
+    both = ["A · Principled · 4 samples", "B · Diffuse · 4 samples"]
+    editor.wait("both", lambda: labels.all_text_contents() == both)
     editor.wait("the end", lambda: editor.text("#state") == "Done" and metric(editor) > 0)
     editor.tab("keep")
     saved = np.asarray(Image.open(io.BytesIO(editor.shot("#download"))).convert("RGB"), int)
