@@ -26,6 +26,7 @@ connection_limits  how many connections there are, and how long one may stand st
 downloads          large answers, in pieces
 documents          what users saved, in SQLite
 quota              room on the disk
+garbage            the garbage collector, out of the way of large imports
 storage            what is kept in the data folder
 logs               a line or a JSON object for each event
 log_output         where log records go

@@ -20,6 +20,7 @@ from service.assets.integrity import Integrity, damaged
 from service.assets.scene_import import Imported, take_apart
 from service.assets.source import Source, digest, format_of, handed, length
 from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
+from service.garbage import collector_paused
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 
 log = logging.getLogger(__name__)
@@ -167,6 +168,10 @@ class AssetStore:
         self.loader.close()
 
     def _import(self, id: str, format: str, data: Source, new: bool) -> tuple[AssetInfo, Imported]:
+        with collector_paused():
+            return self._import_whole(id, format, data, new)
+
+    def _import_whole(self, id: str, format: str, data: Source, new: bool) -> tuple[AssetInfo, Imported]:
         """Stores the parts of a scene and its document, and the file itself where that is `new`."""
         try:
             file = self.loader.sandbox.parse_scene(format, handed(data))

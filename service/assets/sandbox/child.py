@@ -20,6 +20,7 @@ from service.assets.errors import ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile
 from service.confined import bound, confine, unbind
+from service.garbage import collector_paused
 from service.shared_memory import trim
 
 NICENESS = 5
@@ -40,7 +41,8 @@ def main() -> None:
                 importlib.import_module(name)
             continue
         large = os.fstat(source).st_size > LARGE
-        reply, result = _answer(request, source, link)
+        with collector_paused():
+            reply, result = _answer(request, source, link)
         os.close(source)
         if large:
             trim()

@@ -1,0 +1,34 @@
+"""Python's cyclic garbage collector, out of the way of work that makes many objects and keeps them.
+
+While the number of objects grows it looks through all of them again and again: of an import of 60 000 nodes that was
+a third of the processor's time, and found nothing.
+"""
+
+from __future__ import annotations
+
+import gc
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+_lock = threading.Lock()
+_pauses = 0  # under way, in any thread
+_was_enabled = False
+
+
+@contextmanager
+def collector_paused() -> Iterator[None]:
+    """No cycles are collected meanwhile; several threads may ask for it at once."""
+    global _pauses, _was_enabled
+    with _lock:
+        if _pauses == 0:
+            _was_enabled = gc.isenabled()
+            gc.disable()
+        _pauses += 1
+    try:
+        yield
+    finally:
+        with _lock:
+            _pauses -= 1
+            if _pauses == 0 and _was_enabled:
+                gc.enable()
