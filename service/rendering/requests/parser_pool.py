@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gc
 import logging
 import os
 import pickle
@@ -17,6 +16,7 @@ from typing import Any
 
 from service.config import MIB, Config
 from service.cpu_time import answers
+from service.garbage import collector_paused
 from service.problems import ServiceError, TooLarge, Unavailable
 from service.rendering.ipc import channel
 from service.rendering.requests.parser_child import Failed, Work
@@ -31,29 +31,6 @@ CLOSING_SECONDS = 5.0
 THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
 
 log = logging.getLogger(__name__)
-
-
-class _Uncollected:
-    """Without garbage collection: among hundreds of thousands of new values, none of it garbage, each of its rounds
-    stops all threads for tenths of a second."""
-
-    def __init__(self) -> None:
-        self._within = 0
-        self._lock = threading.Lock()
-
-    def __enter__(self) -> None:
-        with self._lock:
-            self._within += 1
-            gc.disable()
-
-    def __exit__(self, *_: object) -> None:
-        with self._lock:
-            self._within -= 1
-            if not self._within:
-                gc.enable()
-
-
-_uncollected = _Uncollected()
 
 
 class ParserFailed(Exception):
@@ -161,7 +138,7 @@ class _Child:
             channel.send(self.link, work)
             if not answers(self.link, self.process.pid, work.seconds + (0 if self._started else START_SECONDS)):
                 raise TooLarge(f"Reading this body takes longer than the {work.seconds:.0f} s allowed.")
-            with _uncollected:
+            with collector_paused():
                 answer = channel.receive(self.link, wait=True)
         except channel.Closed:
             raise self._death(work) from None

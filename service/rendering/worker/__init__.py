@@ -1,6 +1,6 @@
 """The process that owns the GPU: takes the newest messages, traces a slice for whose turn it is, publishes.
 
-`python -m service.rendering.worker DESCRIPTOR` with one end of `link.pair()`.
+`python -m service.rendering.worker DESCRIPTOR` with one end of `channel.pair()`.
 
 __main__        the process: its options, its device, its end
 loop            takes the newest messages, chooses whose turn it is, traces a slice, publishes

@@ -78,7 +78,7 @@ class Loop:
         self._reported = 0.0
 
     def run(self) -> None:
-        """Until the server is gone: raises link.Closed. Sleeps on its sockets when there is nothing to do."""
+        """Until the server is gone: raises channel.Closed. Sleeps on its sockets when there is nothing to do."""
         busy = False
         self._spare.prepare(kernel_keys.common_keys())
         while True:

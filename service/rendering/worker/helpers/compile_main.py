@@ -70,7 +70,7 @@ def main() -> int:
 
 @contextmanager
 def _alone(record: Path, end: socket.socket) -> Iterator[None]:
-    """While nobody else compiles this: one whose renderer was lost may. Raises link.Closed when ours is meanwhile."""
+    """While nobody else compiles this: one whose renderer was lost may. Raises channel.Closed when ours is lost."""
     path = record.with_suffix(".lock")
     try:
         record.parent.mkdir(parents=True, exist_ok=True)

@@ -37,7 +37,7 @@ class HelperProcess:
         return None if self._process is None else self._process.pid
 
     def ask(self, message: object) -> None:
-        """Raises link.Closed where it ends as soon as it begins, OSError where it can't be started."""
+        """Raises channel.Closed where it ends as soon as it begins, OSError where it can't be started."""
         try:
             channel.send(self._begin(), message)
         except channel.Closed:  # it had just ended, being idle
@@ -45,7 +45,7 @@ class HelperProcess:
             channel.send(self._begin(), message)
 
     def hear(self) -> Any:
-        """What it said. Raises BlockingIOError when that is nothing, link.Closed when it has ended."""
+        """What it said. Raises BlockingIOError when that is nothing, channel.Closed when it has ended."""
         if self._end is None:
             raise BlockingIOError
         return channel.receive(self._end)
