@@ -81,7 +81,7 @@ class Process:
             self._process.kill()
 
     async def end(self, patience_s: float) -> Cause:
-        """Gives it that time to end, kills it, buries it; what it died of. The pulse still says where it was."""
+        """Gives it that time to end, kills it, buries it; what it died of. The heartbeat still says where it was."""
         self.link.close()
         code = await tending(partial(_reap, self._process, patience_s))
         self.pulse.read()
@@ -97,7 +97,7 @@ class Process:
 
 
 class _Watched(heartbeat.Heartbeat):
-    """A pulse with the time since it last beat, as much of it as its process had."""
+    """A heartbeat with the time since it last beat, as much of it as its process had."""
 
     def __init__(self) -> None:
         self.descriptor = heartbeat.memory()
