@@ -24,10 +24,15 @@ class TruncatedLight:
         self._given_up = False
 
     def restart(self) -> None:
-        """Another picture, or none: what is under way is let go of."""
+        """Another picture, or none."""
+        self.cancel()
+        self.shares, self._given_up = None, False
+
+    def cancel(self) -> None:
+        """Ends a measurement that is under way and frees its small picture while the context still exists."""
         if self._steps is not None:
             self._steps.close()
-        self.shares, self._steps, self._given_up = None, None, False
+        self._steps = None
 
     def step(self, picture: Picture) -> bool:
         """A slice of measuring, where that is due."""
