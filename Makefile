@@ -1,7 +1,7 @@
 # make run [PORT=8000]   set everything up and serve the editor
 # make test              set everything up and pass the tests
 # make extremes          every row of the tables of numerical stability, with a million samples
-# make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/test_hostile.py
+# make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/service/test_hostile.py
 # make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
 # make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it
 # make gallery DATA=...  render the README's pictures, from the folder with the models
@@ -26,11 +26,11 @@ test:
 	.venv/bin/pytest -m calm
 
 extremes: setup
-	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/test_flags.py tests/test_furnace.py
+	SUNBOX_EXTREMES=1 .venv/bin/pytest tests/extremes tests/gpu/test_flags.py tests/shaders/test_furnace.py
 
 hostile:
 	@.ci/setup test
-	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/test_hostile.py
+	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/service/test_hostile.py
 
 image-test: setup
 	SUNBOX_IMAGE=1 .venv/bin/pytest -s -rs tests/test_image.py

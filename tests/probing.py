@@ -1,4 +1,4 @@
-"""Runs the kernels of tests/probes, which expose one shader function each."""
+"""Runs the kernels of tests/shaders/probes, which expose one shader function each."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gpu.layout import bindings
 from gpu.layout.bindings import Slot
 from gpu.picture import filters
 
-PROBES = Path(__file__).parent / "probes"
+PROBES = Path(__file__).parent / "shaders" / "probes"
 # All flags of the production model.
 PRINCIPLED_FLAGS = frozenset({"HAS_PRINCIPLED", *features.EDITED["HAS_PRINCIPLED"], "HAS_ANISOTROPIC",
                               "HAS_TRANSMISSION", "HAS_ATTENUATION"})  # fmt: skip

@@ -14,7 +14,7 @@ from service.commands import health
 from service.config import Config
 from tests.serving import Server
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 DOCKERFILE, COMPOSE = (ROOT / "Dockerfile").read_text(), (ROOT / "compose.yaml").read_text()
 LOCKS = ("requirements.lock", "requirements.serve.lock", "requirements.build.lock")
 PIN = re.compile(r"^([a-z0-9_.-]+)==[^\\]+\\\n(?:    --hash=\S+(?: \\)?\n)+", re.MULTILINE | re.IGNORECASE)

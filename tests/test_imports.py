@@ -10,7 +10,7 @@ from pathlib import Path
 
 import pytest
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[1]
 MODULES = sorted((*ROOT.glob("gpu/**/*.py"), *ROOT.glob("service/**/*.py")))
 FOLDERS = sorted({path.parent for path in MODULES})
 SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {".glsl", ".comp"})

@@ -13,7 +13,7 @@ from gpu import Picture, Renderer, RenderSettings
 from service.pack import Packed, pack
 from service.scene import parse_scene
 from tests.rendering import Images
-from tests.test_shapes import _icosphere, _matrix
+from tests.shaders.test_shapes import _icosphere, _matrix
 
 LONG = bool(os.environ.get("SUNBOX_EXTREMES"))  # every row and more samples: `make extremes`
 

@@ -11,7 +11,7 @@ from gpu import Renderer
 from service.pack.geometry import instances
 from tests.extremes.scenes import Seen, ball, icosphere, packed, placed, quad, rows
 from tests.rendering import document
-from tests.test_shapes import _matrix, _trace
+from tests.shaders.test_shapes import _matrix, _trace
 
 EDGES = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]  # of that cube

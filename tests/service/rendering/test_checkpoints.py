@@ -17,9 +17,9 @@ from service.rendering.ipc import channel
 from service.rendering.ipc.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device import checkpoints
+from tests.gpu.test_precompile import LINEAR, arrays_of
+from tests.service.rendering.test_worker import Ears, settings
 from tests.supervisors import with_supervisor
-from tests.test_precompile import LINEAR, arrays_of
-from tests.test_worker import Ears, settings
 
 ENDLESS = 1 << 24
 

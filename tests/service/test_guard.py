@@ -21,8 +21,8 @@ from service.guard import Guard
 from service.keys import Keys
 from service.problems import Unauthorized
 from service.routes.errors import respond
+from tests.service.test_rest import OBJ, is_problem
 from tests.serving import ENDLESS, SCENE, SMALL, Server
-from tests.test_rest import OBJ, is_problem
 
 ANNA, BERT = {"authorization": "Bearer anna-1"}, {"authorization": "bearer  bert-2"}
 BODY = {"scene": SCENE, "settings": SMALL}

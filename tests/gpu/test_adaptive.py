@@ -15,10 +15,10 @@ from gpu.picture import adaptive
 from gpu.picture.noise_meter import FROM
 from gpu.picture.sample_plan import AREA, CLASSES, DECISIONS, LEAST, MOST, SamplePlan, pixels_of, weights_of
 from service.cli import main
+from tests.gpu.test_noise_meter import SCENES, SHAPES, luminance
 from tests.rendering import Images, document, picture
 from tests.serving import SCENE, SMALL, Client, Server
 from tests.serving import client as opened
-from tests.test_noise_meter import SCENES, SHAPES, luminance
 
 RAW = {"format": "rgba32f"}
 SIZE: dict[str, Any] = {"width": 44, "height": 37, "max_bounces": 3, "filter": "blackman_harris"}

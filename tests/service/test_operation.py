@@ -21,7 +21,7 @@ from service.config import Config
 from service.logs import _fields
 from tests.serving import ENDLESS, SCENE, SMALL, Server, client
 
-ROOT = Path(__file__).parent.parent
+ROOT = Path(__file__).parents[2]
 
 
 def metrics(server: Server) -> dict[str, float]:

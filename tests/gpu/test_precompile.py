@@ -36,7 +36,7 @@ import sys
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import ENTRY, GUIDES, common_keys, kernel_key
 from gpu.precompile.precompiler import Precompiler
-from tests.test_precompile import SETTINGS, arrays_of
+from tests.gpu.test_precompile import SETTINGS, arrays_of
 a, settings = arrays_of(sys.argv[1]), SETTINGS[sys.argv[1]]
 precompiler = Precompiler()
 keys = [kernel_key(a, settings, features.flags(a), entry) for entry in (ENTRY, GUIDES)]
@@ -45,7 +45,7 @@ print(all([precompiler.compile(each)[1] for each in [*keys, *common_keys()]]))
 RENDERER = """
 import sys
 from gpu import Renderer
-from tests.test_precompile import SETTINGS, arrays_of
+from tests.gpu.test_precompile import SETTINGS, arrays_of
 with Renderer() as renderer:
     picture = renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS[sys.argv[1]])
     picture.trace(9.0, 10)

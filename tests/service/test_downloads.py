@@ -19,8 +19,8 @@ from starlette.types import Message, Receive, Scope, Send
 from service import downloads
 from service.downloads import PIECE, Downloads, FileAnswer, Pieces
 from service.problems import Unavailable
+from tests.service.test_operation import metrics, wait_until
 from tests.serving import SCENE, Server
-from tests.test_operation import metrics, wait_until
 
 SIZE = 768  # of a picture of 9 MiB in float32
 UNREAD = 30

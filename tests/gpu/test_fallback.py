@@ -21,10 +21,10 @@ from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.helpers.compile_client import records
 from service.scene import parse_scene
 from tests.documents import Shelf
+from tests.gpu.test_flags import IMAGES, SCENES
+from tests.gpu.test_precompile import Ears
 from tests.serving import SCENE
 from tests.supervisors import with_supervisor
-from tests.test_flags import IMAGES, SCENES
-from tests.test_precompile import Ears
 
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}

@@ -15,9 +15,9 @@ from service.rendering.ipc.messages import Done, Failed, Frame, Image, Loaded, R
 from service.rendering.supervisor import supervisor as supervisors
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
+from tests.gpu.test_precompile import arrays_of
+from tests.service.rendering.test_worker import LINEAR, Ears, settings
 from tests.supervisors import with_supervisor
-from tests.test_precompile import arrays_of
-from tests.test_worker import LINEAR, Ears, settings
 
 
 async def replaced(supervisor: Supervisor, number: int = signal.SIGKILL) -> None:

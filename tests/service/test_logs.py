@@ -16,10 +16,10 @@ from urllib.parse import urlsplit
 import pytest
 
 from service import log_output, logs
+from tests.service.test_operation import metrics, wait_until
 from tests.serving import Client, Server
-from tests.test_operation import metrics, wait_until
 
-ROOT = Path(__file__).parents[1]
+ROOT = Path(__file__).parents[2]
 
 log = logging.getLogger("service.test")
 

@@ -19,7 +19,7 @@ from service.scene import parse_scene
 from tests.documents import Shelf, matrix_of
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
 from tests.rendering import Images, document, picture, render
-from tests.test_normal_maps import MAPS, TEXTURES
+from tests.shaders.test_normal_maps import MAPS, TEXTURES
 
 Doc = dict[str, Any]
 BRUSHED = {"type": "principled", "metallic": 1, "base_color": 0.9, "roughness": 0.35, "anisotropic": 0.9}

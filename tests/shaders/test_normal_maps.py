@@ -10,7 +10,7 @@ import pytest
 
 from gpu import ESTIMATORS, Renderer
 from tests.rendering import Images, document, render
-from tests.test_textures import BALL, BARE, BOX, QUAD, at, on_ball
+from tests.shaders.test_textures import BALL, BARE, BOX, QUAD, at, on_ball
 
 WHITE = {"type": "constant", "radiance": 1, "background": False}
 

@@ -80,7 +80,7 @@ def test_the_published_list_is_whole() -> None:
     for name, preset in quality.priced().items():
         assert quality.PRESETS[name].items() <= preset.items()
         assert "noise" in preset["gives_up"] and str(preset["max_bounces"]) in preset["gives_up"]
-    readme = (Path(__file__).parent.parent / "README.md").read_text()
+    readme = (Path(__file__).parents[3] / "README.md").read_text()
     assert all(quality.text(name, prices) in readme for name in quality.PRESETS), "run `make tradeoff`"
 
 

@@ -27,8 +27,8 @@ from service.documents import DamagedFile, Documents, checked
 from service.downloads import Downloads, FileAnswer
 from service.problems import Unavailable
 from service.routes.documents import document
+from tests.service.test_rest import is_problem
 from tests.serving import SCENE, Server
-from tests.test_rest import is_problem
 
 MATERIAL = {"type": "diffuse", "albedo": [0.1, 0.2, 0.3]}
 

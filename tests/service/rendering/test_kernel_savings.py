@@ -21,10 +21,10 @@ from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.kernel_savings import NO_KERNEL, NO_PICTURE, KernelSavings
 from tests.extremes.scenes import LONG
+from tests.gpu.test_precompile import arrays_of
+from tests.service.rendering.test_worker import Ears, settings
 from tests.serving import SCENE, SMALL, Server
 from tests.supervisors import with_supervisor
-from tests.test_precompile import arrays_of
-from tests.test_worker import Ears, settings
 
 FIGURES = ("saving", "sample_s", "full_sample_s", "full_compile_ms")
 

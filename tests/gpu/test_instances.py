@@ -17,7 +17,7 @@ from service.scene import parse_scene
 from tests import documents
 from tests.extremes.scenes import LONG, icosphere, moved, quad, rows
 from tests.rendering import Images, document
-from tests.test_shapes import _trace
+from tests.shaders.test_shapes import _trace
 
 Doc = dict[str, Any]
 SKY = {"type": "constant", "radiance": 0.6}

@@ -235,7 +235,7 @@ def test_interrupt_keeps_the_image_so_far(gpu: Any, scene: Path, tmp_path: Path)
 
 
 def test_info_names_the_renderer_and_the_scene(gpu: Any, scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
-    # With a floor: the kernel with everything, 10 s of compiling, is then the one of tests/test_flags.py.
+    # With a floor: the kernel with everything, 10 s of compiling, is then the one of tests/gpu/test_flags.py.
     floor = {"type": "quad", "origin": [-4, -1, 4], "u": [8, 0, 0], "v": [0, 0, -8], "material": "a"}
     scene.write_text(json.dumps({**SCENE, "shapes": [*SCENE["shapes"], floor]}))
     assert main(["info", str(scene)]) == 0

@@ -11,7 +11,7 @@ from gpu import Renderer
 from gpu.kernels import source
 from tests.probing import prober_of
 from tests.rendering import Images, document, picture
-from tests.test_sampling import _draw
+from tests.shaders.test_sampling import _draw
 
 SKY = Images(sky=np.random.default_rng(8).exponential(1, (8, 16, 3)).astype(np.float32) ** 3)
 ROOM = [

@@ -1,0 +1,1 @@
+"""The room gpu/: arrays to images, without a server."""

@@ -1,0 +1,1 @@
+"""Streams, renders and the processes that trace them."""

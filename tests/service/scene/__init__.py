@@ -1,0 +1,1 @@
+"""The document: what is taken, what is refused, what it becomes."""
