@@ -1,0 +1,45 @@
+"""How surfaces scatter and emit: a module for each model.
+
+surface         what every material may carry: emission, opacity, a normal map
+parameters      parameters that several models share
+diffuse         the Lambertian model
+disney          the "principled" BRDF of 2012
+principled      the production model, with glass, coat and sheen: `disney` and more
+metal_rough     the core BRDF of glTF 2.0
+blinn_phong     the highlight of early rasterisers
+"""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+from pydantic import Field
+
+from service.scene.material.blinn_phong import BlinnPhongMaterial
+from service.scene.material.diffuse import DiffuseMaterial
+from service.scene.material.disney import DisneyMaterial
+from service.scene.material.metal_rough import MetalRoughMaterial
+from service.scene.material.principled import PrincipledMaterial
+from service.scene.texture import ScalarTexture
+
+Material = Annotated[
+    DiffuseMaterial | DisneyMaterial | PrincipledMaterial | MetalRoughMaterial | BlinnPhongMaterial,
+    Field(discriminator="type"),
+]
+
+
+def stretches(material: Material) -> bool:
+    """Whether the highlight of `material` has a direction, for which a mesh then needs tangents at its vertices."""
+    found = getattr(material, "anisotropic", 0.0)
+    return bool((found.factor if isinstance(found, ScalarTexture) else found) > 0)
+
+
+__all__ = [
+    "BlinnPhongMaterial",
+    "DiffuseMaterial",
+    "DisneyMaterial",
+    "Material",
+    "MetalRoughMaterial",
+    "PrincipledMaterial",
+    "stretches",
+]

@@ -1,0 +1,48 @@
+"""`blinn_phong`: the highlight of early rasterisers."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from service.scene.base import hint
+from service.scene.material.surface import Surface
+from service.scene.texture import AnyFactor, AnyRadiometric, AnyReflectance
+
+
+class BlinnPhongMaterial(Surface):
+    """The classic highlight of early rasterisers, as a baseline: it conserves no energy."""
+
+    type: Literal["blinn_phong"]
+    diffuse: Annotated[
+        AnyReflectance,
+        hint("Diffuse", "Share of light that is sent back equally in all directions.", unit="", widget="color"),
+    ]
+    specular: Annotated[
+        AnyReflectance,
+        hint(
+            "Specular",
+            "Colour of the highlight; not normalised: a sharper one sends back less light.",
+            unit="",
+            widget="color",
+        ),
+    ]
+    shininess: Annotated[
+        AnyFactor,
+        hint(
+            "Shininess",
+            "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
+            unit="",
+            widget="slider",
+            soft=1000,
+        ),
+    ]
+    ambient: Annotated[
+        AnyRadiometric,
+        hint(
+            "Ambient",
+            "Radiance added wherever the surface is met; it lights nothing by being picked as a light.",
+            unit="W/(m^2 sr)",
+            widget="color",
+            soft=1,
+        ),
+    ] = (0.0, 0.0, 0.0)

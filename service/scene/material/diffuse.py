@@ -1,0 +1,24 @@
+"""`diffuse`: the Lambertian model."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from service.scene.base import hint
+from service.scene.material.surface import Surface
+from service.scene.texture import AnyReflectance
+
+
+class DiffuseMaterial(Surface):
+    """Scatters equally in all directions: f = albedo / pi."""
+
+    type: Literal["diffuse"]
+    albedo: Annotated[
+        AnyReflectance,
+        hint(
+            "Albedo",
+            "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
+            unit="",
+            widget="color",
+        ),
+    ]

@@ -1,0 +1,130 @@
+"""`principled`: the production model and the editor's default."""
+
+from __future__ import annotations
+
+import math
+from typing import Annotated, Literal
+
+from service.scene.base import OMITTABLE, hint
+from service.scene.material.disney import DisneyMaterial
+from service.scene.texture import (
+    AnyDegrees,
+    AnyFraction,
+    AnyIndex,
+    AnyLength,
+    AnyReflectance,
+    NormalTexture,
+)
+
+
+def index_of_specular(specular: float) -> float:
+    """The index of refraction whose reflectance head-on is 0.08 `specular`, as `surface.glsl` has it."""
+    r = math.sqrt(0.08 * specular)
+    return (1 + r) / (1 - r)
+
+
+def roughness_of_gloss(gloss: float) -> float:
+    """The coat's roughness for its gloss: the square root of alpha, which goes from 0.1 to 0.001 as in `disney`."""
+    return math.sqrt(0.1 + (0.001 - 0.1) * gloss)
+
+
+class PrincipledMaterial(DisneyMaterial):
+    """The production model: reciprocal, never gains light, puts back what microfacets lose, and may be glass."""
+
+    type: Literal["principled"]  # type: ignore[assignment]
+    transmission: Annotated[
+        AnyFraction,
+        hint(
+            "Transmission",
+            "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+    ior: Annotated[
+        AnyIndex | None,
+        OMITTABLE,
+        hint(
+            "Index of refraction",
+            "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
+            unit="",
+            widget="slider",
+            follows=("specular", index_of_specular),
+        ),
+    ] = None
+    attenuation_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Attenuation colour",
+            "What is left of white light after the attenuation distance inside.",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    attenuation_distance: Annotated[
+        AnyLength | None,
+        OMITTABLE,
+        hint(
+            "Attenuation distance",
+            "How far inside light takes the attenuation colour; without it, clear.",
+            unit="m",
+            widget="slider",
+            soft=5,
+            absent="clear",
+        ),
+    ] = None
+    specular_color: Annotated[
+        AnyReflectance,
+        hint(
+            "Specular colour",
+            "Tints the dielectric's reflection head-on; grazing stays white.",
+            unit="",
+            widget="color",
+        ),
+    ] = (1.0, 1.0, 1.0)
+    anisotropic_rotation: Annotated[
+        AnyDegrees,
+        hint(
+            "Anisotropic rotation",
+            "Turns the stretch of the highlight, counter-clockwise from the tangent.",
+            unit="degrees",
+            widget="angle",
+            soft=(-180, 180),
+        ),
+    ] = 0.0
+    sheen_color: Annotated[
+        AnyReflectance | None,
+        OMITTABLE,
+        hint(
+            "Sheen colour",
+            "Colour of the sheen, in place of white tinted by the sheen tint.",
+            unit="",
+            widget="color",
+            absent="by tint",
+        ),
+    ] = None
+    sheen_roughness: Annotated[
+        AnyFraction,
+        hint(
+            "Sheen roughness",
+            "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.5
+    clearcoat_roughness: Annotated[
+        AnyFraction | None,
+        OMITTABLE,
+        hint(
+            "Clearcoat roughness",
+            "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
+            unit="",
+            widget="slider",
+            follows=("clearcoat_gloss", roughness_of_gloss),
+        ),
+    ] = None
+    clearcoat_normal_map: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint("Coat normal map", "The coat's own; without it the coat is smooth over whatever is under it."),
+    ] = None

@@ -1,0 +1,50 @@
+"""What every material may carry, whatever its model: emission, opacity and a normal map."""
+
+from __future__ import annotations
+
+from typing import Annotated, Literal
+
+from service.scene.base import OMITTABLE, Model, hint
+from service.scene.texture import AnyFraction, AnyRadiometric, NormalTexture
+
+
+class Surface(Model):
+    emission: Annotated[
+        AnyRadiometric,
+        hint(
+            "Emission",
+            "Radiance that leaves the front side: above 0 the shape is an area light.",
+            unit="W/(m^2 sr)",
+            widget="color",
+            soft=20,
+        ),
+    ] = (0.0, 0.0, 0.0)
+    emission_sides: Annotated[
+        Literal["front", "both"],
+        hint("Emitting sides", "Whether the emission leaves the outward side only, or the inward side as well."),
+    ] = "front"
+    alpha: Annotated[
+        AnyFraction,
+        hint(
+            "Alpha",
+            "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            unit="",
+            widget="slider",
+        ),
+    ] = 1.0
+    alpha_cutoff: Annotated[
+        AnyFraction | None,
+        OMITTABLE,
+        hint(
+            "Alpha cutoff",
+            "Where given, an alpha of at least this counts as 1, any other as 0.",
+            unit="",
+            widget="slider",
+            absent="off",
+        ),
+    ] = None
+    normal_map: Annotated[
+        NormalTexture | None,
+        OMITTABLE,
+        hint("Normal map", "Bends the surface's normal without moving the surface."),
+    ] = None
