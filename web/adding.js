@@ -21,15 +21,15 @@ function sizeOf({ shapes }, { position, target, vfov }) {
 }
 
 export class Adder {
-  // `acts` is the editor, `stage` knows what is seen.
-  constructor({ acts, stage }) { Object.assign(this, { acts, stage }); }
+  // `acts` is the editor, `controller` knows what is seen.
+  constructor({ acts, controller }) { Object.assign(this, { acts, controller }); }
 
   // One of `additions` in outliner.js.
   async add({ kind, title, make }) {
     const { acts } = this;
     const { materials } = acts.state.scene;
     const material = fresh(title.toLowerCase(), materials);
-    const made = make(acts.camera, this.stage.radius(), material);
+    const made = make(acts.camera, this.controller.radius(), material);
     if (kind === "lights") return acts.add(kind, this.#apart(made));
     return this.#put([made], { materials: { [material]: PLAIN }, stands: made.type !== "quad" });
   }
@@ -38,11 +38,11 @@ export class Adder {
     const [, kind] = thing.split("/");
     const original = at(this.acts.state.scene, thing);
     if (kind === "lights") return this.acts.add(kind, this.#apart(original));
-    const own = (await this.stage.boxes())[Number(thing.split("/")[2])];
+    const own = (await this.controller.boxes())[Number(thing.split("/")[2])];
     if (own && solids([own], this.acts.camera.position).length) return this.#put([original], { around: own });
     // A floor or a wall comes in front of itself; what can't be measured goes aside.
     const away = original.type === "quad" ? normalize(cross(original.u, original.v)) : axes(this.acts.camera).right;
-    return this.acts.add(kind, moved(original, scale(away, this.stage.radius())));
+    return this.acts.add(kind, moved(original, scale(away, this.controller.radius())));
   }
 
   // A light that is not where another one is.
@@ -54,7 +54,7 @@ export class Adder {
     let placed = light;
     for (let i = 0; i <= lights.length && isTaken(placed); i += 1) {
       placed = placed.position
-        ? { ...placed, position: add(placed.position, scale(right, this.stage.radius())).map((x) => Number(x.toPrecision(4))) }
+        ? { ...placed, position: add(placed.position, scale(right, this.controller.radius())).map((x) => Number(x.toPrecision(4))) }
         : { ...placed, direction: turn(placed.direction, [0, 1, 0], SUNS_APART).map((x) => Number(x.toPrecision(4))) };
     }
     return placed;
@@ -77,7 +77,7 @@ export class Adder {
   // shapes themselves don't tell; the camera goes to them where it can't see them, or is to (`isFramed`).
   async #put(shapes, { materials = {}, textures = {}, around = null, stands = false, isFramed = false }) {
     const own = around ?? union(shapes.map(box).filter(Boolean));
-    const boxes = await this.stage.boxes();
+    const boxes = await this.controller.boxes();
     const { scene, chosen } = this.acts.state;
     const { camera } = this.acts;
     const bodies = boxes.filter((_, i) => scene.shapes[i]?.type !== "quad");
@@ -85,7 +85,7 @@ export class Adder {
     const placed = way ? shapes.map((shape) => moved(shape, way.offset)) : shapes;
     const stand = own && way ? { low: add(own.low, way.offset), high: add(own.high, way.offset) } : own;
     if (stand) remember(placed, stand);
-    const isSeen = !stand || (!isFramed && isInSight(camera, this.stage.aspect, stand));
+    const isSeen = !stand || (!isFramed && isInSight(camera, this.controller.aspect, stand));
     this.acts.change({
       scene: {
         ...scene,
@@ -101,6 +101,6 @@ export class Adder {
   #framed(stand, neighbour) {
     const [ball, other] = [stand, neighbour].map((each) => each && ballOf(each));
     if (!(ball.radius > 0)) return {};
-    return this.stage.framed(other && other.radius < COMPANION * ball.radius ? together([ball, other]) : ball);
+    return this.controller.framed(other && other.radius < COMPANION * ball.radius ? together([ball, other]) : ball);
   }
 }

@@ -4,7 +4,7 @@ import { element } from "./dom.js";
 import { Stream } from "./stream.js";
 import { watchChoice } from "./tabs.js";
 import { Viewport } from "./viewport.js";
-import { inWords } from "./words.js";
+import { inWords } from "./format-text.js";
 
 const MODES = { swipe: "Swipe", beside: "Side by side", difference: "Difference" };
 const DIFFERENCE_MS = 250; // between two of them

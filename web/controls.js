@@ -6,7 +6,7 @@ import { HEX, hex, linear } from "./color.js";
 import { element, isBeingEdited } from "./dom.js";
 import { slideByTouch } from "./sliding.js";
 import { neededIn, parseNumber, parseTriple } from "./number.js";
-import { compact, inWords, unitText } from "./words.js";
+import { compact, inWords, unitText } from "./format-text.js";
 
 const UNSET = "–"; // neither document nor schema has a value
 

@@ -16,7 +16,7 @@ import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 import { pictured } from "./textures.js";
 import { add } from "./vector.js";
-import { inWords } from "./words.js";
+import { inWords } from "./format-text.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
@@ -31,10 +31,10 @@ const sort = (file) => ENDINGS[file.name.split(".").at(-1).toLowerCase()];
 const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
 
 export class Importer {
-  // `acts` is the editor, `adder` sets things beside others; `messages` tells; `stage` knows what is seen;
+  // `acts` is the editor, `adder` sets things beside others; `messages` tells; `controller` knows what is seen;
   // `reopen(recipe, title)` opens what a picture was made from; `thumbnails` are those of textures.
-  constructor({ schema, acts, adder, messages, stage, reopen, thumbnails }) {
-    Object.assign(this, { schema: schema.scene, acts, adder, messages, stage, reopen, thumbnails });
+  constructor({ schema, acts, adder, messages, controller, reopen, thumbnails }) {
+    Object.assign(this, { schema: schema.scene, acts, adder, messages, controller, reopen, thumbnails });
     this.takesTextures = schema.scene.properties.textures !== undefined;
   }
 
@@ -98,7 +98,7 @@ export class Importer {
   async #aim({ x, y }, file) {
     this.messages.show("upload", { title: `Finding what ${file.name} fell on`, lasting: true });
     try {
-      const shape = await this.stage.shapeAt(x, y);
+      const shape = await this.controller.shapeAt(x, y);
       if (shape !== null) this.acts.select(pointer("shapes", shape));
       return true;
     } catch {
@@ -175,7 +175,7 @@ export class Importer {
   async #around(asset, material, [low, high]) {
     const { center, radius } = ballOf({ low, high });
     const { vfov } = this.acts.camera;
-    const view = frame({ position: add(center, FROM), target: center, vfov }, { center, radius: radius || 1 }, this.stage.aspect);
+    const view = frame({ position: add(center, FROM), target: center, vfov }, { center, radius: radius || 1 }, this.controller.aspect);
     return {
       version: 1, camera: { ...view, vfov }, environment: await studio(), materials: { [material]: PLAIN },
       shapes: [{ type: "mesh", asset, material }],

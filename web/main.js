@@ -4,13 +4,13 @@ import { Adder } from "./adding.js";
 import { boot } from "./boot.js";
 import { commands } from "./commands.js";
 import { Comparison } from "./compare.js";
-import { Desk } from "./desk.js";
+import { UiState } from "./ui-state.js";
 import { element } from "./dom.js";
 import { Editor } from "./editor.js";
 import * as exporting from "./export.js";
 import { saveAs } from "./files.js";
 import { Importer, watchDrops } from "./importer.js";
-import { Keep } from "./keep.js";
+import { SavePage } from "./save-page.js";
 import { askForKey } from "./key.js";
 import { fillSheet, watchKeys } from "./keys.js";
 import { Announcer, Messages } from "./messages.js";
@@ -21,7 +21,7 @@ import { essence, linkTo, revived } from "./share.js";
 import { pictureRecipes } from "./picture-recipe.js";
 import { Preparing } from "./preparing.js";
 import { detailWords, fieldTitles, problemText } from "./problem-text.js";
-import { Stage, viewOf } from "./stage.js";
+import { ViewportController, viewOf } from "./viewport-controller.js";
 import { Status } from "./status.js";
 import { Stream } from "./stream.js";
 import { watchTabs } from "./tabs.js";
@@ -29,7 +29,7 @@ import { textureActs } from "./texture-slot.js";
 import { TextureThumbnails } from "./texture-thumbnails.js";
 import { Thumbnails } from "./thumbnails.js";
 import { Viewport, pictureSize } from "./viewport.js";
-import { inWords, sentence } from "./words.js";
+import { inWords, sentence } from "./format-text.js";
 import { forgetWork, keepWork } from "./work.js";
 
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
@@ -48,7 +48,7 @@ const ABOUT = { refusal: ({ scene, settings, compare }) => [scene, settings, com
 const messages = new Messages(find("messages"), (kind) => (ABOUT[kind] ?? (({ home }) => [home]))(editor?.state ?? {}));
 const announcer = new Announcer(find("announcer"));
 const status = new Status(document);
-const desk = new Desk();
+const ui = new UiState();
 
 let titles = {};
 const complain = (problem) => { messages.show("refusal", { title: problemText(problem, titles) }); };
@@ -96,9 +96,9 @@ const viewport = new Viewport(find("picture"), {
     preparing.end();
     if (!isWaiting) shownHome = editor.state.home;
     status.frame(header, limit());
-    stage.painted(frame);
+    controller.painted(frame);
     comparison.painted();
-    if (desk.state.tab === "render") showPrices();
+    if (ui.state.tab === "render") showPrices();
     tellState();
   },
 });
@@ -111,13 +111,13 @@ const stream = new Stream({
     messages.hide("refusal");
     find("renderer").textContent = info.renderer?.renderer ?? "";
     viewport.restart();
-    if (!isTakenUp) stage.picker.forget();
+    if (!isTakenUp) controller.picker.forget();
     refresh();
   },
   frame: (frame, bytes, view, acknowledge) => viewport.show(frame, bytes, view, acknowledge),
   waiting(is) {
     isWaiting = is;
-    if (is) stage.inspector.forget();
+    if (is) controller.inspector.forget();
     preparing.wait(is);
     tellState();
   },
@@ -161,15 +161,15 @@ function lost({ title, detail = "", key }, wait_ms) {
   });
 }
 
-const stage = new Stage({
-  find, acts: editor, desk, stream, viewport, complain, say: (text) => announcer.say(text),
+const controller = new ViewportController({
+  find, acts: editor, ui, stream, viewport, complain, say: (text) => announcer.say(text),
 });
 const thumbnails = new Thumbnails(() => isConnected && ended === painted && !isPaused);
 const textureThumbnails = new TextureThumbnails();
-const adder = new Adder({ acts: editor, stage });
-const importer = new Importer({ schema, acts: editor, adder, messages, stage, reopen: recipes.reopen, thumbnails: textureThumbnails });
+const adder = new Adder({ acts: editor, controller });
+const importer = new Importer({ schema, acts: editor, adder, messages, controller, reopen: recipes.reopen, thumbnails: textureThumbnails });
 editor.takeTexture = (place, file) => importer.texture(place, file);
-editor.frame = (thing) => stage.frame(thing);
+editor.frame = (thing) => controller.frame(thing);
 editor.addThing = (offer) => adder.add(offer);
 editor.duplicate = (thing) => adder.duplicate(thing);
 const panel = new Panel(find("panel"), {
@@ -181,7 +181,7 @@ const comparison = new Comparison(
   { first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names, lost: () => {}, beside: () => stream.session, headerOfA: () => header },
 );
 
-const keep = new Keep(find("page-keep"), {
+const savePage = new SavePage(find("page-save"), {
   hasDocuments: Object.keys(calls).some((path) => path.startsWith("/v1/documents")),
   acts: {
     document: (kind) => (kind === "scenes" ? editor.state.scene : editor.material),
@@ -215,7 +215,7 @@ function showPrices() {
 }
 
 // Transparency shows where the scene asks for it, or the person does.
-const isCheckered = () => desk.state.checker ?? editor.state.scene.environment?.background === false;
+const isCheckered = () => ui.state.checker ?? editor.state.scene.environment?.background === false;
 
 function size() {
   const area = Math.min(info.renderer?.software === false ? AREA.hardware : AREA.software, info.limits.max_pixels);
@@ -237,7 +237,7 @@ function push() {
   if (!info) return;
   const { scene: document, settings } = editor.state;
   const second = editor.sceneB;
-  const view = viewOf({ ...desk.state, checkered: isCheckered() }, shownView(), {
+  const view = viewOf({ ...ui.state, checkered: isCheckered() }, shownView(), {
     isPaused, quality: PAUSED_QUALITY, isExact: second !== null,
   });
   comparison.show(second && { scene: second, settings: { ...settings, ...size() }, view }, isPaused);
@@ -259,7 +259,7 @@ function refresh() {
   find("paste-material").disabled = clip === null && !navigator.clipboard?.readText;
   push();
   messages.review();
-  stage.mark();
+  controller.mark();
   clearTimeout(keeping);
   if (editor.canUndo || left) keeping = setTimeout(() => keepWork(essence(editor.state)), KEEP_REST_MS);
 }
@@ -314,9 +314,9 @@ async function pasteMaterial() {
   }
 }
 
-const toggle = (member) => desk.set({ [member]: !desk.state[member] });
+const toggle = (member) => ui.set({ [member]: !ui.state[member] });
 const toggleCompare = () => (editor.state.compare ? editor.stopComparing() : editor.startComparing());
-const toggleChecker = () => desk.set({ checker: !isCheckered() });
+const toggleChecker = () => ui.set({ checker: !isCheckered() });
 const showKeys = () => find("keys-dialog").showModal();
 const reset = () => editor.putMaterial({ type: editor.material.type });
 
@@ -324,19 +324,19 @@ const does = {
   toggle, toggleCompare, toggleChecker, togglePause, copyMaterial, pasteMaterial, download, showKeys,
   undo: () => travel(() => editor.undo()), redo: () => travel(() => editor.redo()),
   remove: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
-  openFiles: () => importer.browse("open"), snapshot: () => keep.snapshot(), pickTool: (tool) => desk.set({ tool }),
-  frame: () => stage.frame(), resetView: () => editor.resetView(),
-  nextLayer: () => desk.set({ layer: layers[(layers.indexOf(desk.state.layer) + 1) % layers.length] }),
+  openFiles: () => importer.browse("open"), snapshot: () => savePage.snapshot(), pickTool: (tool) => ui.set({ tool }),
+  frame: () => controller.frame(), resetView: () => editor.resetView(),
+  nextLayer: () => ui.set({ layer: layers[(layers.indexOf(ui.state.layer) + 1) % layers.length] }),
 };
 const acts = commands(does);
-watchKeys(stage.keyMove, acts);
+watchKeys(controller.keyMove, acts);
 fillSheet(find("keys"), acts);
 
 const clicks = {
   pause: does.togglePause, download, compare: toggleCompare, help: showKeys, undo: does.undo, redo: does.redo, frame: does.frame,
   "reset-view": does.resetView, "open-file": does.openFiles, "add-file": () => importer.browse("add"),
   "copy-material": copyMaterial, "paste-material": pasteMaterial, "reset-material": reset,
-  theme: () => desk.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
+  theme: () => ui.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
 };
 for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
 
@@ -348,12 +348,12 @@ watchDrops(document, {
   },
 });
 
-// --- the desk ---
+// --- the interface ---
 
-const showTab = watchTabs(find("tabs"), desk.state.tab, (tab) => desk.set({ tab }));
+const showTab = watchTabs(find("tabs"), ui.state.tab, (tab) => ui.set({ tab }));
 const layer = find("layer");
 layer.append(...layers.map((each) => element("option", { value: each }, inWords(each))));
-layer.addEventListener("change", () => desk.set({ layer: layer.value }));
+layer.addEventListener("change", () => ui.set({ layer: layer.value }));
 const checks = { histogram: "Histogram", clipping: "Clipped pixels", checker: "Checker behind alpha", guides: "Guides" };
 find("overlays").append(...Object.entries(checks).map(([member, title]) => element("label", {},
   element("input", {
@@ -361,23 +361,23 @@ find("overlays").append(...Object.entries(checks).map(([member, title]) => eleme
     onchange: () => (member === "checker" ? toggleChecker() : toggle(member)),
   }), title)));
 
-function showDesk() {
-  const { tab, theme } = desk.state;
+function showUi() {
+  const { tab, theme } = ui.state;
   showTab(tab);
-  layer.value = desk.state.layer;
-  for (const member of Object.keys(checks)) find(`show-${member}`).checked = member === "checker" ? isCheckered() : desk.state[member];
+  layer.value = ui.state.layer;
+  for (const member of Object.keys(checks)) find(`show-${member}`).checked = member === "checker" ? isCheckered() : ui.state[member];
   if (theme) document.documentElement.dataset.theme = theme;
-  stage.showDesk(desk.state);
+  controller.showUi(ui.state);
   push();
 }
 
-desk.subscribe(showDesk);
+ui.subscribe(showUi);
 editor.subscribe(refresh);
 
 let resizing = 0;
 new ResizeObserver(() => {
   clearTimeout(resizing);
-  resizing = setTimeout(() => { push(); stage.overlay(); stage.mark(); }, RESIZE_REST_MS);
+  resizing = setTimeout(() => { push(); controller.overlay(); controller.mark(); }, RESIZE_REST_MS);
 }).observe(root);
 
 if (left?.from === "work") {
@@ -386,6 +386,6 @@ if (left?.from === "work") {
     action: { label: "Start afresh", does: () => { forgetWork(); messages.hide("work"); editor.openScene(scene, name); } },
   });
 }
-showDesk();
+showUi();
 refresh();
 stream.connect();

@@ -4,7 +4,7 @@ import { askName, askWhich } from "./ask.js";
 import * as materials from "./materials.js";
 import { things } from "./outliner.js";
 import { pointer } from "./patch.js";
-import { inWords, sentence } from "./words.js";
+import { inWords, sentence } from "./format-text.js";
 
 const MOST_NAMED = 2; // things that are named; more are counted
 

@@ -6,7 +6,7 @@ import { at, equal, pointer } from "./patch.js";
 import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
 import * as transforms from "./transforms.js";
-import { inWords } from "./words.js";
+import { inWords } from "./format-text.js";
 
 const ICONS = {
   camera: "M2 5h2.5l1-1.5h5l1 1.5H14v8H2zm6 1.6a2.3 2.3 0 1 0 0 4.6 2.3 2.3 0 0 0 0-4.6",

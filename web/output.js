@@ -7,7 +7,7 @@ import { saveAs } from "./files.js";
 import { detailWords } from "./problem-text.js";
 import { fields } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
-import { duration, sentence } from "./words.js";
+import { duration, sentence } from "./format-text.js";
 
 const WINDOW = "window";
 const FREE = "free";

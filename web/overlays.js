@@ -1,7 +1,7 @@
 // What can be laid over the picture: a histogram, clipped pixels, the legend of a layer, guides.
 
 import { element } from "./dom.js";
-import { percent } from "./words.js";
+import { percent } from "./format-text.js";
 
 const RED = [255, 60, 60];
 const BLUE = [60, 110, 255];

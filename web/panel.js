@@ -11,7 +11,7 @@ import { schemaForm } from "./schema-form.js";
 import { qualityChoice } from "./quality.js";
 import { TextureSlot } from "./texture-slot.js";
 import { TextureForm } from "./texturing.js";
-import { inWords } from "./words.js";
+import { inWords } from "./format-text.js";
 
 // The settings that stand open; the others are a click away. The picture's size is the window's business.
 const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "adaptive", "denoise"];

@@ -2,7 +2,7 @@
 // in the place of what the browser or the protocol says.
 
 import { Problem } from "./api.js";
-import { inWords, sentence } from "./words.js";
+import { inWords, sentence } from "./format-text.js";
 
 const LONGEST_LIST = 100; // characters of what would have been right; a longer list helps nobody
 const VERB = /^(must|is|are|has|have|needs?|cannot|can|does|do|refers?|lies|spans?)\b/;

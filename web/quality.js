@@ -2,7 +2,7 @@
 
 import { element } from "./dom.js";
 import { watchChoice } from "./tabs.js";
-import { count, duration, inWords, percent } from "./words.js";
+import { count, duration, inWords, percent } from "./format-text.js";
 
 const TRUSTED = 4; // samples before a forecast is worth something
 const UNSEEN = 0.0005; // a share of the light that nobody misses

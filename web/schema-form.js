@@ -8,7 +8,7 @@ import { acceptFiles } from "./files.js";
 import { equal, isObject } from "./patch.js";
 import { followed } from "./schema.js";
 import { describe } from "./tooltip.js";
-import { unitText } from "./words.js";
+import { unitText } from "./format-text.js";
 
 const isSame = ({ widget }, a, b) =>
   widget === "color" && a !== undefined && b !== undefined ? equal(linear(a), linear(b)) : equal(a, b);

@@ -1,6 +1,6 @@
 // The line under the picture: how far it is, how good, how fast, how long.
 
-import { count, duration, percent } from "./words.js";
+import { count, duration, percent } from "./format-text.js";
 
 const NOTHING = "–";
 

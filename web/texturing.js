@@ -6,7 +6,7 @@ import { at, pointer } from "./patch.js";
 import { fields, textureModel } from "./schema.js";
 import { schemaForm } from "./schema-form.js";
 import { users } from "./textures.js";
-import { inWords } from "./words.js";
+import { inWords } from "./format-text.js";
 
 // For the parameter at `place` in the editor's state. `parts` are the forms shown now, each with its place.
 export class TextureForm {

@@ -2,7 +2,7 @@
 // asked for when the main picture is at rest, one at a time, and kept in the browser.
 
 import { fetchPreset, renderPicture } from "./api.js";
-import { recall, remember } from "./memory.js";
+import { recall, remember } from "./browser-storage.js";
 
 const SIDE = 96;
 const SETTINGS = { width: SIDE, height: SIDE, max_samples: 32, max_bounces: 6, seed: 1 };

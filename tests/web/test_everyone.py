@@ -34,7 +34,7 @@ def findings(editor: Editor) -> list[str]:
 def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any) -> None:
     editor = Editor(browser.new_page(viewport={"width": 1280, "height": 800}, color_scheme=scheme))
     editor.open(server.url)
-    for tab in ("scene", "render", "keep", "material"):
+    for tab in ("scene", "render", "save", "material"):
         editor.tab(tab)
         assert findings(editor) == [], tab
     editor.page.click("[data-field=roughness] .image")
@@ -55,7 +55,7 @@ def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, i
     """Among them a phone both ways, and a laptop at 200 %."""
     editor = Editor(browser.new_page(viewport={"width": size[0], "height": size[1]}))
     editor.open(server.url)
-    for tab in ("scene", "render", "keep", "material"):
+    for tab in ("scene", "render", "save", "material"):
         editor.tab(tab)
         script = """() => [...document.querySelectorAll("button, input, select, [role=option]")]
             .filter((each) => each.checkVisibility() && !each.closest(".presets, .outline, .unseen"))
@@ -102,7 +102,7 @@ def test_letters_can_be_read_and_fingers_hit(browser: Browser, server: Server, s
     page.goto(server.url + "/")
     page.wait_for_selector("#material-form [data-field]")
     page.click("#compare")
-    for tab in ("scene", "render", "keep", "material"):
+    for tab in ("scene", "render", "save", "material"):
         page.click(f"#tab-{tab}")
         assert page.evaluate(SMALL) == [], tab
     page.close()

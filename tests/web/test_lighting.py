@@ -25,7 +25,7 @@ def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.page.click("text=Add the studio")
     editor.wait_for_change(before)
     assert editor.text("#messages") == "" and 60 < max(editor.settled()) < 250
-    editor.tab("keep")
+    editor.tab("save")
     scene = json.loads(editor.shot("text=Scene as JSON"))
     assert scene["environment"]["scale"] == 2**10 and scene["lights"][0]["intensity"][0] > 54_000
 

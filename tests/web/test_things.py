@@ -13,7 +13,7 @@ from tests.web.conftest import Editor
 
 def document(editor: Editor) -> Any:
     """The scene as the page would save it."""
-    editor.tab("keep")
+    editor.tab("save")
     return json.loads(editor.shot("text=Scene as JSON"))
 
 

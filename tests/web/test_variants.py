@@ -64,7 +64,7 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     both = ["A · Principled · 4 samples", "B · Diffuse · 4 samples"]
     editor.wait("both", lambda: labels.all_text_contents() == both)
     editor.wait("the end", lambda: editor.text("#state") == "Done" and metric(editor) > 0)
-    editor.tab("keep")
+    editor.tab("save")
     saved = np.asarray(Image.open(io.BytesIO(editor.shot("#download"))).convert("RGB"), int)
     a, b = (overlay(editor, canvas)[..., :3].astype(int) for canvas in ("picture", "picture-b"))
     assert np.array_equal(a, saved), "no JPEG lies between"

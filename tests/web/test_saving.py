@@ -38,7 +38,7 @@ def read_exr(path: Path) -> tuple[list[str], np.ndarray]:
 
 def test_files_hold_the_picture(editor: Editor, tmp_path: Path) -> None:
     finish(editor, 6)
-    editor.tab("keep")
+    editor.tab("save")
     flat = np.asarray(Image.open(io.BytesIO(editor.shot("text=PNG >> nth=1"))).convert("RGB"), int)
     deep = editor.shot("text=PNG, 16 bit")
     assert deep[24] == 16
@@ -68,7 +68,7 @@ def test_a_picture_carries_its_document_and_brings_it_back(editor: Editor, serve
     editor.page.click("#material-presets [data-name=gold]")
     finish(editor, 5)
     gold = editor.settled()
-    editor.tab("keep")
+    editor.tab("save")
     own = editor.shot("#download")
     made = read_metadata(own)
     assert made is not None and made["samples"] == 5 and made["view"]["bits"] == 8
@@ -100,7 +100,7 @@ def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: Bro
     editor.page.keyboard.press("ArrowLeft")
     editor.wait_for_change(before)
     shown = editor.settled()
-    editor.tab("keep")
+    editor.tab("save")
     editor.page.click("#copy-link")
     editor.wait("the link", lambda: "#v=" in editor.page.input_value(".command"))
     link = editor.page.input_value(".command")
@@ -123,26 +123,26 @@ def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: Bro
 
 def test_snapshots_and_names(editor: Editor, server: Server) -> None:
     before = editor.settled()
-    editor.tab("keep")
+    editor.tab("save")
     editor.page.click("text=Take a snapshot")
     editor.wait("a snapshot", lambda: editor.page.locator(".snapshot img").count() == 1)
-    editor.page.fill("#page-keep .entry >> nth=1", "my red")
-    editor.page.click("#page-keep .group:nth-of-type(2) >> text=Save")
-    editor.wait("its name", lambda: "my red" in editor.text("#page-keep"))
+    editor.page.fill("#page-save .entry >> nth=1", "my red")
+    editor.page.click("#page-save .group:nth-of-type(2) >> text=Save")
+    editor.wait("its name", lambda: "my red" in editor.text("#page-save"))
     assert server.http.get("/v1/documents/materials/my%20red").json()["type"] == "principled"
     editor.tab("material")
     editor.page.click("#material-presets [data-name=gold]")
     editor.wait_for_change(before)
-    editor.tab("keep")
-    editor.page.click("#page-keep .kept .open >> text=my red")
+    editor.tab("save")
+    editor.page.click("#page-save .kept .open >> text=my red")
     editor.wait("red again", lambda: not editor.differs(before, 8))
     editor.page.click("[aria-label='Delete my red']")
     assert editor.page.is_visible("text=Delete “my red”?"), "it is everybody's, and gone for good"
     editor.page.keyboard.press("Escape")
-    assert "my red" in editor.text("#page-keep")
+    assert "my red" in editor.text("#page-save")
     editor.page.click("[aria-label='Delete my red']")
     editor.page.click("dialog[open] button:text-is('Delete')")
-    editor.wait("its end", lambda: "my red" not in editor.text("#page-keep"))
+    editor.wait("its end", lambda: "my red" not in editor.text("#page-save"))
     editor.page.keyboard.press("Control+z")
     editor.wait_for_change(before)
     editor.page.click(".snapshot .open")
@@ -151,29 +151,29 @@ def test_snapshots_and_names(editor: Editor, server: Server) -> None:
 
 def test_any_name_can_be_saved_and_is_not_lost_by_accident(editor: Editor, server: Server) -> None:
     page = editor.page
-    editor.tab("keep")
+    editor.tab("save")
     names = ["My first scene / \u00e4", "..", "50% grey?#1", "m" * 64]
     for name in names:
-        page.fill("#page-keep .entry >> nth=1", name)
+        page.fill("#page-save .entry >> nth=1", name)
         page.keyboard.press("Enter")
-        opener = page.locator("#page-keep .kept .open", has_text=name)
+        opener = page.locator("#page-save .kept .open", has_text=name)
         editor.wait("the name", lambda opener=opener: opener.count() == 1)
         assert editor.text("#messages") == ""
         assert opener.inner_text() == name
     assert {each["title"] for each in server.http.get("/v1/documents/materials").json()} == set(names)
     for name in names[:2]:
-        page.locator("#page-keep .kept .open", has_text=name).click()
+        page.locator("#page-save .kept .open", has_text=name).click()
         editor.wait("the material", lambda: editor.text("#messages") == "")
-    assert page.evaluate("(p => p.scrollWidth - p.clientWidth)(document.getElementById('page-keep'))") == 0
+    assert page.evaluate("(p => p.scrollWidth - p.clientWidth)(document.getElementById('page-save'))") == 0
     cross = page.locator(f"[aria-label='Delete {names[3]}']").bounding_box()
     assert cross is not None and cross["x"] + cross["width"] <= 800, "a long name leaves room for its cross"
 
     before = server.http.get("/v1/documents/materials/50%25%20grey%3F%231").json()
     editor.tab("material")
     page.select_option("#model", "diffuse")
-    editor.tab("keep")
+    editor.tab("save")
     for answer in ("Cancel", "Replace"):
-        page.fill("#page-keep .entry >> nth=1", names[2])
+        page.fill("#page-save .entry >> nth=1", names[2])
         page.keyboard.press("Enter")
         page.click(f"dialog[open] button:text-is('{answer}')")
         editor.wait("the answer", lambda: page.locator("dialog[open]").count() == 0)
@@ -218,7 +218,7 @@ def test_two_tabs_keep_two_works(editor: Editor, context: BrowserContext, server
 
 def test_json_leaves_and_comes_back(editor: Editor) -> None:
     before = editor.settled()
-    editor.tab("keep")
+    editor.tab("save")
     scene = editor.shot("text=Scene as JSON")
     document = json.loads(scene)
     document["materials"]["subject"] = {"type": "diffuse", "albedo": [0, 0.6, 0]}

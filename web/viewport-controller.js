@@ -12,7 +12,7 @@ import { NotReady } from "./stream.js";
 import { watchChoice } from "./tabs.js";
 import { at, pointer } from "./patch.js";
 import { dot } from "./vector.js";
-import { inWords } from "./words.js";
+import { inWords } from "./format-text.js";
 
 // A click before there is a picture.
 const EARLY = {
@@ -25,15 +25,15 @@ const BRIEF_MS = 1000; // that a new thing waits to learn from the picture what 
 const OVERLAY_MS = 200; // between two histograms
 const LENS_SHARE = 0.02; // of the distance: what a pinhole opens to when somebody wants to focus
 
-export class Stage {
+export class ViewportController {
   #outlining = 0;
   #overlaid = 0;
   #timer = null;
 
-  // `find(id)` elements, `acts` the editor, `desk`, `stream`, `viewport`; `say(text)`, `complain(error)`.
+  // `find(id)` elements, `acts` the editor, `ui`, `stream`, `viewport`; `say(text)`, `complain(error)`.
   constructor(parts) {
     Object.assign(this, parts);
-    const { find, stream, viewport, acts, desk } = parts;
+    const { find, stream, viewport, acts, ui } = parts;
     this.root = find("stage");
     this.picker = new Picker(stream);
     this.inspector = new Inspector(
@@ -53,8 +53,8 @@ export class Stage {
       orbit: (right, down) => (this.inspector.active ? this.inspector.step(Math.sign(right), Math.sign(down)) : acts.moves.orbit(right, down)),
       pan: (right, down) => (this.inspector.active ? this.inspector.step(10 * Math.sign(right), 10 * Math.sign(down)) : acts.moves.pan(right, down)),
     };
-    watchGestures(this.root, this.move, () => desk.state.tool);
-    this.markTool = watchChoice(find("tools"), "[data-tool]", ({ dataset }) => desk.set({ tool: dataset.tool }));
+    watchGestures(this.root, this.move, () => ui.state.tool);
+    this.markTool = watchChoice(find("tools"), "[data-tool]", ({ dataset }) => ui.set({ tool: dataset.tool }));
   }
 
   get aspect() {
@@ -69,7 +69,7 @@ export class Stage {
     return Number(size.toPrecision(2));
   }
 
-  showDesk({ tool, guides, clipping, histogram }) {
+  showUi({ tool, guides, clipping, histogram }) {
     this.root.dataset.tool = tool;
     this.markTool(({ dataset }) => dataset.tool === tool);
     this.inspector.toggle(tool === "inspect");
@@ -90,7 +90,7 @@ export class Stage {
 
   // Where lights and the camera's target are, while the scene is arranged.
   mark() {
-    const { tab, tool } = this.desk.state;
+    const { tab, tool } = this.ui.state;
     const isOn = tab === "scene" && tool !== "inspect";
     if (isOn) fitGuides(this.find("markers"), this.root, this.viewport.canvas);
     this.markers.show(isOn, this.aspect);
@@ -98,7 +98,7 @@ export class Stage {
 
   // Histogram and clipping follow the picture at their own pace.
   overlay() {
-    const { histogram, clipping, guides } = this.desk.state;
+    const { histogram, clipping, guides } = this.ui.state;
     if (guides) fitGuides(this.find("guides"), this.root, this.viewport.canvas);
     if ((!histogram && !clipping) || this.#timer) return;
     this.#timer = setTimeout(() => {
@@ -112,7 +112,7 @@ export class Stage {
 
   async tap(x, y) {
     const place = this.viewport.place(x, y);
-    const { tool } = this.desk.state;
+    const { tool } = this.ui.state;
     if (!place || tool === "inspect") return;
     try {
       if (tool === "focus") await this.focus(place);
@@ -182,12 +182,12 @@ export class Stage {
 
 // How frames are to come for a layer: numbers where the page paints them itself; without a loss where `isExact`, so
 // that what is measured between two pictures is not what JPEG did to them.
-export function viewOf(desk, view, { isPaused, quality, isExact }) {
-  const { layer } = desk;
+export function viewOf(ui, view, { isPaused, quality, isExact }) {
+  const { layer } = ui;
   const painted = isPainted(layer);
   return {
     ...view, aov: layer, bits: 8, quality: isPaused ? quality : null,
-    format: painted ? "rgba32f" : desk.checkered || isExact ? "png" : "jpeg",
+    format: painted ? "rgba32f" : ui.checkered || isExact ? "png" : "jpeg",
     max_fps: painted ? 4 : isExact ? 8 : null,
   };
 }

@@ -1,11 +1,11 @@
-// The page that keeps and shares: names on the server, snapshots in this browser, files, a link, a command.
+// The page that saves and shares: names on the server, snapshots in this browser, files, a link, a command.
 
 import * as api from "./api.js";
 import { ask } from "./ask.js";
 import { element, freshId } from "./dom.js";
 import { jsonBlob, saveAs } from "./files.js";
-import { dismiss, recallAll, remember } from "./memory.js";
-import { inWords } from "./words.js";
+import { dismiss, recallAll, remember } from "./browser-storage.js";
+import { inWords } from "./format-text.js";
 
 const KINDS = ["scenes", "materials"];
 const SNAPSHOT = "snapshot ";
@@ -13,7 +13,7 @@ const WHOSE = "Everybody who uses this server has it, and this cannot be undone.
 
 const button = (label, does, more = {}) => element("button", { type: "button", class: "button small", onclick: does, ...more }, label);
 
-export class Keep {
+export class SavePage {
   // `acts` has document(kind), open(kind, document, name), state(), snapshot() -> {blob, note}, restore(essence),
   // link(), command(), png(bits), exr(), complain(error), announce(text).
   constructor(root, { acts, hasDocuments }) {
@@ -45,7 +45,7 @@ export class Keep {
   #saved(kind) {
     const id = freshId("name");
     const name = element("input", { class: "entry", id, placeholder: "Name", maxlength: "100", autocomplete: "off", spellcheck: "false" });
-    const keep = () => this.#try(async () => {
+    const save = () => this.#try(async () => {
       const wanted = name.value.trim();
       if (!wanted) return name.focus();
       const taken = (await api.listSaved(kind)).some((each) => (each.title ?? each.name) === wanted);
@@ -55,11 +55,11 @@ export class Keep {
       this.acts.announce(`Saved ${wanted}.`);
       await this.refresh(kind);
     });
-    name.addEventListener("keydown", ({ key }) => { if (key === "Enter") keep(); });
+    name.addEventListener("keydown", ({ key }) => { if (key === "Enter") save(); });
     this.lists[kind] = element("ul", { class: "kept" });
     return this.#group(
       kind === "scenes" ? "Scenes on the server" : "Materials on the server",
-      element("div", { class: "row" }, element("label", { for: id, class: "unseen" }, `Name of the ${kind === "scenes" ? "scene" : "material"}`), name, button("Save", keep)),
+      element("div", { class: "row" }, element("label", { for: id, class: "unseen" }, `Name of the ${kind === "scenes" ? "scene" : "material"}`), name, button("Save", save)),
       this.lists[kind],
     );
   }
