@@ -32,7 +32,7 @@ from service.downloads import Pieces
 from service.guard import Guard, turning_away
 from service.logs import Requests
 from service.problems import Unavailable
-from service.rendering.first_frame import FirstFrame
+from service.rendering.first_frame import warm_up
 from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.supervisor.process import Options
@@ -207,9 +207,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     if own.renderers.process_id is None:
         own.renderers.start()
     own.assets.warm()
-    warming = asyncio.create_task(
-        FirstFrame(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)).run()
-    )
+    warming = asyncio.create_task(warm_up(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)))
     yield
     warming.cancel()
     await own.farewell()

@@ -9,6 +9,6 @@ statistics   counters and distributions, for /metrics
 ipc          what both processes say to each other
 worker       the renderer's process itself: the only room here that imports `gpu`
 executors    the threads of the server's slow work
-first_frame  what the first client would have to wait for, done before it comes
+first_frame  the first frame of a scene that no client asked for: for readiness, and to warm up
 priority     niceness of threads and processes
 """

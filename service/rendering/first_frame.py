@@ -1,4 +1,4 @@
-"""What the first client would have to wait for, done before it comes: modules, the builder's code, kernels."""
+"""The first frame of a scene that no client asked for: readiness looks at it, and a start is warmed up by it."""
 
 from __future__ import annotations
 
@@ -8,56 +8,74 @@ import time
 from functools import partial
 from typing import Any
 
-from service.pack import warm_builder
-from service.problems import ServiceError
+from service.pack import Packed, warm_builder
+from service.problems import ServiceError, Unavailable
 from service.rendering.executors import packing
 from service.rendering.ipc.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 
-SETTINGS = {"width": 64, "height": 64}
+WARM_UP_SETTINGS = {"width": 64, "height": 64}  # a stream's kernel does not depend on its size
 
 log = logging.getLogger(__name__)
 
 
-class FirstFrame:
-    """A first picture that nobody asked for: `document` in the default settings, as a stream would have it."""
+async def first_frame(
+    renderers: Renderers, packed: Packed, settings: dict[str, Any], patience_s: float | None = None
+) -> Frame:
+    """The frame of the first sample, rendered as a stream's; nothing stays behind in the renderer.
 
-    def __init__(self, renderers: Renderers, reader: RequestReader, document: Any) -> None:
-        self._renderers = renderers
-        self._reader = reader
-        self._document = document
-        self._seen = asyncio.Event()
+    `settings` are the arguments of gpu.RenderSettings. Raises Unavailable where there is no renderer, where it fails,
+    and where it gives no frame within `patience_s`.
+    """
+    listener = _Listener()
+    task = renderers.open(listener, "server")
+    try:
+        stop = StopRule(max_samples=1)
+        await renderers.send_scene(Update(task, 1, packed.arrays, settings, stop, interactive=True))
+        renderers.send(Want(task, 1, View()))
+        return await asyncio.wait_for(listener.frame, patience_s)
+    except TimeoutError:
+        raise Unavailable(f"The renderer has not rendered anything for {patience_s:g} s.") from None
+    finally:
+        renderers.drop(task)
+        listener.frame.cancel()
 
-    async def run(self) -> None:
-        """Leaves nothing behind, and no error either: who comes later meets it himself."""
-        began = time.monotonic()
-        try:
-            packed = await packing(lambda: self._reader.pack(self._reader.scene(self._document)))
-            settings = await packing(partial(self._reader.settings, SETTINGS))
-            task = self._renderers.open(self, "server")
-        except ServiceError as error:
-            log.warning("did not warm up error=%s", error)
-            return
-        try:
-            stop = StopRule(max_samples=1)
-            await self._renderers.send_scene(
-                Update(task, 1, packed.arrays, settings.for_gpu(), stop, interactive=True)
-            )
-            self._renderers.send(Want(task, 1, View()))
-            await self._seen.wait()
-            log.info("warmed up seconds=%.2f", time.monotonic() - began)
-        finally:
-            self._renderers.drop(task)
-        await packing(warm_builder)
-        log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
+
+async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) -> None:
+    """Do what the first client would have to wait for: import modules, compile kernels and the builder's code.
+
+    `document` is the scene that a client is likely to begin with. An error is logged and not raised: a client that
+    comes later meets it as well.
+    """
+    began = time.monotonic()
+    try:
+        packed = await packing(lambda: reader.pack(reader.scene(document)))
+        settings = await packing(partial(reader.settings, WARM_UP_SETTINGS))
+        await first_frame(renderers, packed, settings.for_gpu())
+    except ServiceError as error:
+        log.warning("did not warm up error=%s", error)
+        return
+    log.info("warmed up seconds=%.2f", time.monotonic() - began)
+    await packing(warm_builder)
+    log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
+
+
+class _Listener:
+    """`frame` is the task's first frame, or Unavailable."""
+
+    def __init__(self) -> None:
+        self.frame: asyncio.Future[Frame] = asyncio.get_running_loop().create_future()
 
     def heard(self, message: FromRenderer) -> None:
-        if isinstance(message, Frame | Failed):
-            self._seen.set()
+        if isinstance(message, Failed):
+            self.lost(f"The renderer failed: {message.detail}")
+        elif isinstance(message, Frame) and not self.frame.done():
+            self.frame.set_result(message)
 
     def again(self) -> None:
-        """A first picture is a first picture."""
+        """Another renderer begins the task again: the frame comes from that one."""
 
     def lost(self, detail: str) -> None:
-        self._seen.set()
+        if not self.frame.done():
+            self.frame.set_exception(Unavailable(detail))

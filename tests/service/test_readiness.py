@@ -1,0 +1,124 @@
+"""What readiness makes of a renderer that answers well, wrongly, or not at all; the renderer is a stand-in."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from collections.abc import Callable
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from service import readiness
+from service.assets import Assets
+from service.config import Config
+from service.problems import Unavailable
+from service.readiness import Readiness
+from service.rendering.first_frame import warm_up
+from service.rendering.ipc.messages import Failed, Frame, Progress, ToRenderer, Update, Want
+from service.rendering.renderers import Listener
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.statistics import Kind, Statistics
+
+READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
+
+
+class StandIn:
+    """Renderers of one device, which answers a wish for a frame with `answer(listener, task)`."""
+
+    process_id = 1
+
+    def __init__(self, answer: Callable[[Listener, int], None], software: bool = False) -> None:
+        self.statistics, self.info = Statistics(), {"renderer": "stand-in", "software": software}
+        self.frames = 0
+        self.open_tasks: dict[int, Listener] = {}
+        self._answer = answer
+
+    async def ready(self, timeout_s: float) -> dict[str, Any]:
+        return self.info
+
+    def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
+        self.open_tasks[7] = listener
+        return 7
+
+    def drop(self, task: int) -> None:
+        del self.open_tasks[task]
+
+    async def send_scene(self, update: Update) -> None:
+        assert update.stop is not None and update.stop.max_samples == 1
+
+    def send(self, message: ToRenderer) -> None:
+        assert isinstance(message, Want)
+        self.frames += 1
+        self._answer(self.open_tasks[message.task], message.task)
+
+    def start(self) -> None: ...
+    async def close(self) -> None: ...
+    async def able(self, timeout_s: float) -> None: ...
+
+
+def grey(value: float, size: int = 8) -> Callable[[Listener, int], None]:
+    pixels = np.full((size, size, 4), value, np.float32)
+    return lambda listener, task: listener.heard(Frame(task, 1, 1, pixels, Progress(1), 1.0, True))
+
+
+def fails(listener: Listener, task: int) -> None:
+    listener.heard(Failed(task, 1, "out of memory", None))
+
+
+def is_lost(listener: Listener, task: int) -> None:
+    listener.lost("it was killed")
+
+
+def is_silent(listener: Listener, task: int) -> None: ...
+
+
+def checked(renderers: StandIn, times: int = 1, require_gpu: bool = False) -> None:
+    async def run() -> None:
+        tested = Readiness(renderers, READER, require_gpu)
+        for _ in range(times):
+            await tested.check()
+
+    asyncio.run(run())
+
+
+def test_an_answer_is_valid_for_a_while() -> None:
+    renderers = StandIn(grey(0.5))
+    checked(renderers, times=3)
+    assert renderers.frames == 1 and not renderers.open_tasks
+
+
+@pytest.mark.parametrize(
+    ("answer", "reason"),
+    [
+        (grey(0.0), "black pictures"),
+        (fails, "out of memory"),
+        (is_lost, "it was killed"),
+        (is_silent, "has not rendered anything for 0.1 s"),
+    ],
+)
+def test_a_bad_renderer_is_not_ready(
+    answer: Callable[[Listener, int], None], reason: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(readiness, "PATIENCE_S", 0.1)
+    renderers = StandIn(answer)
+    with pytest.raises(Unavailable, match=reason):
+        checked(renderers)
+    assert not renderers.open_tasks, "nothing stays behind"
+
+
+def test_a_software_renderer_is_not_ready_where_a_gpu_is_required() -> None:
+    with pytest.raises(Unavailable, match="SUNBOX_REQUIRE_GPU"):
+        checked(StandIn(grey(0.5), software=True), require_gpu=True)
+
+
+@pytest.mark.parametrize(("answer", "logged"), [(grey(0.5, 64), "warmed up"), (fails, "did not warm up")])
+def test_warming_up_leaves_no_task_and_raises_nothing(
+    answer: Callable[[Listener, int], None], logged: str, caplog: pytest.LogCaptureFixture
+) -> None:
+    caplog.set_level(logging.INFO)
+    renderers = StandIn(answer)
+    asyncio.run(warm_up(renderers, READER, readiness.SCENE))
+    assert renderers.frames == 1 and not renderers.open_tasks
+    assert [record.message for record in caplog.records if record.message.startswith(logged)]
