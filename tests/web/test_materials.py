@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from tests.web.conftest import Editor
-from tests.web.test_keeping import TRIANGLE
+from tests.web.test_saving import TRIANGLE
 from tests.web.test_things import document
 
 

@@ -11,8 +11,8 @@ import pytest
 from PIL import Image
 
 from tests.web.conftest import Editor
-from tests.web.test_keeping import finish
 from tests.web.test_picture import overlay, point
+from tests.web.test_saving import finish
 
 
 def metric(editor: Editor) -> float:
