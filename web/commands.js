@@ -1,11 +1,112 @@
-// What the keys and the tools' buttons can do, with the words that explain it: [{keys, shift, ctrl, does, says, group}].
+// The commands of the buttons and the keys: what each one does, and which keys give it.
+
+import * as exporting from "./export.js";
+import { saveAs } from "./files.js";
+
+// The copied material: the browser's clipboard where the page may read it, else one of the page's own.
+class Clipboard {
+  #own = null;
+
+  get isEmpty() { return this.#own === null && !navigator.clipboard?.readText; }
+
+  write(material) {
+    this.#own = material;
+    navigator.clipboard?.writeText(JSON.stringify(material, null, 2)).catch(() => {});
+  }
+
+  // {pasted}: a JSON document from outside, else {own}: the material that was copied here or null.
+  async read() {
+    const text = await navigator.clipboard?.readText().catch(() => null);
+    return text?.trim().startsWith("{") ? { pasted: JSON.parse(text) } : { own: this.#own };
+  }
+}
+
+// {does, canPaste}: the commands by name. `find(id)` elements; `page` is the PageState, `madeFrom` as pictureRecipes has
+// it; `complain(error)`, `say(text)`; `refresh()` shows what has changed, `push()` tells the streams.
+export function makeCommands({
+  find, page, editor, ui, stream, controller, panel, importer, savePage, madeFrom, complain, say, refresh, push,
+}) {
+  const clipboard = new Clipboard();
+
+  // Words about what was refused belong to a state that is left.
+  const travel = (step) => {
+    panel.forgive();
+    editor.forgive();
+    step();
+  };
+
+  const does = {
+    toggle: (member) => ui.set({ [member]: !ui.state[member] }),
+    toggleChecker: () => ui.set({ checker: !page.isCheckered }),
+    toggleCompare: () => (editor.state.compare ? editor.stopComparing() : editor.startComparing()),
+    togglePause() {
+      page.isPaused = !page.isPaused;
+      if (page.isPaused) stream.pause();
+      else stream.resume();
+      const button = find("pause");
+      button.classList.toggle("paused", page.isPaused);
+      button.querySelector("span").textContent = page.isPaused ? "Resume" : "Pause";
+      push();
+    },
+    toggleTheme: () => ui.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
+    pickTool: (tool) => ui.set({ tool }),
+    nextLayer: () => ui.set({ layer: page.layers[(page.layers.indexOf(ui.state.layer) + 1) % page.layers.length] }),
+    undo: () => travel(() => editor.undo()),
+    redo: () => travel(() => editor.redo()),
+    remove: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
+    copyMaterial() {
+      clipboard.write(editor.material);
+      say("Material copied");
+      refresh();
+    },
+    async pasteMaterial() {
+      try {
+        const { pasted, own } = await clipboard.read();
+        if (pasted) importer.openDocument(pasted, "pasted");
+        else if (own) editor.putMaterial(own);
+      } catch (error) {
+        complain(error);
+      }
+    },
+    resetMaterial: () => editor.putMaterial({ type: editor.material.type }),
+    openFiles: () => importer.browse("open"),
+    addFiles: () => importer.browse("add"),
+    snapshot: () => savePage.snapshot(),
+    frame: () => controller.frame(),
+    resetView: () => editor.resetView(),
+    showKeys: () => find("keys-dialog").showModal(),
+    async download() {
+      const button = find("download");
+      button.disabled = true;
+      try {
+        const { blob, header } = await exporting.png(stream, 8, madeFrom);
+        saveAs(blob, `sunbox-${editor.state.chosen.scene || "scene"}-${header.samples}.png`);
+      } catch (error) {
+        complain(error);
+      }
+      button.disabled = false;
+    },
+  };
+  return { does, get canPaste() { return !clipboard.isEmpty; } };
+}
+
+// The command of each button, by the button's id.
+const BUTTONS = {
+  pause: "togglePause", download: "download", compare: "toggleCompare", help: "showKeys", undo: "undo", redo: "redo",
+  frame: "frame", "reset-view": "resetView", "open-file": "openFiles", "add-file": "addFiles", theme: "toggleTheme",
+  "copy-material": "copyMaterial", "paste-material": "pasteMaterial", "reset-material": "resetMaterial",
+};
+
+export function watchButtons(find, does) {
+  for (const [id, name] of Object.entries(BUTTONS)) find(id).addEventListener("click", () => does[name]());
+}
 
 const TOOLS = {
   orbit: "orbit and select", fly: "look around", focus: "focus by clicking", inspect: "zoom to pixels; arrows move the cross",
 };
 
-// `does` has an act for each name below; `toggle(overlay)` and `pickTool(tool)` serve several.
-export function commands(does) {
+// The keys of the commands and the words of the sheet that explains them: [{keys, shift, ctrl, does, says, group}].
+export function keyTable(does) {
   const { toggle, pickTool } = does;
   return [
     { keys: ["z"], ctrl: true, shift: false, does: does.undo, says: "undo, also the camera", group: "Work" },
