@@ -30,7 +30,8 @@ garbage            the garbage collector, out of the way of large imports
 storage            what is kept in the data folder
 logs               a line or a JSON object for each event
 log_output         where log records go
-confined           what a process gives up that works on strangers' files
+child_processes    children that parse strangers' files, as the service starts and ends them
+confined           what such a child gives up before it reads anything
 cpu_time           how long a process was able to run
 shared_memory      arrays that another process may map
 commands           the commands

@@ -227,7 +227,7 @@ def test_refused(store: AssetStore, case: str) -> None:
     assert re.search(reason, refusal.value.detail), refusal.value.detail
     assert "/proc" not in refusal.value.detail and "Traceback" not in refusal.value.detail
     # Nothing crashed or had to be killed: one child has read all of them.
-    (child,) = store.loader.sandbox._idle
+    (child,) = store.loader.sandbox.children.idle
     status = Path(f"/proc/{child.process.pid}/status").read_text()
     peak = re.search(r"VmHWM:\s+(\d+) kB", status)
     assert peak is not None and int(peak[1]) < MEGABYTES << 10
@@ -235,11 +235,11 @@ def test_refused(store: AssetStore, case: str) -> None:
 
 def test_the_child_outlived_them_all(store: AssetStore) -> None:
     store.add(OBJ)
-    pid = store.loader.sandbox._idle[0].process.pid
+    pid = store.loader.sandbox.children.idle[0].process.pid
     for name, data, _ in REFUSED.values():
         with pytest.raises(AssetError):
             store.add(data, filename=name)
-    assert [child.process.pid for child in store.loader.sandbox._idle] == [pid]
+    assert [child.process.pid for child in store.loader.sandbox.children.idle] == [pid]
 
 
 def test_too_many_triangles(tmp_path: Path) -> None:

@@ -166,7 +166,7 @@ def test_files_with_a_mistake_are_read_or_refused(store: AssetStore) -> None:
         assert "Traceback" not in reason and "Error:" not in reason, reason
     assert 0.05 * FILES < read < 0.9 * FILES
     assert time.process_time() - began < SECONDS * FILES / 10
-    (child,) = store.loader.sandbox._idle  # nothing crashed or had to be killed
+    (child,) = store.loader.sandbox.children.idle  # nothing crashed or had to be killed
     peak = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{child.process.pid}/status").read_text())
     assert peak is not None and int(peak[1]) < MEGABYTES << 10
 

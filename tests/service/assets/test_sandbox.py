@@ -15,7 +15,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from service import cpu_time
+from service import child_processes, cpu_time
 from service.assets import ImageData, MeshData
 from service.assets.errors import ParseError
 from service.assets.sandbox import sandbox
@@ -41,7 +41,7 @@ def endless() -> bytes:
 
 def pid_of(box: Sandbox) -> int:
     box.parse("obj", OBJ)
-    return box._idle[-1].process.pid
+    return box.children.idle[-1].process.pid
 
 
 def running(pid: int) -> bool:
@@ -96,7 +96,7 @@ def test_a_child_starts_without_what_only_the_service_needs() -> None:
 
 def test_a_child_that_was_started_ahead_reads_the_first_file(box: Sandbox) -> None:
     box.start()
-    waiting = box._idle[0].process.pid
+    waiting = box.children.idle[0].process.pid
     assert pid_of(box) == waiting
 
 
@@ -157,7 +157,7 @@ def test_a_crash_is_an_answer(box: Sandbox, number: signal.Signals) -> None:
 def test_a_child_that_died_waiting_is_replaced(box: Sandbox) -> None:
     pid = pid_of(box)
     os.kill(pid, signal.SIGKILL)
-    box._idle[0].process.wait()
+    box.children.idle[0].process.wait()
     assert pid_of(box) != pid
 
 
@@ -172,7 +172,7 @@ def test_two_files_at_once(box: Sandbox) -> None:
         thread.start()
     for thread in threads:
         thread.join(30)
-    assert len(results) == 6 and 1 <= len(box._idle) <= AssetLimits().children
+    assert len(results) == 6 and 1 <= len(box.children.idle) <= AssetLimits().children
 
 
 def test_nothing_leaks(box: Sandbox) -> None:
@@ -209,10 +209,12 @@ def test_children_end_with_a_parent_that_is_killed(busy: bool, tmp_path: Path) -
         "from service.assets.types import AssetLimits\n"
         "box = Sandbox(AssetLimits())\n"
         f"box.parse('obj', {OBJ!r})\n"
-        "print(box._idle[0].process.pid, flush=True)\n"
+        "print(box.children.idle[0].process.pid, flush=True)\n"
         f"box.parse('obj', open({str(tmp_path / 'endless.obj')!r}, 'rb').read()) if {busy} else time.sleep(60)\n"
     )
-    parent = subprocess.Popen([sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, cwd=sandbox.ROOT)
+    parent = subprocess.Popen(
+        [sys.executable, "-c", program], stdout=subprocess.PIPE, text=True, cwd=child_processes.ROOT
+    )
     assert parent.stdout is not None
     pid = int(parent.stdout.readline())
     time.sleep(0.5)

@@ -105,7 +105,7 @@ def test_what_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parser_pool, "SECONDS_PER_BYTE", 0)
     with pytest.raises(TooLarge, match="longer"):
         pool.parse("request", bytearray(b"[" + b'{"a":1},' * 800_000 + b"1]"))
-    assert pool._idle == []
+    assert pool._children.idle == []
     pool.close()
 
 

@@ -1,0 +1,126 @@
+"""Children that parse strangers' files and texts, as the service starts, reuses and ends them.
+
+`confined.py` is their own side: what they give up before they read anything.
+"""
+
+from __future__ import annotations
+
+import os
+import signal
+import socket
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from service.cpu_time import answers
+
+ROOT = Path(__file__).parents[1]
+START_SECONDS = 30.0  # libraries read from a cold disk
+CLOSING_SECONDS = 5.0  # from a hung-up socket to the end of its process
+# One thread each: a second one gains nothing on files of this size and takes address space from the limit.
+THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+class Closed(Exception):
+    """The children were closed: the service is shutting down."""
+
+
+class Child:
+    """`python -m MODULE DESCRIPTOR`, the descriptor being its end of a socket of whole messages, `link` ours."""
+
+    def __init__(self, module: str, environment: dict[str, str], is_quiet: bool) -> None:
+        self.link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+        with theirs:
+            # Nothing of the service's settings: they may hold its key.
+            inherited = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
+            self.process = subprocess.Popen(
+                [sys.executable, "-m", module, str(theirs.fileno())],
+                cwd=ROOT,
+                env=inherited | THREADS | environment,
+                pass_fds=[theirs.fileno()],
+                stdin=subprocess.DEVNULL,
+                stdout=subprocess.DEVNULL,
+                stderr=subprocess.DEVNULL if is_quiet else None,
+            )
+        self._has_answered = False
+
+    def answers(self, seconds: float) -> bool:
+        """Wait until `link` can be read, for at most `seconds` of the child's own time, and longer for its start."""
+        self._has_answered = answers(
+            self.link, self.process.pid, seconds if self._has_answered else seconds + START_SECONDS
+        )
+        return self._has_answered
+
+    def exit_code(self) -> int | None:
+        """How a child ended that hung up; minus the signal's number for a signal, None where it runs on."""
+        try:
+            return self.process.wait(CLOSING_SECONDS)
+        except subprocess.TimeoutExpired:
+            return None
+
+    def kill(self) -> None:
+        self.process.kill()
+        self.process.wait()
+        self.link.close()
+
+
+class Children:
+    """Children of one module, for any thread. They start on demand, and each serves many requests in turn."""
+
+    def __init__(self, module: str, environment: dict[str, str] | None = None, is_quiet: bool = False) -> None:
+        """`environment` is added to each child's; `is_quiet` throws away what its libraries print to stderr."""
+        self._module, self._environment, self._is_quiet = module, environment or {}, is_quiet
+        self._lock = threading.Lock()
+        self._idle: list[Child] = []
+        self._is_closed = False
+
+    @property
+    def idle(self) -> list[Child]:
+        """The children that wait for work."""
+        with self._lock:
+            return list(self._idle)
+
+    @contextmanager
+    def one(self) -> Iterator[Child]:
+        """A child of the caller's own, which is killed where the block raises. Raises Closed."""
+        child = self._take()
+        try:
+            yield child
+        except BaseException:
+            child.kill()
+            raise
+        self._give_back(child)
+
+    def close(self) -> None:
+        """Ends the children that wait; one that works ends with its work."""
+        with self._lock:
+            self._is_closed = True
+            idle, self._idle = self._idle, []
+        for child in idle:
+            child.kill()
+
+    def _take(self) -> Child:
+        with self._lock:
+            if self._is_closed:
+                raise Closed
+            while self._idle:
+                child = self._idle.pop()
+                if child.process.poll() is None:
+                    return child
+                child.kill()
+        return Child(self._module, self._environment, self._is_quiet)
+
+    def _give_back(self, child: Child) -> None:
+        with self._lock:
+            if not self._is_closed:
+                self._idle.append(child)
+                return
+        child.kill()
+
+
+def signal_name(exit_code: int) -> str:
+    """What ended a process, in words for a message."""
+    return signal.Signals(-exit_code).name if exit_code < 0 else f"exit code {exit_code}"
