@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 
 from service.commands import CommandError
-from service.views import AOVS, DEFAULT_TONE_MAP, TONE_MAPS
+from service.views import AOVS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -58,7 +58,8 @@ def _serve(command: argparse.ArgumentParser) -> None:
 def _render(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add("input", metavar="INPUT", help="a scene's JSON, a glTF model, or a PNG or EXR that Sunbox made")
-    add("-o", "--output", required=True, metavar="OUT", help="the picture: .png, .exr, .hdr or .npy")
+    endings = _any_of([f".{name}" for name in LOSSLESS_FORMATS])
+    add("-o", "--output", required=True, metavar="OUT", help=f"the picture: {endings}")
     spp = "samples per pixel: the setting max_samples"
     add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
     add("--seed", dest="set", action="append", type=_setting("seed"), metavar="N", help="the setting seed")

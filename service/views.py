@@ -1,7 +1,7 @@
 """How a picture may be looked at: the names that the API, the stream, the command line and metadata share.
 
-Nothing heavy is imported here, as the command line's help needs the names. They are those of gpu/settings.py, which
-the server's process does not import; a test compares them.
+Nothing heavy is imported here, as the command line's help needs the names. AOVs and tone maps are those of
+gpu/settings.py, which the server's process does not import, and formats those of `images`; tests compare them.
 """
 
 from __future__ import annotations
@@ -12,9 +12,15 @@ Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "mat
 AovOrAll = Literal[Aov, "all"]  # "all" is every AOV as a layer of one file
 ToneMap = Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"]
 Bits = Literal[8, 16]  # of a PNG's channels
+LossyFormat = Literal["jpeg", "webp"]
+LinearFormat = Literal["exr", "hdr", "npy"]
+LosslessFormat = Literal["png", LinearFormat]  # what the command line writes
+FileFormat = Literal["png", LossyFormat, LinearFormat]
+StreamFormat = Literal[LossyFormat, "png", "rgba32f"]
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
 AOVS: tuple[Aov, ...] = get_args(Aov)
 TONE_MAPS: tuple[ToneMap, ...] = get_args(ToneMap)
+LOSSLESS_FORMATS: tuple[LosslessFormat, ...] = get_args(LosslessFormat)
 DEFAULT_TONE_MAP: Final = "pbr_neutral"
 LEAST_EXPOSURE, MOST_EXPOSURE = -60, 60  # stops

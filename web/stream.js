@@ -13,7 +13,8 @@ const PATIENCE_MS = 3000;
 const CAPTURE_MS = 20000;
 const REMIND_MS = 1500; // until a picture that did not come is asked for again
 
-const MIME = { jpeg: "image/jpeg", png: "image/png", webp: "image/webp", rgba32f: "application/octet-stream" };
+// Browsers decode pictures by their type; raw numbers have none.
+const mimeOf = (format) => (format === "rgba32f" ? "application/octet-stream" : `image/${format}`);
 
 // There is no picture yet of what is wanted, or none at full size.
 export class NotReady extends Error {}
@@ -238,7 +239,7 @@ export class Stream {
     if (header.generation !== this.#generation) return acknowledge();
     if (this.#sent) this.#answered();
     const view = this.#seen ?? this.#sent?.view;
-    const fits = view && header.mime === MIME[view.format];
+    const fits = view && header.mime === mimeOf(view.format);
     const capture = this.#seen && this.#captures[0];
     if (!fits || (!this.#seen && view.format === "rgba32f")) return acknowledge();
     if (this.#seen) clearTimeout(this.#reminder);

@@ -25,14 +25,11 @@ from service.commands.documents import (
     refusals,
     source_assets,
 )
-from service.views import AOVS, LEAST_EXPOSURE, MOST_EXPOSURE, TONE_MAPS
+from service.views import AOVS, LEAST_EXPOSURE, LOSSLESS_FORMATS, MOST_EXPOSURE, TONE_MAPS, LosslessFormat
 
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
-    from service.images import FileFormat
     from service.recipe import PictureView
-
-FORMATS: tuple[FileFormat, ...] = ("png", "exr", "hdr", "npy")
 
 
 @dataclass(frozen=True)
@@ -40,7 +37,7 @@ class Output:
     """What to write where."""
 
     path: Path
-    format: FileFormat
+    format: LosslessFormat
     view: PictureView
 
     @property
@@ -95,12 +92,12 @@ def run(arguments: argparse.Namespace) -> int:
     return 128 + interrupt.signal if interrupt.signal is not None else 0
 
 
-def _arguments(arguments: argparse.Namespace) -> tuple[Path, FileFormat, float | None]:
+def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, float | None]:
     """Where to write, in which format, and the exposure where one is given."""
     path = Path(arguments.output)
-    format = next((name for name in FORMATS if path.suffix.lower() == "." + name), None)
+    format = next((name for name in LOSSLESS_FORMATS if path.suffix.lower() == "." + name), None)
     if format is None:
-        raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join('.' + f for f in FORMATS)}")
+        raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join('.' + f for f in LOSSLESS_FORMATS)}")
     if arguments.aov is not None:
         _choose("--aov", arguments.aov, (*AOVS, "all"))
     if arguments.aov == "all" and format != "exr":

@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import BinaryIO, Literal
+from typing import BinaryIO
 
 from service.images.encoders import (
     Array,
@@ -26,13 +26,11 @@ from service.images.encoders import (
     write_webp,
 )
 from service.images.metadata import read_metadata
-from service.views import Aov, Encoding
+from service.views import Aov, Encoding, FileFormat, StreamFormat
 
 __all__ = [
     "FORMATS",
     "LAYERS",
-    "FileFormat",
-    "StreamFormat",
     "encode",
     "encode_layers",
     "read_metadata",
@@ -40,15 +38,11 @@ __all__ = [
     "write_layers",
 ]
 
-Lossy = Literal["jpeg", "webp"]
-FileFormat = Literal["png", Lossy, "exr", "hdr", "npy"]
-StreamFormat = Literal[Lossy, "png", "rgba32f"]
-
 
 @dataclass(frozen=True)
 class Format:
     """`bits` are those that a channel may have; `is_displayed`: the values are display-encoded, not linear;
-    `by_openimageio`: only to a file with a descriptor."""
+    `by_openimageio`: it can only be written to a file with a descriptor."""
 
     mime: str
     write: Callable[[BinaryIO, Array, Choices], None]

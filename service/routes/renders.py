@@ -24,7 +24,7 @@ from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.routes import answers
 from service.routes.errors import GONE
 from service.state import STARTING_S, AppState, app_state, caller, owner
-from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, ToneMap
+from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 
@@ -38,7 +38,7 @@ Saving = Annotated[
         "of a core by llvmpipe). Answers bring it from then on."
     ),
 ]
-FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(images.FileFormat)))
+FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
 
 
 class Bits(IntEnum):
@@ -50,7 +50,7 @@ class ImageQuery(BaseModel):
     """How an image is written. EXR, npy and HDR hold linear values; exposure and tone map are for the others."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
-    format: images.FileFormat = "png"
+    format: FileFormat = "png"
     bits: Bits = Bits.EIGHT
     aov: AovOrAll = "color"
     exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0

@@ -11,7 +11,7 @@ from typing import Any, get_args
 import numpy as np
 import pytest
 
-from service import images
+from service import images, views
 from tests.asset_files import png, read_exr, read_hdr, read_png
 
 RNG = np.random.default_rng(3)
@@ -140,7 +140,7 @@ def test_rgba32f_is_always_four_floats(channels: int) -> None:
     ("format", "bits", "encoding"),
     [("png", 8, "u1"), ("png", 16, "f4"), ("jpeg", 8, "u1"), ("webp", 16, "u1"), ("exr", 16, "linear")],
 )
-def test_a_format_says_what_it_is_written_from(format: images.FileFormat, bits: int, encoding: str) -> None:
+def test_a_format_says_what_it_is_written_from(format: views.FileFormat, bits: int, encoding: str) -> None:
     assert images.FORMATS[format].encoding(bits) == encoding
 
 
@@ -150,7 +150,7 @@ def test_a_plane_without_channels_is_one_channel() -> None:
 
 
 def test_every_format_is_written() -> None:
-    assert set(get_args(images.FileFormat) + get_args(images.StreamFormat)) == set(images.FORMATS)
+    assert set(get_args(views.FileFormat) + get_args(views.StreamFormat)) == set(images.FORMATS)
     for format in images.FORMATS:
         assert images.encode(linear(), format)
     with pytest.raises(ValueError, match="bmp"):

@@ -14,7 +14,7 @@ from service.rendering.ipc import messages
 from service.scene.base import Model, hint
 from service.scene.text import load_json, most_bytes
 from service.scene.validation import validated
-from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, ToneMap
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, StreamFormat, ToneMap
 
 MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
 GENERATIONS = 2**53  # what every JSON reader keeps exact
@@ -25,7 +25,7 @@ MOST_FPS = 240
 class View(Model):
     """How frames are to look; what a message leaves out stays as it was."""
 
-    format: images.StreamFormat = "jpeg"
+    format: StreamFormat = "jpeg"
     quality: Annotated[int, Field(ge=1, le=100)] | None = None
     exposure: Annotated[
         float,
