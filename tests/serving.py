@@ -9,7 +9,7 @@ import subprocess
 import sys
 import time
 from collections.abc import Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -104,7 +104,8 @@ class Picture:
 
 
 class Client:
-    """The other end of the stream. Acknowledges what it receives unless told otherwise."""
+    """The other end of the stream, open until `close` or the end of `with`. Acknowledges what it receives unless
+    `acknowledges` is set to False."""
 
     def __init__(
         self,
@@ -120,8 +121,20 @@ class Client:
         address = url.replace("http://", "ws://") + "/v1/stream" + (query and f"?{query}")
         offered = None if origin is None else Origin(origin)
         protocols = [Subprotocol("sunbox.v1"), *([] if key is None else [Subprotocol(f"sunbox.key.{key}")])]
-        self.socket = connect(address, subprotocols=protocols, max_size=None, origin=offered)
+        self._closing = ExitStack()
+        self.socket = self._closing.enter_context(
+            connect(address, subprotocols=protocols, max_size=None, origin=offered)
+        )
         self.acknowledges = True
+
+    def __enter__(self) -> Client:
+        return self
+
+    def __exit__(self, *raised: object) -> None:
+        self.close()
+
+    def close(self) -> None:
+        self._closing.close()
 
     def say(self, kind: str, **message: Any) -> None:
         self.socket.send(json.dumps({"type": kind, **message}))
@@ -185,6 +198,6 @@ class Client:
 def client(server: Server) -> Iterator[Client]:
     """A stream that has said hello."""
     opened = Client(server.url)
-    with opened.socket:
+    with opened:
         assert opened.until("hello")
         yield opened

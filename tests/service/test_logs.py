@@ -164,7 +164,7 @@ def test_session_ids_are_in_no_log(server: Server) -> None:
     session = None
     for _ in range(2):
         opened = Client(server.url, session=session)
-        with opened.socket:
+        with opened:
             session = opened.until("hello")[0]["session"]
     wait_until(lambda: server.log.read_text().count("path=/v1/stream") == already + 2)
     assert session not in server.log.read_text()

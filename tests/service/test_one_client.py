@@ -81,7 +81,7 @@ class Victim:
         self._ended.set()
         for thread in self._threads:
             thread.join()
-        self._stream.socket.close()
+        self._stream.close()
 
     def _took(self, what: str, began: float) -> None:
         self.waits[what] = max(self.waits[what], time.monotonic() - began)

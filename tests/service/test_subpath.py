@@ -97,7 +97,7 @@ def test_a_render_is_found_where_it_is_said_to_be(proxy: Proxy) -> None:
 
 def test_the_stream_passes(proxy: Proxy) -> None:
     client = Client(proxy.url, origin=proxy.url.removesuffix(PREFIX))
-    with client.socket:
+    with client:
         assert client.until("hello")
         client.start()
         done, last = client.finished()

@@ -29,7 +29,7 @@ def entered(server: Server, session: str | None = None) -> tuple[Client, str]:
 
 
 def closed_with(client: Client) -> int:
-    with client.socket, pytest.raises(ConnectionClosed) as closed:
+    with client, pytest.raises(ConnectionClosed) as closed:
         client.until("never")
     assert closed.value.rcvd is not None
     return closed.value.rcvd.code
@@ -47,7 +47,7 @@ def test_a_dropped_connection_is_taken_up_with_its_samples(server: Server) -> No
     first.socket.socket.close()  # no farewell
     time.sleep(1.0)
     second, again = entered(server, session)
-    with second.socket:
+    with second:
         assert again == session
         taken = second.frame()
         assert taken.generation == 1 and taken.seq == frames[-1].seq + 1 and taken.samples >= frames[-1].samples
@@ -62,11 +62,11 @@ def test_a_dropped_connection_is_taken_up_with_its_samples(server: Server) -> No
 def test_a_picture_that_rests_rests_on(server: Server) -> None:
     """Done is said again, and what the client has paused stays so."""
     first, session = entered(server)
-    with first.socket:
+    with first:
         first.start()
         done, _ = first.finished()
     second, _ = entered(server, session)
-    with second.socket:
+    with second:
         assert second.finished()[0] == done
         second.say("update", generation=2, settings=ENDLESS)
         second.frame(generation=2)
@@ -74,7 +74,7 @@ def test_a_picture_that_rests_rests_on(server: Server) -> None:
         second.say("ping")
         second.until("pong")
     third, _ = entered(server, session)
-    with third.socket:
+    with third:
         samples = third.frame().samples
         assert not third.silence(0.3)
         third.say("resume")
@@ -86,7 +86,7 @@ def test_taken_up_elsewhere(server: Server) -> None:
     first.start(settings=ENDLESS)
     first.frame()
     second, _ = entered(server, session)
-    with second.socket:
+    with second:
         assert closed_with(first) == 4409
         assert second.frame().generation == 1
         second.say("update", generation=2, settings={"seed": 1})
@@ -165,10 +165,10 @@ def test_a_session_belongs_to_its_key(gpu: object, tmp_path_factory: pytest.Temp
         session = first.until("hello")[0]["session"]
         assert closed_with(Client(server.url, session=session, key="bert-key")) == 4404
         assert closed_with(Client(server.url, beside=session, key="bert-key")) == 4429
-        with Client(server.url, beside=session, key="anna-key").socket:
+        with Client(server.url, beside=session, key="anna-key"):
             pass
         again = Client(server.url, session=session, key="anna-key")
-        with again.socket:
+        with again:
             assert again.until("hello")[0]["session"] == session
         assert closed_with(first) == 4409
     finally:

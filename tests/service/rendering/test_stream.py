@@ -23,7 +23,7 @@ def client(server: Server) -> Iterator[Client]:
 
 def test_hello_says_what_info_says(server: Server) -> None:
     stream = Client(server.url)
-    with stream.socket:
+    with stream:
         hello = stream.hear()
         assert isinstance(hello, dict) and hello.pop("type") == "hello"
         assert len(hello.pop("session")) >= 32
@@ -180,12 +180,12 @@ def test_too_large_a_message_closes(server: Server) -> None:
 @pytest.mark.parametrize("origin", ["http://example.com", "null", "http://127.0.0.1:1"])
 def test_foreign_origins_are_closed(server: Server, origin: str) -> None:
     stream = Client(server.url, origin=origin)
-    with stream.socket, pytest.raises(ConnectionClosed) as closed:
+    with stream, pytest.raises(ConnectionClosed) as closed:
         stream.until("hello")
     assert closed.value.rcvd is not None and closed.value.rcvd.code == 4403
 
 
 def test_own_origin_is_welcome(server: Server) -> None:
     stream = Client(server.url, origin=server.url)
-    with stream.socket:
+    with stream:
         assert stream.until("hello")
