@@ -59,7 +59,7 @@ export class Comparison {
       },
     }, element("option", { value: "" }, "B as…"), ...models.map((name) => element("option", { value: name }, inWords(name))));
     const swap = element("button", { type: "button", class: "button small", onclick: () => this.acts.swapVariants() }, "Swap");
-    const close = element("button", { type: "button", class: "button small", onclick: () => this.acts.stopComparing() }, "Done");
+    const close = element("button", { type: "button", class: "button small close", onclick: () => this.acts.stopComparing() }, "Done");
     this.gains = element("select", {
       "aria-label": "How much the difference is brightened",
       onchange: () => { this.gain = Number(this.gains.value); this.painted(); },

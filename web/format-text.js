@@ -2,7 +2,7 @@
 
 const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²" };
 const NAMES = {
-  aces: "ACES", agx: "AgX", pbr_neutral: "PBR neutral", mis: "MIS", bsdf: "BSDF", blackman_harris: "Blackman\u2013Harris",
+  aces: "ACES", agx: "AgX", pbr_neutral: "PBR neutral", mis: "MIS", bsdf: "BSDF", blackman_harris: "Blackman\u2013Harris", blinn_phong: "Blinn-Phong",
   color: "Colour", shape_id: "Shapes", material_id: "Materials",
 };
 

@@ -83,6 +83,9 @@ export function watchKeys(move, acts) {
   window.addEventListener("blur", () => flight.stop());
 }
 
+const FINGERS = ["Fingers on the picture", [
+  ["drag", "orbit"], ["two fingers", "slide the view"], ["pinch", "come nearer, go away"], ["tap", "select a thing and its material"],
+]];
 const MOVES = [
   ["The picture", [
     ["drag", "orbit"], ["Shift", "drag", "slide the view; also the right button, or two fingers"],
@@ -97,9 +100,10 @@ const shown = ({ keys: [key], ctrl, shift }) => [
   ...(ctrl ? ["Ctrl"] : []), ...(shift ? ["Shift"] : []), NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key),
 ];
 
-// The sheet: every act with its keys, by groups.
+// The sheet: every act with its keys, by groups; what fingers do comes first where there are fingers.
 export function fillSheet(root, acts) {
-  const groups = new Map(MOVES.map(([name, rows]) => [name, rows.map((row) => [row.slice(0, -1), row.at(-1)])]));
+  const isTouched = matchMedia("(pointer: coarse)").matches;
+  const groups = new Map((isTouched ? [FINGERS, ...MOVES] : MOVES).map(([name, rows]) => [name, rows.map((row) => [row.slice(0, -1), row.at(-1)])]));
   for (const act of acts) {
     if (!groups.has(act.group)) groups.set(act.group, []);
     groups.get(act.group).push([shown(act), act.says]);

@@ -27,6 +27,8 @@ export class Messages {
     const node = element("div", { class: `message ${kind}` }, text, bar, button, close);
     this.#shown.set(kind, { node, about: lasting ? [] : this.about(kind) });
     this.root.append(node);
+    // The message takes its height from the page above it: the field in hand stays in sight.
+    document.activeElement?.closest?.(".page .field")?.scrollIntoView({ block: "nearest" });
     return (share) => { if (bar) bar.value = share; };
   }
 

@@ -67,7 +67,7 @@ class ImageTexture(Model):
     ] = 0.0
     offset: Annotated[Pair, hint("Offset", "Added to u and v last.", unit="", widget="number")] = (0.0, 0.0)
     uv: Annotated[
-        int, Field(ge=0, le=1), hint("uv set", "Of a mesh's two sets of coordinates.", unit="", widget="number")
+        int, Field(ge=0, le=1), hint("UV set", "Of a mesh's two sets of coordinates.", unit="", widget="number")
     ] = 0
 
 

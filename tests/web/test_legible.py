@@ -83,13 +83,16 @@ def test_an_unset_slider_stands_where_the_value_is_that_holds(at: Editor) -> Non
     assert page.input_value(slider) == "1.7"
 
 
-@pytest.mark.parametrize("at", [(320, 640, True), (320, 640, False), (390, 844, True)], indirect=True)
+@pytest.mark.parametrize(
+    "at", [(320, 640, True), (320, 640, False), (380, 800, True), (390, 844, True)], indirect=True
+)
 def test_narrow_bars_clip_no_word(at: Editor) -> None:
     page = at.page
     past = """() => ["top", "bar", "readings"].map((name) => document.querySelector(`.${name}`))
         .filter((each) => each.scrollWidth > each.clientWidth).map((each) => each.className)"""
     longest = """() => {
-        for (const [id, text] of [["samples", "256 / 256"], ["left", "13 min"]]) {
+        const words = { samples: "256 / 256", noise: "0.29 %", left: "13 min", state: "Rendering" };
+        for (const [id, text] of Object.entries(words)) {
             document.getElementById(id).textContent = text;
         }
     }"""
@@ -106,3 +109,41 @@ def test_narrow_bars_clip_no_word(at: Editor) -> None:
             assert (
                 page.evaluate(f"(e => e.scrollWidth - e.clientWidth)(document.querySelector('.variant.{side}'))") <= 0
             )
+
+
+@pytest.mark.parametrize("at", SIZES[2:], indirect=True)
+def test_a_phone_gives_its_picture_room_and_lists_gestures_first(at: Editor) -> None:
+    page = at.page
+    page.tap("#compare")
+    at.wait("the bar", lambda: page.is_visible("#comparison"))
+    stage, bar, way_out = (
+        page.locator(each).bounding_box() for each in ("#stage", "#comparison", "#comparison .close")
+    )
+    assert stage and bar and way_out
+    assert bar["height"] < 0.17 * stage["height"]
+    assert way_out["x"] + way_out["width"] <= 390, "the way out is in sight"
+    page.tap("#help")
+    assert page.locator("#keys h3").first.inner_text() == "Fingers on the picture"
+
+
+@pytest.mark.parametrize("at", SIZES[:1], indirect=True)
+def test_rows_without_an_image_keep_the_columns(at: Editor) -> None:
+    edges = """() => ["emission_sides", "alpha"].map((name) =>
+        document.querySelector(`[data-field=${name}] :is(select, .slider)`).getBoundingClientRect().left)"""
+    sides, alpha = at.page.evaluate(edges)
+    assert abs(sides - alpha) < 1
+
+
+@pytest.mark.parametrize("at", SIZES[2:], indirect=True)
+def test_a_message_does_not_hide_the_field_in_hand(at: Editor) -> None:
+    page = at.page
+    box = at.field("roughness", "number")
+    page.evaluate("(place) => document.querySelector(place).scrollIntoView({ block: 'end' })", box)
+    page.focus(box)
+    page.evaluate("""async () => {
+        const { Messages } = await import(new URL("messages.js", location));
+        new Messages(document.getElementById("messages"), () => [])
+            .show("import", { title: "duck.glb: not all of it was taken." });
+    }""")
+    (field, shown) = (page.locator(each).bounding_box() for each in (box, "#messages"))
+    assert field and shown and field["y"] + field["height"] <= shown["y"]
