@@ -212,6 +212,17 @@ LobeSample principled_sample_microfacet(Surface s, vec3 wo, float v, vec2 u, flo
     return r;
 }
 
+#if HAS_CLEARCOAT
+// Samples the coat, which is picked with the chance `weight`.
+LobeSample principled_sample_coat(Surface s, vec3 wo, vec2 u, float weight) {
+    vec3 wi = principled_coat_from_local(s, principled_clearcoat_sample(s, principled_coat_to_local(s, wo), u));
+    float f = s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), CLEARCOAT_ETA);
+    LobeSample r = LobeSample(wi, s.coat_is_delta, Scatter(vec3(0.0), 0.0), true);
+    if (r.is_delta) r.scatter = Scatter(vec3(f), weight);
+    return r;
+}
+#endif
+
 LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     PrincipledWeights w = principled_weights(s, wo);
     LobeSample r = LobeSample(sampling_cosine(u), false, Scatter(vec3(0.0), 0.0), false);
@@ -231,14 +242,7 @@ LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     v -= w.sheen;
 #endif
 #if HAS_CLEARCOAT
-    vec3 coat = principled_coat_from_local(s, principled_clearcoat_sample(s, principled_coat_to_local(s, wo), u));
-    r.coated = v >= 0.0 && w.coat > 0.0;
-    if (r.coated) {
-        r.wi = coat;
-        r.is_delta = s.coat_is_delta;
-        float f = s.clearcoat * fresnel_dielectric(principled_coat_cosine(s, wo), CLEARCOAT_ETA);
-        if (r.is_delta) r.scatter = Scatter(vec3(f), w.coat);
-    }
+    if (v >= 0.0 && w.coat > 0.0) r = principled_sample_coat(s, wo, u, w.coat);
 #endif
     return r;
 }
