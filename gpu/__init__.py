@@ -15,12 +15,14 @@ tables      tables that kernels draw from and look up; public, without GL
 kernels     from a scene to compiled kernels
 device      arrays as OpenGL objects
 picture     one picture in the making
+bsdf        one material's BSDF as numbers
 precompile  kernels that are compiled before they are needed; public
 analysis    measurements of a scene at hand; public
 """
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light
 from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays, apply_edit
+from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfValues
 from gpu.device.scene import Scene
 from gpu.errors import (
     CompileError,
@@ -46,6 +48,9 @@ __all__ = [
     "FIRST_HIT_AOVS",
     "SAMPLERS",
     "TONE_MAPS",
+    "BsdfAlbedo",
+    "BsdfEvaluator",
+    "BsdfValues",
     "CameraArrays",
     "CompileError",
     "ContextError",

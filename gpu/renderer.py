@@ -8,6 +8,7 @@ from typing import Any
 from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
+from gpu.bsdf.evaluator import BsdfEvaluator
 from gpu.device.scene import Scene
 from gpu.device.textures import TextureCache
 from gpu.errors import SceneTooLarge, WrongThread
@@ -25,6 +26,7 @@ class Renderer:
         self._context = contexts.create(device)
         self._kernels = KernelCache(self._context)
         self._texels = TextureCache()
+        self._bsdf = BsdfEvaluator(self._context, self._kernels)
         self._frame = self._context.buffer(reserve=layout.Frame.dtype.itemsize)
         self.info: dict[str, Any] = contexts.describe(self._context)
 
@@ -67,6 +69,12 @@ class Renderer:
         self._own()
         return Picture(self._context, self._kernels, self._frame, scene, settings)
 
+    @property
+    def bsdf(self) -> BsdfEvaluator:
+        """What the BSDF of one material is, as numbers."""
+        self._own()
+        return self._bsdf
+
     def tidy(self) -> float | None:
         """Lets go of kernels that nobody has used for long; in how many seconds to call again, None: no need."""
         self._own()
@@ -87,6 +95,7 @@ class Renderer:
         self._own()
         self._kernels.release()
         self._texels.release()
+        self._bsdf.release()
         self._frame.release()
         contexts.release(self._context)
 

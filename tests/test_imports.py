@@ -49,7 +49,7 @@ GPU_LAYERS = [
     {"gpu.arrays", "gpu.context", "gpu.footprint"},
     {"gpu.kernels"},
     {"gpu.device"},
-    {"gpu.picture"},
+    {"gpu.picture", "gpu.bsdf"},
     {"gpu.precompile"},
     {"gpu.renderer"},
     {"gpu.analysis"},

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from hashlib import sha256
 
@@ -9,6 +10,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
+from gpu.bsdf import kernels as bsdf
 from gpu.device.textures import BYTES, KINDS, bound_textures
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
@@ -102,6 +104,18 @@ def common_keys() -> list[KernelKey]:
     metered = [("meter.comp", noise_meter.defines(weigh)) for weigh in (0, 1)]
     entries = [*shown, *metered, ("areas.comp", features.defines(frozenset()))]
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
+
+
+def bsdf_key(material: np.ndarray, sampled: bool) -> KernelKey:
+    """What a `BsdfEvaluator` needs for one `layout.Material` record: for its albedo (`sampled`) or its values."""
+    entry = bsdf.ALBEDO if sampled else bsdf.VALUES
+    return KernelKey(tuple(bsdf.defines(material, entry).items()), (), entry)
+
+
+def bsdf_keys() -> Iterator[KernelKey]:
+    """What a `BsdfEvaluator` needs for any material."""
+    for entry, defines in bsdf.all_defines():
+        yield KernelKey(tuple(defines.items()), (), entry)
 
 
 def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, str, int, int], ...]:

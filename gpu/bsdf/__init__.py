@@ -1,0 +1,5 @@
+"""One material's BSDF as numbers, from the functions that render.
+
+kernels    which kernels answer for a material
+evaluator  values, densities and albedos, in slices between which others have their turn
+"""

@@ -1,0 +1,195 @@
+"""Values, densities and albedos of one material, in slices between which others have their turn.
+
+Directions are in the frame of `shaders/bsdf_lone.glsl`: z is the outward normal, x the tangent.
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Generator, Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from gpu import context as contexts
+from gpu import layout
+from gpu.bsdf import kernels as own
+from gpu.device.scene import upload_tables
+from gpu.kernels.cache import KernelCache
+from gpu.layout import bindings
+from gpu.layout.bindings import Slot
+
+DELTAS = 3  # as in shaders/bsdf_deltas.glsl
+BATCH = 64  # samples of one invocation: their sums in single precision are right to 4e-6
+SLICE_S = 0.01  # between two looks at who else waits
+_GROUP = 64  # invocations
+_FIRST = 1024  # invocations of the first slice; the time that each slice takes tells the next one's size
+_MOST = 1 << 16  # ... of any, which bounds the buffers
+
+
+@dataclass(frozen=True)
+class BsdfValues:
+    """For n directions wo and m directions wi: `f` (n, m, 3), 1/sr, without the cosine, transmission as basic
+    radiance; `pdf` (n, m), 1/sr. Perfectly specular lobes, which are in neither: `delta_wi` (n, DELTAS, 3),
+    `delta_weight` (n, DELTAS, 3), and `delta_probability` (n, DELTAS), 0 where there is none. All float32."""
+
+    f: np.ndarray
+    pdf: np.ndarray
+    delta_wi: np.ndarray
+    delta_weight: np.ndarray
+    delta_probability: np.ndarray
+
+
+@dataclass(frozen=True)
+class BsdfAlbedo:
+    """The mean of what `samples` samples multiply radiance by, reflected and transmitted, (n, 3) float64, and its
+    standard error (n, 3), NaN for a single sample."""
+
+    albedo: np.ndarray
+    error: np.ndarray
+
+
+class BsdfEvaluator:
+    """Made by `Renderer.bsdf`. The tables of `principled` are uploaded when they are first needed, and stay."""
+
+    def __init__(self, context: Any, kernels: KernelCache) -> None:
+        self._context, self._kernels = context, kernels
+        self._tables: dict[int, Any] = {}
+
+    def values(
+        self, material: np.ndarray, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
+    ) -> Generator[None, None, BsdfValues]:
+        """Evaluate one `layout.Material` record for every pair of `wo` (n, 3) and `wi` (m, 3), unit length.
+
+        Raises CompileError, OutOfMemory.
+        """
+        n, m = len(wo), len(wi)
+        work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m})
+        try:
+            work.give(np.concatenate([wo, wi]))
+            work.make(Slot.OUTPUT, 16 * n * m)
+            work.make(Slot.MOMENTS, 32 * DELTAS * n)
+            for _ in work.slices(n * m, slice_s):
+                yield
+            found = work.read(Slot.OUTPUT).reshape(n, m, 4)
+            wi_, weight = np.moveaxis(work.read(Slot.MOMENTS).reshape(n, DELTAS, 2, 4), 2, 0)
+        finally:
+            work.release()
+        return BsdfValues(found[..., :3], found[..., 3], wi_[..., :3], weight[..., :3], wi_[..., 3])
+
+    def albedo(
+        self, material: np.ndarray, wo: np.ndarray, samples: int, slice_s: float = SLICE_S
+    ) -> Generator[None, None, BsdfAlbedo]:
+        """Sample one `layout.Material` record as a path does, `samples` times from each of `wo` (n, 3), unit length.
+
+        Raises CompileError, OutOfMemory.
+        """
+        n, batches = len(wo), -(-samples // BATCH)
+        sums = np.zeros((2, n, 3))
+        work = self._dispatch(material, own.ALBEDO, {"batches": batches, "batch": BATCH, "samples": samples})
+        try:
+            work.give(wo)
+            work.make(Slot.OUTPUT, 32 * min(_MOST, n * batches))
+            for first, count in work.slices(n * batches, slice_s):
+                part = work.read(Slot.OUTPUT, 32 * count).reshape(count, 2, 4).astype(np.float64)
+                rows = np.arange(first, first + count) // batches
+                for total, each in zip(sums, (part[:, 0], part[:, 1]), strict=True):
+                    np.add.at(total, rows, each[:, :3])
+                yield
+        finally:
+            work.release()
+        mean = sums[0] / samples
+        if samples == 1:
+            return BsdfAlbedo(mean, np.full_like(mean, np.nan))
+        # Rounding may leave a little less than nothing of the variance of samples that are all alike.
+        variance = np.maximum(sums[1] / samples - mean**2, 0.0) * (samples / (samples - 1))
+        return BsdfAlbedo(mean, np.sqrt(variance / samples))
+
+    def release(self) -> None:
+        for table in self._tables.values():
+            table.release()
+
+    def _dispatch(self, material: np.ndarray, entry: str, uniforms: dict[str, int]) -> _Dispatch:
+        contexts.use(self._context)
+        defines = own.defines(material, entry)
+        if defines["HAS_PRINCIPLED"] and not self._tables:
+            self._tables = upload_tables(self._context)
+        return _Dispatch(self._context, self._kernels, (entry, defines), own.bare(material), self._tables, uniforms)
+
+
+class _Dispatch:
+    """A kernel with its buffers, for one question. Others use the context and the kernel between slices, so that
+    each slice binds and sets everything again."""
+
+    def __init__(
+        self,
+        context: Any,
+        kernels: KernelCache,
+        which: tuple[str, dict[str, object]],
+        material: np.ndarray,
+        tables: dict[int, Any],
+        uniforms: dict[str, int],
+    ) -> None:
+        self._context, self._kernels, self._tables, self._uniforms = context, kernels, tables, uniforms
+        self._buffers: dict[Slot, Any] = {}
+        self._blocks: dict[int, Any] = {}
+        self._kernel = kernels.get(*which)
+        kernels.hold(self._kernel)
+        try:
+            self._blocks[bindings.COUNTED["material"]] = contexts.allocate(context, material.view(np.uint8))
+            self._blocks[bindings.FRAME_BLOCK] = contexts.allocate(context, layout.Frame.dtype.itemsize)
+            self._blocks[bindings.FRAME_BLOCK].clear()
+        except BaseException:
+            self.release()
+            raise
+
+    def give(self, directions: np.ndarray) -> None:
+        """Upload directions (n, 3), which kernels read as vec4."""
+        padded = np.zeros((len(directions), 4), np.float32)
+        padded[:, :3] = directions
+        padded[np.abs(padded) < np.finfo(np.float32).tiny] = (
+            0.0  # whether shaders see subnormals is the driver's choice
+        )
+        self._buffers[Slot.SUM] = contexts.allocate(self._context, padded)
+
+    def make(self, slot: Slot, size: int) -> None:
+        """Allocate a buffer of so many bytes, which the kernel writes."""
+        self._buffers[slot] = contexts.allocate(self._context, size)
+
+    def read(self, slot: Slot, size: int = -1) -> np.ndarray:
+        """The first `size` bytes of a buffer, or all of them, as float32."""
+        contexts.use(self._context)
+        return np.frombuffer(self._buffers[slot].read(size), np.float32)
+
+    def slices(self, total: int, slice_s: float) -> Iterator[tuple[int, int]]:
+        """Run over `total` invocations in parts (first, count) of about `slice_s` seconds, each done when yielded."""
+        first, size = 0, _FIRST
+        while first < total:
+            count = min(size, total - first)
+            began = time.perf_counter()
+            self._run(first, count)
+            seconds = time.perf_counter() - began
+            yield first, count
+            first += count
+            growth = min(max(slice_s / max(seconds, 1e-6), 0.25), 4.0)
+            size = min(max(int(size * growth) // _GROUP, 1) * _GROUP, _MOST)
+
+    def _run(self, first: int, count: int) -> None:
+        contexts.use(self._context)
+        for slot, buffer in self._buffers.items():
+            buffer.bind_to_storage_buffer(int(slot))
+        for block, buffer in self._blocks.items():
+            buffer.bind_to_uniform_block(block)
+        for unit, table in self._tables.items():
+            table.use(unit)
+        for name, value in {**self._uniforms, "first": first, "count": count}.items():
+            self._kernel[name].value = value
+        self._kernel.run(-(-count // _GROUP))
+        self._context.finish()
+
+    def release(self) -> None:
+        contexts.use(self._context)
+        for buffer in (*self._buffers.values(), *self._blocks.values()):
+            buffer.release()
+        self._kernels.let_go(self._kernel)

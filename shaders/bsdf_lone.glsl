@@ -1,0 +1,28 @@
+// One material without a scene, as the tables of its BSDF see it (bsdf_values.comp, bsdf_albedo.comp): material 0 in a
+// frame whose z is the outward normal and whose x is the tangent. wo.z < 0 is inside a body that transmits; of other
+// materials nothing is seen from there.
+
+struct Lone {
+    Surface s;
+    float side;   // 1 outside, -1 inside: there y and z of the surface's own frame point the other way
+    bool visible; // false: wo is behind a surface that does not transmit, or in its plane
+};
+
+// Into the frame in which the lobes see the surface from wo's side, and back.
+vec3 lone_turn(Lone lone, vec3 w) { return vec3(w.x, lone.side * w.yz); }
+
+Lone lone_make(vec3 wo) {
+    Material m = material_load(0u);
+    Lone lone;
+    bool behind = wo.z < 0.0;
+    lone.side = behind ? -1.0 : 1.0;
+    lone.visible = wo.z > 0.0 || (behind && surface_transmits(m));
+#if HAS_ANISOTROPIC
+    m.anisotropic_rotation *= lone.side; // it turns from u towards v on both sides, as in interaction_tangent
+#endif
+    lone.s = surface_make(m, vec2(1.0, 0.0));
+#if HAS_PRINCIPLED_LOBES
+    principled_face(lone_turn(lone, wo), behind, lone.s);
+#endif
+    return lone;
+}

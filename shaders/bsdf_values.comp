@@ -1,0 +1,40 @@
+// Entry: f, without the cosine of wi, and the density of wi, for every pair of a wo and a wi, both in the frame of
+// bsdf_lone.glsl; and what is perfectly specular as seen from each wo.
+layout(local_size_x = 64) in;
+#include "layout.glsl"
+#include "constants.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "surface.glsl"
+#include "bsdf.glsl"
+#include "bsdf_lone.glsl"
+#include "bsdf_deltas.glsl"
+layout(std430, binding = SLOT_SUM) readonly buffer direction_buffer { vec4 directions[]; }; // every wo, then every wi
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer value_buffer { vec4 values[]; };     // f and its density
+layout(std430, binding = SLOT_MOMENTS) writeonly buffer delta_buffer { vec4 deltas[]; };    // wi and chance; weight
+uniform uint first; // of the pairs to evaluate
+uniform uint count;
+uniform uint wo_count;
+uniform uint wi_count;
+
+void main() {
+    if (gl_GlobalInvocationID.x >= count) return;
+    uint pair = first + gl_GlobalInvocationID.x;
+    uint row = pair / wi_count, column = pair - row * wi_count;
+    vec3 wo = directions[row].xyz, wi = directions[wo_count + column].xyz;
+    Lone lone = lone_make(wo);
+    wo = lone_turn(lone, wo);
+    Scatter value = bsdf_eval(lone.s, wo, lone_turn(lone, wi));
+    if (!lone.visible || wi.z == 0.0) value = Scatter(vec3(0.0), 0.0);
+    else value.f /= abs(wi.z);
+    values[pair] = vec4(value.f, value.pdf);
+    LobeSample specular[BSDF_DELTAS];
+    bsdf_deltas(lone.s, wo, specular);
+    if (column == 0u) {
+        for (int k = 0; k < BSDF_DELTAS; k++) {
+            uint at = 2u * (row * uint(BSDF_DELTAS) + uint(k));
+            deltas[at] = vec4(lone_turn(lone, specular[k].wi), lone.visible ? specular[k].scatter.pdf : 0.0);
+            deltas[at + 1u] = vec4(specular[k].scatter.f, 0.0);
+        }
+    }
+}
