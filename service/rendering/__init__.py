@@ -3,6 +3,7 @@
 requests     from what a caller wrote to what the renderer takes
 jobs         renders asked for over REST
 streams      scenes that are edited while they are watched
+bsdf         questions about the BSDF of one material
 renderers    what the server asks of its renderers, as a protocol
 supervisor   the renderer's process, kept alive
 statistics   counters and distributions, for /metrics

@@ -11,7 +11,7 @@ from dataclasses import dataclass, field
 from itertools import accumulate
 from typing import Literal
 
-Kind = Literal["stream", "render", "server"]  # whose work: a stream's, REST's, the server's own
+Kind = Literal["stream", "render", "bsdf", "server"]  # whose work: a stream's, a render's, a lobe's, the server's own
 
 SECONDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
 

@@ -156,6 +156,19 @@ class Restore:
     progress: Progress
 
 
+@dataclass(frozen=True)
+class EvaluateBsdf:
+    """Asks for one Evaluated: the BSDF of one material, as gpu.BsdfEvaluator has it. With `samples` its albedo from
+    each of `wo`, else its values for every pair of `wo` and `wi`. The task is this question's alone."""
+
+    task: int
+    material: np.ndarray  # one layout.Material
+    wo: np.ndarray  # (n, 3), unit length
+    wi: np.ndarray | None = None  # (m, 3), unit length
+    samples: int = 0
+    client: str = ""
+
+
 # --- from the renderer ---
 
 
@@ -264,6 +277,14 @@ class KernelMeasured:
 
 
 @dataclass(frozen=True)
+class Evaluated:
+    """The members of a gpu.BsdfValues or a gpu.BsdfAlbedo, by name."""
+
+    task: int
+    arrays: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
 class Evicted:
     """The renderer has this finished task no more; Restore brings it back."""
 
@@ -298,7 +319,7 @@ class Failed:
     fallback: int | None = None
 
 
-ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Settle | Restore | MeasureKernel
+ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Settle | Restore | MeasureKernel | EvaluateBsdf
 FromRenderer = (
     Ready
     | Unable
@@ -310,6 +331,7 @@ FromRenderer = (
     | Checkpoint
     | Done
     | KernelMeasured
+    | Evaluated
     | Evicted
     | Failed
 )

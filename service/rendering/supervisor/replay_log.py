@@ -9,6 +9,7 @@ from service.rendering.ipc.channel import Encoded
 from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
+    EvaluateBsdf,
     Failed,
     Frame,
     FromRenderer,
@@ -48,6 +49,7 @@ class ReplayLog:
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
         self.appraise: MeasureKernel | None = None  # not answered yet
+        self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
         self.saved: Restore | None = None  # a finished picture
         self._checkpoint: Restore | None = None  # one under way
         self._task = task
@@ -74,6 +76,8 @@ class ReplayLog:
             self.reads[message.serial] = message
         elif isinstance(message, MeasureKernel):
             self.appraise = message
+        elif isinstance(message, EvaluateBsdf):
+            self._question = message
         elif isinstance(message, Pause | Resume):
             self._paused = message
         elif isinstance(message, Stop):
@@ -112,6 +116,8 @@ class ReplayLog:
         asked: list[ToRenderer] = [*self.reads.values()]
         if self.appraise is not None:
             asked.append(self.appraise)
+        if self._question is not None:
+            asked.append(self._question)
         if not out or self.saved is not None:
             return [*out, *asked]
         stopped = self._stopped_at

@@ -6,6 +6,7 @@ __main__        the process: its options, its device, its end
 loop            takes the newest messages, chooses whose turn it is, traces a slice, publishes
 scheduler       whose turn it is
 task            one client's picture, from its first update to its end
+bsdf_task       one question about the BSDF of a material, in its turns
 updates         the update that waits to be applied, perhaps for its kernel
 ending          how a render ends, and how its picture comes to the server
 context         what all tasks of a process share

@@ -15,6 +15,7 @@ from service.rendering.ipc import channel
 from service.rendering.ipc.heartbeat import Heartbeat
 from service.rendering.ipc.messages import (
     Drop,
+    EvaluateBsdf,
     Evicted,
     Failed,
     FromRenderer,
@@ -30,6 +31,7 @@ from service.rendering.ipc.messages import (
     Usage,
     Want,
 )
+from service.rendering.worker.bsdf_task import BsdfTask
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.memory import Memory
 from service.rendering.worker.helpers.compile_client import CompileClient
@@ -58,6 +60,7 @@ class Loop:
         self._renderer = renderer
         self._pulse = pulse
         self._tasks: dict[int, Task] = {}
+        self._questions: dict[int, BsdfTask] = {}
         self._memory = Memory(memory_limit, self._tasks.values)
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
@@ -73,6 +76,7 @@ class Loop:
             self._forget,
             checkpoint_s,
         )
+        self._foreseen = kernel_keys.bsdf_keys()  # to be compiled when nothing else is, so that no panel has to wait
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
@@ -87,17 +91,21 @@ class Loop:
             self._denoiser.hear()
             self._compiler.hear()
             self._spare.hear()
-            task = self._scheduler.choose(self._tasks.values())
-            if task is not None:
+            chosen = self._scheduler.choose(self._everyone)
+            if chosen is not None:
                 began = time.monotonic()
-                self._work(task, task.turn)
+                self._work(chosen, chosen.turn)
                 self._pulse.lasted(time.monotonic() - began)
             for task in list(self._tasks.values()):
                 if task.wanted:
                     self._work(task, task.answer)
-            busy = any(task.ready for task in self._tasks.values())
+            busy = any(each.ready for each in self._everyone)
             self._account(at_once=not busy)
-            busy = busy or self._measure_kernel()
+            busy = self._foresee() or busy or self._measure_kernel()
+
+    @property
+    def _everyone(self) -> list[Task | BsdfTask]:
+        return [*self._tasks.values(), *self._questions.values()]
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """What has come in by now; with `wait`, as soon as there is anything, or a helper has spoken."""
@@ -114,7 +122,9 @@ class Loop:
         except BlockingIOError:
             return
 
-    def _work(self, task: Task, work: Callable[[], object], read: Read | None = None, spare: bool = False) -> None:
+    def _work(
+        self, task: Task | BsdfTask, work: Callable[[], object], read: Read | None = None, spare: bool = False
+    ) -> None:
         """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
         in time that nobody wanted, which is not held against it."""
         began = time.perf_counter()
@@ -132,8 +142,19 @@ class Loop:
             self._work(task, task.measure_kernel, spare=True)
         return task is not None
 
+    def _foresee(self) -> bool:
+        """Whether another kernel could be handed to the spare compiler, which is free; one at a time, as others may
+        soon have something for it that is needed more."""
+        if self._spare.left_s is not None:
+            return False
+        key = next(self._foreseen, None)
+        if key is not None:
+            self._spare.prepare([key])
+        return key is not None
+
     def _crowded(self) -> bool:
-        return sum(task.awaited for task in self._tasks.values()) > 1
+        questions = sum(question.awaited for question in self._questions.values())
+        return sum(task.awaited for task in self._tasks.values()) + questions > 1
 
     def _account(self, at_once: bool) -> None:
         """Tells what was used, now and then; at once before there is nothing to do."""
@@ -156,6 +177,10 @@ class Loop:
                 task = Task(self._context, message.task, message.client)
                 self._tasks[message.task] = task
             task.update(message)
+        elif isinstance(message, EvaluateBsdf):
+            self._questions[message.task] = BsdfTask(self._context, message)
+        elif isinstance(message, Drop) and message.task in self._questions:
+            self._questions.pop(message.task).release()
         elif task is None:
             if isinstance(
                 message, Read | MeasureKernel
@@ -190,7 +215,7 @@ class Loop:
         del self._tasks[task.number]
         task.release()
 
-    def _guard(self, task: Task, work: Callable[[], object], read: Read | None = None) -> None:
+    def _guard(self, task: Task | BsdfTask, work: Callable[[], object], read: Read | None = None) -> None:
         try:
             work()
             return

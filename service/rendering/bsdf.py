@@ -1,0 +1,61 @@
+"""Questions about the BSDF of one material, asked of the renderers."""
+
+from __future__ import annotations
+
+import asyncio
+from dataclasses import replace
+
+import numpy as np
+
+from service.problems import Internal, Unavailable
+from service.rendering.ipc.messages import EvaluateBsdf, Evaluated, Failed, FromRenderer
+from service.rendering.renderers import Renderers
+
+MOST = 64  # questions at a time, of everybody
+
+
+class BsdfQuestions:
+    """For the event loop."""
+
+    def __init__(self, renderers: Renderers) -> None:
+        self._renderers = renderers
+        self._open = 0
+
+    async def ask(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:
+        """The arrays of its Evaluated; whoever asks may be cancelled. The renderers give the task its number.
+
+        Raises Unavailable where too many wait or nothing renders, Internal where the renderer fails.
+        """
+        if self._open >= MOST:
+            raise Unavailable("There are too many questions about materials just now.")
+        waiting = _Waiting(asyncio.get_running_loop().create_future())
+        task = self._renderers.open(waiting, "bsdf", question.client)
+        self._open += 1
+        try:
+            self._renderers.send(replace(question, task=task, client=question.client or str(task)))
+            return await waiting.answer
+        finally:
+            self._open -= 1
+            self._renderers.drop(task)
+
+
+class _Waiting:
+    """A Listener for one answer."""
+
+    def __init__(self, answer: asyncio.Future[dict[str, np.ndarray]]) -> None:
+        self.answer = answer
+
+    def heard(self, message: FromRenderer) -> None:
+        if self.answer.done():
+            return
+        if isinstance(message, Evaluated):
+            self.answer.set_result(message.arrays)
+        elif isinstance(message, Failed):
+            self.answer.set_exception(Internal(message.detail))
+
+    def again(self) -> None:
+        """Another renderer is asked the same."""
+
+    def lost(self, detail: str) -> None:
+        if not self.answer.done():
+            self.answer.set_exception(Unavailable(detail))
