@@ -37,7 +37,7 @@ from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
-from service.routes import assets, documents, info, renders, stream
+from service.routes import assets, bsdf, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import respond, tell_errors
@@ -87,7 +87,8 @@ def create_app(config: Config) -> FastAPI:
         redoc_url=None,
     )
     app.state.sunbox = own
-    for router in (info.router, preset_routes.router, assets.router, documents.router, renders.router, stream.router):
+    api = (info, preset_routes, assets, documents, renders, bsdf, stream)
+    for router in (each.router for each in api):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)
     app.mount("/", StaticFiles(directory=WEB, html=True))

@@ -19,6 +19,7 @@ from service.problems import Unavailable
 from service.quality import priced
 from service.quota import Quota
 from service.readiness import SOFTWARE, Readiness
+from service.rendering.bsdf import BsdfQuestions
 from service.rendering.jobs.queue import RenderQueue
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
@@ -45,9 +46,11 @@ class AppState:
     downloads: Downloads = field(init=False)
     bodies: Bodies = field(init=False)
     readiness: Readiness = field(init=False)
+    bsdf: BsdfQuestions = field(init=False)
 
     def __post_init__(self) -> None:
         self.bodies = Bodies(self.config)
+        self.bsdf = BsdfQuestions(self.renderers)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
         self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients)

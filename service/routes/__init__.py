@@ -2,6 +2,7 @@
 
 renders      renders asked for over REST
 stream       the stream's WebSocket
+bsdf         a material's BSDF as numbers
 assets       uploads
 documents    saved scenes and materials
 presets      built-in documents

@@ -9,7 +9,8 @@ from pydantic import BaseModel, Field
 
 from service import documents, presets
 from service.problems import ANSWERS
-from service.routes.examples import ANY_DOCUMENT, ASSET, MATERIAL, RENDER, SCENE
+from service.rendering.requests.bsdf_request import MOST_SAMPLES
+from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE
 
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
 TITLES = {row.status: row.title for row in ANSWERS.values()}
@@ -108,6 +109,30 @@ class Asset(BaseModel):
     )
 
 
+class SpecularLobe(BaseModel):
+    wi: list[float]
+    weight: list[float] = Field(description="What radiance is multiplied by, for each channel; without eta^2.")
+    probability: float = Field(description="With which the renderer picks the lobe.")
+
+
+class BsdfValues(BaseModel):
+    f: list[list[list[float]]] = Field(
+        description="`f[i][j]` is the value for `wo[i]` and `wi[j]`, 1/sr, without the cosine: transmission where "
+        "the z of the two differ in sign, as basic radiance, so that f over the square of the index on wi's side is "
+        "symmetric. 0 behind a surface that does not transmit."
+    )
+    pdf: list[list[float]] = Field(
+        description="The density of `wi[j]`, 1/sr. Its integral is 1, less the probabilities of specular lobes, less "
+        "samples that are lost below the horizon."
+    )
+    delta: list[list[SpecularLobe]] = Field(description="The perfectly specular lobes as seen from `wo[i]`.")
+
+
+class BsdfAlbedo(BaseModel):
+    albedo: list[list[float]] = Field(description="Of each cosine, for each channel.")
+    error: list[list[float | None]] = Field(description="Its standard error; null for a single sample.")
+
+
 def problems(*statuses: int) -> Responses:
     """What else may be answered."""
     content = {"application/problem+json": {"schema": PROBLEM}}
@@ -146,6 +171,39 @@ RENDER_BODY = body(
     sphere=RENDER,
 )
 DOCUMENT_BODY = body({"anyOf": [reference("Scene"), reference("Material")]}, material=MATERIAL, scene=SCENE)
+_DIRECTIONS = {
+    "type": "array",
+    "minItems": 1,
+    "items": {"type": "array", "items": {"type": "number"}, "minItems": 3, "maxItems": 3},
+    "description": "z is the normal, x the tangent; any length but 0. A `wo` with negative z is inside the body.",
+}
+BSDF_BODY = body(
+    {
+        "type": "object",
+        "required": ["material", "wo", "wi"],
+        "additionalProperties": False,
+        "properties": {"material": reference("Material"), "wo": _DIRECTIONS, "wi": _DIRECTIONS},
+    },
+    metal=BSDF,
+)
+ALBEDO_BODY = body(
+    {
+        "type": "object",
+        "required": ["material", "cosines"],
+        "additionalProperties": False,
+        "properties": {
+            "material": reference("Material"),
+            "cosines": {
+                "type": "array",
+                "minItems": 1,
+                "items": {"type": "number", "exclusiveMinimum": 0, "maximum": 1},
+                "description": "Between `wo` and the normal.",
+            },
+            "samples": {"type": "integer", "minimum": 1, "maximum": MOST_SAMPLES, "default": 4096},
+        },
+    },
+    metal=ALBEDO,
+)
 ASSET_BODY = {
     "requestBody": {
         "required": True,

@@ -23,6 +23,7 @@ def _not_vanishing(value: float) -> float:
     return value
 
 
+Cosine = Annotated[float, Field(gt=0, le=1), AfterValidator(_not_vanishing)]
 Fraction = Annotated[float, Field(ge=0, le=1)]
 RefractiveIndex = Annotated[float, Field(ge=1, le=4)]
 Coordinate = Annotated[float, Field(ge=-LARGEST, le=LARGEST)]

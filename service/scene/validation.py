@@ -131,6 +131,7 @@ _WORDS: dict[str, Callable[[dict[str, Any], Any], str]] = {
     "bool_type": _not("true or false"),
     "string_type": _not("a text"),
     "string_too_short": lambda context, value: "must not be empty",
+    "too_short": lambda context, value: "must not be empty",
     "list_type": _not("an array"),
     "dict_type": _not("an object"),
     "model_type": _not("an object"),

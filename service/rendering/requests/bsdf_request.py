@@ -1,0 +1,97 @@
+"""Bodies that ask about the BSDF of one material, checked. Textures are refused, as there is no surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Annotated, Any
+
+import numpy as np
+from pydantic import Field, TypeAdapter
+
+from service.problems import FieldError, InvalidDocument, TooLarge
+from service.scene import ColorTexture, Material, NormalTexture, ScalarTexture, load_json
+from service.scene.base import Model
+from service.scene.number_arrays import Directions
+from service.scene.numbers import Cosine
+from service.scene.validation import validated
+
+MOST_PAIRS = 1 << 16  # of one question
+MOST_SAMPLES = 1 << 20  # of one direction
+MOST_WORK = 1 << 24  # samples of one question, some seconds of two cores
+
+
+class BsdfBody(Model):
+    """Directions are in the shading frame and are normalised: z is the normal, x the tangent; wo.z < 0 is inside."""
+
+    material: Material
+    wo: Directions
+    wi: Directions
+
+
+class AlbedoBody(Model):
+    material: Material
+    cosines: Annotated[list[Cosine], Field(min_length=1)]
+    samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 4096
+
+
+_BSDF, _ALBEDO = TypeAdapter(BsdfBody), TypeAdapter(AlbedoBody)
+
+
+@dataclass(frozen=True)
+class BsdfRequest:
+    """Directions (n, 3) and (m, 3) float64, unit length; `samples` above 0 asks for the albedo, which needs no wi."""
+
+    material: Material
+    wo: np.ndarray
+    wi: np.ndarray | None = None
+    samples: int = 0
+
+
+def parse_values(body: bytes | bytearray | memoryview) -> BsdfRequest:
+    """Raises MalformedJson, InvalidDocument, TooLarge."""
+    document = load_json(body)
+    n, m = _length(document, "wo"), _length(document, "wi")
+    if n * m > MOST_PAIRS:
+        raise TooLarge(f"{n} wo and {m} wi are {n * m} pairs: at most {MOST_PAIRS} are evaluated at a time")
+    parsed = validated(_BSDF, document, "")
+    _without_textures(parsed.material)
+    return BsdfRequest(parsed.material, normalized(parsed.wo), normalized(parsed.wi))
+
+
+def parse_albedo(body: bytes | bytearray | memoryview) -> BsdfRequest:
+    """Raises MalformedJson, InvalidDocument, TooLarge."""
+    document = load_json(body)
+    if (count := _length(document, "cosines")) > MOST_PAIRS:
+        raise TooLarge(f"{count} cosines are too many: at most {MOST_PAIRS} are evaluated at a time")
+    parsed = validated(_ALBEDO, document, "")
+    _without_textures(parsed.material)
+    work = len(parsed.cosines) * parsed.samples
+    if work > MOST_WORK:
+        raise TooLarge(f"{len(parsed.cosines)} cosines of {parsed.samples} samples are {work}: at most {MOST_WORK}")
+    return BsdfRequest(parsed.material, in_plane(parsed.cosines), samples=parsed.samples)
+
+
+def normalized(directions: np.ndarray) -> np.ndarray:
+    """Unit length, (n, 3) float64."""
+    scaled = directions / np.abs(directions).max(axis=1, keepdims=True)
+    out: np.ndarray = scaled / np.linalg.norm(scaled, axis=1, keepdims=True)
+    return out
+
+
+def in_plane(cosines: list[float]) -> np.ndarray:
+    """Directions in the plane of normal and tangent, on the tangent's side, (n, 3) float64."""
+    c = np.array(cosines, np.float64)
+    return np.stack([np.sqrt((1 - c) * (1 + c)), np.zeros_like(c), c], axis=1)
+
+
+def _length(document: Any, name: str) -> int:
+    found = document.get(name) if isinstance(document, dict) else None
+    return len(found) if isinstance(found, list) else 0
+
+
+def _without_textures(material: Material) -> None:
+    names = type(material).model_fields
+    textured = [n for n in names if isinstance(getattr(material, n), ScalarTexture | ColorTexture | NormalTexture)]
+    if textured:
+        detail = "a texture has no value without a surface: give a number or a colour"
+        raise InvalidDocument(FieldError(f"/material/{name}", detail) for name in textured)

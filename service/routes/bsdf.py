@@ -1,0 +1,118 @@
+"""What a material's BSDF is, as numbers: from the functions that render."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+from fastapi import APIRouter, Request, Response
+
+from service.downloads import disconnected
+from service.pack import pack_material
+from service.rendering.executors import packing
+from service.rendering.ipc.messages import EvaluateBsdf
+from service.rendering.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfRequest
+from service.rendering.requests.request_parser import Kind
+from service.routes import answers
+from service.routes.errors import GONE
+from service.state import STARTING_S, app_state, owner
+
+router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
+
+AT_ONCE = 1 << 12  # numbers that are written in a few milliseconds
+PIECE = 1 << 10  # ... without letting anybody else run
+
+Arrays = dict[str, np.ndarray]
+
+
+@router.post(
+    "",
+    summary="Values of a material's BSDF",
+    description="For any material without textures: `f` for every pair of directions, the density with which the "
+    "renderer would sample `wi`, and the perfectly specular lobes, which are in neither. Opacity, emission, ambient "
+    f"light and absorption are left out. At most {MOST_PAIRS} pairs.",
+    openapi_extra=answers.BSDF_BODY,
+    response_class=Response,
+    responses=answers.shaped(answers.BsdfValues) | answers.problems(400, 413, 415, 422, 503),
+)
+async def values(request: Request) -> Response:
+    return await _answer(request, "bsdf", _values)
+
+
+@router.post(
+    "/albedo",
+    summary="Directional albedo of a material",
+    description="The share of the light from one direction that is reflected or transmitted, perfectly specular "
+    "lobes included, by sampling as the renderer does. `wo` lies in the plane of normal and tangent. At most "
+    f"{MOST_WORK} samples, over all cosines.",
+    openapi_extra=answers.ALBEDO_BODY,
+    response_class=Response,
+    responses=answers.shaped(answers.BsdfAlbedo) | answers.problems(400, 413, 415, 422, 503),
+)
+async def albedo(request: Request) -> Response:
+    return await _answer(request, "albedo", _albedo)
+
+
+async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]) -> Response:
+    own = app_state(request)
+    async with own.bodies.taken(request) as body:
+        await own.renderers.able(STARTING_S)
+        asked: BsdfRequest = await own.bodies.parsed(kind, body)
+    material = pack_material(asked.material)
+    question = EvaluateBsdf(0, material, asked.wo, asked.wi, asked.samples, owner(request))
+    answer = asyncio.ensure_future(own.bsdf.ask(question))
+    gone = asyncio.ensure_future(disconnected(request.receive))
+    try:
+        await asyncio.wait({answer, gone}, return_when=asyncio.FIRST_COMPLETED)
+        if not answer.done():
+            return Response(status_code=GONE)
+        arrays = answer.result()
+    finally:
+        answer.cancel()
+        gone.cancel()
+    few = sum(array.size for array in arrays.values()) <= AT_ONCE
+    return Response(write(arrays) if few else await packing(partial(write, arrays)), media_type="application/json")
+
+
+def _values(arrays: Arrays) -> bytes:
+    deltas = zip(arrays["delta_wi"], arrays["delta_weight"], arrays["delta_probability"], strict=True)
+    delta = [
+        [
+            {"wi": _numbers(wi), "weight": _numbers(weight), "probability": float(probability)}
+            for wi, weight, probability in zip(*each, strict=True)
+            if probability > 0
+        ]
+        for each in deltas
+    ]
+    return _object({"f": _rows(arrays["f"]), "pdf": _rows(arrays["pdf"]), "delta": json.dumps(delta)})
+
+
+def _albedo(arrays: Arrays) -> bytes:
+    error = arrays["error"]
+    written = json.dumps([[None] * 3] * len(error)) if np.isnan(error).all() else _pieces(error)
+    return _object({"albedo": _pieces(arrays["albedo"]), "error": written})
+
+
+def _object(members: dict[str, str]) -> bytes:
+    return ("{" + ",".join(f'"{name}":{text}' for name, text in members.items()) + "}").encode()
+
+
+def _rows(array: np.ndarray) -> str:
+    return "[" + ",".join(map(_pieces, array)) + "]"
+
+
+def _pieces(array: np.ndarray) -> str:
+    """JSON of an array; the encoder, which is written in C, gives way now and then."""
+    parts = (_numbers(array[at : at + PIECE]) for at in range(0, len(array), PIECE))
+    return "[" + ",".join(json.dumps(part, allow_nan=False)[1:-1] for part in parts) + "]"
+
+
+def _numbers(array: np.ndarray) -> Any:
+    """Lists of numbers with the digits that tell a value in single precision from its neighbours; no -0."""
+    if array.dtype == np.float32:
+        array = np.array([float(str(x)) for x in array.ravel()]).reshape(array.shape)
+    return (array + 0.0).tolist()
