@@ -22,7 +22,7 @@ analysis    measurements of a scene at hand; public
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light
 from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays, apply_edit
-from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfValues
+from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfTerms, BsdfValues
 from gpu.device.scene import Scene
 from gpu.errors import (
     CompileError,
@@ -50,6 +50,7 @@ __all__ = [
     "TONE_MAPS",
     "BsdfAlbedo",
     "BsdfEvaluator",
+    "BsdfTerms",
     "BsdfValues",
     "CameraArrays",
     "CompileError",

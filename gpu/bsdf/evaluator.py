@@ -1,5 +1,6 @@
 """Values, densities and albedos of one material, in slices between which others have their turn.
 
+A material comes as a scene that holds it and nothing else.
 Directions are in the frame of `shaders/bsdf_lone.glsl`: z is the outward normal, x the tangent.
 """
 
@@ -14,8 +15,10 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import layout
+from gpu.arrays import SceneArrays
 from gpu.bsdf import kernels as own
 from gpu.device.scene import upload_tables
+from gpu.device.textures import KINDS, bound_textures, linear_texture
 from gpu.kernels.cache import KernelCache
 from gpu.layout import bindings
 from gpu.layout.bindings import Slot
@@ -50,6 +53,17 @@ class BsdfAlbedo:
     error: np.ndarray
 
 
+@dataclass(frozen=True)
+class BsdfTerms:
+    """Of n directions: `distribution` (n,), 1/sr, `geometry` (n,) and `fresnel` (n, 3), all float32. Where
+    `has_facets` (n,) is false the surface is a perfect mirror, which has only the last of them."""
+
+    distribution: np.ndarray
+    geometry: np.ndarray
+    fresnel: np.ndarray
+    has_facets: np.ndarray
+
+
 class BsdfEvaluator:
     """Made by `Renderer.bsdf`. The tables of `principled` are uploaded when they are first needed, and stay."""
 
@@ -58,9 +72,9 @@ class BsdfEvaluator:
         self._tables: dict[int, Any] = {}
 
     def values(
-        self, material: np.ndarray, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
+        self, material: SceneArrays, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
     ) -> Generator[None, None, BsdfValues]:
-        """Evaluate one `layout.Material` record for every pair of `wo` (n, 3) and `wi` (m, 3), unit length.
+        """Evaluate a material for every pair of `wo` (n, 3) and `wi` (m, 3), unit length.
 
         Raises CompileError, OutOfMemory.
         """
@@ -79,9 +93,9 @@ class BsdfEvaluator:
         return BsdfValues(found[..., :3], found[..., 3], wi_[..., :3], weight[..., :3], wi_[..., 3])
 
     def albedo(
-        self, material: np.ndarray, wo: np.ndarray, samples: int, slice_s: float = SLICE_S
+        self, material: SceneArrays, wo: np.ndarray, samples: int, slice_s: float = SLICE_S
     ) -> Generator[None, None, BsdfAlbedo]:
-        """Sample one `layout.Material` record as a path does, `samples` times from each of `wo` (n, 3), unit length.
+        """Sample a material as a path does, `samples` times from each of `wo` (n, 3), unit length.
 
         Raises CompileError, OutOfMemory.
         """
@@ -106,16 +120,43 @@ class BsdfEvaluator:
         variance = np.maximum(sums[1] / samples - mean**2, 0.0) * (samples / (samples - 1))
         return BsdfAlbedo(mean, np.sqrt(variance / samples))
 
+    def terms(
+        self, material: SceneArrays, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
+    ) -> Generator[None, None, BsdfTerms]:
+        """The terms of a material of microfacets: D at the normals `wi` (n, 3), F at their cosines, and G between
+        each of them as a direction, mirrored at the normal, and the one direction `wo` (1, 3).
+
+        Raises CompileError, OutOfMemory.
+        """
+        work = self._dispatch(material, own.TERMS, {})
+        try:
+            work.give(np.concatenate([wo, wi]))
+            work.make(Slot.OUTPUT, 32 * len(wi))
+            for _ in work.slices(len(wi), slice_s):
+                yield
+            facets, rest = np.moveaxis(work.read(Slot.OUTPUT).reshape(len(wi), 2, 4), 1, 0)
+        finally:
+            work.release()
+        return BsdfTerms(facets[:, 3], rest[:, 0], facets[:, :3], rest[:, 1] > 0)
+
     def release(self) -> None:
         for table in self._tables.values():
             table.release()
 
-    def _dispatch(self, material: np.ndarray, entry: str, uniforms: dict[str, int]) -> _Dispatch:
+    def _dispatch(self, material: SceneArrays, entry: str, uniforms: dict[str, int]) -> _Dispatch:
         contexts.use(self._context)
-        defines = own.defines(material, entry)
-        if defines["HAS_PRINCIPLED"] and not self._tables:
+        bare = own.bare(material)
+        flags, defines = own.flags(bare), own.defines(bare, entry)
+        if "HAS_PRINCIPLED" in flags and not self._tables:
             self._tables = upload_tables(self._context)
-        return _Dispatch(self._context, self._kernels, (entry, defines), own.bare(material), self._tables, uniforms)
+        kernel = self._kernels.get(entry, defines)
+        work = _Dispatch(self._context, self._kernels, kernel, self._tables, uniforms)
+        try:
+            work.upload(bare, flags)
+        except BaseException:
+            work.release()
+            raise
+        return work
 
 
 class _Dispatch:
@@ -123,26 +164,23 @@ class _Dispatch:
     each slice binds and sets everything again."""
 
     def __init__(
-        self,
-        context: Any,
-        kernels: KernelCache,
-        which: tuple[str, dict[str, object]],
-        material: np.ndarray,
-        tables: dict[int, Any],
-        uniforms: dict[str, int],
+        self, context: Any, kernels: KernelCache, kernel: Any, tables: dict[int, Any], uniforms: dict[str, int]
     ) -> None:
-        self._context, self._kernels, self._tables, self._uniforms = context, kernels, tables, uniforms
+        self._context, self._kernels, self._kernel = context, kernels, kernel
+        self._tables, self._uniforms = tables, uniforms
         self._buffers: dict[Slot, Any] = {}
         self._blocks: dict[int, Any] = {}
-        self._kernel = kernels.get(*which)
-        kernels.hold(self._kernel)
-        try:
-            self._blocks[bindings.COUNTED["material"]] = contexts.allocate(context, material.view(np.uint8))
-            self._blocks[bindings.FRAME_BLOCK] = contexts.allocate(context, layout.Frame.dtype.itemsize)
-            self._blocks[bindings.FRAME_BLOCK].clear()
-        except BaseException:
-            self.release()
-            raise
+        self._textures: dict[int, Any] = {}
+        kernels.hold(kernel)
+
+    def upload(self, material: SceneArrays, flags: frozenset[str]) -> None:
+        """Upload the material, and what else its kernels read."""
+        record = np.ascontiguousarray(material.materials).view(np.uint8)
+        self._blocks[bindings.COUNTED["material"]] = contexts.allocate(self._context, record)
+        self._blocks[bindings.FRAME_BLOCK] = contexts.allocate(self._context, layout.Frame.dtype.itemsize)
+        self._blocks[bindings.FRAME_BLOCK].clear()
+        for unit, texels in bound_textures(material, flags).items():
+            self._textures[unit] = linear_texture(self._context, texels, *KINDS[unit])
 
     def give(self, directions: np.ndarray) -> None:
         """Upload directions (n, 3), which kernels read as vec4."""
@@ -181,8 +219,8 @@ class _Dispatch:
             buffer.bind_to_storage_buffer(int(slot))
         for block, buffer in self._blocks.items():
             buffer.bind_to_uniform_block(block)
-        for unit, table in self._tables.items():
-            table.use(unit)
+        for unit, texture in (*self._tables.items(), *self._textures.items()):
+            texture.use(unit)
         for name, value in {**self._uniforms, "first": first, "count": count}.items():
             self._kernel[name].value = value
         self._kernel.run(-(-count // _GROUP))
@@ -190,6 +228,6 @@ class _Dispatch:
 
     def release(self) -> None:
         contexts.use(self._context)
-        for buffer in (*self._buffers.values(), *self._blocks.values()):
-            buffer.release()
+        for thing in (*self._buffers.values(), *self._blocks.values(), *self._textures.values()):
+            thing.release()
         self._kernels.let_go(self._kernel)

@@ -1,8 +1,12 @@
-"""Which kernels answer for a material: as few as there can be, so that a slider seldom waits for a compiler."""
+"""Which kernels answer for a material: as few as there can be, so that a slider seldom waits for a compiler.
+
+A material comes as a scene that holds it and nothing else.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,50 +15,42 @@ from gpu.arrays import CameraArrays, SceneArrays
 from gpu.kernels import features
 from gpu.layout import MaterialModel
 
-VALUES, ALBEDO = "bsdf_values.comp", "bsdf_albedo.comp"
-ENTRIES = (VALUES, ALBEDO)
+VALUES, ALBEDO, TERMS = "bsdf_values.comp", "bsdf_albedo.comp", "bsdf_terms.comp"
+ENTRIES = (VALUES, ALBEDO, TERMS)
 
-_NOWHERE = CameraArrays((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 1.0, 0.0, 1.0)
+NOWHERE = CameraArrays((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 1.0, 0.0, 1.0)
 # What a material has besides its BSDF.
 _REST = {"emission": 0.0, "ambient": 0.0, "opacity": 1.0, "attenuation_distance": layout.ABSENT}
 
 
-def bare(material: np.ndarray) -> np.ndarray:
-    """A copy of one `layout.Material` record that has a BSDF and nothing else."""
-    out = np.array(material).reshape(1)
+def bare(arrays: SceneArrays) -> SceneArrays:
+    """The same with a material that has a BSDF and nothing else."""
+    materials = arrays.materials.copy()
     for member, value in _REST.items():
-        out[member] = value
-    return out
+        materials[member] = value
+    return replace(arrays, materials=materials)
 
 
-def defines(material: np.ndarray, entry: str) -> dict[str, object]:
-    """What the kernel `entry` is compiled with for one `layout.Material` record; many materials have it in common.
+def flags(arrays: SceneArrays) -> frozenset[str]:
+    """The flags that a bare material raises, with those that its sliders could raise."""
+    return features.grown(frozenset(), arrays)
+
+
+def defines(arrays: SceneArrays, entry: str) -> dict[str, object]:
+    """What the kernel `entry` is compiled with for a bare material; many materials have it in common.
 
     The numbers of `bsdf_albedo.comp` are independent: the scatter of its samples tells their error.
     """
-    arrays = SceneArrays(_NOWHERE, bare(material))
-    out = features.defines(features.grown(frozenset(), arrays), shapes=features.counts(arrays))
+    out = features.defines(flags(arrays), shapes=features.counts(arrays))
     return out | {"SAMPLER": 1} if entry == ALBEDO else out
 
 
-def all_defines() -> Iterator[tuple[str, dict[str, object]]]:
-    """(entry, defines) of every kernel that some material needs, without repetitions."""
-    found = set[tuple[object, ...]]()
-    for entry in ENTRIES:
-        for material in _samples():
-            made = defines(material, entry)
-            key = (entry, *made.items())
-            if key not in found:
-                found.add(key)
-                yield entry, made
-
-
-def _samples() -> Iterator[np.ndarray]:
-    """A material of each model, and of those that can transmit or stretch one for each combination."""
+def samples() -> Iterator[SceneArrays]:
+    """A bare material of each model, and of those that can transmit or stretch one for each combination."""
     for model in MaterialModel:
         for transmission in (0.0, 1.0):
             for anisotropic in (0.0, 1.0):
                 material = np.zeros(1, layout.Material.dtype)
                 material["model"] = model
                 material["transmission"], material["anisotropic"] = transmission, anisotropic
-                yield material
+                yield bare(SceneArrays(NOWHERE, material))

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from hashlib import sha256
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -18,6 +19,8 @@ from gpu.layout import ShapeKind, bindings
 from gpu.picture import noise_meter, resolve
 from gpu.settings import TONE_MAPS, RenderSettings
 
+BsdfQuestion = Literal["values", "albedo", "terms"]
+QUESTIONS = get_args(BsdfQuestion)  # in the order of gpu.bsdf.kernels.ENTRIES
 ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others: `common_keys`
 
 
@@ -106,16 +109,21 @@ def common_keys() -> list[KernelKey]:
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
 
 
-def bsdf_key(material: np.ndarray, sampled: bool) -> KernelKey:
-    """What a `BsdfEvaluator` needs for one `layout.Material` record: for its albedo (`sampled`) or its values."""
-    entry = bsdf.ALBEDO if sampled else bsdf.VALUES
-    return KernelKey(tuple(bsdf.defines(material, entry).items()), (), entry)
+def bsdf_key(material: SceneArrays, question: BsdfQuestion) -> KernelKey:
+    """What a `BsdfEvaluator` needs for a scene of one material."""
+    bare, entry = bsdf.bare(material), bsdf.ENTRIES[QUESTIONS.index(question)]
+    return KernelKey(tuple(bsdf.defines(bare, entry).items()), _textures(bare, bsdf.flags(bare)), entry)
 
 
 def bsdf_keys() -> Iterator[KernelKey]:
     """What a `BsdfEvaluator` needs for any material."""
-    for entry, defines in bsdf.all_defines():
-        yield KernelKey(tuple(defines.items()), (), entry)
+    found = set[KernelKey]()
+    for question in QUESTIONS:
+        for material in bsdf.samples():
+            key = bsdf_key(material, question)
+            if key not in found:
+                found.add(key)
+                yield key
 
 
 def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, str, int, int], ...]:

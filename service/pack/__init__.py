@@ -12,8 +12,8 @@ edits               what serves again after an edit, and which arrays differ
 from service.pack.edits.cache import CacheBudget, PackCache
 from service.pack.edits.scene_delta import scene_delta
 from service.pack.geometry.scene_bvh import warm_builder
-from service.pack.parameters import pack_camera, pack_material, pack_materials, pack_turn
-from service.pack.scene import Packed, pack
+from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.scene import Packed, pack, pack_material
 from service.pack.textures.words import repacked
 
 __all__ = [

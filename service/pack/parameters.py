@@ -45,32 +45,21 @@ def pack_materials(scene: Scene) -> np.ndarray:
     """`layout.Material` records in the order of the document's names, unused ones included."""
     records = np.zeros(len(scene.materials), layout.Material.dtype)
     for record, material in zip(records, scene.materials.values(), strict=True):
-        _fill(record, material)
+        record["model"] = layout.MaterialModel[material.type.upper()]
+        for name in type(material).model_fields:
+            if name == "emission_sides":
+                record[name] = SIDES[material.emission_sides]
+                continue
+            member = member_of(material, name)
+            if member in layout.Material.members:
+                value = getattr(material, name)
+                if isinstance(value, ScalarTexture | ColorTexture):
+                    value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
+                record[member] = layout.ABSENT if value is None else value
+        record["opacity"] = opacity(material)
+        if isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
+            record["cutoff"] /= material.alpha  # the opacity is 1 or 0 already, and a vertex's alpha a share of that
     return records
-
-
-def pack_material(material: Material) -> np.ndarray:
-    """One `layout.Material` record of a material that needs no scene: (1,). Of textures it has only the places."""
-    records = np.zeros(1, layout.Material.dtype)
-    _fill(records[0], material)
-    return records
-
-
-def _fill(record: np.void, material: Material) -> None:
-    record["model"] = layout.MaterialModel[material.type.upper()]
-    for name in type(material).model_fields:
-        if name == "emission_sides":
-            record[name] = SIDES[material.emission_sides]
-            continue
-        member = member_of(material, name)
-        if member in layout.Material.members:
-            value = getattr(material, name)
-            if isinstance(value, ScalarTexture | ColorTexture):
-                value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
-            record[member] = layout.ABSENT if value is None else value
-    record["opacity"] = opacity(material)
-    if isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
-        record["cutoff"] /= material.alpha  # the opacity is 1 or 0 already, and a vertex's alpha a share of that
 
 
 def member_of(material: Material, name: str) -> str:

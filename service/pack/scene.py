@@ -23,11 +23,12 @@ from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.textured_emission import dark, mean_emission
 from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
-from service.scene import Scene
+from service.scene import Camera, Material, Scene
 from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
 from service.scene.shape import MeshShape
 
+_NOWHERE = Camera(position=(0.0, 0.0, 1.0), target=(0.0, 0.0, 0.0))
 MAX_TRIANGLES = LEAF_FIRST_MASK + 1
 
 
@@ -120,6 +121,12 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         origin=built.origin,
     )
     return Packed(arrays, warnings)
+
+
+def pack_material(material: Material) -> SceneArrays:
+    """A scene that holds this material, which must not read textures, and nothing to look at."""
+    scene = Scene(version=1, camera=_NOWHERE, materials={"": material}, shapes=[])
+    return SceneArrays(camera=pack_camera(scene.camera), materials=pack_materials(scene))
 
 
 def _geometry(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from typing import Annotated, Any, Literal
 
 from fastapi import Path
@@ -10,7 +11,7 @@ from pydantic import BaseModel, Field
 from service import documents, presets
 from service.problems import ANSWERS
 from service.rendering.requests.bsdf_request import MOST_SAMPLES
-from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE
+from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE, TERMS
 
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
 TITLES = {row.status: row.title for row in ANSWERS.values()}
@@ -128,6 +129,17 @@ class BsdfValues(BaseModel):
     delta: list[list[SpecularLobe]] = Field(description="The perfectly specular lobes as seen from `wo[i]`.")
 
 
+class BsdfTerms(BaseModel):
+    distribution: list[float] | None = Field(
+        description="The density of facets whose normal has this cosine, 1/sr; null for a perfect mirror."
+    )
+    geometry: list[float] | None = Field(
+        description="The share of facets that is neither masked nor shadowed, between a direction of this cosine and "
+        "one of `wo_cosine` on the other side of the normal; null for a perfect mirror."
+    )
+    fresnel: list[list[float]] = Field(description="The reflectance of a facet that is met at this cosine.")
+
+
 class BsdfAlbedo(BaseModel):
     albedo: list[list[float]] = Field(description="Of each cosine, for each channel.")
     error: list[list[float | None]] = Field(description="Its standard error; null for a single sample.")
@@ -186,6 +198,22 @@ BSDF_BODY = body(
     },
     metal=BSDF,
 )
+_COSINE = {"type": "number", "exclusiveMinimum": 0, "maximum": 1}
+_COSINES = {"type": "array", "minItems": 1, "items": _COSINE}
+TERMS_BODY = body(
+    {
+        "type": "object",
+        "required": ["material", "cosines"],
+        "additionalProperties": False,
+        "properties": {
+            "material": reference("Material"),
+            "cosines": _COSINES,
+            "wo_cosine": _COSINE
+            | {"default": math.sqrt(0.5), "description": "Of the other direction, for geometry."},
+        },
+    },
+    metal=TERMS,
+)
 ALBEDO_BODY = body(
     {
         "type": "object",
@@ -193,12 +221,7 @@ ALBEDO_BODY = body(
         "additionalProperties": False,
         "properties": {
             "material": reference("Material"),
-            "cosines": {
-                "type": "array",
-                "minItems": 1,
-                "items": {"type": "number", "exclusiveMinimum": 0, "maximum": 1},
-                "description": "Between `wo` and the normal.",
-            },
+            "cosines": _COSINES | {"description": "Between `wo` and the normal."},
             "samples": {"type": "integer", "minimum": 1, "maximum": MOST_SAMPLES, "default": 4096},
         },
     },

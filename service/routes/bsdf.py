@@ -57,13 +57,26 @@ async def albedo(request: Request) -> Response:
     return await _answer(request, "albedo", _albedo)
 
 
+@router.post(
+    "/terms",
+    summary="Distribution, geometry and Fresnel term of a material",
+    description="Of models of microfacets, at the cosines of angles to the normal in the plane of normal and "
+    f"tangent. Other models are refused. At most {MOST_PAIRS} cosines.",
+    openapi_extra=answers.TERMS_BODY,
+    response_class=Response,
+    responses=answers.shaped(answers.BsdfTerms) | answers.problems(400, 413, 415, 422, 503),
+)
+async def terms(request: Request) -> Response:
+    return await _answer(request, "terms", _terms)
+
+
 async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]) -> Response:
     own = app_state(request)
     async with own.bodies.taken(request) as body:
         await own.renderers.able(STARTING_S)
         asked: BsdfRequest = await own.bodies.parsed(kind, body)
     material = pack_material(asked.material)
-    question = EvaluateBsdf(0, material, asked.wo, asked.wi, asked.samples, owner(request))
+    question = EvaluateBsdf(0, asked.question, material, asked.wo, asked.wi, asked.samples, owner(request))
     answer = asyncio.ensure_future(own.bsdf.ask(question))
     gone = asyncio.ensure_future(disconnected(request.receive))
     try:
@@ -95,6 +108,13 @@ def _albedo(arrays: Arrays) -> bytes:
     error = arrays["error"]
     written = json.dumps([[None] * 3] * len(error)) if np.isnan(error).all() else _pieces(error)
     return _object({"albedo": _pieces(arrays["albedo"]), "error": written})
+
+
+def _terms(arrays: Arrays) -> bytes:
+    parts = {name: _pieces(arrays[name]) for name in ("distribution", "geometry", "fresnel")}
+    if not arrays["has_facets"].all():
+        parts |= {"distribution": "null", "geometry": "null"}
+    return _object(parts)
 
 
 def _object(members: dict[str, str]) -> bytes:

@@ -8,9 +8,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import BsdfAlbedo, BsdfValues, Renderer, Steps
+from gpu import BsdfAlbedo, BsdfTerms, BsdfValues, Renderer, SceneArrays, Steps
 from gpu.bsdf import kernels
 from gpu.layout import MaterialModel
+from gpu.precompile import kernel_keys
 from tests import baseline, disney
 from tests.probing import materials
 from tests.shaders.test_lobes import PRINCIPLED, ROWS
@@ -31,12 +32,21 @@ NARROW = {"mirror", "smooth metal", "clear coat", "glTF mirror", "glTF dielectri
 ANGLES = (10.0, 50.0, 80.0)
 
 
+def lone(material: np.ndarray) -> SceneArrays:
+    return SceneArrays(kernels.NOWHERE, material)
+
+
 def values(gpu: Renderer, material: np.ndarray, wo: Any, wi: Any) -> BsdfValues:
-    return Steps(gpu.bsdf.values(material, np.atleast_2d(wo), np.atleast_2d(wi))).finish()
+    return Steps(gpu.bsdf.values(lone(material), np.atleast_2d(wo), np.atleast_2d(wi))).finish()
 
 
 def albedo(gpu: Renderer, material: np.ndarray, wo: Any, samples: int) -> BsdfAlbedo:
-    return Steps(gpu.bsdf.albedo(material, np.atleast_2d(wo), samples)).finish()
+    return Steps(gpu.bsdf.albedo(lone(material), np.atleast_2d(wo), samples)).finish()
+
+
+def terms(gpu: Renderer, material: np.ndarray, degrees: np.ndarray, view: float = 45) -> BsdfTerms:
+    w = np.array([direction(angle) for angle in degrees])
+    return Steps(gpu.bsdf.terms(lone(material), direction(view)[None], w)).finish()
 
 
 def direction(degrees: float) -> np.ndarray:
@@ -194,9 +204,9 @@ def test_slices_and_other_questions_change_nothing(gpu: Renderer) -> None:
     alone = values(gpu, first, wo, wi)
     sampled = albedo(gpu, first, wo, 4096)
     work = [
-        gpu.bsdf.values(first, wo, wi, slice_s=0),
-        gpu.bsdf.values(second, wi[:40], wi, slice_s=0),
-        gpu.bsdf.albedo(first, wo, 4096, slice_s=0),
+        gpu.bsdf.values(lone(first), wo, wi, slice_s=0),
+        gpu.bsdf.values(lone(second), wi[:40], wi, slice_s=0),
+        gpu.bsdf.albedo(lone(first), wo, 4096, slice_s=0),
     ]
     found: dict[int, Any] = {}
     steps = [Steps(each) for each in work]
@@ -211,14 +221,45 @@ def test_slices_and_other_questions_change_nothing(gpu: Renderer) -> None:
     assert (found[2].albedo == sampled.albedo).all() and (found[2].error == sampled.error).all()
 
 
+@pytest.mark.parametrize("row", ["glTF metal", "rough metal", "smooth metal", "brushed"])
+def test_a_metal_is_the_product_of_its_terms(gpu: Renderer, row: str) -> None:
+    """f = D G F / (4 cos cos), each factor taken at its own angle."""
+    view, angles = 45.0, np.array([2.0, 30.0, 44.0, 46.0, 80.0])  # on the other side of the normal than the view
+    f = values(gpu, ROWS[row], direction(view), [direction(-angle) for angle in angles]).f[0]
+    d = terms(gpu, ROWS[row], np.abs(view - angles) / 2).distribution
+    fresnel_ = terms(gpu, ROWS[row], (view + angles) / 2).fresnel
+    g = terms(gpu, ROWS[row], angles, view).geometry
+    cosines = math.cos(math.radians(view)) * np.cos(np.radians(angles))
+    np.testing.assert_allclose(f, (d * g / (4 * cosines))[:, None] * fresnel_, rtol=2e-3)
+    assert ((g > 0) & (g <= 1)).all()
+
+
+def test_terms_of_principled(gpu: Renderer) -> None:
+    """Trowbridge and Reitz, Smith with correlated heights, and Fresnel, in double precision."""
+    alpha, angles = 0.4**2, np.array([0.0, 20.0, 60.0, 85.0])
+    found = terms(gpu, materials(model=P, roughness=0.4, ior=1.5), angles, 30)
+    c = np.cos(np.radians(angles))
+    np.testing.assert_allclose(found.distribution, alpha**2 / (np.pi * (c**2 * (alpha**2 - 1) + 1) ** 2), rtol=1e-4)
+    np.testing.assert_allclose(found.fresnel, [[fresnel(x, 1.5)[0]] * 3 for x in c], rtol=1e-4)
+
+    def hidden(degrees: Any) -> np.ndarray:
+        return np.asarray((np.sqrt(1 + (alpha * np.tan(np.radians(degrees))) ** 2) - 1) / 2)
+
+    np.testing.assert_allclose(found.geometry, 1 / (1 + hidden(30) + hidden(angles)), rtol=1e-4)
+    assert found.has_facets.all()
+    mirror = terms(gpu, materials(model=P, roughness=0, ior=1.5), angles)
+    assert not mirror.has_facets.any()
+    np.testing.assert_array_equal(mirror.fresnel, found.fresnel)
+
+
 def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
-    foreseen = [(entry, defines) for entry, defines in kernels.all_defines()]
-    assert len(foreseen) == len({repr(each) for each in foreseen})
+    foreseen = list(kernel_keys.bsdf_keys())
     used = set()
     for material in ALL.values():
         glowing = material.copy()
         glowing["emission"], glowing["opacity"], glowing["attenuation_distance"] = 3.0, 0.5, 1.0
-        for entry in kernels.ENTRIES:
-            assert kernels.defines(glowing, entry) == kernels.defines(material, entry)
-            used.add(foreseen.index((entry, kernels.defines(material, entry))))
+        for question in kernel_keys.QUESTIONS:
+            key = kernel_keys.bsdf_key(lone(material), question)
+            assert kernel_keys.bsdf_key(lone(glowing), question) == key
+            used.add(foreseen.index(key))
     assert used == set(range(len(foreseen)))

@@ -70,6 +70,24 @@ def test_albedo_and_its_error(server: Server) -> None:
     assert albedo(GREY, cosines=[1], samples=1)["error"] == [[None, None, None]]
 
 
+def test_terms(server: Server) -> None:
+    def terms(material: Any, **given: Any) -> httpx.Response:
+        return server.http.post("/v1/bsdf/terms", json={"material": material, "cosines": [1, 0.5], **given})
+
+    found = terms(METAL, wo_cosine=1).json()
+    alpha = 0.25
+    expected = [1 / (math.pi * alpha**2), alpha**2 / (math.pi * (0.25 * (alpha**2 - 1) + 1) ** 2)]
+    assert found["distribution"] == pytest.approx(expected, rel=1e-4)
+    np.testing.assert_allclose(found["fresnel"][0], METAL["base_color"], rtol=1e-5)
+    assert found["geometry"][0] == pytest.approx(1, rel=1e-5) and 0.5 < found["geometry"][1] < 1
+    mirror = terms(GLASS).json()
+    assert mirror["distribution"] is None and mirror["geometry"] is None
+    assert mirror["fresnel"][0] == pytest.approx([0.04] * 3, rel=1e-4)
+    assert mistakes(terms(GREY)) == ["/material/type"]
+    assert mistakes(terms(METAL, cosines=[0.5, 0])) == ["/cosines/1"]
+    assert mistakes(terms(METAL, wo_cosine=2)) == ["/wo_cosine"]
+
+
 @pytest.mark.parametrize(
     ("change", "pointers"),
     [

@@ -9,6 +9,7 @@ import numpy as np
 
 from service.views import DEFAULT_TONE_MAP, Encoding
 
+BsdfQuestion = Literal["values", "albedo", "terms"]
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 
 EDITS = ("camera", "materials", "texture_words", "environment", "moved")  # what `Scene.edit` takes
@@ -158,14 +159,14 @@ class Restore:
 
 @dataclass(frozen=True)
 class EvaluateBsdf:
-    """Asks for one Evaluated: the BSDF of one material, as gpu.BsdfEvaluator has it. With `samples` its albedo from
-    each of `wo`, else its values for every pair of `wo` and `wi`. The task is this question's alone."""
+    """Asks for one Evaluated: what the method `question` of gpu.BsdfEvaluator says. The task is this one's alone."""
 
     task: int
-    material: np.ndarray  # one layout.Material
+    question: BsdfQuestion
+    material: Any  # a gpu.SceneArrays of one material
     wo: np.ndarray  # (n, 3), unit length
-    wi: np.ndarray | None = None  # (m, 3), unit length
-    samples: int = 0
+    wi: np.ndarray  # (m, 3), unit length; for "albedo" none
+    samples: int = 0  # for "albedo"
     client: str = ""
 
 
@@ -278,7 +279,7 @@ class KernelMeasured:
 
 @dataclass(frozen=True)
 class Evaluated:
-    """The members of a gpu.BsdfValues or a gpu.BsdfAlbedo, by name."""
+    """The members of a gpu.BsdfValues, BsdfAlbedo or BsdfTerms, by name."""
 
     task: int
     arrays: dict[str, np.ndarray]

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+import math
+from dataclasses import dataclass, field
 from typing import Annotated, Any
 
 import numpy as np
 from pydantic import Field, TypeAdapter
 
 from service.problems import FieldError, InvalidDocument, TooLarge
+from service.rendering.ipc.messages import BsdfQuestion
 from service.scene import ColorTexture, Material, NormalTexture, ScalarTexture, load_json
 from service.scene.base import Model
 from service.scene.number_arrays import Directions
@@ -18,6 +20,7 @@ from service.scene.validation import validated
 MOST_PAIRS = 1 << 16  # of one question
 MOST_SAMPLES = 1 << 20  # of one direction
 MOST_WORK = 1 << 24  # samples of one question, some seconds of two cores
+WITH_TERMS = ("disney", "metal_rough", "principled")  # models of microfacets; see shaders/bsdf_terms.comp
 
 
 class BsdfBody(Model):
@@ -34,16 +37,23 @@ class AlbedoBody(Model):
     samples: Annotated[int, Field(ge=1, le=MOST_SAMPLES)] = 4096
 
 
-_BSDF, _ALBEDO = TypeAdapter(BsdfBody), TypeAdapter(AlbedoBody)
+class TermsBody(Model):
+    material: Material
+    cosines: Annotated[list[Cosine], Field(min_length=1)]
+    wo_cosine: Cosine = math.sqrt(0.5)
+
+
+_BSDF, _ALBEDO, _TERMS = TypeAdapter(BsdfBody), TypeAdapter(AlbedoBody), TypeAdapter(TermsBody)
 
 
 @dataclass(frozen=True)
 class BsdfRequest:
-    """Directions (n, 3) and (m, 3) float64, unit length; `samples` above 0 asks for the albedo, which needs no wi."""
+    """What an EvaluateBsdf asks. Directions (n, 3) and (m, 3) float64, unit length."""
 
+    question: BsdfQuestion
     material: Material
     wo: np.ndarray
-    wi: np.ndarray | None = None
+    wi: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     samples: int = 0
 
 
@@ -54,21 +64,34 @@ def parse_values(body: bytes | bytearray | memoryview) -> BsdfRequest:
     if n * m > MOST_PAIRS:
         raise TooLarge(f"{n} wo and {m} wi are {n * m} pairs: at most {MOST_PAIRS} are evaluated at a time")
     parsed = validated(_BSDF, document, "")
-    _without_textures(parsed.material)
-    return BsdfRequest(parsed.material, normalized(parsed.wo), normalized(parsed.wi))
+    without_textures(parsed.material)
+    return BsdfRequest("values", parsed.material, normalized(parsed.wo), normalized(parsed.wi))
 
 
 def parse_albedo(body: bytes | bytearray | memoryview) -> BsdfRequest:
     """Raises MalformedJson, InvalidDocument, TooLarge."""
-    document = load_json(body)
-    if (count := _length(document, "cosines")) > MOST_PAIRS:
-        raise TooLarge(f"{count} cosines are too many: at most {MOST_PAIRS} are evaluated at a time")
-    parsed = validated(_ALBEDO, document, "")
-    _without_textures(parsed.material)
+    parsed = validated(_ALBEDO, _with_few_cosines(body), "")
+    without_textures(parsed.material)
     work = len(parsed.cosines) * parsed.samples
     if work > MOST_WORK:
         raise TooLarge(f"{len(parsed.cosines)} cosines of {parsed.samples} samples are {work}: at most {MOST_WORK}")
-    return BsdfRequest(parsed.material, in_plane(parsed.cosines), samples=parsed.samples)
+    return BsdfRequest("albedo", parsed.material, in_plane(parsed.cosines), samples=parsed.samples)
+
+
+def parse_terms(body: bytes | bytearray | memoryview) -> BsdfRequest:
+    """Raises MalformedJson, InvalidDocument, TooLarge."""
+    parsed = validated(_TERMS, _with_few_cosines(body), "")
+    without_textures(parsed.material)
+    if detail := without_terms(parsed.material):
+        raise InvalidDocument([FieldError("/material/type", detail)])
+    return BsdfRequest("terms", parsed.material, in_plane([parsed.wo_cosine]), in_plane(parsed.cosines))
+
+
+def without_terms(material: Material) -> str:
+    """Why it has neither distribution nor geometry nor Fresnel term; "" where it has."""
+    if material.type in WITH_TERMS:
+        return ""
+    return f"{material.type!r} has no distribution, geometry and Fresnel term; {', '.join(WITH_TERMS)} have"
 
 
 def normalized(directions: np.ndarray) -> np.ndarray:
@@ -84,12 +107,20 @@ def in_plane(cosines: list[float]) -> np.ndarray:
     return np.stack([np.sqrt((1 - c) * (1 + c)), np.zeros_like(c), c], axis=1)
 
 
+def _with_few_cosines(body: bytes | bytearray | memoryview) -> Any:
+    document = load_json(body)
+    if (count := _length(document, "cosines")) > MOST_PAIRS:
+        raise TooLarge(f"{count} cosines are too many: at most {MOST_PAIRS} are evaluated at a time")
+    return document
+
+
 def _length(document: Any, name: str) -> int:
     found = document.get(name) if isinstance(document, dict) else None
     return len(found) if isinstance(found, list) else 0
 
 
-def _without_textures(material: Material) -> None:
+def without_textures(material: Material) -> None:
+    """Raises InvalidDocument with pointers from the root of the body."""
     names = type(material).model_fields
     textured = [n for n in names if isinstance(getattr(material, n), ScalarTexture | ColorTexture | NormalTexture)]
     if textured:

@@ -14,7 +14,7 @@ from service.config import Config
 from service.documents import checked
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings, resolve
-from service.rendering.requests.bsdf_request import parse_albedo, parse_values
+from service.rendering.requests.bsdf_request import parse_albedo, parse_terms, parse_values
 from service.scene import Scene, load_json, parse_scene, parse_settings
 from service.scene.base import Model
 from service.scene.document import Parsed
@@ -87,7 +87,7 @@ def unfolded(data: bytes) -> str:
     return zlib.decompress(data).decode("ascii")
 
 
-Kind = Literal["request", "scenes", "materials", "bsdf", "albedo"]
+Kind = Literal["request", "scenes", "materials", "bsdf", "albedo", "terms"]
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "request": lambda config, body: RequestParser(config).request(body),
@@ -95,4 +95,5 @@ PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "materials": lambda config, body: checked("materials", load_json(body), config),
     "bsdf": lambda config, body: parse_values(body),
     "albedo": lambda config, body: parse_albedo(body),
+    "terms": lambda config, body: parse_terms(body),
 }

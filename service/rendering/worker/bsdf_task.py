@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Generator
 
-from gpu import BsdfAlbedo, BsdfValues, Steps
+from gpu import BsdfAlbedo, BsdfTerms, BsdfValues, Steps
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import EvaluateBsdf, Evaluated
 from service.rendering.worker.context import WorkerContext
@@ -22,9 +22,9 @@ class BsdfTask:
         self._question = question
         self._send = context.send
         self._evaluator = context.renderer.bsdf
-        self._key = kernel_keys.bsdf_key(question.material, sampled=question.samples > 0)
+        self._key = kernel_keys.bsdf_key(question.material, question.question)
         self._wait = KernelWait(context.compiler)
-        self._steps: Steps[BsdfValues | BsdfAlbedo] | None = None
+        self._steps: Steps[BsdfValues | BsdfAlbedo | BsdfTerms] | None = None
         self._begun = self._ended = False
 
     @property
@@ -59,12 +59,12 @@ class BsdfTask:
             self._ended = True
             self._send(Evaluated(self.number, vars(answer)))
 
-    def _work(self) -> Generator[None, None, BsdfValues | BsdfAlbedo]:
-        question = self._question
-        if question.samples:
-            return (yield from self._evaluator.albedo(question.material, question.wo, question.samples))
-        assert question.wi is not None
-        return (yield from self._evaluator.values(question.material, question.wo, question.wi))
+    def _work(self) -> Generator[None, None, BsdfValues | BsdfAlbedo | BsdfTerms]:
+        asked, evaluator = self._question, self._evaluator
+        if asked.question == "albedo":
+            return evaluator.albedo(asked.material, asked.wo, asked.samples)
+        evaluate = evaluator.values if asked.question == "values" else evaluator.terms
+        return evaluate(asked.material, asked.wo, asked.wi)
 
     def fail(self) -> None:
         """The server is told by the loop."""
