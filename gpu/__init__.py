@@ -21,7 +21,7 @@ analysis    measurements of a scene at hand; public
 """
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light
-from gpu.arrays import CameraArrays, EnvironmentArrays, SceneArrays, TextureArrays, apply_edit
+from gpu.arrays import EnvironmentArrays, SceneArrays, TextureArrays, apply_edit
 from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfTerms, BsdfValues
 from gpu.device.scene import Scene
 from gpu.errors import (
@@ -52,7 +52,6 @@ __all__ = [
     "BsdfEvaluator",
     "BsdfTerms",
     "BsdfValues",
-    "CameraArrays",
     "CompileError",
     "ContextError",
     "EnvironmentArrays",

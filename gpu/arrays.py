@@ -21,19 +21,6 @@ SHAREABLE, HEAVY = 1 << 10, 1 << 15
 
 
 @dataclass(frozen=True)
-class CameraArrays:
-    """A thin-lens camera in the scene's (rebased) coordinates; right, up and forward are orthonormal."""
-
-    position: Vec3
-    right: Vec3
-    up: Vec3
-    forward: Vec3
-    tan_half_vfov: float
-    aperture_radius: float
-    focus_distance: float
-
-
-@dataclass(frozen=True)
 class EnvironmentArrays:
     """Light from infinity: (h, w, 3) float32 radiance, row 0 at the top (v = 0), latitude-longitude.
 
@@ -86,7 +73,7 @@ class SceneArrays:
     Positions are relative to `origin` (float64, world): what was subtracted before rounding to float32.
     """
 
-    camera: CameraArrays
+    camera: np.void  # layout.Camera
     materials: np.ndarray  # layout.Material
     spheres: np.ndarray = field(default_factory=lambda: _empty(layout.Sphere))
     quads: np.ndarray = field(default_factory=lambda: _empty(layout.Quad))
@@ -130,7 +117,7 @@ class SceneArrays:
 
 def apply_edit(
     arrays: SceneArrays,
-    camera: CameraArrays | None = None,
+    camera: np.void | None = None,
     materials: np.ndarray | None = None,
     texture_words: np.ndarray | None = None,
     environment: tuple[float, float] | None = None,

@@ -1,15 +1,24 @@
+// Where rays begin but for the lens: what the bodies around the camera are found from.
+vec3 camera_origin() { return frame.camera.position; }
+
+// A direction given along the camera's right, up and forward, in world space.
+vec3 camera_to_world(vec3 v) {
+    return v.x * frame.camera.right + v.y * frame.camera.up + v.z * frame.camera.forward;
+}
+
 // The ray of a thin-lens camera through a pixel. Row 0 is the top of the picture; columns count from the left.
 void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
+    Camera c = frame.camera;
     vec2 at = vec2(pixel) + 0.5 + sampling_filter(sobol_pair(rng, PAIR_PIXEL));
     vec2 half_size = 0.5 * vec2(frame.resolution);
-    vec2 xy = (at - half_size) * (frame.tan_half_vfov / half_size.y);
-    vec3 through = xy.x * frame.camera_right - xy.y * frame.camera_up + frame.camera_forward;
-    o = frame.camera_position;
+    vec2 xy = (at - half_size) * (c.tan_half_vfov / half_size.y);
+    vec3 through = xy.x * c.right - xy.y * c.up + c.forward;
+    o = c.position;
 #if HAS_APERTURE
-    vec2 lens = frame.aperture_radius * sampling_disk(sobol_pair(rng, PAIR_LENS));
-    vec3 offset = lens.x * frame.camera_right + lens.y * frame.camera_up;
+    vec2 lens = c.aperture_radius * sampling_disk(sobol_pair(rng, PAIR_LENS));
+    vec3 offset = lens.x * c.right + lens.y * c.up;
     o += offset;
-    through = through * frame.focus_distance - offset;
+    through = through * c.focus_distance - offset;
 #endif
     d = normalize(through);
 }

@@ -36,9 +36,8 @@ Medium medium_left(Medium m, vec3 rate) {
 // Opaque shapes do not count. The line goes backwards, where there is least to meet. If it says that the camera is in a
 // body, a second line forwards must agree, as an open sheet is no body.
 Medium medium_at_camera() {
-    vec3 d = normalize(MEDIUM_SEARCH.x * frame.camera_right + MEDIUM_SEARCH.y * frame.camera_up
-                     + MEDIUM_SEARCH.z * frame.camera_forward);
-    vec3 o = frame.camera_position;
+    vec3 d = normalize(camera_to_world(MEDIUM_SEARCH));
+    vec3 o = camera_origin();
     Medium sum = Medium(vec3(0.0), 0.0), first = sum;
     vec3 walls = vec3(0.0);
     uint skip = NONE, layer = 0u, side = 0u;
@@ -74,7 +73,7 @@ Medium medium_at_camera() {
             more = side == 0u && sum.depth > 0.5;
             if (side == 0u) first = sum;
             side++;
-            o = frame.camera_position;
+            o = camera_origin();
             d = -d;
             skip = NONE;
             if (more) {

@@ -14,8 +14,8 @@ layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
 #include "sampling.glsl"
 #include "shapes.glsl"
 #include "texture.glsl"
-#include "path.glsl"
 #include "camera.glsl"
+#include "path.glsl"
 #include "plan.glsl"
 
 precise vec4 sum, lost;

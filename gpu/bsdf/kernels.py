@@ -11,14 +11,14 @@ from dataclasses import replace
 import numpy as np
 
 from gpu import layout
-from gpu.arrays import CameraArrays, SceneArrays
+from gpu.arrays import SceneArrays
 from gpu.kernels import features
 from gpu.layout import MaterialModel
 
 VALUES, ALBEDO, TERMS = "bsdf_values.comp", "bsdf_albedo.comp", "bsdf_terms.comp"
 ENTRIES = (VALUES, ALBEDO, TERMS)
 
-NOWHERE = CameraArrays((0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, -1.0), 1.0, 0.0, 1.0)
+NOWHERE: np.void = np.zeros(1, layout.Camera.dtype)[0]  # a camera where there is no scene to look at
 # What a material has besides its BSDF.
 _REST = {"emission": 0.0, "ambient": 0.0, "opacity": 1.0, "attenuation_distance": layout.ABSENT}
 

@@ -11,7 +11,7 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import layout
-from gpu.arrays import CameraArrays, SceneArrays, apply_edit
+from gpu.arrays import SceneArrays, apply_edit
 from gpu.device import buffers
 from gpu.device.textures import IMAGE_UNITS, KINDS, TextureCache, bound_textures, linear_texture, placeholder
 from gpu.errors import OutOfMemory
@@ -168,7 +168,7 @@ class Scene:
 
     def edit(
         self,
-        camera: CameraArrays | None = None,
+        camera: np.void | None = None,
         materials: np.ndarray | None = None,
         texture_words: np.ndarray | None = None,
         environment: tuple[float, float] | None = None,
@@ -201,14 +201,8 @@ class Scene:
 
     def write_frame(self, frame: np.ndarray) -> None:
         """Fill the scene's part of a `layout.Frame` record."""
-        a, c = self.arrays, self.arrays.camera
-        frame["camera_position"] = c.position
-        frame["camera_right"] = c.right
-        frame["camera_up"] = c.up
-        frame["camera_forward"] = c.forward
-        frame["tan_half_vfov"] = c.tan_half_vfov
-        frame["aperture_radius"] = c.aperture_radius
-        frame["focus_distance"] = c.focus_distance
+        a = self.arrays
+        frame["camera"] = a.camera
         frame["node_origin"] = a.node_origin
         frame["node_scale"] = a.node_scale
         frame["node_count"] = a.node_count

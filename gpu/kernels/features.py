@@ -121,6 +121,15 @@ def _veiled(s: SceneArrays) -> bool:
     return any(bool(values.any()) for values in textured) or (len(given) > 0 and _thin(s))
 
 
+def _camera(asks: Callable[[np.void], bool]) -> Callable[[SceneArrays], bool]:
+    return lambda s: asks(s.camera)
+
+
+# Flags that the camera alone decides, a `layout.Camera`: where one differs, another camera needs another kernel.
+CAMERA_FLAGS: dict[str, Callable[[np.void], bool]] = {
+    "HAS_APERTURE": lambda camera: bool(camera["aperture_radius"] > 0),
+}
+
 FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_SPHERES": _linear(ShapeKind.SPHERE, "spheres"),
     "HAS_VAST_SPHERES": lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any()),
@@ -173,7 +182,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_ENVIRONMENT_CUBE": lambda s: s.environment is not None and s.environment.cube,
     "HAS_SUN": lambda s: s.environment is not None and s.environment.sun is not None,
     "HAS_OPEN_VIEW": lambda s: background_share(s) >= OPEN,
-    "HAS_APERTURE": lambda s: s.camera.aperture_radius > 0,
+    **{name: _camera(asks) for name, asks in CAMERA_FLAGS.items()},
     "HAS_DISNEY": _model(MaterialModel.DISNEY),
     "HAS_SUBSURFACE": _disney("subsurface"),
     "HAS_SHEEN": _disney("sheen"),

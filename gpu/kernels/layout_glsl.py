@@ -141,10 +141,12 @@ def text() -> str:
 
 
 def _frame() -> str:
+    structs = "\n".join(_struct(kind) for kind in Frame.members.values() if issubclass(kind, Record))
     members = {name: f"{kind.glsl} {name};" for name, kind in Frame.members.items()}
     last = " ".join(members.pop(name) for name in instances_glsl.FRAME)
     body = " ".join(members.values())
-    return f"""layout(std140, binding = {bindings.FRAME_BLOCK}) uniform frame_block {{ {body}
+    return f"""{structs}
+layout(std140, binding = {bindings.FRAME_BLOCK}) uniform frame_block {{ {body}
 #if HAS_INSTANCES
 {last}
 #endif

@@ -20,13 +20,14 @@ def background_share(scene: SceneArrays) -> float:
     if scene.bvh_kinds or any(len(records) for records in others) or vast or not len(balls):
         return 0.0
     camera = scene.camera
-    across = ((np.arange(_SIDE) + 0.5) / _SIDE * 2 - 1) * camera.tan_half_vfov
+    position, right, up, forward = (camera[name].astype(float) for name in ("position", "right", "up", "forward"))
+    across = ((np.arange(_SIDE) + 0.5) / _SIDE * 2 - 1) * float(camera["tan_half_vfov"])
     x, y = np.meshgrid(across, across)
-    rays = x[..., None] * np.array(camera.right) + y[..., None] * np.array(camera.up) + np.array(camera.forward)
+    rays = x[..., None] * right + y[..., None] * up + forward
     rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
     free = np.ones(x.shape, bool)
     for ball in balls:
-        to = ball["center"].astype(float) - camera.position
+        to = ball["center"].astype(float) - position
         along = rays @ to
         apart = (to @ to) - along**2  # squared, of the ray's line from the centre
         radius = float(ball["radius"]) ** 2

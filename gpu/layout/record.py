@@ -1,8 +1,8 @@
-"""What a declared record is: its members' places, as a numpy dtype; `layout_glsl` writes the same as GLSL."""
+"""What a declared record is: its members and their offsets, as a numpy dtype. `layout_glsl` writes it as GLSL."""
 
 from __future__ import annotations
 
-from typing import ClassVar
+from typing import Any, ClassVar
 
 import numpy as np
 
@@ -14,11 +14,15 @@ class LayoutError(TypeError):
 
 
 class Kind:
-    """A member's type: its GLSL name, its size in 32-bit words, and numpy's element."""
+    """A member's type: its GLSL name, its size in 32-bit words, and numpy's element and dtype."""
 
     glsl: ClassVar[str]
     words: ClassVar[int]
     base: ClassVar[type[np.generic]] = np.float32
+    dtype: ClassVar[np.dtype[Any]]
+
+    def __init_subclass__(cls) -> None:
+        cls.dtype = np.dtype((cls.base, (cls.words,)) if cls.words > 1 else cls.base)
 
 
 class f32(Kind):
@@ -48,13 +52,15 @@ class vec4(Kind):
 _KINDS: dict[str, type[Kind]] = {k.__name__: k for k in (f32, u32, vec2, uvec2, vec3, vec4)}
 
 
-class Record:
-    """Base of all records: members in order, a vec3 followed by a scalar, no hole between members."""
+class Record(Kind):
+    """Base of all records: members in order, a vec3 followed by a scalar, no hole between members.
 
-    dtype: ClassVar[np.dtype[np.void]]
+    A member may be another record, whose size is then a multiple of four words, as GLSL rounds it up to that.
+    """
+
+    glsl, words, base = "", 0, np.void
     members: ClassVar[dict[str, type[Kind]]]
     offsets: ClassVar[dict[str, int]]  # in words
-    words: ClassVar[int]
     slot: ClassVar[Slot | None] = None
 
     def __init_subclass__(cls) -> None:
@@ -65,18 +71,21 @@ class Record:
             cls.members[name] = _KINDS[kind]
         cls.offsets, end = {}, 0
         for name, kind_ in cls.members.items():
-            align = {1: 1, 2: 2, 3: 4, 4: 4}[kind_.words]
+            align = {1: 1, 2: 2}.get(kind_.words, 4)
+            if kind_.base is np.void and kind_.words % 4:
+                raise LayoutError(f"{cls.__name__}.{name}: a hole after it, as it has {kind_.words} words")
             if end % align:
                 raise LayoutError(f"{cls.__name__}.{name}: a hole of {align - end % align} words before it")
             cls.offsets[name] = end
             end += kind_.words
         group = 4 if end > 2 else 2
-        cls.words = -(-end // group) * group
+        cls.glsl, cls.words = cls.__name__, -(-end // group) * group
         cls.dtype = np.dtype(
             {
                 "names": list(cls.members),
-                "formats": [(k.base, (k.words,)) if k.words > 1 else k.base for k in cls.members.values()],
+                "formats": [k.dtype for k in cls.members.values()],
                 "offsets": [4 * o for o in cls.offsets.values()],
                 "itemsize": 4 * cls.words,
             }
         )
+        _KINDS[cls.__name__] = cls

@@ -228,17 +228,22 @@ class EnvironmentCell(Record):
     count: u32  # ... and how many there are
 
 
+class Camera(Record):
+    """A thin lens in the scene's (rebased) coordinates; right, up and forward are orthonormal."""
+
+    position: vec3
+    aperture_radius: f32  # of the lens; 0: a pinhole
+    right: vec3
+    focus_distance: f32  # along forward
+    up: vec3
+    tan_half_vfov: f32  # tangent of half the vertical field of view
+    forward: vec3
+
+
 class Frame(Record):
     """Uniforms of one dispatch."""
 
-    camera_position: vec3
-    aperture_radius: f32
-    camera_right: vec3
-    focus_distance: f32
-    camera_up: vec3
-    tan_half_vfov: f32
-    camera_forward: vec3
-    environment_scale: f32
+    camera: Camera
     environment_turn: vec2  # cosine, sine of the rotation
     resolution: uvec2  # of the whole picture
     tile_origin: uvec2
@@ -263,6 +268,7 @@ class Frame(Record):
     environment_sun_cap: f32  # 1 - cos of its angular radius
     environment_sun_radiance: vec3
     environment_sun_share: f32  # of the environment's samples
+    environment_scale: f32  # factor on the environment's radiance
     slot_first: u32  # the pixel at the beginning of the bound part of the accumulators
     sun_first: u32  # among the lights: directional ones with a disk stand side by side
     sun_count: u32

@@ -57,6 +57,11 @@ def flags(arrays: SceneArrays, editing: bool = False) -> frozenset[str]:
     return features.flags(arrays, editing)
 
 
+def camera_flags(camera: np.void) -> frozenset[str]:
+    """The flags that a `layout.Camera` raises by itself: two cameras that raise the same share a scene's kernel."""
+    return frozenset(name for name, asks in features.CAMERA_FLAGS.items() if asks(camera))
+
+
 def flags_after_edit(raised: frozenset[str], arrays: SceneArrays, editing: bool) -> frozenset[str]:
     """The flags of a scene after an edit, where these were raised before: while it is edited none is lowered."""
     return features.grown(raised, arrays) if editing else features.flags(arrays)

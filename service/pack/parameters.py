@@ -6,7 +6,7 @@ import math
 
 import numpy as np
 
-from gpu import CameraArrays, layout
+from gpu import layout
 from service.scene import Scene
 from service.scene.camera import Camera
 from service.scene.environment import Environment, SkyEnvironment
@@ -22,23 +22,23 @@ RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
 SIDES = {"front": 1, "both": 2}
 
 
-def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> CameraArrays:
-    """The camera relative to `SceneArrays.origin`."""
+def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
+    """A `layout.Camera`, relative to `SceneArrays.origin`."""
     position, target = np.array(camera.position, np.float64), np.array(camera.target, np.float64)
     view = target - position
     distance = math.hypot(*view)
     forward = view / distance
     right = np.cross(forward, np.array(camera.up, np.float64) / math.hypot(*camera.up))
     right /= math.hypot(*right)
-    return CameraArrays(
-        position=vec3(position - origin),
-        right=vec3(right),
-        up=vec3(np.cross(right, forward)),
-        forward=vec3(forward),
-        tan_half_vfov=math.tan(math.radians(camera.vfov) / 2),
-        aperture_radius=camera.aperture_radius,
-        focus_distance=distance if camera.focus_distance is None else camera.focus_distance,
-    )
+    out: np.void = np.zeros(1, layout.Camera.dtype)[0]
+    out["position"] = position - origin
+    out["right"] = right
+    out["up"] = np.cross(right, forward)
+    out["forward"] = forward
+    out["tan_half_vfov"] = math.tan(math.radians(camera.vfov) / 2)
+    out["aperture_radius"] = camera.aperture_radius
+    out["focus_distance"] = distance if camera.focus_distance is None else camera.focus_distance
+    return out
 
 
 def pack_materials(scene: Scene) -> np.ndarray:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import asyncio
 import time
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -139,7 +138,8 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         assert first.mean((0, 1)) == pytest.approx(last.mean((0, 1)), rel=0.25)
 
         supervisor.send(Pause(task))
-        open_lens = replace(arrays.camera, aperture_radius=0.1)
+        open_lens = arrays.camera.copy()
+        open_lens["aperture_radius"] = 0.1
         supervisor.send(Update(task, 3, camera=open_lens, base=2))
         (only,) = await shown(supervisor, ears, task, 3)
         assert isinstance(only, Frame) and not only.provisional, "at rest one first look is all it wants"

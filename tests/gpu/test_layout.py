@@ -63,12 +63,17 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
     record = layout.Frame
     words = np.random.default_rng(6).integers(0x00800000, 0x7F000000, record.words, np.uint32)
     lines, expected = [], []
-    for member, kind in record.members.items():
+    camera = {
+        f"camera.{member}": (kind, layout.Camera.offsets[member]) for member, kind in layout.Camera.members.items()
+    }
+    members = {member: (kind, record.offsets[member]) for member, kind in record.members.items()}
+    assert members.pop("camera") == (layout.Camera, 0)
+    for member, (kind, offset) in {**camera, **members}.items():
         for k, axis in enumerate("xyzw"[: kind.words]):
             value = f"frame.{member}" + (f".{axis}" if kind.words > 1 else "")
             bits = value if kind.base is np.uint32 else f"floatBitsToUint({value})"
             lines.append(f"    echo[{len(expected)}] = {bits};")
-            expected.append(words[record.offsets[member] + k])
+            expected.append(words[offset + k])
     head = "\n".join(f"#define {k} {v}" for k, v in defines(frozenset({"HAS_INSTANCES"})).items())
     kernel = gpu._context.compute_shader(
         f"#version 430\n{head}\nlayout(local_size_x = 8) in;\n{layout_glsl.text()}\n"
@@ -89,6 +94,9 @@ def test_a_hole_is_refused() -> None:
         type("Holed", (Record,), {"__annotations__": {"a": "f32", "b": "vec3"}})
     with pytest.raises(LayoutError, match="unknown type"):
         type("Odd", (Record,), {"__annotations__": {"a": "f64"}})
+    with pytest.raises(LayoutError, match="a hole after it"):
+        type("Pair", (Record,), {"__annotations__": {"a": "f32"}})
+        type("Outer", (Record,), {"__annotations__": {"a": "Pair", "b": "f32"}})
     assert (f32.words, vec3.words) == (1, 3)
 
 

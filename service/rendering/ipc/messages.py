@@ -59,7 +59,7 @@ class Update:
     scene: Any = None
     settings: dict[str, Any] | None = None
     stop: StopRule | None = None
-    camera: Any = None
+    camera: np.void | None = None  # gpu.layout.Camera
     materials: np.ndarray | None = None
     texture_words: np.ndarray | None = None
     environment: tuple[float, float] | None = None

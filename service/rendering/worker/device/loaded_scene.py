@@ -112,8 +112,10 @@ def kernel_request(
         raised = kernel_keys.flags(arrays, editing)
     elif loaded is not None:
         arrays, editing, raised = loaded.scene.arrays, loaded.editing, loaded.scene.flags
-        aperture = update.camera is None or update.camera.aperture_radius == arrays.camera.aperture_radius
-        if update.settings is None and aperture and not edits.keys() & {"materials", "texture_words", "moved"}:
+        same_flags = update.camera is None or kernel_keys.camera_flags(update.camera) == kernel_keys.camera_flags(
+            arrays.camera
+        )
+        if update.settings is None and same_flags and not edits.keys() & {"materials", "texture_words", "moved"}:
             return None
     elif offloaded is not None:
         arrays, editing, raised = offloaded.arrays, offloaded.editing, offloaded.flags
