@@ -1,4 +1,4 @@
-"""The command line: `sunbox serve | render | import | info | bench`.
+"""The command line: `sunbox serve | render | bsdf | import | info | bench`.
 
 Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
 Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
@@ -13,7 +13,7 @@ from collections.abc import Callable, Sequence
 from importlib import import_module
 
 from service.commands import CommandError
-from service.views import AOVS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
+from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -43,6 +43,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _serve(commands.add_parser("serve", help="serve the editor and the API"))
     _render(commands.add_parser("render", help="render a scene to a file"))
+    _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a glTF model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
     _bench(commands.add_parser("bench", help="measure"))
@@ -71,6 +72,16 @@ def _render(command: argparse.ArgumentParser) -> None:
     add("--tone-map", metavar="NAME", help=f"for .png: {_any_of(curves)}")
     add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
     _asset_root(command)
+
+
+def _bsdf(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    add("material", metavar="MATERIAL.json", help="a material without textures, as a scene's `materials` holds it")
+    add("-o", "--output", required=True, metavar="OUT", help="a table, .csv, or a figure, .svg or .png")
+    add("--kind", choices=BSDF_KINDS, default=BSDF_KINDS[0], help=f"what to show (default: {BSDF_KINDS[0]})")
+    text = "of the direction that is seen from, for polar and geometry, 0 to 89.9; may be given again (default: 45)"
+    add("--angle", action="append", metavar="DEGREES", help=text)
+    add("--with", dest="other", metavar="OTHER.json", help="another material to compare with")
 
 
 def _any_of(names: Sequence[str]) -> str:

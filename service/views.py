@@ -17,10 +17,12 @@ LinearFormat = Literal["exr", "hdr", "npy"]
 LosslessFormat = Literal["png", LinearFormat]  # what the command line writes
 FileFormat = Literal["png", LossyFormat, LinearFormat]
 StreamFormat = Literal[LossyFormat, "png", "rgba32f"]
+BsdfKind = Literal["polar", "distribution", "geometry", "fresnel", "albedo", "slice"]  # of a material, to look at
 Encoding = Literal["u1", "f4", "linear"]  # display-encoded 8 bits or floats; or the picture itself
 
 AOVS: tuple[Aov, ...] = get_args(Aov)
 TONE_MAPS: tuple[ToneMap, ...] = get_args(ToneMap)
+BSDF_KINDS: tuple[BsdfKind, ...] = get_args(BsdfKind)
 LOSSLESS_FORMATS: tuple[LosslessFormat, ...] = get_args(LosslessFormat)
 DEFAULT_TONE_MAP: Final = "pbr_neutral"
 LEAST_EXPOSURE, MOST_EXPOSURE = -60, 60  # stops

@@ -1,4 +1,4 @@
-// Entry: f, without the cosine of wi, and the density of wi, for every pair of a wo and a wi, both in the frame of
+// Entry: f, without the cosine of wi, and the density of wi, for pairs of a wo and a wi, both in the frame of
 // bsdf_lone.glsl; and what is perfectly specular as seen from each wo.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
@@ -15,13 +15,14 @@ layout(std430, binding = SLOT_MOMENTS) writeonly buffer delta_buffer { vec4 delt
 uniform uint first; // of the pairs to evaluate
 uniform uint count;
 uniform uint wo_count;
-uniform uint wi_count;
+uniform uint wi_count; // of each wo
+uniform uint wi_step;  // 0: every wo has the same ones; 1: the first is as far along as its wo
 
 void main() {
     if (gl_GlobalInvocationID.x >= count) return;
     uint pair = first + gl_GlobalInvocationID.x;
     uint row = pair / wi_count, column = pair - row * wi_count;
-    vec3 wo = directions[row].xyz, wi = directions[wo_count + column].xyz;
+    vec3 wo = directions[row].xyz, wi = directions[wo_count + row * wi_step + column].xyz;
     Lone lone = lone_make(wo);
     wo = lone_turn(lone, wo);
     Scatter value = bsdf_eval(lone.s, wo, lone_turn(lone, wi));

@@ -72,14 +72,20 @@ class BsdfEvaluator:
         self._tables: dict[int, Any] = {}
 
     def values(
-        self, material: SceneArrays, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
+        self,
+        material: SceneArrays,
+        wo: np.ndarray,
+        wi: np.ndarray,
+        slice_s: float = SLICE_S,
+        paired: bool = False,
     ) -> Generator[None, None, BsdfValues]:
-        """Evaluate a material for every pair of `wo` (n, 3) and `wi` (m, 3), unit length.
+        """Evaluate a material for every pair of `wo` (n, 3) and `wi` (m, 3), unit length; `paired`: for each wo with
+        the wi in its place, so that m is n in what is given and 1 in what comes back.
 
         Raises CompileError, OutOfMemory.
         """
-        n, m = len(wo), len(wi)
-        work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m})
+        n, m = len(wo), 1 if paired else len(wi)
+        work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m, "wi_step": int(paired)})
         try:
             work.give(np.concatenate([wo, wi]))
             work.make(Slot.OUTPUT, 16 * n * m)

@@ -2,6 +2,9 @@
 
 render         a picture of a document, into a file
 serve          the editor and the API
+bsdf           curves of a material's BSDF, into a table or a figure
+bsdf_curves    what those curves are, by kind
+bsdf_figure    the figures, drawn by matplotlib
 import         a glTF model as a document with files beside it
 info           what would render here
 bench          measurements

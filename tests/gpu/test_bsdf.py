@@ -196,6 +196,15 @@ def test_values_are_reciprocal_across_the_surface(gpu: Renderer, glass: dict[str
     assert (there[across] > 0).any() and (there[~across] > 0).any()
 
 
+def test_pairs_are_those_of_the_grid(gpu: Renderer) -> None:
+    rng = np.random.default_rng(7)
+    wo, wi = sphere(rng, 50)[:40], sphere(rng, 50)[:40]
+    grid = values(gpu, ALL["frosted"], wo, wi)
+    paired = Steps(gpu.bsdf.values(lone(ALL["frosted"]), wo, wi, paired=True)).finish()
+    np.testing.assert_array_equal(paired.f[:, 0], grid.f[range(40), range(40)])
+    np.testing.assert_array_equal(paired.pdf[:, 0], grid.pdf[range(40), range(40)])
+
+
 def test_slices_and_other_questions_change_nothing(gpu: Renderer) -> None:
     """Two questions of one kernel take turns, slice by slice."""
     rng = np.random.default_rng(6)

@@ -45,6 +45,8 @@ class TermsBody(Model):
 
 _BSDF, _ALBEDO, _TERMS = TypeAdapter(BsdfBody), TypeAdapter(AlbedoBody), TypeAdapter(TermsBody)
 
+_MATERIAL: TypeAdapter[Material] = TypeAdapter(Material)
+
 
 @dataclass(frozen=True)
 class BsdfRequest:
@@ -64,14 +66,14 @@ def parse_values(body: bytes | bytearray | memoryview) -> BsdfRequest:
     if n * m > MOST_PAIRS:
         raise TooLarge(f"{n} wo and {m} wi are {n * m} pairs: at most {MOST_PAIRS} are evaluated at a time")
     parsed = validated(_BSDF, document, "")
-    without_textures(parsed.material)
+    _without_textures(parsed.material)
     return BsdfRequest("values", parsed.material, normalized(parsed.wo), normalized(parsed.wi))
 
 
 def parse_albedo(body: bytes | bytearray | memoryview) -> BsdfRequest:
     """Raises MalformedJson, InvalidDocument, TooLarge."""
     parsed = validated(_ALBEDO, _with_few_cosines(body), "")
-    without_textures(parsed.material)
+    _without_textures(parsed.material)
     work = len(parsed.cosines) * parsed.samples
     if work > MOST_WORK:
         raise TooLarge(f"{len(parsed.cosines)} cosines of {parsed.samples} samples are {work}: at most {MOST_WORK}")
@@ -81,7 +83,7 @@ def parse_albedo(body: bytes | bytearray | memoryview) -> BsdfRequest:
 def parse_terms(body: bytes | bytearray | memoryview) -> BsdfRequest:
     """Raises MalformedJson, InvalidDocument, TooLarge."""
     parsed = validated(_TERMS, _with_few_cosines(body), "")
-    without_textures(parsed.material)
+    _without_textures(parsed.material)
     if detail := without_terms(parsed.material):
         raise InvalidDocument([FieldError("/material/type", detail)])
     return BsdfRequest("terms", parsed.material, in_plane([parsed.wo_cosine]), in_plane(parsed.cosines))
@@ -119,10 +121,16 @@ def _length(document: Any, name: str) -> int:
     return len(found) if isinstance(found, list) else 0
 
 
-def without_textures(material: Material) -> None:
-    """Raises InvalidDocument with pointers from the root of the body."""
+def parse_material(document: Any, pointer: str = "") -> Material:
+    """A material without textures. Raises InvalidDocument, with pointers to it from `pointer` up."""
+    material: Material = validated(_MATERIAL, document, pointer)
+    _without_textures(material, pointer)
+    return material
+
+
+def _without_textures(material: Material, pointer: str = "/material") -> None:
     names = type(material).model_fields
     textured = [n for n in names if isinstance(getattr(material, n), ScalarTexture | ColorTexture | NormalTexture)]
     if textured:
         detail = "a texture has no value without a surface: give a number or a colour"
-        raise InvalidDocument(FieldError(f"/material/{name}", detail) for name in textured)
+        raise InvalidDocument(FieldError(f"{pointer}/{name}", detail) for name in textured)

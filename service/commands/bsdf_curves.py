@@ -1,0 +1,178 @@
+"""Curves of a material's BSDF over an angle, by kind, and their table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Generator, Mapping
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, TypeVar
+
+import numpy as np
+
+from gpu import SceneArrays, Steps
+from service.pack import pack_material
+
+if TYPE_CHECKING:
+    from gpu import BsdfEvaluator, Renderer
+    from service.scene import Material
+
+STEP = 0.1  # degrees between two values of a curve
+ALBEDO_STEP = 1.0  # ... of the albedo, which is smooth and is sampled
+ALBEDO_SAMPLES = 1 << 16
+SLICE_STEP = 1.0  # ... of a slice, along both of its axes
+CHANNELS = ("r", "g", "b")
+
+T = TypeVar("T")
+
+
+@dataclass(frozen=True)
+class Specular:
+    """A perfectly specular lobe in a polar diagram."""
+
+    theta: float  # degrees
+    weight: tuple[float, ...]  # per channel
+
+
+@dataclass(frozen=True)
+class Curves:
+    """`theta` (n,) in degrees, and a column (n,) for each curve; of a slice, `image` is (theta_d, theta_h, 3)."""
+
+    kind: str
+    theta: np.ndarray
+    columns: dict[str, np.ndarray]
+    specular: dict[str, list[Specular]] = field(default_factory=dict)  # by curve
+    image: np.ndarray | None = None
+    missing: str = ""  # why there is nothing to show
+
+    @property
+    def notes(self) -> list[str]:
+        """What the columns cannot say."""
+        return [
+            f"{name}: a perfectly specular lobe at {lobe.theta:.1f} degrees reflects or transmits "
+            + " ".join(f"{x:.4g}" for x in lobe.weight)
+            for name, lobes in self.specular.items()
+            for lobe in lobes
+        ]
+
+
+def curves_of(renderer: Renderer, material: Material, kind: str, angles: list[float]) -> Curves:
+    """The curves of one kind. Raises GpuError."""
+    made: Curves = KINDS[kind](renderer.bsdf, pack_material(material), angles)
+    return made
+
+
+def table(materials: Mapping[str, Curves]) -> str:
+    """Comma-separated values: theta_deg, then a column for each curve, with its material where there are two."""
+    several = len(materials) > 1
+    first = max(materials.values(), key=lambda curves: len(curves.theta))
+    columns = {"theta_deg": first.theta}
+    for name, curves in materials.items():
+        known = np.isin(first.theta, curves.theta)
+        for curve, values in curves.columns.items():
+            column = np.zeros(len(first.theta))  # behind a surface that does not transmit there is no light
+            column[known] = values
+            columns[f"{_plain(name)}:{curve}" if several else curve] = column
+    rows = zip(*columns.values(), strict=True)
+    lines = [",".join(columns), *(",".join(f"{x + 0.0:.9g}" for x in row) for row in rows)]
+    return "\n".join(lines) + "\n"
+
+
+def _plain(name: str) -> str:
+    """A name without what has a meaning in the table."""
+    return "".join("_" if c in ',"\r\n' else c for c in name)
+
+
+def _done(work: Generator[None, None, T]) -> T:
+    return Steps(work).finish()
+
+
+def _directions(theta: np.ndarray | float) -> np.ndarray:
+    """Directions (n, 3) in the plane of normal and tangent, at these degrees from the normal towards the tangent."""
+    t = np.radians(np.atleast_1d(theta))
+    cos = np.where(np.abs(np.atleast_1d(theta)) == 90, 0, np.cos(t))  # else 6e-17, which is above the horizon
+    return np.stack([np.sin(t), np.zeros_like(t), cos], axis=1)
+
+
+def _channels(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
+    """(n, 3) as one curve, or as three where the channels differ."""
+    if (values == values[:, :1]).all():
+        return {name: values[:, 0]}
+    return {f"{name}_{channel}": values[:, i] for i, channel in enumerate(CHANNELS)}
+
+
+def _polar(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+    """f in the plane of incidence; wo is at -angle, so that a mirror reflects it to +angle. Light beyond 90 degrees
+    is transmitted."""
+    theta = np.round(np.arange(-1800, 1801) * STEP, 1)
+    wo = _directions(-np.array(angles))
+    found = _done(bsdf.values(material, wo, _directions(theta)))
+    above = np.abs(theta) < 90
+    clear = bool(found.f[:, ~above].any()) or bool((found.delta_wi[found.delta_probability > 0][:, 2] < 0).any())
+    shown = np.ones_like(above) if clear else above
+    columns: dict[str, np.ndarray] = {}
+    specular: dict[str, list[Specular]] = {}
+    for i, angle in enumerate(angles):
+        name = f"f_{angle:g}"
+        columns |= _channels(name, found.f[i, shown])
+        for k in np.flatnonzero(found.delta_probability[i] > 0):
+            x, _, z = found.delta_wi[i, k].tolist()
+            weight = tuple(found.delta_weight[i, k].tolist())
+            specular.setdefault(name, []).append(Specular(float(np.degrees(np.arctan2(x, z))), weight))
+    return Curves("polar", theta[shown], columns, specular)
+
+
+def _albedo(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+    theta = np.append(np.arange(0, 90, ALBEDO_STEP), 90 - STEP)
+    found = _done(bsdf.albedo(material, _directions(theta), ALBEDO_SAMPLES))
+    return Curves("albedo", theta, _channels("albedo", found.albedo))
+
+
+def _slice(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+    """f over the angle of the half vector to the normal, theta_h, and that of both directions to it, theta_d, in
+    planes at right angles [Rusinkiewicz 1998; Burley 2012, figure 1]. Luminance in the columns, one for each theta_d.
+    """
+    grid = np.arange(0, 90, SLICE_STEP)
+    theta_d, theta_h = (np.radians(a.ravel()) for a in np.meshgrid(grid, grid, indexing="ij"))
+    half = np.stack([np.sin(theta_h), np.zeros_like(theta_h), np.cos(theta_h)], axis=1)
+    across = np.zeros_like(half)
+    across[:, 1] = np.sin(theta_d)
+    along = half * np.cos(theta_d)[:, None]
+    found = _done(bsdf.values(material, along + across, along - across, paired=True))
+    image = found.f[:, 0].reshape(len(grid), len(grid), 3)
+    luminance = image.astype(np.float64) @ [0.2126, 0.7152, 0.0722]
+    columns = {f"theta_d_{angle:g}": values for angle, values in zip(grid, luminance, strict=True)}
+    return Curves("slice", grid, columns, image=image)
+
+
+def _distribution(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+    theta = np.round(np.arange(900) * STEP, 1)
+    found = _done(bsdf.terms(material, _directions(0.0), _directions(theta)))
+    missing = "" if found.has_facets.all() else "a perfect mirror has no distribution: it must be at least 0.01"
+    return Curves("distribution", theta, {"D": found.distribution}, missing=missing)
+
+
+def _geometry(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+    """G between a direction at -angle and one at theta on the other side of the normal."""
+    theta = np.round(np.arange(900) * STEP, 1)
+    columns, missing = dict[str, np.ndarray](), ""
+    for angle in angles:
+        found = _done(bsdf.terms(material, _directions(angle), _directions(theta)))
+        columns[f"G_{angle:g}"] = found.geometry
+        if not found.has_facets.all():
+            missing = "a perfect mirror has no geometry term: it must be at least 0.01"
+    return Curves("geometry", theta, columns, missing=missing)
+
+
+def _fresnel(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+    theta = np.round(np.arange(900) * STEP, 1)
+    found = _done(bsdf.terms(material, _directions(0.0), _directions(theta)))
+    return Curves("fresnel", theta, _channels("F", found.fresnel))
+
+
+KINDS: dict[str, Callable[[BsdfEvaluator, SceneArrays, list[float]], Curves]] = {
+    "polar": _polar,
+    "distribution": _distribution,
+    "geometry": _geometry,
+    "fresnel": _fresnel,
+    "albedo": _albedo,
+    "slice": _slice,
+}

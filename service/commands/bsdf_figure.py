@@ -1,0 +1,103 @@
+"""Curves of BSDFs as figures. Raises ImportError without matplotlib, which takes half a second to load."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Mapping
+from typing import Any
+
+import matplotlib
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from service.commands.bsdf_curves import Curves
+
+AXES = {  # what is on the two axes
+    "distribution": ("angle of the facet's normal (degrees)", "D (1/sr)"),
+    "geometry": ("angle of the incident direction (degrees)", "G"),
+    "fresnel": ("angle of incidence on the facet (degrees)", "F"),
+    "albedo": ("angle to the normal (degrees)", "directional albedo"),
+}
+COLORS = {"r": "#c0392b", "g": "#27803b", "b": "#2b5fc0"}
+STYLES = ("-", "--")  # of the first material and of the one that it is compared with
+PEAKED = 20.0  # times the median of a lobe: then its radius is logarithmic, or nothing but the peak would be seen
+
+
+def draw(materials: Mapping[str, Curves], format: str) -> bytes:
+    """The figure as "svg" or "png". The same curves give the same bytes."""
+    kind = next(iter(materials.values())).kind
+    sheet = Figure(figsize=(6.4 * (len(materials) if kind == "slice" else 1), 5.2), layout="constrained")
+    FigureCanvasAgg(sheet)
+    if kind == "slice":
+        _slices(sheet, materials)
+    elif kind == "polar":
+        _polar(sheet.add_subplot(projection="polar"), materials)
+    else:
+        _plain(sheet.add_subplot(), kind, materials)
+    out = io.BytesIO()
+    with matplotlib.rc_context({"svg.hashsalt": "sunbox", "svg.fonttype": "path"}):
+        sheet.savefig(out, format=format, dpi=150, metadata={"Date": None} if format == "svg" else None)
+    return out.getvalue()
+
+
+def _curves(materials: Mapping[str, Curves]) -> list[tuple[Curves, np.ndarray, dict[str, Any]]]:
+    """(its material's curves, values, how to draw it) of each curve."""
+    out = []
+    for (name, curves), style in zip(materials.items(), STYLES, strict=False):
+        for column, values in curves.columns.items():
+            label = f"{name}: {column}" if len(materials) > 1 else column
+            color = COLORS.get(column.rpartition("_")[2]) if len(curves.columns) <= len(COLORS) else None
+            out.append((curves, values, {"label": label, "linestyle": style, "color": color}))
+    return out
+
+
+def _plain(plot: Any, kind: str, materials: Mapping[str, Curves]) -> None:
+    for curves, values, how in _curves(materials):
+        plot.plot(curves.theta, values, **how)
+    across, up = AXES[kind]
+    plot.set_xlabel(across)
+    plot.set_ylabel(up)
+    plot.set_xlim(0, 90)
+    if kind == "distribution":
+        plot.set_yscale("log")
+    else:
+        plot.set_ylim(bottom=0)
+    plot.grid(True, alpha=0.3)
+    plot.legend()
+
+
+def _polar(plot: Any, materials: Mapping[str, Curves]) -> None:
+    plot.set_theta_zero_location("N")
+    plot.set_theta_direction(-1)
+    half = all(abs(curves.theta).max() <= 90 for curves in materials.values())
+    if half:
+        plot.set_thetamin(-90)
+        plot.set_thetamax(90)
+    drawn = _curves(materials)
+    for curves, values, how in drawn:
+        plot.plot(np.radians(curves.theta), values, **how)
+    lit = np.concatenate([values[values > 0] for _, values, _ in drawn])
+    if len(lit) and lit.max() > PEAKED * np.median(lit):
+        plot.set_rscale("symlog", linthresh=float(np.median(lit)))
+    top = float(lit.max()) if len(lit) else 1.0
+    plot.set_rlim(0, 1.05 * top)
+    for curves in materials.values():
+        for lobe in (lobe for lobes in curves.specular.values() for lobe in lobes):
+            angle = np.radians(lobe.theta)
+            plot.plot([angle, angle], [0, top], color="black", linewidth=1)
+            plot.annotate(f"{max(lobe.weight):.3g}", (angle, top), fontsize=8)
+    plot.set_xlabel("f (1/sr) in the plane of incidence; lines: perfectly specular lobes and their weights")
+    plot.legend(loc="upper left", bbox_to_anchor=(-0.15, 1.1))
+
+
+def _slices(sheet: Any, materials: Mapping[str, Curves]) -> None:
+    for i, (name, curves) in enumerate(materials.items()):
+        plot = sheet.add_subplot(1, len(materials), i + 1)
+        assert curves.image is not None
+        # White is f = 1 / pi, the most that a matte surface has; sRGB's curve, nearly.
+        shown = np.clip(curves.image * np.pi, 0, 1) ** (1 / 2.2)
+        plot.imshow(shown, origin="lower", extent=(0, 90, 0, 90), interpolation="nearest")
+        plot.set_title(name)
+        plot.set_xlabel("theta_h (degrees)")
+        plot.set_ylabel("theta_d (degrees)")
