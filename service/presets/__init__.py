@@ -3,13 +3,14 @@
 A file's `title` is for menus, its `source` says where numbers were measured; neither is part of the document.
 `"builtin:NAME"` in it stands for an asset of `generated`.
 
-generated  the assets that presets use
-field      a thousand spheres
-knot       a torus knot, as a mesh
-skies      painted skies
-studio     a photographer's studio
-latlong    directions and shapes of light in latitude-longitude pictures
-exr        a writer of the plainest OpenEXR files
+generated      the assets that presets use
+field          a thousand spheres
+disney_charts  spheres that show what each parameter of `disney` does
+knot           a torus knot, as a mesh
+skies          painted skies
+studio         a photographer's studio
+latlong        directions and shapes of light in latitude-longitude pictures
+exr            a writer of the plainest OpenEXR files
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from functools import cache
 from importlib.resources import files
 from typing import Any
 
+from service.presets.disney_charts import parameter_grid, parameter_rows
 from service.presets.field import sphere_field
 from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
@@ -29,7 +31,11 @@ KINDS = ("scenes", "materials", "environments")
 DEFAULT_SCENE = "sphere-on-floor"
 
 # Documents that would be long files of numbers.
-COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {("scenes", "sphere-field"): sphere_field}
+COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
+    ("scenes", "sphere-field"): sphere_field,
+    ("scenes", "disney-parameters"): parameter_rows,
+    ("scenes", "disney-grid"): parameter_grid,
+}
 
 
 def names(kind: str) -> list[dict[str, str]]:

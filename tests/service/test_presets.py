@@ -22,6 +22,8 @@ from service.presets import latlong
 from service.presets.generated import ASSETS, asset, asset_id
 from service.problems import NotFound
 from service.scene import parse_scene
+from service.scene.material.disney import DisneyMaterial
+from service.scene.material.surface import Surface
 
 EVERY = [(kind, entry["name"]) for kind in presets.KINDS for entry in presets.names(kind)]
 SCENES = [name for kind, name in EVERY if kind == "scenes"]
@@ -61,7 +63,8 @@ def test_lists_have_titles(kind: str) -> None:
 
 def test_there_is_enough_to_choose_from() -> None:
     wanted = {"sphere-on-floor", "cornell-empty", "cornell-boxes", "cornell-spheres", "roughness-row", "sphere-field",
-              "generated-mesh", "point-lights"}  # fmt: skip
+              "generated-mesh", "point-lights", "cornell-glossy", "cornell-open", "disney-parameters",
+              "disney-grid"}  # fmt: skip
     assert wanted <= set(SCENES)
     assert len(presets.names("materials")) >= 24 and len(presets.names("environments")) >= 6
 
@@ -103,6 +106,29 @@ def test_the_row_goes_from_mirror_to_matte() -> None:
     spheres = sorted((s for s in scene.shapes if s.type == "sphere"), key=lambda sphere: sphere.center[0])
     roughness = [scene.materials[sphere.material].roughness for sphere in spheres]  # type: ignore[union-attr]
     assert roughness == np.linspace(0, 1, 9).tolist()
+
+
+def test_each_parameter_of_disney_has_a_row_from_0_to_1() -> None:
+    """And nothing else changes along it."""
+    document = presets.get("scenes", "disney-parameters")
+    rows: dict[float, list[Any]] = {}
+    for sphere in sorted(document["shapes"], key=lambda sphere: sphere["center"][0]):
+        material = document["materials"][sphere["material"]]
+        rows.setdefault(sphere["center"][1], []).append(material)
+    shown = set()
+    for row in rows.values():
+        (varied,) = {key for material in row for key in material if material[key] != row[0].get(key)}
+        assert [material[varied] for material in row] == pytest.approx(np.linspace(0, 1, 11))
+        shown.add(varied)
+    assert shown == set(DisneyMaterial.model_fields) - set(Surface.model_fields) - {"type"}
+
+
+def test_the_grid_has_every_combination_once() -> None:
+    materials = presets.get("scenes", "disney-grid")["materials"].values()
+    seen = {(m["metallic"], m["roughness"], m["specular"]) for m in materials}
+    axes = [sorted(set(values)) for values in zip(*seen, strict=True)]
+    assert len(seen) == len(materials) == np.prod([len(axis) for axis in axes])
+    assert all((axis[0], axis[-1]) == (0, 1) for axis in axes)
 
 
 def test_the_field_has_a_thousand_spheres_that_do_not_touch() -> None:
