@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from contextlib import nullcontext
 from dataclasses import replace
 
 import numpy as np
@@ -12,6 +13,8 @@ from service.rendering.ipc.messages import EvaluateBsdf, Evaluated, Failed, From
 from service.rendering.renderers import Renderers
 
 MOST = 64  # questions at a time, of everybody
+LONG = 1 << 18  # samples: some 50 ms of two cores
+LONG_AT_ONCE = 2  # ... of such, as each one takes as much of the renderer's time as a stream does
 
 
 class BsdfQuestions:
@@ -20,6 +23,7 @@ class BsdfQuestions:
     def __init__(self, renderers: Renderers) -> None:
         self._renderers = renderers
         self._open = 0
+        self._long = asyncio.Semaphore(LONG_AT_ONCE)
 
     async def ask(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:
         """The arrays of its Evaluated; whoever asks may be cancelled. The renderers give the task its number.
@@ -28,14 +32,20 @@ class BsdfQuestions:
         """
         if self._open >= MOST:
             raise Unavailable("There are too many questions about materials just now.")
+        self._open += 1
+        try:
+            async with self._long if question.samples * len(question.wo) > LONG else nullcontext():
+                return await self._answer(question)
+        finally:
+            self._open -= 1
+
+    async def _answer(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:
         waiting = _Waiting(asyncio.get_running_loop().create_future())
         task = self._renderers.open(waiting, "bsdf", question.client)
-        self._open += 1
         try:
             self._renderers.send(replace(question, task=task, client=question.client or str(task)))
             return await waiting.answer
         finally:
-            self._open -= 1
             self._renderers.drop(task)
 
 

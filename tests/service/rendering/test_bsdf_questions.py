@@ -1,0 +1,138 @@
+"""Questions about a material's BSDF among pictures: nobody stands still for them, and none is left behind."""
+
+from __future__ import annotations
+
+import asyncio
+import subprocess
+import sys
+from contextlib import suppress
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer
+from gpu.precompile import kernel_keys
+from service.pack import pack, pack_material
+from service.problems import Unavailable
+from service.rendering.bsdf import LONG_AT_ONCE, MOST, BsdfQuestions
+from service.rendering.ipc.messages import EvaluateBsdf, Image, Loaded, Read, StopRule, Update
+from service.rendering.supervisor.supervisor import Supervisor
+from service.scene import PrincipledMaterial, parse_scene
+from tests.documents import Shelf
+from tests.gpu.test_precompile import LINEAR, SIZE, Ears, helpers
+from tests.serving import SCENE
+from tests.supervisors import with_supervisor
+
+GLASS = pack_material(PrincipledMaterial(type="principled", transmission=1.0, roughness=0.4))
+UP = np.array([[0.0, 0.0, 1.0]])
+SHORT = EvaluateBsdf(0, "values", GLASS, UP, UP)
+LONG = EvaluateBsdf(0, "albedo", GLASS, np.repeat(UP, 64, axis=0), UP[:0], samples=1 << 20)
+
+AHEAD = """
+from gpu.precompile.kernel_keys import bsdf_keys
+from gpu.precompile.precompiler import Precompiler
+precompiler = Precompiler()
+print(all([precompiler.compile(key)[1] for key in bsdf_keys()]))
+"""
+EVALUATOR = """
+import numpy as np
+from gpu import Renderer, Steps
+from gpu.bsdf import kernels
+up = np.array([[0.0, 0.0, 1.0]])
+with Renderer() as renderer:
+    for material in kernels.samples():
+        Steps(renderer.bsdf.values(material, up, up)).finish()
+        Steps(renderer.bsdf.albedo(material, up, 64)).finish()
+        Steps(renderer.bsdf.terms(material, up, up)).finish()
+"""
+
+
+@pytest.fixture
+def cold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
+    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
+    return tmp_path
+
+
+async def busy_picture(supervisor: Supervisor) -> tuple[int, Ears]:
+    """A task that traces without end."""
+    ears = Ears()
+    task = supervisor.open(ears)
+    arrays = pack(parse_scene(SCENE), Shelf()).arrays
+    await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule()))
+    await ears.next(task, Loaded)
+    return task, ears
+
+
+def test_pictures_grow_while_its_kernel_is_compiled(gpu: Renderer, cold: Path) -> None:
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await busy_picture(supervisor)
+        answer = asyncio.ensure_future(BsdfQuestions(supervisor).ask(SHORT))
+        seen: list[int] = []
+        helped = False
+        while not answer.done():
+            supervisor.send(Read(task, len(seen), LINEAR))
+            seen.append((await ears.next(task, Image)).progress.samples)
+            helped = helped or bool(helpers(supervisor.process_id))
+        assert (await answer)["f"].any()
+        assert helped and len(set(seen)) >= 5
+
+    with_supervisor(test)
+
+
+def test_the_foreseen_kernels_are_those_that_are_used(gpu: Renderer, cold: Path) -> None:
+    """They come from the driver's disk cache, where another process has put them: nothing is added there."""
+
+    def run(program: str) -> str:
+        return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, check=True).stdout
+
+    if not gpu.info["software"]:
+        pytest.skip("other drivers keep their caches elsewhere")
+    assert run(AHEAD).strip() == "True"
+    before = sum(path.is_file() for path in cold.rglob("*"))
+    run(EVALUATOR)
+    assert sum(path.is_file() for path in cold.rglob("*")) == before >= len(set(kernel_keys.bsdf_keys()))
+
+
+def test_who_goes_away_takes_the_question_along(gpu: Renderer) -> None:
+    async def test(supervisor: Supervisor) -> None:
+        questions = BsdfQuestions(supervisor)
+        await questions.ask(SHORT)
+        long = asyncio.ensure_future(questions.ask(LONG))
+        used = supervisor.statistics.gpu_s
+        before = used["bsdf"]
+        while used["bsdf"] < before + 0.3:
+            await asyncio.sleep(0.05)
+        long.cancel()
+        with suppress(asyncio.CancelledError):
+            await long
+        await questions.ask(SHORT)  # the renderer has heard of it by then
+        await asyncio.sleep(0.6)  # and has told what it had used
+        told = dict(used)
+        await asyncio.sleep(0.6)
+        assert dict(used) == told
+
+    with_supervisor(test)
+
+
+def test_no_more_questions_than_can_be_answered_soon(gpu: Renderer) -> None:
+    async def test(supervisor: Supervisor) -> None:
+        questions = BsdfQuestions(supervisor)
+        waiting = [asyncio.ensure_future(questions.ask(LONG)) for _ in range(MOST)]
+        await asyncio.sleep(0)
+        with pytest.raises(Unavailable):
+            await questions.ask(SHORT)
+        for each in waiting[4:]:
+            each.cancel()
+        await asyncio.gather(*waiting[4:], return_exceptions=True)
+        assert (await questions.ask(SHORT))["f"].any()  # it does not wait in the line of the long ones
+        assert not any(each.done() for each in waiting[LONG_AT_ONCE:4])
+        assert len(supervisor._tasks) == LONG_AT_ONCE
+        for each in waiting:
+            each.cancel()
+        await asyncio.gather(*waiting, return_exceptions=True)
+        answer: dict[str, Any] = await questions.ask(SHORT)
+        assert answer["f"].shape == (1, 1, 3)
+
+    with_supervisor(test)
