@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from typing import Protocol
 
@@ -13,9 +13,11 @@ from gpu import EnvironmentArrays, SceneArrays
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
 from service.assets import Assets
 from service.pack.edits.cache import PackCache, content, lasting
-from service.pack.geometry.assemble import Geometry, assemble
+from service.pack.geometry.assemble import assemble
+from service.pack.geometry.geometry import Geometry
+from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.shared_meshes import shift
-from service.pack.geometry.world import triangles
+from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights
 from service.pack.lights.environment import PackedEnvironment, environment_key, pack_environment
 from service.pack.lights.light_bounds import Grown, grow_light_tree
@@ -48,33 +50,73 @@ class Packed:
     warnings: list[str]
 
 
+@dataclass(frozen=True)
+class _Sky:
+    """The environment, with what it sends through a disk around the scene (W of luminance, for a brightness of 1) and
+    its greatest radiance."""
+
+    arrays: EnvironmentArrays | None = None
+    power: float = 0.0
+    peak: float = 0.0
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Lights:
+    """All lights, the words of the tree they are picked by, and the greatest radiance that any of them causes."""
+
+    records: np.ndarray
+    tree: np.ndarray
+    peak: float
+
+
 def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: Limits | None = None) -> Packed:
     """The renderer's arrays for `scene`.
 
     Raises InvalidDocument, its pointers from the scene's root. Slow where there is geometry: not for an event loop.
     """
     materials = pack_materials(scene)
-    textures, uses, texels, told = pack_textures(scene, assets, cache, limits)
+    textures, uses, texels, texture_warnings = pack_textures(scene, assets, cache, limits)
     emissive = np.any(materials["emission"] > 0, axis=1)
     emissive[dark(uses, texels)] = False
     built = _geometry(scene, emissive, assets, cache, limits)
-    warnings = [*built.warnings, *told]
-    environment, sky_power, peak = None, 0.0, 0.0
-    if scene.environment is not None:
-        sky = _sky(scene.environment, assets, cache)
-        rotation, scale = pack_turn(scene.environment)
-        warnings += sky.warnings
-        if scale * sky.peak > BRIGHTEST:
-            scale = BRIGHTEST / sky.peak
-            warnings.append(f"/environment/scale: lowered to {scale:.3g}, as radiance ends at {BRIGHTEST:g}")
-        environment = EnvironmentArrays(
-            sky.texels, sky.probability, sky.cells, rotation, scale, scene.environment.background,
-            sky.cube, sky.sun, sky.sun_share,
-        )  # fmt: skip
-        if scale > 0:  # what it sends through a disk around the scene
-            sky_power, peak = math.pi * built.radius**2 * sky.irradiance, scale * sky.peak
-    standing, standing_power = lights.analytic_lights(scene.lights, built.origin, built.radius)
+    sky = _Sky() if scene.environment is None else _environment(scene.environment, built.radius, assets, cache)
     emission, brightest = mean_emission(materials, uses, texels, built)
+    picked = _lights(scene, built, materials, emission, sky.power, cache)
+    arrays = SceneArrays(
+        camera=pack_camera(scene.camera, built.origin),
+        materials=materials,
+        lights=picked.records,
+        light_tree=picked.tree,
+        environment=sky.arrays,
+        textures=textures,
+        radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
+    )
+    return Packed(_with_geometry(arrays, built), [*built.warnings, *texture_warnings, *sky.warnings])
+
+
+def _environment(environment: Environment, radius: float, assets: Assets, cache: PackCache | None) -> _Sky:
+    sky = _packed_environment(environment, assets, cache)
+    rotation, scale = pack_turn(environment)
+    warnings = tuple(sky.warnings)
+    if scale * sky.peak > BRIGHTEST:
+        scale = BRIGHTEST / sky.peak
+        warnings += (f"/environment/scale: lowered to {scale:.3g}, as radiance ends at {BRIGHTEST:g}",)
+    arrays = EnvironmentArrays(
+        sky.texels, sky.probability, sky.cells, rotation, scale, environment.background,
+        sky.cube, sky.sun, sky.sun_share,
+    )  # fmt: skip
+    if scale <= 0:
+        return _Sky(arrays, warnings=warnings)
+    return _Sky(arrays, math.pi * radius**2 * sky.irradiance, scale * sky.peak, warnings)
+
+
+def _lights(
+    scene: Scene, built: Geometry, materials: np.ndarray, emission: np.ndarray, sky_power: float,
+    cache: PackCache | None,
+) -> _Lights:  # fmt: skip
+    """`emission`: the mean radiance of each light of `built` (n, 3)."""
+    analytic, analytic_power = lights.analytic_lights(scene.lights, built.origin, built.radius)
     built_sides = lights.sides(built.lights, materials)
     area_power = np.pi * built.areas * lights.luminance(emission) * built_sides
 
@@ -82,18 +124,16 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         sides = np.concatenate([built_sides, np.ones(len(near) - len(built_sides), built_sides.dtype)])
         return grow_light_tree(near, power, share, built.shapes, sides, 2 * built.radius, cache)
 
-    weighed, light_tree = lights.weigh(
-        np.concatenate([built.lights, standing]), np.concatenate([area_power, standing_power]), sky_power, grow
+    records, tree = lights.weigh(
+        np.concatenate([built.lights, analytic]), np.concatenate([area_power, analytic_power]), sky_power, grow
     )
-    reached = np.where(standing["kind"] == LightKind.DIRECTIONAL, 1.0, math.pi * built.radius**2)
-    peak = max(
-        peak,
-        brightest,
-        float((standing["intensity"].max(axis=1, initial=0.0) / reached).max(initial=0.0)),
-    )
-    arrays = SceneArrays(
-        camera=pack_camera(scene.camera, built.origin),
-        materials=materials,
+    reached = np.where(analytic["kind"] == LightKind.DIRECTIONAL, 1.0, math.pi * built.radius**2)
+    return _Lights(records, tree, float((analytic["intensity"].max(axis=1, initial=0.0) / reached).max(initial=0.0)))
+
+
+def _with_geometry(arrays: SceneArrays, built: Geometry) -> SceneArrays:
+    return replace(
+        arrays,
         spheres=built.shapes[ShapeKind.SPHERE],
         quads=built.shapes[ShapeKind.QUAD],
         boxes=built.shapes[ShapeKind.BOX],
@@ -104,8 +144,6 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         triangle_uvs=built.triangle_uvs,
         triangle_uvs_1=built.triangle_uvs_1,
         triangle_colors=built.triangle_colors,
-        lights=weighed,
-        light_tree=light_tree,
         nodes=built.nodes,
         node_count=built.node_count,
         node_origin=built.node_origin,
@@ -115,12 +153,8 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
         instance_shift=shift(built.models),
         bvh_kinds=built.bvh_kinds,
         large=built.large,
-        environment=environment,
-        textures=textures,
-        radiance_scale=lights.radiance_scale(peak),
         origin=built.origin,
     )
-    return Packed(arrays, warnings)
 
 
 def pack_material(material: Material) -> SceneArrays:
@@ -136,25 +170,25 @@ def _geometry(
     used = {shape.material for shape in scene.shapes}
     shining = frozenset(name for name, shines in zip(names, emissive, strict=True) if shines and name in used)
     room = MAX_TRIANGLES if limits is None else min(limits.max_triangles, MAX_TRIANGLES)
-    read = required_charts(scene)
+    materials = ShapeMaterials(names, shining, required_charts(scene))
     if cache is None or not all(lasting(getattr(shape, "asset", None)) for shape in scene.shapes):
-        return assemble(scene.shapes, names, shining, assets, room, read)
+        return assemble(scene.shapes, materials, assets, room)
     contents = tuple(map(content, scene.shapes))
     apart = cache.moves.apart(scene.shapes, contents, lambda shape: triangles(shape, assets))
-    shared = tuple(names), room, tuple(read.items()), apart
+    shared = tuple(names), room, tuple(materials.charts.items()), apart
     meshes = [(i, shape) for i, shape in enumerate(scene.shapes) if isinstance(shape, MeshShape)]
     mesh_key = None
     if meshes and not any(shape.material in shining for _, shape in meshes):
         mesh_key = (tuple((i, contents[i]) for i, _ in meshes), *shared)
 
     def make() -> Geometry:
-        kept = cache.gather(Geometry)
-        return assemble(scene.shapes, names, shining, assets, room, read, mesh_key, contents, kept, apart)
+        earlier = Earlier(cache.gather(Geometry), contents, mesh_key)
+        return assemble(scene.shapes, materials, assets, room, earlier, apart)
 
     return cache.get(("geometry", contents, shining, *shared), make)
 
 
-def _sky(environment: Environment, assets: Assets, cache: PackCache | None) -> PackedEnvironment:
+def _packed_environment(environment: Environment, assets: Assets, cache: PackCache | None) -> PackedEnvironment:
     key = environment_key(environment)
     make = partial(pack_environment, environment, assets)
     return make() if cache is None or key is None else cache.get(key, make)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu.layout import LightKind, ShapeKind, texture_records
-from service.pack.geometry.assemble import Geometry
+from service.pack.geometry.geometry import Geometry
 from service.pack.textures.images import PackedTexels
 from service.pack.textures.uses import TextureReference
 from service.pack.textures.words import record_of, values_of

@@ -37,7 +37,6 @@ def test_the_tree_finds_what_the_loops_find(gpu: Renderer, monkeypatch) -> None:
         monkeypatch.setattr("gpu.accel.bvh.WHOLE", whole)
         monkeypatch.setattr(scene_bvh, "LARGE_SHARE", 1e-5 if few == 1 else 1.0)
         monkeypatch.setattr(scene_bvh, "LINEAR", dict.fromkeys(scene_bvh.LINEAR, few))
-        monkeypatch.setattr("service.pack.geometry.assemble.LINEAR", scene_bvh.LINEAR)
         arrays = pack(parse_scene(crowd()), Shelf()).arrays
         assert len(arrays.bvh_kinds) == (0 if few > 1 else 5)
         assert any(arrays.large.values()) == (few == 1)

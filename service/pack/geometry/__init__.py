@@ -1,6 +1,8 @@
 """Shapes -> records, triangles and the tree over them, relative to an origin near the camera.
 
-assemble          the whole, and what of earlier geometries serves again
+assemble          the whole
+geometry          what comes of it
+reuse             what of earlier geometries serves again
 world             the document's shapes in world space: analytic ones, meshes and instances, in float64
 analytic          spheres, quads, boxes and ellipsoids in world space
 meshes            meshes in world space, and their triangles as records
@@ -11,6 +13,7 @@ instances         which meshes are shared, and the records of the shapes that sh
 scene_bvh         the tree over everything, or lists of what is few
 records           analytic shapes -> records with their bounds
 triangle_buffers  the finished arrays of all triangles, in shared memory
+shape_records     what is written into the records of all kinds alike: what is hidden, what shines
 rebase            the origin that float32 coordinates are relative to
 parallel          work over many rows, in threads
 warnings          equal warnings about many shapes as one with a count

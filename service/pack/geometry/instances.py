@@ -88,7 +88,7 @@ def _content(each: MeshRequest, digests: dict[int, Hashable]) -> Hashable:
     return digests[id(shape)]
 
 
-def stand(model: SharedMesh, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -> list[Instance | None]:
+def place(model: SharedMesh, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -> list[Instance | None]:
     """Of shapes under these transforms (n, 4, 4); None where float32 can't take a ray through one and back."""
     axes = matrices[:, :3, :3]
     lengths = np.linalg.svd(axes, compute_uv=False)
@@ -105,12 +105,14 @@ def stand(model: SharedMesh, matrices: np.ndarray, used: Sequence[tuple[int, int
     return [Instance(model, *row) if fit else None for fit, *row in rows]
 
 
-def records(standing: Sequence[Instance], models: Sequence[SharedMesh], origin: np.ndarray, first: int) -> np.ndarray:
+def records(
+    instances: Sequence[Instance], models: Sequence[SharedMesh], origin: np.ndarray, first: int
+) -> np.ndarray:
     """`layout.Instance` of each; the models' triangles begin at `first`, in this order, and so do their nodes at 0.
 
     Raises InvalidDocument.
     """
-    out = np.zeros(len(standing), layout.Instance.dtype)
+    out = np.zeros(len(instances), layout.Instance.dtype)
     if not len(out):
         return out
     bits = shift(models)
@@ -118,10 +120,10 @@ def records(standing: Sequence[Instance], models: Sequence[SharedMesh], origin: 
         detail = f"show {len(out)} instances of up to {1 << bits} triangles; at most {MOST_SEEN + 1} in all"
         raise InvalidDocument([FieldError("/shapes", detail)])
     number = {id(model): i for i, model in enumerate(models)}
-    which = np.array([number[id(each.model)] for each in standing])
+    which = np.array([number[id(each.model)] for each in instances])
     triangles = first + np.cumsum([0, *(model.count for model in models)])
     nodes = np.cumsum([0, *(len(model.nodes) for model in models)])
-    axes, center = np.array([each.axes for each in standing]), np.array([each.center for each in standing])
+    axes, center = np.array([each.axes for each in instances]), np.array([each.center for each in instances])
     rows = np.linalg.inv(axes)
     out["row_x"], out["row_y"], out["row_z"] = rows[:, 0], rows[:, 1], rows[:, 2]
     out["axis_x"], out["axis_y"] = axes[:, :, 0], axes[:, :, 1]
@@ -129,7 +131,7 @@ def records(standing: Sequence[Instance], models: Sequence[SharedMesh], origin: 
     out["center"] = center - origin
     out["error"] = _errors(axes, rows, np.abs(center - origin), np.array([model.reach for model in models])[which])
     out["side"] = np.where(np.linalg.det(axes) < 0, -1.0, 1.0)
-    out["material"], out["shape"] = np.array([each.used for each in standing], np.uint32).T
+    out["material"], out["shape"] = np.array([each.used for each in instances], np.uint32).T
     out["first"], out["node_first"] = triangles[which], nodes[which]
     for name in ("node_count", "node_origin", "node_scale"):
         out[name] = np.array([getattr(model, name) for model in models])[which]

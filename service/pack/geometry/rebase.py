@@ -3,8 +3,15 @@
 from __future__ import annotations
 
 import math
+from dataclasses import dataclass
 
 import numpy as np
+
+from gpu.layout import ShapeKind
+from service.pack.geometry import records
+from service.pack.geometry.analytic import AnalyticShapes
+from service.pack.geometry.geometry import MeshExtents
+from service.pack.geometry.records import Bounds
 
 # Extents from 0 at which a scene's float32 positions begin to lose digits it needs.
 FAR = 4.0
@@ -18,7 +25,38 @@ LOST = 2.0**14
 # of that one, and shadows begin to part from what throws them.
 VAST = 2.0**17
 
-Bounds = tuple[np.ndarray, np.ndarray]
+
+@dataclass(frozen=True)
+class Rebased:
+    """The analytic shapes of a scene relative to the origin that suits all of its shapes."""
+
+    records: dict[ShapeKind, np.ndarray]
+    bounds: dict[ShapeKind, Bounds]
+    origin: np.ndarray  # float64, world
+    radius: float  # of a ball around everything; 1 where there is nothing
+    warnings: list[str]  # about shapes that are too small, or too far away for float32
+
+
+def rebase(placed: AnalyticShapes, meshes: MeshExtents) -> Rebased:
+    """These shapes, beside meshes that reach so far."""
+    found = records.analytic(placed, np.zeros(3))
+    low = np.concatenate([*(bounds[0] for _, bounds in found.values()), meshes.low])
+    high = np.concatenate([*(bounds[1] for _, bounds in found.values()), meshes.high])
+    owners = np.concatenate([*(array["shape"] for array, _ in found.values()), meshes.owners])
+    origin, radius = choose_origin(low, high)
+    if origin.any():
+        found = records.analytic(placed, origin)
+    spheres, _ = found[ShapeKind.SPHERE]  # the first kind
+    records.only_vast(spheres, low, high)
+    exact = np.arange(len(owners)) < len(spheres)
+    lost = [f"/shapes/{i}: too small to be traced, left out" for i in dict.fromkeys(placed.vanished)]
+    return Rebased(
+        {kind: array for kind, (array, _) in found.items()},
+        {kind: bounds for kind, (_, bounds) in found.items()},
+        origin,
+        radius,
+        [*lost, *warnings(low, high, owners, exact, origin)],
+    )
 
 
 def choose_origin(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, float]:

@@ -7,12 +7,23 @@ from collections.abc import Sequence
 import numpy as np
 
 from gpu import layout
+from gpu.layout import ShapeKind
 from gpu.layout.record import Record
 from service.pack.geometry.analytic import AnalyticShapes, Solids
 
 VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin, and over the smallest shape
 
 Bounds = tuple[np.ndarray, np.ndarray]  # (n, 3) each, float64
+
+
+def analytic(placed: AnalyticShapes, origin: np.ndarray) -> dict[ShapeKind, tuple[np.ndarray, Bounds]]:
+    """The records of all analytic shapes by kind, spheres first, with their bounds."""
+    return {
+        ShapeKind.SPHERE: spheres(placed, origin),
+        ShapeKind.QUAD: quads(placed, origin),
+        ShapeKind.BOX: boxes(placed, origin),
+        ShapeKind.ELLIPSOID: ellipsoids(placed, origin),
+    }
 
 
 def spheres(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bounds]:

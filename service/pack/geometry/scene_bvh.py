@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from gpu import SceneTooLarge
-from gpu.layout import ShapeKind
+from gpu.layout import Node, ShapeKind
 from service.pack.geometry.parallel import chunks, in_threads
 from service.pack.geometry.records import Bounds
 from service.problems import FieldError, InvalidDocument
@@ -31,6 +33,21 @@ LARGE = {
 }
 LARGE_SHARE = 1 / 32  # of the area of the box around everything, at least
 LARGE_RATIO = 16.0  # times the median of its kind, at least: a ball of few triangles is none the better for it
+
+
+@dataclass(frozen=True)
+class SceneBvh:
+    """The threaded tree over a scene."""
+
+    nodes: np.ndarray  # layout.Node
+    count: int  # of one octant's order
+    order: dict[ShapeKind, np.ndarray]  # of each kind: those that stand in the loop, then the leaves'
+    origin: Vec3
+    scale: Vec3
+
+    @classmethod
+    def empty(cls) -> SceneBvh:
+        return cls(np.zeros(0, Node.dtype), 0, {}, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
 
 
 def stand_out(bounds: dict[ShapeKind, Bounds]) -> dict[ShapeKind, np.ndarray]:
@@ -81,11 +98,8 @@ def _areas(low: np.ndarray, high: np.ndarray) -> np.ndarray:
     return areas
 
 
-def build_scene_bvh(
-    bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.ndarray]
-) -> tuple[np.ndarray, int, dict[ShapeKind, np.ndarray], Vec3, Vec3]:
-    """(nodes, nodes of one octant, each kind's order: the `large` ones, then the leaves'; grid origin and scale).
-    Instances stay in theirs.
+def build_scene_bvh(bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.ndarray]) -> SceneBvh:
+    """The tree over shapes with these bounds, without the `large` ones. Instances stay in their order.
 
     Raises InvalidDocument.
     """
@@ -114,7 +128,7 @@ def build_scene_bvh(
             continue
         leaves = tree.order if len(small) == 1 else tree.order[kinds[tree.order] == kind] - np.uint32(start)
         order[kind] = np.concatenate([large[kind].astype(np.uint32), places[leaves]])
-    return nodes, count, order, tree.origin, tree.scale
+    return SceneBvh(nodes, count, order, tree.origin, tree.scale)
 
 
 def warm_builder() -> None:

@@ -21,45 +21,54 @@ from service.scene.numbers import LARGEST
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
 
 
+@dataclass(frozen=True)
+class ShapeMaterials:
+    """What shapes need to know of the materials."""
+
+    names: Sequence[str]  # in order
+    emissive: Collection[str] = frozenset()  # those that shine
+    charts: Mapping[str, RequiredCharts] = field(default_factory=dict)  # what they read of their shapes
+
+
 @dataclass
 class World:
     """The shapes of a scene in the world."""
 
-    placed: AnalyticShapes = field(default_factory=AnalyticShapes)
+    analytic: AnalyticShapes = field(default_factory=AnalyticShapes)
     meshes: list[PlacedMesh] = field(default_factory=list)
-    standing: list[Instance] = field(default_factory=list)  # meshes that share their triangles
-    odd: list[tuple[int, str]] = field(default_factory=list)  # warnings about meshes, each with its shape's number
+    instances: list[Instance] = field(default_factory=list)  # meshes that share their triangles
+    mesh_warnings: list[tuple[int, str]] = field(default_factory=list)  # each with its shape's number
 
     @property
     def models(self) -> list[SharedMesh]:
-        return list({id(each.model): each.model for each in self.standing}.values())
+        return list({id(each.model): each.model for each in self.instances}.values())
 
 
 def place(
-    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], assets: Assets, max_triangles: int,
-    reads: Mapping[str, RequiredCharts], known: Mapping[Hashable, SharedMesh] | None = None, apart: bool = False,
+    shapes: Sequence[Shape], materials: ShapeMaterials, assets: Assets, max_triangles: int,
+    known: Mapping[Hashable, SharedMesh] | None = None, apart: bool = False,
 ) -> World:  # fmt: skip
-    """`names` and `emissive` are materials, `reads` what these read of them; `known`: models that need not be made
-    again; `apart`: large meshes shall move without the others.
+    """All shapes in the world. `known` are shared meshes that need not be made again; `apart`: large meshes shall
+    move without the others.
 
     Raises InvalidDocument.
     """
-    out = World(place_analytic(shapes, names, emissive, reads))
-    materials, files = {name: i for i, name in enumerate(names)}, dict[str, MeshData]()
+    out = World(place_analytic(shapes, materials))
+    numbers, files = {name: i for i, name in enumerate(materials.names)}, dict[str, MeshData]()
     wanted = list[MeshRequest]()
     for i, shape in enumerate(shapes):
         if isinstance(shape, MeshShape):
             data = _data(shape, i, assets, files)
-            out.odd += [(i, warning) for warning in data.warnings]
-            read = reads.get(shape.material, RequiredCharts())
+            out.mesh_warnings += [(i, warning) for warning in data.warnings]
+            read = materials.charts.get(shape.material, RequiredCharts())
             _check_charts(i, shape, data, read.uv_sets)
-            used, matrix = (materials[shape.material], i), _matrix(shape)
-            wanted.append(MeshRequest(shape, data, matrix, used, read, shape.material in emissive))
-    standing, room = _standing(wanted, known or {}, apart, max_triangles)
-    for each, stands in zip(wanted, standing, strict=True):
-        if stands is not None:
-            _check_reach(stands, each)
-            out.standing.append(stands)
+            used, matrix = (numbers[shape.material], i), _matrix(shape)
+            wanted.append(MeshRequest(shape, data, matrix, used, read, shape.material in materials.emissive))
+    shown, room = _instances(wanted, known or {}, apart, max_triangles)
+    for each, instance in zip(wanted, shown, strict=True):
+        if instance is not None:
+            _check_reach(instance, each)
+            out.instances.append(instance)
             continue
         _check_room(each, room)
         room -= len(each.data.faces)
@@ -69,10 +78,10 @@ def place(
     return out
 
 
-def _standing(
+def _instances(
     wanted: Sequence[MeshRequest], known: Mapping[Hashable, SharedMesh], apart: bool, room: int
 ) -> tuple[list[Instance | None], int]:
-    """Those that stand as instances, and for how many triangles there is room beside their models."""
+    """Each mesh as an instance, or None where its triangles are its own; and how many of these there is room for."""
     out: list[Instance | None] = [None] * len(wanted)
     groups = dict[Hashable, list[int]]()
     for i, key in enumerate(instances.keys(wanted, apart)):
@@ -86,22 +95,20 @@ def _standing(
             continue
         room -= len(first.data.faces)
         matrices = np.array([np.eye(4) if wanted[i].matrix is None else wanted[i].matrix for i in group])
-        stood = instances.stand(shared, matrices, [wanted[i].used for i in group])
-        for i, stands in zip(group, stood, strict=True):
-            out[i] = stands
+        fitting = instances.place(shared, matrices, [wanted[i].used for i in group])
+        for i, instance in zip(group, fitting, strict=True):
+            out[i] = instance
     return out, room
 
 
-def place_analytic(
-    shapes: Sequence[Shape], names: Sequence[str], emissive: Collection[str], reads: Mapping[str, RequiredCharts]
-) -> AnalyticShapes:
+def place_analytic(shapes: Sequence[Shape], materials: ShapeMaterials) -> AnalyticShapes:
     """All shapes but meshes. Raises InvalidDocument."""
-    materials, placed = {name: i for i, name in enumerate(names)}, AnalyticShapes()
+    numbers, placed = {name: i for i, name in enumerate(materials.names)}, AnalyticShapes()
     for i, shape in enumerate(shapes):
         if isinstance(shape, MeshShape):
             continue
-        matrix, used = _matrix(shape), (materials[shape.material], i)
-        if 1 in reads.get(shape.material, RequiredCharts()).uv_sets:
+        matrix, used = _matrix(shape), (numbers[shape.material], i)
+        if 1 in materials.charts.get(shape.material, RequiredCharts()).uv_sets:
             raise _uncharted(i, "material", shape.material, f"uv set 1; a {shape.type} has set 0 only")
         match shape:
             case SphereShape():
@@ -109,7 +116,7 @@ def place_analytic(
             case QuadShape():
                 placed.quad(shape.origin, shape.u, shape.v, matrix, used)
             case BoxShape():
-                placed.box(shape.min, shape.max, matrix, used, shape.material in emissive)
+                placed.box(shape.min, shape.max, matrix, used, shape.material in materials.emissive)
     return placed
 
 
@@ -140,9 +147,9 @@ def _check_room(each: MeshRequest, room: int) -> None:
         raise InvalidDocument([FieldError(f"/shapes/{each.used[1]}", detail)])
 
 
-def _check_reach(standing: Instance, each: MeshRequest) -> None:
+def _check_reach(instance: Instance, each: MeshRequest) -> None:
     """By the boxes of its parts where they suffice."""
-    reach = float(np.abs(standing.box).max())
+    reach = float(np.abs(instance.box).max())
     if reach > LARGEST:
         matrix = np.eye(4) if each.matrix is None else each.matrix
         reach = float(np.abs(each.data.vertices @ matrix[:3, :3].T + matrix[:3, 3]).max())

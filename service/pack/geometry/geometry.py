@@ -1,0 +1,58 @@
+"""What `assemble` makes of a scene's shapes."""
+
+from __future__ import annotations
+
+from collections.abc import Hashable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpu.layout import ShapeKind
+from service.pack.geometry.shared_meshes import SharedMesh
+from service.pack.geometry.triangle_buffers import TriangleBuffers
+from service.scene.numbers import Vec3
+
+
+@dataclass(frozen=True)
+class MeshExtents:
+    """Where the meshes of a geometry are; `key` is equal where they are, with all that goes into their triangles."""
+
+    key: Hashable
+    low: np.ndarray  # boxes around those with vertices (n, 3), and which shapes of the document they are
+    high: np.ndarray
+    owners: np.ndarray
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class Geometry:
+    """Records by kind, in final order: of a kind in `bvh_kinds` that of the leaves. Large ones are shared memory."""
+
+    shapes: dict[ShapeKind, np.ndarray]
+    triangle_normals: np.ndarray
+    tangents: bool  # whether these have them
+    triangle_uvs: np.ndarray
+    triangle_uvs_1: np.ndarray
+    triangle_colors: np.ndarray
+    lights: np.ndarray  # layout.Light of the shapes that shine, not yet weighted
+    areas: np.ndarray  # of these, m^2
+    nodes: np.ndarray
+    node_count: int
+    node_origin: Vec3
+    node_scale: Vec3
+    bvh_kinds: frozenset[ShapeKind]
+    large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
+    instances: np.ndarray
+    instance_nodes: np.ndarray
+    models: tuple[SharedMesh, ...]  # that the instances show, in the order of their triangles
+    unshared_key: Hashable  # equal where all other triangles are; None: they shine, or nothing can be compared
+    origin: Vec3
+    radius: float  # of a ball around everything; 1 where there is nothing
+    meshes: MeshExtents
+    warnings: tuple[str, ...]
+
+    @property
+    def triangle_buffers(self) -> TriangleBuffers:
+        corners = self.triangle_uvs, self.triangle_uvs_1, self.triangle_colors
+        own = self.shapes[ShapeKind.TRIANGLE], self.triangle_normals, self.tangents
+        return TriangleBuffers(*own, *corners, self.instance_nodes)
