@@ -14,6 +14,7 @@ scene_import  a glTF file -> a document whose references are assets
 sandbox       the child process that parses
 readers       readers of single formats
 gltf          the reader of glTF
+scenes        what importers of whole scenes share
 """
 
 from service.assets.local_files import FileAssets

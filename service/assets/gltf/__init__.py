@@ -7,7 +7,6 @@ importer              a file -> a scene's document with its meshes and images as
 merged_mesh           a file -> one mesh
 document              the file: its JSON, buffers, views and limits
 json_view             a place in the JSON, and its values by type; errors name it
-warnings              what is said about a file, equal things once
 extensions            which extensions are supported, and what is said of the others
 accessors             accessors -> arrays
 draco                 meshes that KHR_draco_mesh_compression holds
@@ -15,7 +14,6 @@ nodes                 nodes and their transforms
 placements            which mesh stands where, for the camera and the metering
 primitives            primitives -> triangles with normals, colours and charts
 deform                morph targets and skins, in the pose that the file shows
-ply_writer            a primitive as a PLY file, which the store keeps
 materials             materials -> the document's
 material_reader       the numbers and textures of one material
 material_extensions   KHR_materials_*, as parameters of `principled`

@@ -7,7 +7,7 @@ from typing import Any
 
 from service.assets.errors import ParseError
 from service.assets.gltf.json_view import JsonView, escaped, shown
-from service.assets.gltf.warnings import Warnings
+from service.assets.scenes.warnings import Warnings
 
 READ = {
     "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",

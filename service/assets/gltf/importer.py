@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -16,25 +16,13 @@ from service.assets.gltf.json_view import JsonView, whole
 from service.assets.gltf.materials import Materials
 from service.assets.gltf.nodes import Node, Nodes, instances
 from service.assets.gltf.placements import Part, Placements
-from service.assets.gltf.ply_writer import ply
 from service.assets.gltf.primitives import Primitive, read_primitive
 from service.assets.gltf.textures import Textures
-from service.assets.gltf.warnings import Warnings
 from service.assets.readers.raw_mesh import MAX_COORDINATE
-from service.assets.types import AssetLimits, SceneFile, ScenePart
-
-
-@dataclass
-class _Files:
-    kept: list[ScenePart] = field(default_factory=list)
-    numbers: dict[bytes, int] = field(default_factory=dict)
-
-    def keep(self, data: bytes, pointer: str, vertices: int | None = None, triangles: int | None = None) -> str:
-        """The reference; the same bytes get the same."""
-        if data not in self.numbers:
-            self.numbers[data] = len(self.kept)
-            self.kept.append(ScenePart(data, pointer, vertices, triangles))
-        return f"part:{self.numbers[data]}"
+from service.assets.scenes.part_files import PartFiles
+from service.assets.scenes.ply_writer import ply
+from service.assets.scenes.warnings import Warnings
+from service.assets.types import AssetLimits, SceneFile
 
 
 def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
@@ -44,7 +32,7 @@ def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
 
 class _Importer:
     def __init__(self, file: GltfDocument) -> None:
-        self.file, self.notes, self.files = file, Warnings(), _Files()
+        self.file, self.notes, self.files = file, Warnings(), PartFiles()
         self.nodes = Nodes(file, self.notes)
         self.textures = Textures(file, self.notes, self.files.keep)
         self.materials = Materials(file, self.textures, self.notes)
@@ -139,14 +127,16 @@ class _Importer:
             if not np.isfinite(rows).all():
                 bad = np.flatnonzero(~np.isfinite(rows).all(axis=1))
                 raise _wrong(primitive, place, name, rows, bad[0], "is not finite")
-        reference = self.files.keep(ply(primitive), place.pointer, len(vertices), len(primitive.faces))
+        charts = [None if uv is None else np.column_stack([uv[:, 0], 1 - uv[:, 1]]) for uv in primitive.uvs]
+        data = ply(vertices, primitive.faces, primitive.normals, charts, primitive.colors, primitive.tangents)
+        reference = self.files.keep(data, place.pointer, len(vertices), len(primitive.faces))
         self._triangles += 0 if reference in self._held else len(primitive.faces)
         self._held.add(reference)
         limit = self.file.limits.max_triangles
         if self._triangles > limit:
             raise ParseError(f"the scene has more than the {limit} triangles allowed")
-        charts = tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs)
-        name, material = self.materials.name(place, charts)
+        reaches = tuple(uv if uv is None else (uv.min(axis=0), uv.max(axis=0)) for uv in primitive.uvs)
+        name, material = self.materials.name(place, reaches)
         tinted = primitive.colors is not None and bool((primitive.colors[:, :3] != 1).any())
         if tinted and material.extension("KHR_materials_unlit") is not None:
             self.notes.add(

@@ -10,13 +10,9 @@ import numpy as np
 from service.assets.gltf.document import GltfDocument
 from service.assets.gltf.json_view import JsonView, shown
 from service.assets.gltf.nodes import Node
-from service.assets.gltf.warnings import Warnings
-from service.assets.types import Doubles
+from service.assets.scenes.framing import FRAMED_VFOV, Bounds, framed
+from service.assets.scenes.warnings import Warnings
 
-Bounds = tuple[Doubles, Doubles]
-FRAMED_VFOV = 35.0  # degrees
-FLAT = 0.15  # of the greatest extent: a wall is looked at from the front, a floor from above
-MARGIN = 1.06
 INSTEAD = "a perspective camera that shows the whole scene is used instead"
 
 
@@ -95,26 +91,6 @@ def _perspective(place: JsonView, node: Node, bounds: Bounds) -> dict[str, Any]:
     target = position + forward * (distance if distance > 0.01 * size else max(size, 1.0))
     vfov = math.degrees(place.number("yfov", math.radians(FRAMED_VFOV), 1e-6, math.pi - 1e-6))
     return {"position": position.tolist(), "target": target.tolist(), "up": _axis(node, 1, 1), "vfov": vfov}
-
-
-def framed(bounds: Bounds) -> dict[str, Any]:
-    """Everything in a square picture, seen from the front a little from the side and above."""
-    low, high = bounds
-    extent = high - low
-    azimuth, elevation = 30.0, 15.0
-    if extent[2] < FLAT * extent.max():
-        azimuth, elevation = 0.0, 0.0
-    elif extent[1] < FLAT * extent.max():
-        elevation = 40.0
-    a, e = math.radians(azimuth), math.radians(elevation)
-    back = np.array([math.sin(a) * math.cos(e), math.sin(e), math.cos(a) * math.cos(e)])
-    right = np.array([math.cos(a), 0, -math.sin(a)])
-    axes = np.stack([right, np.cross(back, right), back])
-    middle = (low + high) / 2
-    corners = (np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3) - middle) @ axes.T
-    slope = math.tan(math.radians(FRAMED_VFOV / 2)) / MARGIN
-    distance = float((np.abs(corners[:, :2]).max(axis=1) / slope + corners[:, 2]).max()) or 1.0
-    return {"position": (middle + back * distance).tolist(), "target": middle.tolist(), "vfov": FRAMED_VFOV}
 
 
 def _axis(node: Node, axis: int, sign: int) -> list[float]:

@@ -6,7 +6,7 @@ from typing import Any
 
 from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.textures import Chart, ColorSpace, Textures, factor
-from service.assets.gltf.warnings import Warnings
+from service.assets.scenes.warnings import Warnings
 
 
 class MaterialReader:

@@ -9,8 +9,9 @@ from service.assets.gltf.document import GltfDocument
 from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.material_reader import MaterialReader
 from service.assets.gltf.specular_glossiness import converted
-from service.assets.gltf.textures import Chart, Textures, unique
-from service.assets.gltf.warnings import Warnings
+from service.assets.gltf.textures import Chart, Textures
+from service.assets.scenes.names import unique
+from service.assets.scenes.warnings import Warnings
 
 WHITE = (1.0, 1.0, 1.0)
 

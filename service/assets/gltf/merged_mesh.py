@@ -9,8 +9,8 @@ from service.assets.gltf.deform import Skin, morphed, weights
 from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.nodes import Nodes, instances
 from service.assets.gltf.primitives import UV_SETS, Primitive, read_primitive
-from service.assets.gltf.warnings import Warnings
 from service.assets.readers.raw_mesh import RawMesh
+from service.assets.scenes.warnings import Warnings
 from service.assets.types import AssetLimits
 
 

@@ -12,7 +12,7 @@ from service.assets.errors import ParseError
 from service.assets.gltf.accessors import read
 from service.assets.gltf.document import GltfDocument
 from service.assets.gltf.json_view import JsonView, shown
-from service.assets.gltf.warnings import Warnings
+from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles
 
 MOST_INSTANCES = 100_000  # shapes in a document; beyond, the document itself is the burden

@@ -13,13 +13,13 @@ from service.assets.errors import ParseError
 from service.assets.gltf.document import Array
 from service.assets.gltf.nodes import Node
 from service.assets.gltf.rays import Placed
-from service.assets.gltf.warnings import Warnings
 from service.assets.readers.raw_mesh import MAX_COORDINATE
+from service.assets.scenes.framing import Bounds
+from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles, Indices
 
 MOST_SHAPES = 100_000  # beyond, the document itself is the burden
 LEAST_VOLUME = 1e-7  # of the axes at length one: what service.scene.transform takes for invertible
-Bounds = tuple[Doubles, Doubles]  # the least and the greatest coordinates (3,)
 
 
 @dataclass(frozen=True)

@@ -10,8 +10,8 @@ import numpy as np
 from service.assets.gltf import accessors, draco
 from service.assets.gltf.document import Array, GltfDocument
 from service.assets.gltf.json_view import JsonView
-from service.assets.gltf.warnings import Warnings
 from service.assets.readers.polygons import Longs
+from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles, Floats, Indices
 
 MODES = ("POINTS", "LINES", "LINE_LOOP", "LINE_STRIP", "TRIANGLES", "TRIANGLE_STRIP", "TRIANGLE_FAN")

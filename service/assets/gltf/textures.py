@@ -17,7 +17,8 @@ from service.assets.gltf.document import GltfDocument
 from service.assets.gltf.extensions import remedy
 from service.assets.gltf.json_view import JsonView, number
 from service.assets.gltf.primitives import UV_SETS
-from service.assets.gltf.warnings import Warnings
+from service.assets.scenes.names import unique
+from service.assets.scenes.warnings import Warnings
 
 ColorSpace = Literal["srgb", "linear"]
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
@@ -199,15 +200,6 @@ def _channels(data: bytes, place: JsonView) -> str:
     transparent = "A" in image.getbands() or "transparency" in image.info
     grey = len(image.getbands()) == 1 and image.mode != "P" and not transparent
     return ("L" if grey else "RGB") + ("A" if transparent else "")
-
-
-def unique(base: str, taken: dict[str, Any]) -> str:
-    """A name not yet taken: the base, or the base and a number."""
-    base = base[:80]
-    name, k = base, 2
-    while name in taken:
-        name, k = f"{base} {k}", k + 1
-    return name
 
 
 def factor(values: tuple[float, ...]) -> Any:
