@@ -44,7 +44,7 @@ def parser() -> argparse.ArgumentParser:
     _serve(commands.add_parser("serve", help="serve the editor and the API"))
     _render(commands.add_parser("render", help="render a scene to a file"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
-    _import(commands.add_parser("import", help="turn a glTF model into a scene's JSON and its assets"))
+    _import(commands.add_parser("import", help="turn a glTF or OBJ model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
     _bench(commands.add_parser("bench", help="measure"))
     return top
@@ -58,7 +58,7 @@ def _serve(command: argparse.ArgumentParser) -> None:
 
 def _render(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
-    add("input", metavar="INPUT", help="a scene's JSON, a glTF model, or a PNG or EXR that Sunbox made")
+    add("input", metavar="INPUT", help="a scene's JSON, a glTF or OBJ model, or a PNG or EXR that Sunbox made")
     endings = _any_of([f".{name}" for name in LOSSLESS_FORMATS])
     add("-o", "--output", required=True, metavar="OUT", help=f"the picture: {endings}")
     spp = "samples per pixel: the setting max_samples"
@@ -89,7 +89,7 @@ def _any_of(names: Sequence[str]) -> str:
 
 
 def _info(command: argparse.ArgumentParser) -> None:
-    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF model")
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF or OBJ model")
     _asset_root(command)
 
 
@@ -99,7 +99,11 @@ def _asset_root(command: argparse.ArgumentParser) -> None:
 
 
 def _import(command: argparse.ArgumentParser) -> None:
-    command.add_argument("model", metavar="MODEL", help="a .glb, or a .gltf with its files beside it")
+    command.add_argument(
+        "model",
+        metavar="MODEL",
+        help="a .glb; a .gltf or .obj with its files beside it; or a .zip of an .obj and its files",
+    )
     text = "the scene; its meshes and images go into a folder beside it, named like it and ending in .assets"
     command.add_argument("-o", "--output", required=True, metavar="SCENE.json", help=text)
     _asset_root(command)

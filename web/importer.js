@@ -1,5 +1,5 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
-// images textures, glTF a scene, JSON what it says it is.
+// images textures, glTF and zipped OBJ a scene, JSON what it says it is.
 
 import { fetchAssetScene, upload } from "./api.js";
 import { question } from "./ask.js";
@@ -18,7 +18,7 @@ import { pictured } from "./textures.js";
 import { add } from "./vector.js";
 import { inWords } from "./format-text.js";
 
-const ENDINGS = { gltf: "scene", glb: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
+const ENDINGS = { gltf: "scene", glb: "scene", zip: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
 const FROM = [0.5, 0.4, 1]; // where a single mesh is looked at from: a little from the right and above
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
@@ -213,7 +213,7 @@ export function watchDrops(page, { take, tell }) {
   page.addEventListener("dragenter", (event) => {
     if (!isFiles(event)) return;
     depth += 1;
-    tell("Scenes (GLB, JSON), meshes (OBJ, PLY, STL), light (HDR, EXR), images (PNG, JPEG)");
+    tell("Scenes (GLB, JSON, a zipped OBJ), meshes (OBJ, PLY, STL), light (HDR, EXR), images (PNG, JPEG)");
   });
   page.addEventListener("dragleave", (event) => {
     if (isFiles(event) && (depth -= 1) <= 0) tell(null);

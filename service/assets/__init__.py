@@ -10,10 +10,11 @@ folder        the files of the store, each written whole or not at all
 integrity     whether the bytes on the disk still match their hash
 cache         parsed assets in memory
 local_files   assets that are files beside a scene
-scene_import  a glTF file -> a document whose references are assets
+scene_import  a whole scene's file -> a document whose references are assets
 sandbox       the child process that parses
 readers       readers of single formats
 gltf          the reader of glTF
+obj           the importer of OBJ files with materials and textures
 scenes        what importers of whole scenes share
 """
 

@@ -76,5 +76,5 @@ class Integrity:
 
 def damaged(id: str) -> NotFound:
     return NotFound(
-        f"the stored bytes of {id} are damaged; upload the file again, or the glTF file that it is part of"
+        f"the stored bytes of {id} are damaged; upload the file again, or the glTF file or zip that it is part of"
     )

@@ -44,6 +44,10 @@ class FileAssets:
         with open(fd, "rb") as file:
             return file.read()
 
+    def holds(self, ref: str) -> bool:
+        """Whether there is such a file. Raises AssetError where it may not be looked for."""
+        return _exists(self._find(ref))
+
     def keep(self, ref: str) -> None:
         """Copies a file into the store. Raises AssetError, Unavailable."""
         data, parsed = self.read(ref), self._load(ref)

@@ -26,9 +26,10 @@ from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 log = logging.getLogger(__name__)
 
 ID = re.compile(r"sha256:[0-9a-f]{64}")
-FORMATS = "OBJ, PLY, STL, glTF and GLB meshes; EXR, Radiance HDR, PNG, JPEG and WebP images"
-
-
+FORMATS = (
+    "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures; "
+    "EXR, Radiance HDR, PNG, JPEG and WebP images"
+)
 RECORD_BYTES = 512  # about what the record of an asset takes
 
 Room = Callable[[int], AbstractContextManager[None]]
@@ -106,7 +107,10 @@ class AssetStore:
         return info
 
     def scene(self, id: str) -> Imported:
-        """A glTF file as a document whose references are assets here. Raises NotFound, AssetError, Unavailable."""
+        """A glTF file or a zipped OBJ as a document whose references are assets here.
+
+        Raises NotFound, AssetError, Unavailable.
+        """
         info = self.info(id)
         if info.kind != "scene":
             raise NotFound(f"{id[:100]} is not a scene but {'an image' if info.kind == 'image' else 'a mesh'}")

@@ -71,7 +71,7 @@ class AssetInfo:
     """What an upload is answered with; a mesh has no width and an image no triangles: those are None.
 
     `warnings`, `[{pointer, detail, count?}]`, say what is odd about it, or what a scene asks for and does not get; a
-    pointer is into the file's own JSON, the first of `count` places.
+    pointer is into the file's own JSON, or FILE:LINE of an OBJ's files, the first of `count` places.
     """
 
     id: str

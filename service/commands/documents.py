@@ -54,7 +54,7 @@ class Source:
 
 
 def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
-    """The scene that a document, a glTF model, or the metadata of a PNG or EXR describes."""
+    """The scene that a document, a glTF or OBJ model, or the metadata of a PNG or EXR describes."""
     data = files.read(path)
     from service.commands.models import is_model
 

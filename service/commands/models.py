@@ -1,15 +1,22 @@
-"""glTF models as the command line takes them: a GLB, or a .gltf with its buffers and images in files beside it."""
+"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, or a zip of these.
+
+What the importer gets is always one file: a .gltf with its files put into it, an OBJ and its files as a zip.
+"""
 
 from __future__ import annotations
 
 import base64
 import json
+import posixpath
+import re
 import sys
+from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
 from urllib.parse import unquote
 
 from service.assets.errors import ParseError
+from service.assets.formats import sniff, text
 from service.assets.gltf.document import load
 from service.commands import BadInput
 from service.problems import AssetError
@@ -19,9 +26,13 @@ if TYPE_CHECKING:
     from service.assets.scene_import import Imported
 
 
+SUFFIXES = (".glb", ".gltf", ".obj", ".zip")
+MTLLIB = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^#\r\n]*)")
+
+
 def is_model(path: Path, data: bytes) -> bool:
     """By its name or its bytes; of JSON by the object `asset` at its root, which no scene's document has."""
-    if data.startswith(b"glTF") or path.suffix.lower() in (".glb", ".gltf"):
+    if path.suffix.lower() in SUFFIXES or sniff(data) in ("glb", "zip", "obj"):
         return True
     try:
         tree = load(data) if b'"asset"' in data else None
@@ -32,9 +43,12 @@ def is_model(path: Path, data: bytes) -> bool:
 
 def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) -> Imported:
     """The model as a document whose references are assets of `store`. Tells its warnings. Raises ServiceError."""
-    if not data.startswith(b"glTF"):
-        data = _embedded(data, files)
-    imported = store.scene(store.add(data, filename="model.gltf").id)
+    format = sniff(data, filename=path.name)
+    if format == "obj":
+        data = _zipped(path, data, files)
+    elif format not in ("glb", "zip"):
+        data, format = _embedded(data, files), "gltf"
+    imported = store.scene(store.add(data, filename=f"model.{format}").id)
     for warning in imported.warnings:
         place = f"{warning['pointer']}: " if warning["pointer"] else ""
         print(f"warning: {place}{warning['detail']}", file=sys.stderr)
@@ -64,3 +78,52 @@ def _read(uri: str, pointer: str, files: FileAssets) -> str:
     except AssetError as error:
         raise BadInput(f"{pointer}: {error.detail}") from None
     return "data:application/octet-stream;base64," + base64.b64encode(data).decode()
+
+
+def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
+    """The OBJ with those of its libraries and textures that are there."""
+    from service.assets.obj.importer import zipped
+
+    found = {located: files.read(located) for located in _libraries(data, files)}
+    for library, content in list(found.items()):
+        found |= {image: files.read(image) for image in _textures(library, content, files)}
+    # A path may lead out of the folder where --asset-root allows that: in the zip the model lies as deep.
+    deep = max((name.split("/").count("..") for name in found), default=0)
+    folder = "/".join(["model"] * deep)
+    own = (path.name if path.suffix.lower() == ".obj" else f"{path.name}.obj").replace("\\", "_")
+    entries = {posixpath.normpath(posixpath.join(folder, name)): content for name, content in found.items()}
+    return zipped(entries | {posixpath.join(folder, own): data})
+
+
+def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:
+    """The paths of the material libraries that are there, relative to the model's folder."""
+    from service.assets.obj.paths import library_names, located
+
+    for statement in dict.fromkeys(MTLLIB.findall(text(data))):
+        for name in library_names(statement.decode("utf-8", "replace").strip()):
+            if not name.lower().endswith(".obj") and _is_there(located("", name), "mtllib", files):
+                yield located("", name)
+
+
+def _textures(library: str, content: bytes, files: FileAssets) -> Iterator[str]:
+    """The paths of the images that a library names and that are there, relative to the model's folder."""
+    from service.assets.obj.mtl import read_mtl
+    from service.assets.obj.paths import located
+    from service.assets.scenes.warnings import Warnings
+
+    try:
+        materials = read_mtl(library, content, Warnings())  # the importer tells what is odd about it
+    except ParseError:
+        return  # and what is wrong
+    for material in materials.values():
+        for found in material.maps.values():
+            path = located(library, found.reference)
+            if _is_there(path, found.place, files):
+                yield path
+
+
+def _is_there(path: str, place: str, files: FileAssets) -> bool:
+    try:
+        return files.holds(path)
+    except AssetError as error:
+        raise BadInput(f"{place}: {error.detail}") from None

@@ -80,7 +80,9 @@ class Render(BaseModel):
 
 
 class AssetWarning(BaseModel):
-    pointer: str = Field(description="RFC 6901, into the file's own JSON: the first place; empty where it has none.")
+    pointer: str = Field(
+        description="The first place: RFC 6901 into the file's own JSON, or FILE:LINE of a zipped OBJ; may be empty."
+    )
     detail: str
     count: int | None = Field(None, description="How many places; not there where the pointer is the only one.")
 

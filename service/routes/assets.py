@@ -32,7 +32,7 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
 @router.post(
     "",
     status_code=201,
-    summary="Upload a mesh, an image or a glTF scene",
+    summary="Upload a mesh, an image, or a scene: glTF, or a zip of an OBJ with its materials",
     openapi_extra=answers.ASSET_BODY,
     response_model=None,
     responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 503),
@@ -54,7 +54,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
 
 @router.get(
     "/{id}/scene",
-    summary="A glTF file as a scene document",
+    summary="A glTF file or a zipped OBJ as a scene document",
     response_class=JSONResponse,
     responses=answers.DOCUMENT | answers.problems(404, 422),
 )

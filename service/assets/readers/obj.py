@@ -6,13 +6,13 @@ vertices, and reorders.
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import numpy.typing as npt
 
 from service.assets.errors import ParseError
-from service.assets.readers.obj_lines import CORNERS, NUMBERS, Lines, blocks, starts_of_words
+from service.assets.readers.obj_lines import CORNERS, NUMBERS, Lines, Named, blocks, starts_of_words
 from service.assets.readers.polygons import Longs, triangulate
 from service.assets.readers.raw_mesh import Numbers, RawMesh
 from service.assets.types import Doubles
@@ -26,6 +26,7 @@ NAMES = {
 }
 MOST_ROWS = 2**31 - 1
 SHARES = 8
+MOST_NAMED = 1 << 20
 
 
 @dataclass
@@ -37,15 +38,52 @@ class Found:
     counts: list[Ints] = field(default_factory=list)
     corners: dict[str, list[Ints]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
     lines: list[Ints] = field(default_factory=list)  # of the faces
+    named: list[Named] = field(default_factory=list)  # `faces` are those of the whole file
 
     def rows(self, keyword: str) -> int:
         return sum(map(len, self.tables[keyword]))
 
 
+@dataclass
+class MaterialMesh:
+    """An OBJ file with the materials that it names: triangle k wears `materials[of_triangle[k]]`."""
+
+    mesh: RawMesh
+    materials: list[str]  # the first is that of faces before any `usemtl`: ""
+    of_triangle: Ints
+    libraries: list[Named]  # `mtllib` statements, each text once
+
+
 def read_obj(data: bytes | memoryview) -> RawMesh:
     """Vertices as the file has them, or, where it gives more, one for each set of indices that a corner has."""
-    found = Found()
+    return _joined(_found(data, with_names=False))
+
+
+def read_obj_with_materials(data: bytes | memoryview) -> MaterialMesh:
+    """What `read_obj` reads, and which triangle wears which material."""
+    found = _found(data, with_names=True)
+    counts = np.concatenate(found.counts)
+    numbers = {"": 0}
+    libraries: dict[str, Named] = {}
+    starts, worn = [0], [0]
+    for one in found.named:
+        if one.keyword == "usemtl":
+            starts.append(one.faces)
+            worn.append(numbers.setdefault(one.name, len(numbers)))
+        else:
+            libraries.setdefault(one.name, one)
+    # The last of several statements before the same face counts.
+    use = np.searchsorted(np.array(starts), np.arange(len(counts)), "right") - 1
+    of_face = np.array(worn, np.int32)[use]
+    return MaterialMesh(_joined(found), list(numbers), np.repeat(of_face, counts - 2), list(libraries.values()))
+
+
+def _found(data: bytes | memoryview, with_names: bool) -> Found:
+    found, faces = Found(), 0
     for block in blocks(data):
+        if with_names:
+            found.named += [replace(one, faces=one.faces + faces) for one in block.named]
+        faces += len(block.before)
         rows_before = [found.rows(k) for k in WIDTHS]
         for keyword, width in WIDTHS.items():
             if block.rows[keyword].text:
@@ -65,9 +103,11 @@ def read_obj(data: bytes | memoryview) -> RawMesh:
                     have = found.rows(keyword)
                     raise block.rows["f"].error(row, f"{one} {index[bad]} does not exist; there are {have} {many}")
                 found.corners[keyword].append(index.astype(np.int32))
+        if len(found.named) > MOST_NAMED:
+            raise ParseError(f"it has more than {MOST_NAMED} `usemtl` and `mtllib` statements")
     if not found.counts:
         raise ParseError("it has no faces")
-    return _joined(found)
+    return found
 
 
 def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces: Lines) -> None:

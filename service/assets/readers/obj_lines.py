@@ -1,6 +1,6 @@
 """The statements of an OBJ file that matter, in blocks of whole lines: a file is never split into objects by line.
 
-Lines, materials and free-form statements are skipped.
+Lines and free-form statements are skipped.
 """
 
 from __future__ import annotations
@@ -20,8 +20,8 @@ from service.assets.readers.polygons import Longs
 
 Letters = npt.NDArray[np.uint8]
 
-KEYWORDS = {"v": (b"v", 1), "vt": (b"vt", 2), "vn": (b"vn", 2), "f": (b"f", 1)}
 BLOCK = 1 << 19  # bytes; what is made of a block is some forty times as large
+NAMING = (b"usemtl", b"mtllib")
 NEWLINE, BLANK = 10, 32  # the latter and all below separate words
 NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
 CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
@@ -60,11 +60,22 @@ class Lines:
 
 
 @dataclass(frozen=True)
+class Named:
+    """A `usemtl` or `mtllib` with what follows it; `faces` is how many faces of its block precede it."""
+
+    keyword: str
+    name: str
+    line: int
+    faces: int
+
+
+@dataclass(frozen=True)
 class Block:
     """`before`: how many rows of v, vt and vn preceded each row of f in this block (indices may count back)."""
 
     rows: dict[str, Lines]
     before: Longs  # (faces, 3)
+    named: list[Named]
 
 
 def blocks(data: bytes | memoryview) -> Iterator[Block]:
@@ -76,14 +87,15 @@ def blocks(data: bytes | memoryview) -> Iterator[Block]:
         at = end
         if isinstance(view.obj, mmap.mmap):  # what was read of the file need not count as this process' memory
             view.obj.madvise(mmap.MADV_DONTNEED, 0, at)
-        starts, found = _classified(text)
+        starts, found, others = _classified(text)
         numbers = line + np.arange(len(starts))
         line += len(starts)
-        if any(mask.any() for mask in found.values()):
+        if any(mask.any() for mask in (*found.values(), others)):
+            named = list(_named(text, starts, numbers, np.flatnonzero(others), found["f"]))
             lengths = np.diff(starts, append=len(text))
             rows = {k: Lines(_taken(text, starts, lengths, mask, k), numbers[mask]) for k, mask in found.items()}
             faces = found["f"]
-            yield Block(rows, np.stack([np.cumsum(found[k])[faces] for k in ("v", "vt", "vn")], axis=1))
+            yield Block(rows, np.stack([np.cumsum(found[k])[faces] for k in ("v", "vt", "vn")], axis=1), named)
 
 
 def _end(view: memoryview, at: int) -> int:
@@ -108,24 +120,37 @@ def _plain(text: bytes) -> bytes:
         text = text.replace(b"\\\n", b" ")
     if b"#" in text:
         text = re.sub(rb"#[^\n]*+", b"", text)
-    if re.search(rb"(?:\A|\n)[\x00-\x09\x0b-\x20]++[vf]", text):
+    if re.search(rb"(?:\A|\n)[\x00-\x09\x0b-\x20]++[vfum]", text):
         text = re.sub(rb"(?m)^[\x00-\x09\x0b-\x20]++", b"", text)
     return text if text.endswith(b"\n") else text + b"\n"
 
 
-def _classified(text: bytes) -> tuple[Longs, dict[str, npt.NDArray[np.bool_]]]:
-    """Where lines start, and which are of each keyword."""
+def _classified(text: bytes) -> tuple[Longs, dict[str, npt.NDArray[np.bool_]], npt.NDArray[np.bool_]]:
+    """Where lines start, which are of each keyword, and which may be a usemtl or mtllib."""
     letters = np.frombuffer(text + b"\n\n\n", np.uint8)
     ends = np.flatnonzero(letters[: len(text)] == NEWLINE)
     starts = np.concatenate([[0], ends[:-1] + 1])
     first, second, third = (letters[starts + k] for k in range(3))
     v = first == ord("v")
-    return starts, {
+    others = ((first == ord("u")) & (second == ord("s"))) | ((first == ord("m")) & (second == ord("t")))
+    keywords = {
         "v": v & (second <= BLANK),
         "vt": v & (second == ord("t")) & (third <= BLANK),
         "vn": v & (second == ord("n")) & (third <= BLANK),
         "f": (first == ord("f")) & (second <= BLANK),
     }
+    return starts, keywords, others
+
+
+def _named(text: bytes, starts: Longs, numbers: Longs, rows: Longs, faces: npt.NDArray[np.bool_]) -> Iterator[Named]:
+    """The statements of `rows` that name a material or a library."""
+    before = np.cumsum(faces) if len(rows) else faces
+    for row in rows:
+        start = int(starts[row])
+        keyword, *rest = text[start : text.index(b"\n", start)].split(None, 1)
+        if keyword in NAMING:
+            name = rest[0].decode("utf-8", "replace").strip() if rest else ""
+            yield Named(keyword.decode(), name, int(numbers[row]), int(before[row]))
 
 
 def _taken(text: bytes, starts: Longs, lengths: Longs, mask: npt.NDArray[np.bool_], keyword: str) -> bytes:

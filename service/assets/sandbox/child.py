@@ -83,6 +83,7 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
     """`whole`: of a file that is a scene not its triangles only."""
     from service.assets.gltf.importer import read_scene
+    from service.assets.obj.importer import read_obj_scene
     from service.assets.readers.image import SIGNATURES, parse_image
     from service.assets.sandbox.parse_mesh import parse_mesh
 
@@ -93,7 +94,9 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshDa
         return parse_image(format, os.pread(source, size, 0), f"/proc/self/fd/{source}", limits)
     # Mapped and not read: the file is in memory already.
     data = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
-    return read_scene(data, limits) if whole else parse_mesh(format, data, limits)
+    if not whole:
+        return parse_mesh(format, data, limits)
+    return read_obj_scene(data, limits) if format == "zip" else read_scene(data, limits)
 
 
 def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Pieces], dict[str, Any]]:

@@ -51,10 +51,17 @@ def _gltf(data: memoryview, limits: AssetLimits) -> RawMesh:
     return read_merged(data, limits)
 
 
+def _zip(data: memoryview, limits: AssetLimits) -> RawMesh:
+    from service.assets.obj.importer import read_zipped_obj
+
+    return read_zipped_obj(data, limits)
+
+
 READERS: dict[str, Callable[[memoryview, AssetLimits], RawMesh]] = {
     "obj": _obj,
     "ply": _ply,
     "stl": read_stl,
     "glb": _gltf,
     "gltf": _gltf,
+    "zip": _zip,
 }

@@ -25,6 +25,7 @@ BYTES_PER_TEXEL = 48
 BYTES_PER_MESH_BYTE, BYTES_PER_BIG_MESH_BYTE, BIG_MESH_BYTES = 64, 12, 4 << 30
 # That OBJ is read at 0.05 s a megabyte; for a slower machine under load.
 SECONDS_PER_BYTE = 0.25 / (1 << 20)
+USUAL_RATIO = 6  # of a zip's files to the zip: a text of numbers shrinks to a third, its faces to a fifth
 # What a big file took goes back to the machine: glibc else keeps blocks of up to 32 MiB for the next one.
 ENVIRONMENT = {
     "OPENIMAGEIO_THREADS": "1",
@@ -86,6 +87,8 @@ class Sandbox:
         if KINDS[format] == "image":
             worst = BYTES_PER_TEXEL * self.limits.max_texels + size
         else:
+            if format == "zip":
+                size = min(USUAL_RATIO * size, self.limits.max_file)
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
         memory = min(BASE_BYTES + worst, self.limits.memory)

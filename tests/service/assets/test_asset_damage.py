@@ -145,7 +145,7 @@ def test_a_part_that_is_damaged_says_where_it_came_from(
 ) -> None:
     part = store.scene(store.add(GLB).id).document["shapes"][0]["asset"]
     damage(file(tmp_path, part))
-    with pytest.raises(AssetError, match="or the glTF file that it is part of"):
+    with pytest.raises(AssetError, match="or the glTF file or zip that it is part of"):
         restarted.mesh(part)
 
 

@@ -1,0 +1,9 @@
+"""OBJ with its materials and textures, read in the parsing child from a zip of its folder: a whole scene.
+
+importer   the zip -> a scene's document with its meshes and images as parts
+archive    the files of a zip, bounded before any is unpacked
+paths      where a file's reference to another one leads
+mtl        material libraries -> statements
+materials  their materials -> the document's
+textures   their maps -> the document's textures
+"""

@@ -1,0 +1,136 @@
+"""A zip with an OBJ file, its material libraries and textures as a scene document, and what it refers to.
+
+Each material's triangles become a mesh of their own. Coordinates stay as they are; nothing is merged or reordered
+otherwise.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Mapping
+
+import numpy as np
+
+from service.assets.errors import ParseError
+from service.assets.formats import text
+from service.assets.obj.archive import Archive
+from service.assets.obj.materials import Materials
+from service.assets.obj.mtl import MtlMaterial, read_mtl
+from service.assets.obj.paths import library_names, located
+from service.assets.obj.textures import Textures
+from service.assets.readers.mesh_checks import mesh_warnings
+from service.assets.readers.obj import MaterialMesh, read_obj, read_obj_with_materials
+from service.assets.readers.obj_lines import Named
+from service.assets.readers.raw_mesh import RawMesh, check_raw_mesh
+from service.assets.scenes.framing import framed
+from service.assets.scenes.part_files import PartFiles
+from service.assets.scenes.ply_writer import ply
+from service.assets.scenes.warnings import Warnings
+from service.assets.types import AssetLimits, Indices, SceneFile
+
+MOST_MATERIALS = 10_000  # that faces wear
+MOST_LIBRARIES = 1_000
+
+
+def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
+    """Raises ParseError."""
+    archive = Archive(data, limits.max_file)
+    path = _model(archive)
+    read = read_obj_with_materials(text(archive.read(path)))
+    mesh = read.mesh
+    check_raw_mesh(mesh, limits.max_triangles)
+    notes, files = Warnings(), PartFiles()
+    name = path.rpartition("/")[2]
+    for warning in [
+        *mesh.warnings,
+        *mesh_warnings(np.asarray(mesh.vertices, np.float64), mesh.faces.astype(np.int32)),
+    ]:
+        notes.add(name, warning)
+    library = _library(path, read.libraries, archive, notes)
+    textures = Textures(archive, files, notes, limits)
+    materials = Materials(library, textures, mesh.uvs is not None, notes)
+    shapes = [
+        {"type": "mesh", "asset": _keep(files, mesh, faces, worn or name), "material": materials.add(worn, name)}
+        for worn, faces in _by_material(read)
+    ]
+    used = mesh.vertices[np.unique(mesh.faces)]
+    bounds = used.min(axis=0), used.max(axis=0)
+    document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}
+    if textures.documents:
+        document["textures"] = textures.documents
+    corners = [corner.tolist() for corner in bounds]
+    return SceneFile(document, files.kept, notes.document(), len(mesh.faces), False, bounds=corners)
+
+
+def read_zipped_obj(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
+    """The triangles of the OBJ file in a zip as one mesh, without its materials. Raises ParseError."""
+    archive = Archive(data, limits.max_file)
+    return read_obj(text(archive.read(_model(archive))))
+
+
+def zipped(files: Mapping[str, bytes]) -> bytes:
+    """Files by path as a zip that `read_obj_scene` takes; the same files always give the same bytes."""
+    out = io.BytesIO()
+    with zipfile.ZipFile(out, "w", zipfile.ZIP_STORED) as archive:
+        for path in sorted(files):
+            archive.writestr(zipfile.ZipInfo(path), files[path])
+    return out.getvalue()
+
+
+def _model(archive: Archive) -> str:
+    """The path of the only OBJ file."""
+    found = [name for name in archive.names if name.lower().endswith(".obj")]
+    if len(found) != 1:
+        named = ", ".join(repr(name[:60]) for name in found[:3])
+        what = f"holds {len(found)} OBJ files, {named}" if found else "holds no OBJ file"
+        raise ParseError(f"the zip {what}; one is needed, with its materials and textures")
+    return found[0]
+
+
+def _library(model: str, statements: list[Named], archive: Archive, notes: Warnings) -> dict[str, MtlMaterial]:
+    """The materials of all libraries that are there; of equal names the first one's."""
+    if len(statements) > MOST_LIBRARIES:
+        raise ParseError(f"it names {len(statements)} material libraries; {MOST_LIBRARIES} are allowed")
+    found: dict[str, MtlMaterial] = {}
+    read: set[str] = set()
+    for statement in statements:
+        place = f"{model.rpartition('/')[2]}:{statement.line}"
+        names = library_names(statement.name)
+        paths = [located(model, name) for name in names]
+        if len(names) > 1 and paths[0] not in archive:  # then they are several files
+            names, paths = names[1:], paths[1:]
+        else:
+            names, paths = names[:1], paths[:1]
+        for name, path in zip(names, paths, strict=True):
+            if path in read:
+                continue
+            read.add(path)
+            if path not in archive or path == model:
+                notes.add(place, f"the material library {name[:100]!r} is not there; its materials are shown grey")
+                continue
+            found = read_mtl(path, archive.read(path), notes) | found
+    return found
+
+
+def _by_material(read: MaterialMesh) -> list[tuple[str, Indices]]:
+    """The materials that triangles wear, in the order in which the file first uses them, and these triangles."""
+    counts = np.bincount(read.of_triangle, minlength=len(read.materials))
+    if np.count_nonzero(counts) > MOST_MATERIALS:
+        raise ParseError(f"its faces wear {np.count_nonzero(counts)} materials; {MOST_MATERIALS} are allowed")
+    order = np.argsort(read.of_triangle, kind="stable")
+    faces = read.mesh.faces.astype(np.int32)[order]
+    ends = np.cumsum(counts)
+    return [(read.materials[k], faces[ends[k] - counts[k] : ends[k]]) for k in np.flatnonzero(counts)]
+
+
+def _keep(files: PartFiles, mesh: RawMesh, faces: Indices, pointer: str) -> str:
+    """The reference of these triangles with the vertices that they use, as a mesh of their own."""
+    used, corners = np.unique(faces, return_inverse=True)
+    normals, uvs, colors = (None if rows is None else rows[used] for rows in (mesh.normals, mesh.uvs, mesh.colors))
+    if normals is not None and not normals.any():
+        normals = None
+    if colors is not None:
+        colors = np.clip(colors, 0, 1)
+    triangles = corners.reshape(-1, 3).astype(np.int32)
+    return files.keep(ply(mesh.vertices[used], triangles, normals, [uvs], colors), pointer, len(used), len(triangles))
