@@ -11,7 +11,7 @@ import numpy as np
 
 from gpu import EnvironmentArrays, SceneArrays
 from gpu.layout import LEAF_FIRST_MASK, LightKind, ShapeKind
-from service.assets import Assets
+from service.assets import Assets, ImageData, MeshData
 from service.pack.edits.cache import PackCache, content, lasting
 from service.pack.geometry.assemble import assemble
 from service.pack.geometry.geometry import Geometry
@@ -25,6 +25,7 @@ from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.textured_emission import dark, mean_emission
 from service.pack.textures.uses import required_charts
 from service.pack.textures.words import pack_textures
+from service.problems import AssetError
 from service.scene import Camera, Material, Scene
 from service.scene.environment import Environment
 from service.scene.numbers import BRIGHTEST
@@ -160,7 +161,17 @@ def _with_geometry(arrays: SceneArrays, built: Geometry) -> SceneArrays:
 def pack_material(material: Material) -> SceneArrays:
     """A scene that holds this material, which must not read textures, and nothing to look at."""
     scene = Scene(version=1, camera=_NOWHERE, materials={"": material}, shapes=[])
-    return SceneArrays(camera=pack_camera(scene.camera), materials=pack_materials(scene))
+    return pack(scene, _NoAssets()).arrays
+
+
+class _NoAssets:
+    """For a scene without meshes and images."""
+
+    def mesh(self, ref: str) -> MeshData:
+        raise AssetError("there are no assets here")
+
+    def image(self, ref: str) -> ImageData:
+        raise AssetError("there are no assets here")
 
 
 def _geometry(
