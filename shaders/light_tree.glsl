@@ -19,7 +19,7 @@ uvec4 light_tree_fetch(uint i) {
 uvec4 light_tree_head() { return texelFetch(light_tree_words, ivec2(0), 0); }
 
 vec3 light_tree_axis(uint bits) {
-    vec2 e = vec2(bits & 0xffu, (bits >> 8u) & 0xffu) / 127.0 - 1.0;
+    vec2 e = vec2(bits & 0xffu, (bits >> 8u) & 0xffu) * (1.0 / 127.0) - 1.0;
     vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
     float fold = max(-n.z, 0.0);
     n.xy -= fold * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));
@@ -35,8 +35,15 @@ vec2 light_tree_less(vec2 a, vec2 b) {
     return a.x >= b.x ? vec2(1.0, 0.0) : vec2(a.x * b.x + a.y * b.y, a.y * b.x - a.x * b.y);
 }
 
-// x is a bound on the contribution of a node's lights times y, the square of their distance. p is on the tree's grid.
-vec2 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
+// The square of a cluster's distance, in radii of the ball around it, beyond which its lights matter by intensity alone.
+// A thousand lamps over a floor take three quarters of the time then, for 5 % more error at equal samples.
+const float LIGHT_TREE_FAR = 6.0;
+// Numbers that lead to a cluster at least, that each of its lights gets as many as its share says.
+const int LIGHT_TREE_LEAST = 1 << 20;
+
+// x is a bound on the contribution of a node's lights times y, the square of their distance; z is positive where they
+// are far. p is on the tree's grid.
+vec3 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
     vec3 to = vec3(node.x & 0xffffu, node.x >> 16u, node.y & 0xffffu) - p;
     float radius = uintBitsToFloat(((node.y & 0xff0000u) << 4u) + (123u << 23u));
     float d2 = dot(to, to), r2 = radius * radius;
@@ -59,22 +66,38 @@ vec2 light_tree_importance(uvec4 node, vec3 p, LightContext context) {
     float cos_out = 1.0; // all lights shine in all directions
 #endif
     float share = d2 <= r2 ? 1.0 : max(cos_in, 0.0) * max(cos_out, 0.0);
-    return vec2(light_tree_intensity(node) * share, max(d2, r2));
+    return vec3(light_tree_intensity(node) * share, max(d2, r2), d2 - LIGHT_TREE_FAR * r2);
 }
 
-// The chance of coming down the tree to a light: to the one that `code` leads to, which is `found`, or with `told` to
-// the one that `trail` leads to. `near` is false where the light is not in the tree. The codes of a node are an
-// interval, which its children share out.
-float light_tree_walk(bool near, bool told, uint code, uint trail, LightContext context, out uint found) {
+// Where a walk down the tree has ended.
+struct LightTreeEnd {
+    uint found;    // the light
+    float chance;  // of coming to that node
+    float inverse; // of the intensity of a cluster's lights; 0: the node is the light itself
+};
+
+// Draws one of a cluster's lights by a number 0 .. 1.
+void light_tree_draw(float u, inout LightTreeEnd end) {
+    uvec4 cluster = light_tree_fetch(2u * light_tree_head().w + end.found);
+    float x = u * float(cluster.y);
+    uint i = min(uint(x), cluster.y - 1u);
+    uvec4 entry = light_tree_fetch(cluster.x + i);
+    end.found = x - float(i) >= uintBitsToFloat(entry.z) ? entry.y : entry.x;
+    end.inverse = uintBitsToFloat(cluster.z);
+}
+
+// Goes down the tree to a light: to the one that `code` leads to, or with `told` towards the one that `trail` leads to.
+// `near` is false where the light is not in the tree. The codes of a node are an interval, which its children share
+// out. A walk ends at a cluster that is far.
+LightTreeEnd light_tree_walk(bool near, bool told, uint code, uint trail, LightContext context) {
     uvec4 head = light_tree_head(), grid = texelFetch(light_tree_words, ivec2(1, 0), 0);
     vec3 p = (context.p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
     int rest = int(code) - int(head.y), width = int(head.x - head.y);
     uint pair = 1u, depth = 0u;
-    bool more = near;
-    found = 0u;
+    bool more = near, far = false;
     do {
         uvec4 a = light_tree_fetch(2u * pair), b = light_tree_fetch(2u * pair + 1u);
-        vec2 x = light_tree_importance(a, p, context), y = light_tree_importance(b, p, context);
+        vec3 x = light_tree_importance(a, p, context), y = light_tree_importance(b, p, context);
         float first = x.x * y.y, second = y.x * x.y; // gpu/accel/light_tree.py keeps them inside float32
         // Neither bound says that light arrives, though that of the parent did: the chances follow intensity alone.
         bool lost = !(first + second > 0.0);
@@ -89,12 +112,20 @@ float light_tree_walk(bool near, bool told, uint code, uint trail, LightContext 
             uint link = right ? b.w : a.w;
             rest -= right ? cut : 0;
             width = right ? width - cut : cut;
-            more = (link & LEAF_BIT) == 0u;
-            found = link & ~LEAF_BIT;
-            pair = more ? link : pair;
+            far = (link & (LEAF_BIT | CLUSTER_BIT)) == CLUSTER_BIT && (right ? y.z : x.z) > 0.0
+                && width >= LIGHT_TREE_LEAST;
+            more = (link & LEAF_BIT) == 0u && !far;
+            pair = link & ~(LEAF_BIT | CLUSTER_BIT); // or the light
         }
         depth++;
     } while (more && depth < 32u);
-    return float(width) * (1.0 / float(LIGHT_CODES));
+    LightTreeEnd end = LightTreeEnd(near ? pair : 0u, float(width) * (1.0 / float(LIGHT_CODES)), 0.0);
+    if (far) light_tree_draw(told ? 0.0 : float(rest) / float(width), end);
+    return end;
+}
+
+// The chance of picking the light l by a walk that ends there.
+float light_tree_chance(LightTreeEnd end, Light l) {
+    return end.chance * (end.inverse > 0.0 ? l.threshold * end.inverse : 1.0);
 }
 #endif

@@ -34,11 +34,10 @@ Light lights_pick(uint bits, LightContext context) {
     float x = float(code - head.x) * (float(far) / float(max(LIGHT_CODES - head.x, 1u)));
     uint i = head.w + min(uint(x), far - 1u), first = near ? (even ? code >> head.z : 0u) : i;
     Light drawn = light_pick(first);
-    uint found;
-    float chance = light_tree_walk(near, even, code, drawn.alias, context, found);
+    LightTreeEnd end = light_tree_walk(near, even, code, drawn.alias, context);
     uint other = fract(x) >= drawn.threshold ? drawn.alias : i;
-    Light l = light_pick(near ? (even ? first : found) : other);
-    if (near) l.probability += chance;
+    Light l = light_pick(near ? (even ? first : end.found) : other);
+    if (near) l.probability += light_tree_chance(end, l);
     return l;
 }
 #else
@@ -197,8 +196,8 @@ float lights_pdf(uint light, Hit hit, SurfacePoint at, LightContext context, vec
     vec3 p = context.p;
     Light l = light_pick(light);
 #if HAS_LIGHT_TREE
-    uint same;
-    l.probability += light_tree_walk(light != NONE && light_tree_head().x > 0u, true, 0u, l.alias, context, same);
+    bool near = light != NONE && light_tree_head().x > 0u;
+    l.probability += light_tree_chance(light_tree_walk(near, true, 0u, l.alias, context), l);
 #endif
     Emitter e = lights_emitter(l);
     uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK; // as the light has them, without a load

@@ -10,7 +10,7 @@ import numpy as np
 from gpu import Renderer, SceneArrays, layout
 from gpu.device.textures import linear_texture
 from gpu.kernels.features import FLAGS
-from gpu.layout import LightKind, LightNode, LightTreeHead, bindings
+from gpu.layout import LightCluster, LightKind, LightNode, LightTreeHead, bindings
 from gpu.layout.bindings import Slot
 from tests.probing import prober_of
 
@@ -35,7 +35,7 @@ def head_of(words: np.ndarray) -> np.void:
 
 def nodes_of(words: np.ndarray) -> Nodes:
     head = head_of(words)
-    n: Any = np.ascontiguousarray(words).reshape(-1).view(LightNode.dtype)
+    n: Any = np.ascontiguousarray(words[: 2 * head["far_first"]]).reshape(-1).view(LightNode.dtype)
     step = 1 / float(head["inverse_step"])
     grid = np.stack([n["place"] & 0xFFFF, n["place"] >> 16, n["reach"] & 0xFFFF], 1)
     radius = (((n["reach"] >> 16 & 0xFF) << 20) + np.uint32(123 << 23)).view(np.float32) * step
@@ -55,6 +55,13 @@ def nodes_of(words: np.ndarray) -> Nodes:
     )
 
 
+def clusters_of(words: np.ndarray) -> list[np.ndarray]:
+    """Of each cluster: the lights in its table."""
+    n = int(head_of(words)["far_first"])
+    clusters = np.ascontiguousarray(words[2 * n : 3 * n]).reshape(-1).view(LightCluster.dtype)
+    return [words[int(c["first"]) :][: int(c["count"]), 0].astype(int) for c in clusters if c["count"]]
+
+
 def ways(arrays: SceneArrays) -> list[list[int]]:
     """Of each light in the tree: the nodes that its trail leads through, the last of which is its own."""
     links = nodes_of(arrays.light_tree).link
@@ -63,7 +70,7 @@ def ways(arrays: SceneArrays) -> list[list[int]]:
         way, pair = list[int](), 1
         while not way or not int(links[way[-1]]) & layout.LEAF_BIT:
             way.append(2 * pair + (trail >> len(way) & 1))
-            pair = int(links[way[-1]])
+            pair = int(links[way[-1]]) & ~layout.CLUSTER_BIT
         assert int(links[way[-1]]) == layout.LEAF_BIT | i
         out.append(way)
     return out

@@ -1,9 +1,10 @@
 """The trees that make rays and lights quick to find. Public; runs without GL, and loads numba.
 
-bvh               boxes -> a bounding volume hierarchy as `layout.Node` records
-bvh_build         the loop that grows it over boxes
-sah               where to split a range of boxes: the surface area heuristic
-bvh_thread        the same tree in the order in which rays of each octant meet it, with skip links
-light_tree        bounded lights -> a tree by which they are picked where they matter
-light_tree_build  the loops that grow that tree and bound its nodes
+bvh                  boxes -> a bounding volume hierarchy as `layout.Node` records
+bvh_build            the loop that grows it over boxes
+sah                  where to split a range of boxes: the surface area heuristic
+bvh_thread           the same tree in the order in which rays of each octant meet it, with skip links
+light_tree           bounded lights -> a tree by which they are picked where they matter
+light_tree_build     the loops that grow that tree and bound its nodes
+light_tree_clusters  its nodes whose lights are drawn by intensity alone from far away
 """

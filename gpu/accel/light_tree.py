@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpu import layout
-from gpu.accel import light_tree_build
+from gpu.accel import light_tree_build, light_tree_clusters
 from gpu.accel.light_tree_build import AXIS, BEYOND, INTENSITY, NORMALS, RADIUS, WIDTH
 from gpu.layout import LightNode, LightTreeHead
 
@@ -29,9 +29,9 @@ FARTHEST = 2.0**38  # steps from one end of the scene to the other: squares time
 def build(
     low: np.ndarray, high: np.ndarray, radius: np.ndarray, axis: np.ndarray, normals: np.ndarray, beyond: np.ndarray,
     intensity: np.ndarray, share: float, reach: float,
-) -> tuple[np.ndarray, np.ndarray, float]:  # fmt: skip
-    """(words (2 n, 4) uint32: a head and the pairs of nodes; trails (n,) uint32; the even part of each light's
-    probability).
+) -> tuple[np.ndarray, np.ndarray, float, np.ndarray]:  # fmt: skip
+    """(words (k, 4) uint32: a head, the pairs of nodes, their clusters from 2 n on, whose entries begin at 3 n;
+    trails (n,) uint32; the even part of each light's probability; intensities (n,) float32, 1 for the brightest).
 
     For n >= 2 lights: boxes `low`, `high` (n, 3) and the `radius` (n,) of a ball around each one's middle; its
     normals lie about the unit `axis` (n, 3) within the angle whose cosine is `normals` (n,), and light leaves at up
@@ -46,8 +46,8 @@ def build(
     lights[:, 0:3], lights[:, 3:6], lights[:, AXIS : AXIS + 3] = low, high, axis
     lights[:, NORMALS], lights[:, BEYOND], lights[:, RADIUS] = normals, beyond, radius
     lights[:, INTENSITY] = intensity / (intensity.max() or 1.0)
-    children, trails = np.empty((n - 1, 2), np.int64), np.empty(n, np.uint32)
-    light_tree_build.grow(lights, np.arange(n), children, trails)
+    children, trails, order = np.empty((n - 1, 2), np.int64), np.empty(n, np.uint32), np.arange(n)
+    light_tree_build.grow(lights, order, children, trails)
     bounds = np.empty((n - 1, 2, WIDTH), np.float64)
     light_tree_build.bound(lights, children, bounds)
     head = np.zeros(1, LightTreeHead.dtype)
@@ -56,12 +56,16 @@ def build(
     head["near"], head["even"], head["even_shift"], head["far_first"] = near, n << shift, shift, n
     origin, step = _grid(lights, reach)
     head["origin"], head["inverse_step"] = origin, 1 / step
-    words = np.empty((2 * n, 4), np.uint32)
+    clusters, entries, clustered = light_tree_clusters.gather(lights, children, bounds, order, 3 * n)
+    words = np.zeros((3 * n + len(entries), 4), np.uint32)
     words[:2] = head.view(np.uint32).reshape(2, 4)
     for first in range(0, n - 1, PIECE):
-        some = slice(first, first + PIECE)
-        words[2 + 2 * first : 2 + 2 * (first + PIECE)] = _packed(bounds[some], children[some], origin, step)
-    return words, trails, 2.0**shift / layout.LIGHT_CODES
+        last = min(first + PIECE, n - 1)
+        some = slice(first, last)
+        words[2 + 2 * first : 2 + 2 * last] = _packed(bounds[some], children[some], clustered[some], origin, step)
+    words[2 * n + 1 : 3 * n] = clusters.view(np.uint32).reshape(-1, 4)
+    words[3 * n :] = entries.view(np.uint32).reshape(-1, 4)
+    return words, trails, 2.0**shift / layout.LIGHT_CODES, lights[:, INTENSITY].astype(np.float32)
 
 
 def _grid(lights: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
@@ -74,7 +78,9 @@ def _grid(lights: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
     return (low - 2 * step).astype(np.float32).astype(np.float64), step
 
 
-def _packed(bounds: np.ndarray, children: np.ndarray, origin: np.ndarray, step: float) -> np.ndarray:
+def _packed(
+    bounds: np.ndarray, children: np.ndarray, clustered: np.ndarray, origin: np.ndarray, step: float
+) -> np.ndarray:
     """(2 (n - 1), 4) uint32: `layout.LightNode` records, rounded so that they still hold what they held."""
     nodes = np.zeros(children.shape, LightNode.dtype)
     place = (0.5 * (bounds[..., 0:3] + bounds[..., 3:6]) - origin) / step
@@ -91,6 +97,7 @@ def _packed(bounds: np.ndarray, children: np.ndarray, origin: np.ndarray, step: 
     nodes["reach"] = z | radius << 16 | normals.astype(np.uint32) << 24
     nodes["shine"] = axis | beyond.astype(np.uint32) << 16 | _brightness(bounds[..., INTENSITY]) << 21
     nodes["link"] = np.where(children < 0, layout.LEAF_BIT | ~children, children + 1).astype(np.uint32)
+    nodes["link"][clustered] |= layout.CLUSTER_BIT
     return nodes.view(np.uint32).reshape(-1, 4)
 
 

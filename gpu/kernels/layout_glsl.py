@@ -116,6 +116,7 @@ def _constants() -> str:
         "LEAF_FIRST_MASK",
         "TREELET_BIT",
         "TREELET_MAX_NODES",
+        "CLUSTER_BIT",
         "LIGHT_CODES",
         "METER_REPLICATES",
     ):

@@ -8,6 +8,7 @@ bindings         binding points of buffers and blocks, and texture units
 """
 
 from gpu.layout.links import (
+    CLUSTER_BIT,
     INSTANCED,
     LEAF_BIT,
     LEAF_COUNT_SHIFT,
@@ -37,6 +38,8 @@ from gpu.layout.records import (
     Frame,
     Instance,
     Light,
+    LightCluster,
+    LightClusterEntry,
     LightKind,
     LightNode,
     LightTreeHead,
@@ -54,6 +57,7 @@ from gpu.layout.records import (
 __all__ = [
     "ABSENT",
     "BUFFERS",
+    "CLUSTER_BIT",
     "HIDDEN",
     "INSTANCED",
     "LEAF_BIT",
@@ -79,6 +83,8 @@ __all__ = [
     "Frame",
     "Instance",
     "Light",
+    "LightCluster",
+    "LightClusterEntry",
     "LightKind",
     "LightNode",
     "LightTreeHead",

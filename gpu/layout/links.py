@@ -11,5 +11,7 @@ INSTANCED = 0x80000000
 # A treelet's link: bit 31 not set, bit 30 set, nodes << LEAF_COUNT_SHIFT, first: from where the octants' orders end
 TREELET_BIT = 0x40000000
 TREELET_MAX_NODES = 63
+# A link of the lights' tree: the pair of a node that is a cluster
+CLUSTER_BIT = 0x40000000
 
 LIGHT_CODES = 1 << 30  # numbers that lights are picked by, in a scene with a tree of them

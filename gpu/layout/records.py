@@ -189,7 +189,7 @@ class Light(Record):
     intensity: vec3  # W/sr, points and spots; directional: radiance of the disk, or irradiance; 0 for shapes
     index: u32  # into the array of the shape's kind
     probability: f32  # of being picked; of a light in the tree: the part that does not go by the tree
-    threshold: f32  # alias table: keep this light where u < threshold
+    threshold: f32  # alias table: keep this light where u < threshold; of a light in the tree: its intensity
     alias: u32  # else take that one; of a light in the tree: bit k says which child leads to it at depth k
     material: u32
     direction: vec3  # the way the light travels; a spot's is scaled, see spot.glsl
@@ -215,7 +215,21 @@ class LightNode(Record):
     # The cone's axis, octahedral 2 x 8 bits; sine of half the angle from a normal at which light leaves << 16, of 31
     # for a right one; intensity << 21
     shine: u32
-    link: u32  # the pair of its children; a light: LEAF_BIT | its index
+    link: u32  # the pair of its children, with CLUSTER_BIT; a light: LEAF_BIT | its index
+
+
+class LightCluster(Record):
+    """A node whose lights are drawn by an alias table where they are far; that of the pair k at 2 far_first + k."""
+
+    first: u32  # its table's first entry, among all words
+    count: u32
+    inverse_intensity: f32  # of all of them, in the unit of Light.threshold
+
+
+class LightClusterEntry(Record):
+    light: u32
+    alias: u32  # the light to take where u >= threshold
+    threshold: f32
 
 
 class EnvironmentCell(Record):

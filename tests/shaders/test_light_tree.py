@@ -17,7 +17,7 @@ from service.pack.lights import light_bounds
 from service.scene import parse_scene
 from tests import stats
 from tests.extremes.scenes import Seen, everything, scaled
-from tests.light_trees import Picker, head_of, nodes_of, ways
+from tests.light_trees import Picker, clusters_of, head_of, nodes_of, ways
 from tests.rendering import Images, document
 
 Doc = dict[str, Any]
@@ -110,6 +110,43 @@ def test_lights_are_drawn_as_often_as_they_say(pickers: Any) -> None:
     far = np.isin(arrays.lights["kind"], [LightKind.DIRECTIONAL, LightKind.ENVIRONMENT])
     shares = [picker.chances(p, n)[0][far].sum() for p, n, _ in _places(4, 3)]
     assert shares == pytest.approx([shares[0]] * 3)  # a fixed share, wherever light is asked for
+
+
+def _ceiling(count: int = 20) -> Doc:
+    """A grid of lamps that face down, of several brightnesses."""
+    shapes = [
+        {
+            "type": "quad",
+            "origin": [x, 3, z],
+            "u": [0.05, 0, 0],
+            "v": [0, 0, 0.05],
+            "material": LAMPS[(3 * x + z) % 4],
+        }
+        for x in range(count)
+        for z in range(count)
+    ]
+    return document(shapes, MATERIALS)
+
+
+def test_far_clusters_are_drawn_as_often_as_they_say(pickers: Any) -> None:
+    """Walks from under the lamps end at lamps nearby and at clusters elsewhere; from far away at clusters alone."""
+    arrays = _packed(_ceiling())
+    picker = pickers(arrays)
+    clusters = clusters_of(arrays.light_tree)
+    bits = np.random.default_rng(3).integers(0, 1 << 32, 400_000, dtype=np.uint32)
+    for p, least, most in (((10, 2.8, 10), 0.5, 0.75), ((10, 0, 10), 0.75, 0.9), ((-30, -20, 40), 1.0, 1.0)):
+        place = np.float32(p) - arrays.origin
+        chances, _ = picker.chances(place, (0, 1, 0))
+        assert chances.sum() == pytest.approx(1, abs=1e-5) and chances.min() > 0
+        which, said = picker.drawn(bits, place, (0, 1, 0))
+        np.testing.assert_allclose(said, chances[which], rtol=1e-5)
+        counts = np.bincount(which, minlength=len(chances))
+        assert stats.chi_square(counts, chances * len(bits)) > stats.sidak(1e-3, 3)
+        # In a cluster where walks end, lamps differ in their chances by intensity alone.
+        even = arrays.lights["probability"]
+        rates = (chances - even) / arrays.lights["threshold"]
+        ended = {k for some in clusters for k in some if np.ptp(rates[some]) < 1e-3 * rates[some].mean()}
+        assert least <= len(ended) / len(rates) <= most
 
 
 def test_near_numbers_draw_near_lights(pickers: Any) -> None:
@@ -335,6 +372,6 @@ def test_a_large_tree_is_kept_while_its_lights_are() -> None:
         return pack(parse_scene(document([mesh, ball], materials)), Images(), cache).arrays.light_tree
 
     first = tree(0)
-    assert len(first) == 2 * 2 * n * n
+    assert len(nodes_of(first).link) == 2 * 2 * n * n
     assert tree(0.25) is first  # a ball moved
     assert tree(0.25, emission=[3, 2, 1]) is not first

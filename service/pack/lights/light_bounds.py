@@ -13,7 +13,7 @@ MANY = 4
 APART = 4.0  # radii between the middles of fewer lights that are in more than one place
 LASTING = 4096  # lights whose tree is worth keeping beside geometries: it takes some ms
 
-Grown = tuple[np.ndarray, np.ndarray, float]  # as by `gpu.accel.light_tree.build`
+Grown = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # as by `gpu.accel.light_tree.build`
 _FLAT = np.array([0.0, 0.0, 1.0])
 
 
@@ -127,9 +127,9 @@ def grow_light_tree(
         kept = make()
     else:
         kept = cache.get(("light tree", *map(digest, given), share, reach), make)
-    return kept.words, kept.trails, kept.even
+    return kept.words, kept.trails, kept.even, kept.intensity
 
 
 class _Kept:
-    def __init__(self, words: np.ndarray, trails: np.ndarray, even: float) -> None:
-        self.words, self.trails, self.even = words, trails, even
+    def __init__(self, words: np.ndarray, trails: np.ndarray, even: float, intensity: np.ndarray) -> None:
+        self.words, self.trails, self.even, self.intensity = words, trails, even, intensity

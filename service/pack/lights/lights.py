@@ -30,7 +30,7 @@ LEAST_RIM = 1e-6
 LEAST_DISK = 1e-6
 
 # Bounded lights (n,), their power (n,) and their share of all picks -> as `gpu.accel.light_tree.build`; None: no tree
-Grow = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, float] | None]
+Grow = Callable[[np.ndarray, np.ndarray, float], tuple[np.ndarray, np.ndarray, float, np.ndarray] | None]
 
 
 def mark(shapes: dict[ShapeKind, np.ndarray], emissive: np.ndarray) -> np.ndarray:
@@ -177,7 +177,7 @@ def weigh(
     if grown is None:
         lights["threshold"], lights["alias"], lights["probability"] = alias_table(weights)
         return lights, words
-    words, lights["alias"][:n], lights["probability"][:n] = grown
+    words, lights["alias"][:n], lights["probability"][:n], lights["threshold"][:n] = grown
     if n < len(lights):
         threshold, alias, probability = alias_table(weights[n:])
         lights["threshold"][n:], lights["alias"][n:] = threshold, n + alias

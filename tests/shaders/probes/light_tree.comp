@@ -24,8 +24,9 @@ void main() {
 #else
     Light l = light_load(i);
     bool near = i < light_tree_head().w;
-    uint found;
-    float chance = light_tree_walk(near, true, 0u, l.alias, at, found);
+    LightTreeEnd end = light_tree_walk(near, true, 0u, l.alias, at);
+    uint found = end.inverse > 0.0 ? i : end.found;
+    float chance = light_tree_chance(end, l);
     uvec4 grid = texelFetch(light_tree_words, ivec2(1, 0), 0);
     vec3 o = (p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
     uint pair = 1u, depth = 0u;
@@ -36,7 +37,7 @@ void main() {
         if (more) {
             least = min(least, light_tree_importance(node, o, at).x);
             more = (node.w & LEAF_BIT) == 0u;
-            pair = more ? node.w : pair;
+            pair = node.w & ~CLUSTER_BIT;
         }
         depth++;
     } while (more && depth < 32u);
