@@ -14,6 +14,7 @@ from service.assets.obj.archive import Archive
 from service.assets.obj.mtl import Map
 from service.assets.obj.paths import is_absolute, located
 from service.assets.readers.image import PILLOW, check_size
+from service.assets.readers.raw_mesh import MAX_COORDINATE
 from service.assets.scenes.names import unique
 from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.warnings import Warnings
@@ -47,8 +48,11 @@ class Textures:
         if found.options.get("-clamp", ("off",))[:1] == ("on",):
             settings["wrap"] = "clamp"
         for option, name, default in (("-s", "scale", 1.0), ("-o", "offset", 0.0)):
-            if found.vectors.get(option, (default, default)) != (default, default):
-                settings[name] = list(found.vectors[option])
+            values = found.vectors.get(option, (default, default))
+            if max(map(abs, values)) > MAX_COORDINATE:
+                self.notes.add(found.place, f"the option {option} has a number beyond 1e9 and is ignored")
+            elif values != (default, default):
+                settings[name] = list(values)
         reference = self.files.keep(image, path)
         key = reference, repr(settings)
         if key not in self._names:

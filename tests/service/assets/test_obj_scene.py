@@ -13,7 +13,11 @@ import numpy as np
 import pytest
 
 from service.assets import AssetInfo, AssetStore
-from service.assets.obj import archive
+from service.assets.errors import ParseError
+from service.assets.obj import archive, importer
+from service.assets.obj.importer import read_obj_scene
+from service.assets.scene_import import take_apart
+from service.assets.types import AssetLimits
 from service.config import Config
 from service.problems import AssetError
 from tests.asset_files import OBJ, png
@@ -136,6 +140,7 @@ def test_statements_become_parameters(store: AssetStore, text: str, expected: di
         ("map_Kd m.mtl", "is not in a supported format"),
         ("map_Kd -cc on grey.png", "the option -cc is not supported"),
         ("map_Kd -t 1 1 1 grey.png", "turbulence"),
+        ("map_Kd -o 1e20 grey.png", "the option -o has a number beyond 1e9"),
         ("norm -bm -1 normals.png", "a negative scale (-bm) is not supported"),
         ("map_Kd", "map_kd names no file"),
         ("Kd spectral copper.rfl", "kd is not followed by the numbers that it needs"),
@@ -208,6 +213,55 @@ def test_libraries_with_blanks_and_several_of_them(store: AssetStore) -> None:
     document, _, details = imported(store, {"a.obj": obj, **files})
     assert [one["albedo"] for one in document["materials"].values()] == [[1.0, 0.0, 0.0], [0.0, 0.0, 1.0]]
     assert not [said for said in details if "not there" in said]
+
+
+WORDS = (
+    "nan",
+    "1e999",
+    "-1",
+    "1e19",
+    "../",
+    "\0",
+    "#",
+    "\\",
+    "newmtl",
+    "usemtl",
+    "f",
+    "C:\\x",
+    "-s",
+    "-bm",
+    "-imfchan",
+    "é",
+)
+
+
+def mutated(text: str, rng: np.random.Generator) -> bytes:
+    """The text with a few characters changed, pieces cut out, doubled, or words put in."""
+    for _ in range(rng.integers(1, 7)):
+        at = int(rng.integers(len(text) + 1))
+        piece = [chr(rng.integers(256)), f" {rng.choice(WORDS)} ", text[at - 20 : at], ""][rng.integers(4)]
+        text = text[:at] + piece + text[at + int(rng.integers(8)) :]
+    return text.encode()
+
+
+def test_nonsense_is_a_scene_or_is_refused() -> None:
+    """Nothing but a ParseError comes out, and what is read is a valid document."""
+    library = "newmtl m\n" + "\n".join(
+        ["Kd 0.5 0.5 0.5", "Ks .5 .5 .5", "Ns 100", "Ni 1.5", "Tr 0.5", "illum 7", "Tf 1 1 1", "Ke 1 2 3", "Pr .5",
+         "Pm .5", "Pc 1", "aniso .5", "anisor .3", "map_Kd -s 1 2 3 -o .5 -clamp on grey.png", "bump normals.png",
+         "map_d -imfchan m fading.png", "map_Pr grey.png", "map_Ke grey.png"]
+    )  # fmt: skip
+    rng, scenes = np.random.default_rng(5), 0
+    for _ in range(400):
+        files = {"a.obj": TEXTURED.encode(), "m.mtl": library.encode()} | IMAGES
+        broken = "m.mtl" if rng.random() < 0.7 else "a.obj"
+        files[broken] = mutated(files[broken].decode(), rng)
+        try:
+            take_apart(read_obj_scene(importer.zipped(files), AssetLimits()), lambda part: "sha256:" + "0" * 64)
+            scenes += 1
+        except ParseError:
+            pass
+    assert scenes > 200
 
 
 def test_a_plain_obj_stays_a_mesh(store: AssetStore) -> None:
