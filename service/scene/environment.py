@@ -54,7 +54,21 @@ class ConstantEnvironment(_Surroundings):
         return self
 
 
-class ImageEnvironment(_Surroundings):
+class _Picture(_Surroundings):
+    blur: Annotated[
+        float,
+        Field(ge=0, le=90),
+        hint(
+            "Blur",
+            "Blurs the picture by a Gaussian of this standard deviation: less noise, softer shadows, a bias.",
+            unit="degrees",
+            widget="slider",
+            soft=30,
+        ),
+    ] = 0.0
+
+
+class ImageEnvironment(_Picture):
     """A latitude-longitude image; -Z is in its middle."""
 
     type: Literal["image"]
@@ -76,7 +90,7 @@ class CubeFaces(Model):
     nz: Annotated[str, Field(min_length=1), hint("-Z", "Image of what lies towards -Z; right is -X, up is +Y.")]
 
 
-class CubemapEnvironment(_Surroundings):
+class CubemapEnvironment(_Picture):
     """Six HDR images, the faces of a cube."""
 
     type: Literal["cubemap"]

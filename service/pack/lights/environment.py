@@ -13,6 +13,7 @@ from gpu.tables.alias_table import LUMINANCE, cube_solid_angles, cube_tables, en
 from gpu.tables.sky import SunDisk, bake, sun_disk
 from service.assets import Assets, ImageData
 from service.pack.edits.cache import lasting
+from service.pack.lights.environment_blur import blur_cube, blur_image
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.color import LINEAR_OF_BYTE
 from service.scene.environment import (
@@ -48,10 +49,10 @@ class PackedEnvironment:
 def environment_key(environment: Environment) -> Hashable:
     """Equal where `pack_environment` makes equal skies; None where nothing is gained or a file may change."""
     if isinstance(environment, ImageEnvironment):
-        return ("image", environment.asset) if lasting(environment.asset) else None
+        return ("image", environment.asset, environment.blur) if lasting(environment.asset) else None
     if isinstance(environment, CubemapEnvironment):
         faces = tuple(environment.assets.model_dump().values())
-        return ("cubemap", faces) if all(map(lasting, faces)) else None
+        return ("cubemap", faces, environment.blur) if all(map(lasting, faces)) else None
     if isinstance(environment, SkyEnvironment):
         e = environment
         return "sky", e.sun_elevation, e.turbidity, e.ground_albedo, e.sun
@@ -63,14 +64,15 @@ def pack_environment(environment: Environment, assets: Assets) -> PackedEnvironm
     if isinstance(environment, ConstantEnvironment):
         return _packed(np.array(environment.radiance, np.float32).reshape(1, 1, 3), ())
     if isinstance(environment, CubemapEnvironment):
-        return _cube(environment.assets, assets)
+        return _cube(environment.assets, assets, environment.blur)
     if isinstance(environment, SkyEnvironment):
         return _clear(environment)
     image = _image(environment.asset, assets, "/environment/asset")
     height, width = image.pixels.shape[:2]
     if max(height, width) > LARGEST_SIDE:
         raise _refused("/environment/asset", f"is {width} x {height}; at most {LARGEST_SIDE} a side")
-    return _packed(*_clamped(image, "/environment/asset"))
+    texels, warnings = _clamped(image, "/environment/asset")
+    return _packed(blur_image(texels, environment.blur) if environment.blur else texels, warnings)
 
 
 def _image(reference: str, assets: Assets, pointer: str) -> ImageData:
@@ -84,7 +86,7 @@ def _refused(pointer: str, detail: str) -> InvalidDocument:
     return InvalidDocument([FieldError(pointer, detail)])
 
 
-def _cube(faces: CubeFaces, assets: Assets) -> PackedEnvironment:
+def _cube(faces: CubeFaces, assets: Assets, blur: float) -> PackedEnvironment:
     pointers = {name: f"/environment/assets/{name}" for name in CubeFaces.model_fields}
     images = {name: _image(getattr(faces, name), assets, pointer) for name, pointer in pointers.items()}
     sizes = {name: image.pixels.shape[:2] for name, image in images.items()}
@@ -100,6 +102,8 @@ def _cube(faces: CubeFaces, assets: Assets) -> PackedEnvironment:
     if errors:
         raise InvalidDocument(errors)
     parts, warnings = zip(*(_clamped(image, pointers[name]) for name, image in images.items()), strict=True)
+    if blur:
+        return _packed(blur_cube(list(parts), blur), sum(warnings, ()))
     texels = np.vstack([np.hstack(parts[:3]), np.hstack(parts[3:])]).astype(np.float32)
     probability, cells = cube_tables(texels)
     solid = np.tile(cube_solid_angles(wanted), (2, 3))
