@@ -14,6 +14,7 @@ import numpy as np
 
 from gpu.accel.bvh_build import WORDS, grow, measure
 from gpu.accel.bvh_thread import lay_treelets, thread_octant, top_sizes
+from gpu.accel.sah import Split
 from gpu.errors import SceneTooLarge
 from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, TREELET_MAX_NODES, Node, ShapeKind
 
@@ -61,6 +62,7 @@ def _grid(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
 def build(
     lower: np.ndarray, upper: np.ndarray, kinds: np.ndarray, leaf_size: int | None = None,
     firsts: Mapping[int, int] | None = None, staying: Mapping[int, int] | None = None,
+    split: Split = Split.SAH,
 ) -> Tree:  # fmt: skip
     """The tree over n boxes: `lower`, `upper` (n, 3) float32, finite; `kinds` (n,) `layout.ShapeKind`.
 
@@ -88,8 +90,9 @@ def build(
 
     def subtree(slot: int, free: int, first: int, last: int, whole: int) -> tuple[int, int]:
         used, task_count = grow(
-            rows, slot, free, boxes, order, kinds, mixed, grid, first, last, leaf_min, leaf_max, whole, tasks
-        )
+            rows, slot, free, boxes, order, kinds, mixed, grid, first, last, leaf_min, leaf_max, whole, tasks,
+            int(split),
+        )  # fmt: skip
         if task_count == 0:
             measure(rows, free, used, slot)
         return used, task_count

@@ -8,7 +8,18 @@ from __future__ import annotations
 
 import numpy as np
 
-from gpu.accel.sah import BINS, best_split, bounds, half_area, is_mixed, partition, partition_kind
+from gpu.accel.sah import (
+    BINS,
+    OBJECT_MEDIAN,
+    best_split,
+    bounds,
+    half_area,
+    halve,
+    is_mixed,
+    longest_axis,
+    partition,
+    partition_kind,
+)
 from gpu.jit import jit
 from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_FIRST_MASK, LEAF_KIND_SHIFT
 
@@ -34,13 +45,14 @@ def _write_box(row: np.ndarray, box: np.ndarray, grid: np.ndarray) -> None:
 def grow(
     rows: np.ndarray, slot: int, free: int, boxes: np.ndarray, index: np.ndarray, kinds: np.ndarray,
     mixed: bool, grid: np.ndarray, first: int, last: int, leaf_min: int, leaf_max: int, whole: int,
-    tasks: np.ndarray,
+    tasks: np.ndarray, split: int,
 ) -> tuple[int, int]:  # fmt: skip
     """Grows the subtree over boxes [first, last), its root into `slot`, the others from slot `free` on.
 
     Reorders `boxes` and `index`. Splits ranges of more than `leaf_max` boxes, of several `kinds` or of instances
-    always, others of `leaf_min` or fewer never. A range of at most `whole` boxes, unless it is the root's, is left to
-    another call: its slot, first and last go into `tasks`. Returns (first slot left free, number of tasks).
+    always, others of `leaf_min` or fewer never, by `split`, a `Split`. A range of at most `whole` boxes, unless it is
+    the root's, is left to another call: its slot, first and last go into `tasks`. Returns (first slot left free,
+    number of tasks).
     """
     # The smaller child is always done first, so the stack holds at most log2(boxes) ranges.
     stack = np.empty((64, 3), np.int64)
@@ -62,12 +74,18 @@ def grow(
         of_several_kinds = mixed and n <= leaf_max and is_mixed(index, kinds, a, b)
         axis, cut = -1, a
         if n > 1 and (n > leaf_min or of_several_kinds):
-            cost, axis, split, used = best_split(boxes, a, b, middle, count, bins, sums)
-            area = half_area(box)
-            worth = n > leaf_max or of_several_kinds or area * NODE_COST + cost < area * n
-            if axis >= 0 and worth:
+            worth = n > leaf_max or of_several_kinds
+            if 0 < split <= OBJECT_MEDIAN:
+                axis, bin_, used = longest_axis(middle), 1, 2
+            else:
+                cost, axis, bin_, used = best_split(boxes, a, b, middle, count, bins, sums, split)
+                area = half_area(box)
+                worth = worth or area * NODE_COST + cost < area * n
+            if axis >= 0 and worth and split == OBJECT_MEDIAN:
+                cut = halve(boxes, index, a, b, axis)
+            elif axis >= 0 and worth:
                 rate = used * 0.999999 / (middle[axis + 3] - middle[axis])
-                cut = partition(boxes, index, a, b, axis, middle[axis], rate, split)
+                cut = partition(boxes, index, a, b, axis, middle[axis], rate, bin_)
             elif of_several_kinds:
                 cut = partition_kind(boxes, index, kinds, a, b)
                 if cut == b:

@@ -5,12 +5,27 @@
 
 from __future__ import annotations
 
+from enum import IntEnum
+
 import numpy as np
 
 from gpu.jit import jit
 from gpu.layout import ShapeKind
 
+
+class Split(IntEnum):
+    """How a range of boxes is divided. All but the first are there to be compared with it: `sunbox bench seeds`."""
+
+    SAH = 0  # the surface area heuristic, over BINS bins or, where the boxes are few, half as many
+    SPATIAL_MEDIAN = 1  # in the middle of the centroids' bounds, across their longest axis
+    OBJECT_MEDIAN = 2  # as many boxes on the one side as on the other
+    SAH_5 = 5  # the heuristic over as many bins everywhere
+    SAH_11 = 11
+    SAH_16 = 16
+
+
 INSTANCE = int(ShapeKind.INSTANCE)
+OBJECT_MEDIAN = int(Split.OBJECT_MEDIAN)
 BINS = 16
 FEW = 24  # below this many boxes half the bins do: most nodes are small, and their time went into empty bins
 
@@ -64,13 +79,16 @@ def bounds(boxes: np.ndarray, first: int, last: int, box: np.ndarray, middle: np
 @jit
 def best_split(
     boxes: np.ndarray, first: int, last: int, middle: np.ndarray,
-    count: np.ndarray, bins: np.ndarray, sums: np.ndarray,
+    count: np.ndarray, bins: np.ndarray, sums: np.ndarray, split: int,
 ) -> tuple[float, int, int, int]:  # fmt: skip
     """(area times count, summed over the two sides; axis; the right side's first bin; number of bins).
 
-    Axis -1: all centroids are one point. `count`, `bins` and `sums` are room to work in.
+    Axis -1: all centroids are one point. `count`, `bins` and `sums` are room to work in. `split`: one of the
+    heuristics among `Split`.
     """
-    used = BINS if last - first >= FEW else BINS // 2
+    used = split
+    if split == 0:
+        used = BINS if last - first >= FEW else BINS // 2
     rate = np.empty(3, np.float64)
     for k in range(3):
         extent = middle[k + 3] - middle[k]
@@ -111,6 +129,45 @@ def best_split(
             if cost < best or (cost == best and skew < best_skew):
                 best, best_axis, best_bin, best_skew = cost, k, b, skew
     return best, best_axis, best_bin, used
+
+
+@jit
+def longest_axis(middle: np.ndarray) -> int:
+    """Of the centroids' bounds; -1: they are one point."""
+    axis, longest = -1, 0.0
+    for k in range(3):
+        if middle[k + 3] - middle[k] > longest:
+            axis, longest = k, middle[k + 3] - middle[k]
+    return axis
+
+
+@jit
+def halve(boxes: np.ndarray, index: np.ndarray, first: int, last: int, axis: int) -> int:
+    """Brings the boxes of the lower half along `axis` to the front [Hoare 1961]; returns the first place behind them.
+
+    Written out, as numba takes five seconds to compile a sort.
+    """
+    middle = first + (last - first) // 2
+    low, high = first, last - 1
+    while low < high:
+        i, j, at = low, high, (low + high) // 2
+        pivot = np.float64(boxes[at, axis]) + np.float64(boxes[at, axis + 3])
+        while i <= j:
+            while np.float64(boxes[i, axis]) + np.float64(boxes[i, axis + 3]) < pivot:
+                i += 1
+            while np.float64(boxes[j, axis]) + np.float64(boxes[j, axis + 3]) > pivot:
+                j -= 1
+            if i <= j:
+                _swap(boxes, index, i, j)
+                i += 1
+                j -= 1
+        if middle <= j:
+            high = j
+        elif middle >= i:
+            low = i
+        else:
+            break
+    return middle
 
 
 @jit

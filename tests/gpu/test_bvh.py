@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from gpu.accel import bvh, bvh_build
+from gpu.accel.sah import Split
 from gpu.errors import SceneTooLarge
 from gpu.layout import (
     LEAF_BIT,
@@ -196,6 +197,53 @@ def test_traversal_finds_what_brute_force_finds(name, treelet):
         assert found == expected
         met += np.isfinite(expected)
     assert met > 20
+
+
+@pytest.mark.parametrize("split", Split)
+@pytest.mark.parametrize("name", ["soup", "same", "flat"])
+def test_every_way_of_splitting_makes_a_whole_tree(name, split):
+    triangles = TRIANGLES[name]
+    tree, nodes = build(triangles, split=split)
+    assert sorted(tree.order) == list(range(len(triangles)))
+    lower, upper = unpack(tree, nodes)
+    ordered = triangles[tree.order].astype(np.float64)
+    for origin, direction in rays(triangles, 8):
+        found, _ = trace(tree, nodes, lower, upper, ordered, origin, direction)
+        assert found == hits(origin, direction, ordered).min()
+
+
+def test_splits_are_what_they_are_called():
+    """In a row of boxes that lie ever farther apart."""
+    start = 1.1 ** np.arange(64)[:, None, None] * [1, 0, 0]
+    triangles = (start + np.random.default_rng(RNG_SEED).random((64, 3, 3)) * 0.01).astype(np.float32)
+    middle = triangles.min(axis=1)[:, 0] + triangles.max(axis=1)[:, 0]
+    below = {}
+    for split in (Split.OBJECT_MEDIAN, Split.SPATIAL_MEDIAN):
+        tree, _ = build(triangles, split=split)
+        left = int(tree.rows[0, bvh_build.LINK])
+        below[split] = [leaves_under(tree, slot) for slot in (left, left + 1)]
+    assert [len(places) for places in below[Split.OBJECT_MEDIAN]] == [32, 32]
+    low, high = (middle[places] for places in below[Split.SPATIAL_MEDIAN])
+    halfway = (middle.min() + middle.max()) / 2
+    assert low.max() < halfway <= high.min() and len(low) > 50
+
+
+def leaves_under(tree, slot):
+    """The primitives of a subtree."""
+    link = int(tree.rows[slot, bvh_build.LINK])
+    if not link & LEAF_BIT:
+        return leaves_under(tree, link) + leaves_under(tree, link + 1)
+    _, first, count = leaf(link)
+    return tree.order[first : first + count].tolist()
+
+
+def test_bins_are_those_that_were_asked_for():
+    """More bins find better splits; those of the product err little from the most."""
+    triangles = soup(3000)
+    costs = {split: cost(*build(triangles, split=split)) for split in Split}
+    assert costs[Split.SAH_16] < costs[Split.SAH_5] < costs[Split.OBJECT_MEDIAN]
+    assert len(set(costs.values())) == len(costs)
+    assert costs[Split.SAH] < 1.02 * costs[Split.SAH_16]
 
 
 def test_near_boxes_come_first():
