@@ -79,7 +79,7 @@ def run(arguments: argparse.Namespace) -> int:
                 tracing.run(interrupt)
                 files.write(output.path, _encode(tracing, output, document, names))
                 if stats and interrupt.signal is None:
-                    tracing.appraise()
+                    tracing.measure_kernel()
                 tracing.close()
         except GpuError as error:
             raise Failed(str(error)) from None

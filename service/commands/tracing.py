@@ -72,7 +72,7 @@ class Tracing:
         self._line = ProgressLine()
         self._reason: str | None = None
         self._kernel: dict[str, Any] | None = None
-        self._appraised = UNMEASURED
+        self._kernel_measured = UNMEASURED
         self._pixels: np.ndarray | None = None
         self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
@@ -102,7 +102,7 @@ class Tracing:
             raise Failed("stopped before the first sample: there is no picture yet")
         return self._pixels
 
-    def appraise(self) -> None:
+    def measure_kernel(self) -> None:
         """Measures what its kernel saves, where that takes no compiling."""
         self._task.savings.ask()
         while self._task.savings.due:
@@ -128,7 +128,7 @@ class Tracing:
             "noise": now.noise,
             "elapsed_s": now.elapsed_s,
             "setup_s": setup_s,
-            "kernel": None if self._kernel is None else self._kernel | self._appraised.kernel,
+            "kernel": None if self._kernel is None else self._kernel | self._kernel_measured.kernel,
             "eta_s": now.eta_s,
             "forecast": forecast(now.samples, now.noise, now.elapsed_s, now.missing),
             "warnings": self.warnings,
@@ -139,7 +139,7 @@ class Tracing:
         if isinstance(message, Image):
             self._pixels, self._answered = message.pixels, True
         elif isinstance(message, KernelMeasured):
-            self._appraised = message
+            self._kernel_measured = message
         elif isinstance(message, Progressed):
             if self._line.due():
                 self._line.show(message.progress)

@@ -125,7 +125,7 @@ async def renders(request: Request) -> list[dict[str, Any]]:
 async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving: Saving = False) -> dict[str, Any]:
     job = app_state(request).renders.get(id, owner(request))
     if saving:
-        job.appraise()
+        job.measure_kernel()
     if wait:
         with contextlib.suppress(TimeoutError):
             await asyncio.wait_for(job.settled(saving), wait)

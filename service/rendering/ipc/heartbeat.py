@@ -54,7 +54,7 @@ class Heartbeat:
 
 
 def memory() -> int:
-    """The descriptor of memory for a pulse; the caller's to close."""
-    descriptor = os.memfd_create("sunbox-pulse", os.MFD_CLOEXEC)
+    """The descriptor of memory for a heartbeat; the caller's to close."""
+    descriptor = os.memfd_create("sunbox-heartbeat", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, SIZE)
     return descriptor

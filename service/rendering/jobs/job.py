@@ -71,7 +71,7 @@ class Job:
         self._progress = Progress()
         self._reason: str | None = None
         self._kernel: dict[str, Any] | None = None  # before it is compiled
-        self._appraised = UNASKED
+        self._kernel_measured = UNASKED
         self._answered = asyncio.Event()  # by the renderer, as to that
         self._error: ServiceError | None = None
         self._task: int | None = None
@@ -111,18 +111,18 @@ class Job:
             self._renderers.drop(self._task)
             self._task = None
 
-    def appraise(self) -> None:
+    def measure_kernel(self) -> None:
         """Has measured what its kernel saves, when the renderer has nothing else to do."""
-        if self._appraised.sample_s is None and self._error is None:
-            self._appraised = ASKED
+        if self._kernel_measured.sample_s is None and self._error is None:
+            self._kernel_measured = ASKED
             self._answered.clear()
             if self._kernel is not None and self._task is not None:
                 self._renderers.send(MeasureKernel(self._task))
 
-    async def settled(self, appraised: bool) -> None:
-        """Returns when it is finished, and with `appraised` when that is answered."""
+    async def settled(self, measured: bool) -> None:
+        """Returns when it is finished, and with `measured` when that is answered."""
         await self.finished.wait()
-        if appraised and self._kernel is not None and self._task is not None:
+        if measured and self._kernel is not None and self._task is not None:
             await self._answered.wait()
 
     @property
@@ -139,7 +139,7 @@ class Job:
             "noise": progress.noise,
             "elapsed_s": progress.elapsed_s,
             "setup_s": self._setup_s,
-            "kernel": None if self._kernel is None else self._kernel | self._appraised.kernel,
+            "kernel": None if self._kernel is None else self._kernel | self._kernel_measured.kernel,
             "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
             "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
             "warnings": self._warnings,
@@ -171,8 +171,8 @@ class Job:
         elif isinstance(message, Loaded):
             self._setup_s += message.setup_s
             self._kernel = message.kernel
-            if self._appraised is ASKED:
-                self.appraise()
+            if self._kernel_measured is ASKED:
+                self.measure_kernel()
             self._warnings += message.warnings
             if self.state == "queued":
                 self.state = "running"
@@ -181,7 +181,7 @@ class Job:
             if message.progress.samples:
                 self._sampled.set()
         elif isinstance(message, KernelMeasured):
-            self._appraised = message
+            self._kernel_measured = message
             self._answered.set()
         elif isinstance(message, Done):
             self._end(message)

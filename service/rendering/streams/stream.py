@@ -75,7 +75,9 @@ class Stream:
         self._task = renderers.open(self)
         self._flow = FlowControl(self._task, renderers.send)
         self._live = EditSession(reader, self._task)
-        self._lane = ClientExecutor("stream")  # what this client asks to be parsed and packed waits for nobody else's
+        self._executor = ClientExecutor(
+            "stream"
+        )  # what this client asks to be parsed and packed waits for nobody else's
         self._paused = False  # by the client
         self._done: dict[str, Any] | None = None  # what was said last of the present generation
         self._attendance: Attendance | None = None
@@ -111,7 +113,7 @@ class Stream:
         finally:
             self._flow.close()
             self._renderers.drop(self._task)
-            self._lane.close()
+            self._executor.close()
             self._live.close()
 
     def attach(self, socket: Socket) -> Attendance:
@@ -211,7 +213,7 @@ class Stream:
         began = asyncio.get_running_loop().time()
         while True:
             try:
-                await self._tell(await self._lane.run(partial(self._live.take, message)), began)
+                await self._tell(await self._executor.run(partial(self._live.take, message)), began)
                 if isinstance(message, protocol.Start) and message.view is not None:
                     self._flow.look(message.view.over(self._flow.view))
             except ServiceError as error:
@@ -221,14 +223,14 @@ class Stream:
             message = cast(Edit, self._inbox.popleft().message)
         self._stir()
         try:
-            await self._tell(await self._lane.run(self._live.settle), began)
+            await self._tell(await self._executor.run(self._live.settle), began)
         except ServiceError as error:
             self._refuse(error, message.generation)
 
     async def _fall_back(self, failed: Failed) -> None:
         """To the last scene that was good; a newer one is tried anew."""
         try:
-            update = await self._lane.run(partial(self._live.failed, failed.generation, failed.fallback))
+            update = await self._executor.run(partial(self._live.failed, failed.generation, failed.fallback))
         except ServiceError as error:
             return self._refuse(error, failed.generation)
         if update is not None:
@@ -319,7 +321,7 @@ class Stream:
     async def _parsed(self, text: str | None) -> protocol.Message:
         if text is None:
             raise MalformedJson("A message is JSON text, not bytes.")
-        return protocol.parse(text) if len(text) < SMALL else await self._lane.run(partial(protocol.parse, text))
+        return protocol.parse(text) if len(text) < SMALL else await self._executor.run(partial(protocol.parse, text))
 
 
 async def _stopped(task: asyncio.Task[None]) -> None:

@@ -48,16 +48,16 @@ class Process:
         self.began = time.monotonic()
         self.ready = False
         self.unable = False  # to render, as it says itself
-        self.pulse, self._options = _Watched(), options
+        self.heartbeat, self._options = _Watched(), options
         self._condemned: Cause | None = None
         self._oom_kills = _oom_kills()
         ours, theirs = channel.pair()
         try:
-            self._process = _spawn(theirs, self.pulse.descriptor, options, lifeline)
+            self._process = _spawn(theirs, self.heartbeat.descriptor, options, lifeline)
         finally:
             theirs.close()
-            os.close(self.pulse.descriptor)
-        self.pulse.begin(self._process.pid)
+            os.close(self.heartbeat.descriptor)
+        self.heartbeat.begin(self._process.pid)
         self.link = channel.Channel(ours, received, lost)
 
     @property
@@ -71,21 +71,21 @@ class Process:
     def watch(self, excused: bool = False) -> None:
         """To be called now and then: ends a renderer that owes something and makes no progress."""
         if excused:
-            self.pulse.excuse()
-        silent_s = self.pulse.silent_s(self.link.sent)
-        limit_s = self._options.patience_s + TURNS * self.pulse.turn_s + self.pulse.allowance_s
+            self.heartbeat.excuse()
+        silent_s = self.heartbeat.silent_s(self.link.sent)
+        limit_s = self._options.patience_s + TURNS * self.heartbeat.turn_s + self.heartbeat.allowance_s
         limit_s += 0.0 if self.ready else STARTING_S
         if silent_s > limit_s and self._condemned is None:
             self._condemned = "stopped" if _is_stopped(self.id) else "hung"
-            log.error("renderer %s silent_s=%.1f task=%d", self._condemned, silent_s, self.pulse.task)
+            log.error("renderer %s silent_s=%.1f task=%d", self._condemned, silent_s, self.heartbeat.task)
             self._process.kill()
 
     async def end(self, patience_s: float) -> Cause:
         """Gives it that time to end, kills it, buries it; what it died of. The heartbeat still says where it was."""
         self.link.close()
         code = await tending(partial(_reap, self._process, patience_s))
-        self.pulse.read()
-        self.pulse.close()
+        self.heartbeat.read()
+        self.heartbeat.close()
         if self._condemned is not None:
             return self._condemned
         if code is None:  # its end of the link was closed, and it stayed
@@ -124,9 +124,9 @@ class _Watched(heartbeat.Heartbeat):
 
 
 def _spawn(
-    end: socket.socket, pulse_descriptor: int, options: Options, lifeline: int | None
+    end: socket.socket, heartbeat_descriptor: int, options: Options, lifeline: int | None
 ) -> subprocess.Popen[bytes]:
-    command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(pulse_descriptor)]
+    command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(heartbeat_descriptor)]
     command += ["--server", str(os.getpid()), "--log-level", str(logs.level())]
     command += ["--checkpoint", str(options.checkpoint_s)]
     command += [] if options.device is None else ["--device", str(options.device)]
@@ -136,7 +136,7 @@ def _spawn(
     # stdout is the command line's, who may be read by a script that waits for its end.
     return subprocess.Popen(
         command,
-        pass_fds=[end.fileno(), pulse_descriptor, *([] if lifeline is None else [lifeline])],
+        pass_fds=[end.fileno(), heartbeat_descriptor, *([] if lifeline is None else [lifeline])],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,

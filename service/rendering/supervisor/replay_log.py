@@ -48,7 +48,7 @@ class ReplayLog:
 
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
-        self.appraise: MeasureKernel | None = None  # not answered yet
+        self.measure_kernel: MeasureKernel | None = None  # not answered yet
         self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
         self.saved: Restore | None = None  # a finished picture
         self._checkpoint: Restore | None = None  # one under way
@@ -75,7 +75,7 @@ class ReplayLog:
         elif isinstance(message, Read):
             self.reads[message.serial] = message
         elif isinstance(message, MeasureKernel):
-            self.appraise = message
+            self.measure_kernel = message
         elif isinstance(message, EvaluateBsdf):
             self._question = message
         elif isinstance(message, Pause | Resume):
@@ -93,7 +93,7 @@ class ReplayLog:
         elif isinstance(message, Image):
             self.reads.pop(message.serial, None)
         elif isinstance(message, KernelMeasured):
-            self.appraise = None
+            self.measure_kernel = None
         elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
             self._works(message.generation)
         if isinstance(message, Checkpoint):
@@ -114,8 +114,8 @@ class ReplayLog:
         if kept is not None:
             out.append(kept)
         asked: list[ToRenderer] = [*self.reads.values()]
-        if self.appraise is not None:
-            asked.append(self.appraise)
+        if self.measure_kernel is not None:
+            asked.append(self.measure_kernel)
         if self._question is not None:
             asked.append(self._question)
         if not out or self.saved is not None:

@@ -43,7 +43,7 @@ TRIES = 3  # in a row that don't get as far as rendering; then there is no rende
 BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start, ever
 LAST_WORDS_S = 5.0  # for a renderer whose end of the link is closed to be gone: then its exit code tells why
 BETWEEN_TRIES_S = 0.5
-SIEGE_S = 5.0  # ... at most, between renderers that others kill as soon as they begin
+AFTER_KILLS_S = 5.0  # ... at most, between renderers that others kill as soon as they begin
 HOPELESS_S = 15.0  # ... between those that come then, and find nobody waiting
 STRIKES = 3  # renderers that a task may bring down
 FORGIVEN_S = 5.0  # of life with that task, after which an earlier loss was not its fault
@@ -188,7 +188,7 @@ class Supervisor:
         lifeline = None if self._lifeline is None else self._lifeline[0]
         self._process = process = Process(self._options, self._received, lambda: self._lose(process), lifeline)
         for task, held in self._tasks.items():
-            self._not_appraised(held, "The renderer was lost meanwhile: ask again.")
+            self._not_measured(held, "The renderer was lost meanwhile: ask again.")
             held.resident = held.record.kept is None
             if held.resident:
                 self._tell_all(held.record)
@@ -227,7 +227,7 @@ class Supervisor:
 
     def _hear(self, message: FromRenderer, held: _Task) -> None:
         if isinstance(message, Evicted):
-            self._not_appraised(held, "It made room for others meanwhile: ask again.")
+            self._not_measured(held, "It made room for others meanwhile: ask again.")
             held.resident = held.record.saved is None
             if held.resident:  # it ended before it had a sample
                 for read in list(held.record.reads.values()):
@@ -245,9 +245,9 @@ class Supervisor:
             held.strikes = 0
         held.listener.heard(held.record.heard(message))
 
-    def _not_appraised(self, held: _Task, why: str) -> None:
+    def _not_measured(self, held: _Task, why: str) -> None:
         """Nobody is tempted to try again and again what may have been too much."""
-        if (asked := held.record.appraise) is not None:
+        if (asked := held.record.measure_kernel) is not None:
             held.listener.heard(held.record.heard(KernelMeasured(asked.task, why)))
 
     def _is_ready(self, message: Ready) -> None:
@@ -322,12 +322,12 @@ class Supervisor:
 
     def _pause_s(self, lived_s: float) -> float:
         """Before the next try; what was killed after a while need not wait for that."""
-        siege_s = min(BETWEEN_TRIES_S * self._shots, SIEGE_S) - lived_s
-        return max(BETWEEN_TRIES_S * self._failures, siege_s, 0.0)
+        after_kill_s = min(BETWEEN_TRIES_S * self._shots, AFTER_KILLS_S) - lived_s
+        return max(BETWEEN_TRIES_S * self._failures, after_kill_s, 0.0)
 
     def _blame(self, process: Process, cause: Cause) -> None:
         """Three strikes against the task that was worked on, where nobody from outside ended the renderer."""
-        task = process.pulse.task
+        task = process.heartbeat.task
         held = self._tasks.get(task)
         if held is None or cause in BY_OTHERS:
             return

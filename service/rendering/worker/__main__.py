@@ -27,7 +27,7 @@ log = logging.getLogger("service.rendering.worker")  # __name__ is __main__ here
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m service.rendering.worker")
     parser.add_argument("descriptor", type=int)
-    parser.add_argument("pulse", type=int)
+    parser.add_argument("heartbeat", type=int)
     parser.add_argument("--memory", type=int, help="bytes that may be held on the device")
     parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
     parser.add_argument("--device", type=int)
@@ -72,8 +72,8 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
             "the processor renders, as this user may not use the GPU device=%s group=%s", closed[0], closed[0].group()
         )
     limit = arguments.memory or default_limit(bool(renderer.info["software"]))
-    pulse, lifeline = Heartbeat(arguments.pulse), arguments.lifeline
-    Loop(end, renderer, pulse, limit, arguments.device, arguments.checkpoint, lifeline).run()
+    heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
+    Loop(end, renderer, heartbeat, limit, arguments.device, arguments.checkpoint, lifeline).run()
     return 0
 
 

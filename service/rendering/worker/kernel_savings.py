@@ -72,6 +72,6 @@ class KernelSavings:
         self._tell(KernelMeasured(self._number, NO_KERNEL))
         return True
 
-    def _tell(self, appraised: KernelMeasured) -> None:
+    def _tell(self, measured: KernelMeasured) -> None:
         self._asked, self._steps = False, None
-        self._send(appraised)
+        self._send(measured)

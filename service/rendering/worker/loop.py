@@ -50,7 +50,7 @@ class Loop:
         self,
         end: socket.socket,
         renderer: Renderer,
-        pulse: Heartbeat,
+        heartbeat: Heartbeat,
         memory_limit: int,
         device: int | None,
         checkpoint_s: float,
@@ -58,7 +58,7 @@ class Loop:
     ) -> None:
         self._end = end
         self._renderer = renderer
-        self._pulse = pulse
+        self._heartbeat = heartbeat
         self._tasks: dict[int, Task] = {}
         self._questions: dict[int, BsdfTask] = {}
         self._memory = Memory(memory_limit, self._tasks.values)
@@ -95,7 +95,7 @@ class Loop:
             if chosen is not None:
                 began = time.monotonic()
                 self._work(chosen, chosen.turn)
-                self._pulse.lasted(time.monotonic() - began)
+                self._heartbeat.lasted(time.monotonic() - began)
             for task in list(self._tasks.values()):
                 if task.wanted:
                     self._work(task, task.answer)
@@ -117,7 +117,7 @@ class Loop:
         try:
             while True:
                 message = channel.receive(self._end)
-                self._pulse.take()
+                self._heartbeat.take()
                 yield message
         except BlockingIOError:
             return
@@ -128,7 +128,7 @@ class Loop:
         """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
         in time that nobody wanted, which is not held against it."""
         began = time.perf_counter()
-        with self._pulse.working(task.number, COMPILING_S if task.loads or spare else 0.0):
+        with self._heartbeat.working(task.number, COMPILING_S if task.loads or spare else 0.0):
             self._guard(task, work, read)
         seconds = time.perf_counter() - began
         if not spare:

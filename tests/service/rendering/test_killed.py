@@ -43,7 +43,7 @@ def niceness(pid: int | None) -> set[int]:
 
 def test_who_kills_it_before_it_can_start_never_wins(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four times the three that may fail by themselves, and more than were once allowed."""
-    monkeypatch.setattr(supervisors, "SIEGE_S", 0.0)
+    monkeypatch.setattr(supervisors, "AFTER_KILLS_S", 0.0)
 
     async def test(supervisor: Supervisor) -> None:
         ears = Ears()
@@ -63,7 +63,7 @@ def test_renderers_that_are_killed_at_once_are_not_begun_all_the_time(gpu: Rende
     supervisor._shots = 3
     assert supervisor._pause_s(0.1) == pytest.approx(1.4) and supervisor._pause_s(2.0) == 0.0
     supervisor._shots = 1000
-    assert supervisor._pause_s(0.0) == supervisors.SIEGE_S and supervisor._pause_s(8.0) == 0.0
+    assert supervisor._pause_s(0.0) == supervisors.AFTER_KILLS_S and supervisor._pause_s(8.0) == 0.0
 
 
 def test_what_was_asked_while_there_was_none_is_answered(gpu: Renderer) -> None:

@@ -137,6 +137,6 @@ def test_large_messages_wait_in_the_network() -> None:
         stream._inbox.popleft()
         stream._stir()
         await asyncio.wait_for(hearing, 10)
-        stream._lane.close()
+        stream._executor.close()
 
     asyncio.run(run())

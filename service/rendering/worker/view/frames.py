@@ -46,14 +46,14 @@ class FrameSource:
         self._served: tuple[object, ...] = ()
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
-        self._smooth_reads: list[Read] = []  # waiting for the denoised picture
-        self._smoothed = False  # the denoiser has spoken, and who waits for that is to be told
+        self._denoised_reads: list[Read] = []  # waiting for the denoised picture
+        self._denoiser_answered = False  # the denoiser has spoken, and who waits for that is to be told
 
     def restart(self) -> None:
         """Another picture: nothing of it was seen yet."""
         self.part()
         self.denoising.restart()
-        self._smoothed = False
+        self._denoiser_answered = False
         self.scale = None
 
     def part(self) -> None:
@@ -63,8 +63,8 @@ class FrameSource:
 
     def forget(self) -> None:
         """Nothing is there any more, which is what who waits for a reading is given."""
-        reads = self._reads + self._smooth_reads
-        self._reads, self._smooth_reads = [], []
+        reads = self._reads + self._denoised_reads
+        self._reads, self._denoised_reads = [], []
         self.restart()
         self.owes_done = False
         for read in reads:
@@ -73,7 +73,7 @@ class FrameSource:
     @property
     def awaited(self) -> bool:
         """Somebody waits for something that takes steps."""
-        return self._guided is not None or bool(self._reads) or self._smoothed or self._smooth_due
+        return self._guided is not None or bool(self._reads) or self._denoiser_answered or self._denoising_due
 
     @property
     def due(self) -> bool:
@@ -82,7 +82,7 @@ class FrameSource:
 
     def step(self) -> bool:
         """Does it; whether there was one."""
-        return self._smooth() or self._trace_guides()
+        return self._denoise() or self._trace_guides()
 
     def answer(self) -> bool:
         """Sends the frame that is wanted if there is something new to see in it."""
@@ -98,24 +98,24 @@ class FrameSource:
         picture = self._residency.ladder.picture(shown)
         if self._needs_guides(picture, want.view):
             return False
-        smooth = None
+        clean = None
         if shown == 1.0 and self.denoising.covers(want.view.aov, tracker.meter.noise):
-            smooth = self._smooth_frame()
-            if smooth is None and self._holds_frame(want):
+            clean = self._denoised_frame()
+            if clean is None and self._holds_frame(want):
                 return False
-        progress = smooth.progress if smooth else tracker.progress(self._residency, shown)
-        whole = smooth is None or smooth is self.denoising.has(picture.samples)
-        content = (tracker.generation, shown, progress.samples, tracker.reason, smooth is not None and smooth.fine)
+        progress = clean.progress if clean else tracker.progress(self._residency, shown)
+        whole = clean is None or clean is self.denoising.has(picture.samples)
+        content = (tracker.generation, shown, progress.samples, tracker.reason, clean is not None and clean.fine)
         if content == self._served and not want.anyway:
             return False
-        pixels = pixels_of(picture, want.view, smooth)
+        pixels = pixels_of(picture, want.view, clean)
         last = tracker.reason is not None and whole
         self._served, self.want = content, None
-        denoised = smooth is not None
+        denoised = clean is not None
         self._send(Frame(self._number, want.serial, tracker.generation, pixels, progress, shown, last, denoised))
         return True
 
-    def _smooth_frame(self) -> Denoised | None:
+    def _denoised_frame(self) -> Denoised | None:
         """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
         latest = self.denoising.latest
         if latest is None or self._served[:2] != (self._tracker.generation, 1.0):
@@ -135,57 +135,57 @@ class FrameSource:
         if full is not None and self._needs_guides(full, read.view):
             self._reads.append(read)
             return
-        smooth = None
+        clean = None
         if full is not None and self.denoising.covers(read.view.aov, self._tracker.meter.read(full, fresh=True)):
-            smooth = self.denoising.has(full.samples)
-            if smooth is None:
-                self._smooth_reads.append(read)
+            clean = self.denoising.has(full.samples)
+            if clean is None:
+                self._denoised_reads.append(read)
                 return
-        self._give(read, full, smooth)
+        self._give(read, full, clean)
 
-    def _give(self, read: Read, full: Picture | None, smooth: Denoised | None) -> None:
-        pixels = pixels_of(full, read.view, smooth) if full else None
-        progress = smooth.progress if smooth else self._tracker.progress(self._residency)
+    def _give(self, read: Read, full: Picture | None, clean: Denoised | None) -> None:
+        pixels = pixels_of(full, read.view, clean) if full else None
+        progress = clean.progress if clean else self._tracker.progress(self._residency)
         self._residency.rests()
-        self._send(Image(self._number, read.serial, pixels, progress, smooth is not None))
+        self._send(Image(self._number, read.serial, pixels, progress, clean is not None))
 
     @property
-    def _smooth_due(self) -> bool:
+    def _denoising_due(self) -> bool:
         """Whether somebody waits for the picture to be denoised, and it can be."""
         if self._residency.loaded is None or self.scale != 1.0 or not self.denoising.wanted:
             return False
         want = self.want if self._tracker.interactive else None
         watched = want is not None and self.denoising.covers(want.view.aov, self._tracker.meter.noise)
-        if not (watched or self.owes_done or self._smooth_reads):
+        if not (watched or self.owes_done or self._denoised_reads):
             return False
-        return self.denoising.due(self._residency.full.samples, fine=self._smooth_finely)
+        return self.denoising.due(self._residency.full.samples, fine=self._denoises_finely)
 
     @property
-    def _smooth_finely(self) -> bool:
-        return self._tracker.reason is not None or bool(self._smooth_reads)
+    def _denoises_finely(self) -> bool:
+        return self._tracker.reason is not None or bool(self._denoised_reads)
 
-    def _smooth(self) -> bool:
+    def _denoise(self) -> bool:
         """A slice of what denoising needs on this side, where any is due."""
-        if self._smoothed:
-            self._smoothed = False
-            reads, self._smooth_reads = self._smooth_reads, []
+        if self._denoiser_answered:
+            self._denoiser_answered = False
+            reads, self._denoised_reads = self._denoised_reads, []
             for read in reads:
                 self._give(read, self._residency.full, None if self.denoising.warning else self.denoising.latest)
             if self.owes_done:
                 self._finish()
             return True
-        if not self._smooth_due:
+        if not self._denoising_due:
             return False
         full, tracker = self._residency.full, self._tracker
         if self._waits(full):
             return True
         if full.trace_guides(SLICE_S, GUIDE_SAMPLES):
             tracker.meter.read(full, fresh=True)
-            self.denoising.begin(full, tracker.progress(self._residency), self._smooth_finely, self._hear_smoothed)
+            self.denoising.begin(full, tracker.progress(self._residency), self._denoises_finely, self._hear_denoised)
         return True
 
-    def _hear_smoothed(self) -> None:
-        self._smoothed = True
+    def _hear_denoised(self) -> None:
+        self._denoiser_answered = True
 
     def _waits(self, picture: Picture) -> bool:
         """Whether the kernel for the AOVs of the first hit is being compiled, where others would wait for it."""
@@ -225,9 +225,9 @@ class FrameSource:
         return True
 
 
-def pixels_of(picture: Picture, view: View, smooth: Denoised | None) -> np.ndarray:
+def pixels_of(picture: Picture, view: View, clean: Denoised | None) -> np.ndarray:
     """What is shown of it: (height, width, 4) as the view wants it."""
-    color = smooth.pixels if smooth else None
+    color = clean.pixels if clean else None
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color
     return picture.display(view.aov, view.exposure, view.tone_map, view.encoding, color)
