@@ -12,13 +12,13 @@ from service.problems import Internal, Unavailable
 from service.rendering.ipc.messages import EvaluateBsdf, Evaluated, Failed, FromRenderer
 from service.rendering.renderers import Renderers
 
-MOST = 64  # questions at a time, of everybody
+MOST = 64  # questions at a time, of all callers together
 LONG = 1 << 18  # samples: some 50 ms of two cores
-LONG_AT_ONCE = 2  # ... of such, as each one takes as much of the renderer's time as a stream does
+LONG_AT_ONCE = 2  # long questions at a time, as each one takes as much of the renderer's time as a stream does
 
 
 class BsdfQuestions:
-    """For the event loop."""
+    """Sends questions and awaits their answers, on the event loop."""
 
     def __init__(self, renderers: Renderers) -> None:
         self._renderers = renderers
@@ -64,7 +64,7 @@ class _Waiting:
             self.answer.set_exception(Internal(message.detail))
 
     def again(self) -> None:
-        """Another renderer is asked the same."""
+        """Another renderer gets the same question."""
 
     def lost(self, detail: str) -> None:
         if not self.answer.done():

@@ -1,4 +1,4 @@
-"""Where the slow work of the server is done, so that neither the event loop nor each other waits for it."""
+"""Threads for the server's slow work: neither the event loop nor another kind of work waits for it."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from typing import TypeVar
 from service.rendering.priority import raise_thread_niceness
 
 # Steps of niceness above the event loop and the encoders; the renderer is 10 above.
-NICENESS = 5  # of what parses and packs scenes, for which a client waits
-WRITING_NICENESS = 12  # of what writes large pictures to files, beside which every stream goes on
+NICENESS = 5  # of threads that parse and pack scenes, for which a client waits
+WRITING_NICENESS = 12  # of threads that write large pictures to files while every stream goes on
 
 T = TypeVar("T")
 
@@ -32,19 +32,19 @@ class Pool:
 
 
 parsing = Pool("parsing", 2, NICENESS)  # small bodies: milliseconds
-waiting_for_parsers = Pool("waiting", 2)  # of large ones, each in a process of its own: seconds
+waiting_for_parsers = Pool("waiting", 2)  # waits for processes that parse large bodies: seconds
 packing = Pool("packing", 2, NICENESS)  # scenes: seconds for the largest
 storing = Pool("storing", 2, NICENESS)  # assets, which are parsed and hashed first: seconds
 saving = Pool("saving", 2)  # documents: the disk's time
-encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, and somebody looks
+encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, while a person watches
 writing = Pool("writing", 2, WRITING_NICENESS)  # pictures to files: seconds for the largest
 sending = Pool("sending", 2)  # scenes to the renderer: copied to shared memory
-tending = Pool("tending", 2)  # the renderers' ends and replacements, and what they rendered before
+tending = Pool("tending", 2)  # ends and replaces renderers, and restores what they had rendered
 measuring = Pool("measuring", 1)  # /metrics
 
 
 class ClientExecutor:
-    """A thread for one client's parsing and packing, begun at its first work: whoever asks for much waits alone."""
+    """A thread for one client's parsing and packing, started at first use: no client delays another."""
 
     def __init__(self, name: str) -> None:
         self._threads = ThreadPoolExecutor(1, name, _yield_to_others)

@@ -1,4 +1,4 @@
-"""What the renderer and its clients have been through since the server began: plain counters, for whoever publishes.
+"""Plain counters of the renderer and its clients since the server began, for /metrics.
 
 Everything is changed on the event loop and read there. A `Counter` is by label.
 """
@@ -18,7 +18,7 @@ SECONDS = (0.01, 0.02, 0.05, 0.1, 0.2, 0.5, 1.0, 2.0, 5.0, 10.0, 30.0)
 
 @dataclass
 class Distribution:
-    """How often values were at most each of `bounds` (and above them all), how many, and their sum."""
+    """A histogram: how many values were at most each of `bounds` or above them all, their number and their sum."""
 
     bounds: tuple[float, ...] = SECONDS
     counts: list[int] = field(default_factory=list)

@@ -40,7 +40,7 @@ def pair() -> tuple[socket.socket, socket.socket]:
 
 
 def encode(message: object) -> Encoded:
-    """What to send; the caller discards it."""
+    """The message as a datagram and descriptors; the caller discards them."""
     arrays: list[pickle.PickleBuffer] = []
     body = pickle.dumps(message, protocol=5, buffer_callback=arrays.append)
     parts = [array.raw() for array in arrays]
@@ -73,7 +73,8 @@ def decode(datagram: bytes, descriptors: tuple[int, ...]) -> Any:
 
 
 def receive(end: socket.socket, wait: bool = False) -> Any:
-    """The next message. BlockingIOError: there is none, and it shall not `wait`. Closed: there will be none."""
+    """The next message. Raises BlockingIOError where there is none and `wait` is False, Closed where there
+    will be none."""
     try:  # not socket.recv_fds, which in Python 3.11 forgets its flags and waits
         datagram, passed, _, _ = end.recvmsg(RECEIVED, ROOM, 0 if wait else socket.MSG_DONTWAIT)
     except ConnectionError as error:
@@ -84,7 +85,7 @@ def receive(end: socket.socket, wait: bool = False) -> Any:
 
 
 def send(end: socket.socket, message: object) -> None:
-    """Waits for room. Raises Closed when nobody listens any more."""
+    """Send, waiting for room. Raises Closed when nobody listens any more."""
     encoded = encode(message)
     try:
         _transmit(end, *encoded)
@@ -103,7 +104,7 @@ class Channel:
         self._receive = receive
         self._lost = lost
         self._waiting: deque[Encoded] = deque()
-        self.sent = 0  # that the other end can take
+        self.sent = 0  # messages that the other end can take
         self._loop = asyncio.get_running_loop()
         self._loop.add_reader(end, self._readable)
 
@@ -146,7 +147,7 @@ class Channel:
                 self._loop.add_writer(self._end, self._writable)
                 return
             except ConnectionError:
-                return  # the reader hears of it after what was still said
+                return  # the reader learns of the end after the last messages
             self.sent += 1
             discard(self._waiting.popleft())
         self._loop.remove_writer(self._end)
@@ -169,7 +170,7 @@ def another(message: Encoded) -> Encoded:
 
 
 def discard(message: Encoded) -> None:
-    """Gives back what an encoded message holds."""
+    """Close the descriptors of an encoded message."""
     for each in message[1]:
         os.close(each)
 

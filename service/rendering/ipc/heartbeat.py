@@ -1,4 +1,4 @@
-"""Whether the renderer lives, and on whose work it is: a few numbers in memory that it shares with the server.
+"""A few numbers in memory shared with the server say whether the renderer lives, and whose work it does.
 
 Messages could not tell: a renderer that hangs sends none, and one that has died tells nobody what it was doing.
 """
@@ -20,9 +20,9 @@ class Heartbeat:
 
     def __init__(self, descriptor: int) -> None:
         self._memory = mmap.mmap(descriptor, SIZE)
-        self.beats = 0  # of work begun, ended and taken
+        self.beats = 0  # counts each piece of work begun or ended, and each message taken
         self.taken = 0  # messages
-        self.task = 0  # that is being worked on; 0: none
+        self.task = 0  # the task that is being worked on; 0: none
         self.turn_s = 0.0  # what the last piece of work took
         self.allowance_s = 0.0  # what this piece may take beyond the usual
 
@@ -30,7 +30,7 @@ class Heartbeat:
         self.beats, self.taken, self.task, self.turn_s, self.allowance_s = _NUMBERS.unpack_from(self._memory)
 
     def take(self) -> None:
-        """A message was taken."""
+        """Count a message as taken."""
         self.taken += 1
         self._beat()
 
@@ -54,7 +54,7 @@ class Heartbeat:
 
 
 def memory() -> int:
-    """The descriptor of memory for a heartbeat; the caller's to close."""
+    """The descriptor of memory for a heartbeat; the caller closes it."""
     descriptor = os.memfd_create("sunbox-heartbeat", os.MFD_CLOEXEC)
     os.ftruncate(descriptor, SIZE)
     return descriptor

@@ -26,7 +26,7 @@ class StopRule:
 
 @dataclass(frozen=True)
 class View:
-    """How a picture is to be shown; costs no samples."""
+    """How a picture is to be shown; changing it costs no samples."""
 
     aov: str = "color"
     exposure: float = 0.0
@@ -66,7 +66,7 @@ class Update:
     moved: dict[str, Any] | None = None
     denoise: bool | None = None
     base: int | None = None  # the generation that it changes; without one it is whole
-    client: str = ""  # whose; tasks of one client share its part of the GPU's time
+    client: str = ""  # tasks of one client share its part of the GPU's time
     interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
 
     @property
@@ -90,7 +90,7 @@ class Update:
 
 @dataclass(frozen=True)
 class Want:
-    """Asks for one Frame, as soon as there is newer content than was last given; `anyway`: or any at all."""
+    """Asks for one Frame, as soon as there is newer content than the last one showed; with `anyway` at once."""
 
     task: int
     serial: int
@@ -100,7 +100,7 @@ class Want:
 
 @dataclass(frozen=True)
 class Read:
-    """Asks for one Image of what there is."""
+    """Asks for one Image of the picture so far."""
 
     task: int
     serial: int
@@ -109,7 +109,7 @@ class Read:
 
 @dataclass(frozen=True)
 class Pause:
-    """No samples but a first look at what is new; with `away` not even that: nobody is there to look."""
+    """Stops sampling but for a first look at what is new; with `away` that as well, as nobody is there to look."""
 
     task: int
     away: bool = False
@@ -122,7 +122,7 @@ class Resume:
 
 @dataclass(frozen=True)
 class Stop:
-    """No more samples; what there is stays readable until Drop."""
+    """Ends sampling; the picture so far stays readable until Drop."""
 
     task: int
 
@@ -141,7 +141,7 @@ class MeasureKernel:
 
 @dataclass(frozen=True)
 class Settle:
-    """What was told of a task is to be made true before what follows, which may be too much and fall back to it."""
+    """Asks to apply the updates so far before the next one, which may be too much and fall back to them."""
 
     task: int
 
@@ -159,7 +159,7 @@ class Restore:
 
 @dataclass(frozen=True)
 class EvaluateBsdf:
-    """Asks for one Evaluated: what the method `question` of gpu.BsdfEvaluator says. The task is this one's alone."""
+    """Asks for one Evaluated: the result of the method `question` of gpu.BsdfEvaluator. The task has no other use."""
 
     task: int
     question: BsdfQuestion
@@ -180,7 +180,7 @@ class Ready:
 
 @dataclass(frozen=True)
 class Unable:
-    """There is no renderer on this machine, and why."""
+    """Says why there is no renderer on this machine."""
 
     detail: str
 
@@ -246,7 +246,7 @@ class Done:
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """A render under way, should this renderer be lost."""
+    """The picture of a render under way, to go on from should this renderer be lost."""
 
     task: int
     generation: int
@@ -256,7 +256,7 @@ class Checkpoint:
 
 @dataclass(frozen=True)
 class KernelMeasured:
-    """What a render's own kernel takes beside the one with everything on, or in `detail` why that is not known."""
+    """How long a sample takes with a render's own kernel and with every feature on; or `detail` says why not."""
 
     task: int
     detail: str = ""
@@ -287,14 +287,14 @@ class Evaluated:
 
 @dataclass(frozen=True)
 class Evicted:
-    """The renderer has this finished task no more; Restore brings it back."""
+    """The renderer no longer has this finished task; Restore brings it back."""
 
     task: int
 
 
 @dataclass(frozen=True)
 class Usage:
-    """What was done since the last one: GPU seconds by task, samples of pixels; and what is held now."""
+    """GPU seconds by task and samples of pixels since the last Usage, and what the device stores now."""
 
     gpu_s: dict[int, float]
     samples: int

@@ -1,4 +1,4 @@
-"""One render asked for over REST: what is wanted, how far it is, and its picture."""
+"""One render asked for over REST: its scene, its progress and its picture."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ ASKED = KernelMeasured(
     0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60."
 )
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
-ID_BYTES = 16  # 128 bits: nobody guesses one
+ID_BYTES = 16  # 128 bits: an id cannot be guessed
 PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
 
 
 class Job:
-    """Runs on the event loop. Finished, it holds its picture in the renderer until `release`."""
+    """A render, on the event loop. Once finished, it keeps its picture in the renderer until `release`."""
 
     def __init__(
         self,
@@ -72,7 +72,7 @@ class Job:
         self._reason: str | None = None
         self._kernel: dict[str, Any] | None = None  # before it is compiled
         self._kernel_measured = UNASKED
-        self._answered = asyncio.Event()  # by the renderer, as to that
+        self._answered = asyncio.Event()  # set once the renderer has answered about its kernel
         self._error: ServiceError | None = None
         self._task: int | None = None
         self._reads: dict[int, asyncio.Future[Image]] = {}
@@ -81,7 +81,7 @@ class Job:
         self._sampled.set()
 
     async def run(self) -> None:
-        """From queued to finished, whichever way."""
+        """Take the render from queued to finished, however it ends."""
         if self._packed is None:
             return
         try:
@@ -97,7 +97,7 @@ class Job:
         await self.finished.wait()
 
     def cancel(self) -> None:
-        """Stops at once; the image so far stays."""
+        """Stop at once; the image so far stays."""
         if self.finished.is_set():
             return
         self.state, self._packed = "cancelled", None
@@ -106,13 +106,13 @@ class Job:
         self._finish()
 
     def release(self) -> None:
-        """Forgets the picture."""
+        """Forget the picture."""
         if self._task is not None:
             self._renderers.drop(self._task)
             self._task = None
 
     def measure_kernel(self) -> None:
-        """Has measured what its kernel saves, when the renderer has nothing else to do."""
+        """Have the renderer measure what the kernel saves, when it has nothing else to do."""
         if self._kernel_measured.sample_s is None and self._error is None:
             self._kernel_measured = ASKED
             self._answered.clear()
@@ -120,7 +120,7 @@ class Job:
                 self._renderers.send(MeasureKernel(self._task))
 
     async def settled(self, measured: bool) -> None:
-        """Returns when it is finished, and with `measured` when that is answered."""
+        """Return when the render is finished; with `measured`, once its kernel has been measured too."""
         await self.finished.wait()
         if measured and self._kernel is not None and self._task is not None:
             await self._answered.wait()
@@ -148,7 +148,7 @@ class Job:
         return status if self._error is None else status | {"problem": problem(self._error)}
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
-        """The picture so far. Raises Conflict before its first sample, and what became of it when it failed."""
+        """The picture so far. Raises Conflict before the first sample, and the render's own error where it failed."""
         if self._error is not None:
             raise self._error
         if self._task is None:
@@ -193,7 +193,7 @@ class Job:
                 self._fail(error)
 
     def again(self) -> None:
-        """Rendered again from the start. What had been cancelled stays as far as it was, once it is there again."""
+        """Another renderer begins the render again; a cancelled one has no image until that has samples."""
         if self._progress.samples:
             self._sampled.clear()
         if not self.finished.is_set():

@@ -16,9 +16,9 @@ RETRY_S = 5  # when to ask again where there is no room
 
 @dataclass(frozen=True)
 class QueueLimits:
-    """How many render at once, and what is kept of those that have ended."""
+    """How many renders run at once, and which of the ended ones are kept."""
 
-    running: int = 8  # the others wait in line, for each holds its scene and its picture on the GPU
+    running: int = 8  # renders; the others wait, as each has its scene and its picture on the GPU
     waiting: int = 256
     each: int = 64  # running and waiting, of one owner
     kept: int = 64  # ended, of one owner ...
@@ -27,7 +27,7 @@ class QueueLimits:
 
 
 class RenderQueue:
-    """An owner is a text that the caller chooses; who is not the owner of a render does not hear that it exists."""
+    """The renders of all owners. An owner is a text that the caller chooses; nobody else learns of its renders."""
 
     def __init__(self, bounds: QueueLimits | None = None) -> None:
         self._bounds = bounds or QueueLimits()
@@ -37,7 +37,7 @@ class RenderQueue:
         self._running: dict[asyncio.Task[None], Job] = {}
 
     def submit(self, job: Job, listed: bool = True) -> None:
-        """Has it run when its turn comes; a job that is not `listed` is its owner's to release.
+        """Queue a job, which runs when its turn comes; the caller releases one that is not `listed`.
 
         Raises TooManyRequests where its owner has as many under way as one may have, Unavailable where the queue is
         full.
@@ -50,7 +50,7 @@ class RenderQueue:
         task.add_done_callback(self._running.pop)
 
     def admit(self, owner: str) -> None:
-        """Raises what `submit` would raise, before the work of reading a scene is done."""
+        """Raise what `submit` would raise, before a scene is read for nothing."""
         own = sum(job.owner == owner for job in self._running.values())
         if own >= self._bounds.each:
             detail = f"{own} renders of yours are under way: no more than {self._bounds.each} (SUNBOX_MAX_JOBS)"
@@ -89,7 +89,7 @@ class RenderQueue:
         async with self._room:
             await job.run()
         self._evict()
-        # Only so that memory is given back when nobody comes any more.
+        # So that memory is freed also when no more requests come.
         asyncio.get_running_loop().call_later(self._bounds.kept_s + 1, self._evict)
 
     def _evict(self) -> None:
@@ -105,7 +105,7 @@ class RenderQueue:
             held: Counter[str] = Counter()
             for job in ended:
                 held[job.owner] += job.bytes
-            most = held.most_common(1)[0][0]  # one owner's pictures do not push out another's few
+            most = held.most_common(1)[0][0]  # the owner of most pictures loses one, and not another owner of few
             self._forget(next(job for job in ended if job.owner == most), ended)
 
     def _forget(self, job: Job, ended: list[Job]) -> None:

@@ -21,7 +21,7 @@ from service.rendering.ipc import channel
 from service.rendering.requests.request_parser import PARSERS, Kind
 from service.shared_memory import trim
 
-NICENESS = 10  # the renderer's, whose share of the processors large bodies would else take
+NICENESS = 10  # as the renderer has, whose share of the processors large bodies would take otherwise
 IDLE_S = 300.0
 BASE_BYTES, TIMES = 256 << 20, 3  # of address space: for what comes beside the values; models and arrays made of them
 
@@ -37,7 +37,7 @@ class Work:
 
 @dataclass(frozen=True)
 class Failed:
-    """By no fault of the body; `detail` is for the log."""
+    """Parsing failed through no fault of the body; `detail` is for the log."""
 
     detail: str
 
@@ -45,7 +45,7 @@ class Failed:
 def main() -> None:
     end = socket.socket(fileno=int(sys.argv[1]))
     confine(NICENESS)
-    gc.disable()  # it goes through all values there are again and again, and finds nothing
+    gc.disable()  # it would go through all values again and again, and find nothing to free
     gc.freeze()
     end.settimeout(IDLE_S)
     while True:

@@ -25,11 +25,11 @@ log = logging.getLogger(__name__)
 
 
 class ParserFailed(Exception):
-    """A defect of ours."""
+    """The parser failed, which is a defect of the service and not of the body."""
 
 
 class ParserPool:
-    """`parse` from as many threads as there shall be processes; they start on demand."""
+    """Processes that parse, started on demand: one for each thread that calls `parse` at the same time."""
 
     def __init__(self, config: Config) -> None:
         self._config = config.model_copy(update={"api_key": []})  # a process that reads strangers' texts needs no key
@@ -61,7 +61,7 @@ class ParserPool:
 
 
 class _Room:
-    """So many bytes for all; who finds too few left waits until others give theirs back."""
+    """A budget of bytes: a thread that finds too few left waits until others return theirs."""
 
     def __init__(self, size: int) -> None:
         self._left = size

@@ -1,4 +1,4 @@
-"""From JSON to a scene and settings that are valid, by the service's limits. No assets, no packing, nothing kept."""
+"""JSON becomes a valid scene and settings within the service's limits. Nothing is loaded, packed or kept."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ class RequestParser:
         return ParsedRequest(settings, scene, folded(request.scene))
 
     def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
-        """Both documents, or the mistakes of both."""
+        """The scene and the settings. Raises InvalidDocument with the mistakes of both."""
         errors: list[FieldError] = []
         understood: list[Any] = []
         for parse, document in ((self.scene, scene), (self.settings, settings)):
@@ -64,7 +64,7 @@ class RequestParser:
         return understood[0], understood[1]
 
     def scene(self, document: Any, before: Parsed | None = None) -> Scene:
-        """With the one `before` an edit costs only what it changes."""
+        """The scene of a document; with the one `before`, only what an edit changed is validated."""
         return parse_scene(document, "/scene", self._config, before)
 
     def settings(self, document: Any) -> ResolvedSettings:
@@ -78,7 +78,7 @@ class RequestParser:
 
 
 def folded(document: Any) -> bytes:
-    """JSON (ASCII) in few bytes, for what is seldom looked at and may hold a mesh."""
+    """The JSON (ASCII) of a document, compressed: it is seldom read and may contain a mesh."""
     return zlib.compress(json.dumps(document, separators=(",", ":")).encode(), 1)
 
 

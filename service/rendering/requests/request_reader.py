@@ -1,4 +1,4 @@
-"""From what a caller wrote to what the renderer takes, with its limits and assets. Not for the event loop."""
+"""A caller's documents become packed scenes, with the service's limits and assets. Not for the event loop."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def stop_rule(settings: ResolvedSettings) -> StopRule:
 
 
 def weight(packed: Packed) -> int:
-    """Bytes of the arrays."""
+    """The bytes that the arrays of a packed scene take."""
     parts = [vars(part) for part in (packed.arrays, packed.arrays.textures) if part is not None]
     return sum(getattr(value, "nbytes", 0) for part in parts for value in part.values())
 

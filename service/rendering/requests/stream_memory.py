@@ -8,12 +8,12 @@ import weakref
 from service.config import MIB
 from service.problems import TooLarge, Unavailable
 
-EACH = 8  # a stream may take that part of it
+EACH = 8  # one stream may take an eighth of it
 RETRY_S = 5
 
 
 class StreamMemory:
-    """Holders count as long as they live. Any thread."""
+    """Counts the bytes of each holder for as long as it lives. For any thread."""
 
     def __init__(self, most: int) -> None:
         self.each = most // EACH
@@ -22,7 +22,7 @@ class StreamMemory:
         self._lock = threading.Lock()
 
     def hold(self, holder: object, size: int) -> None:
-        """From now on `holder` takes so many bytes. Raises TooLarge or Unavailable, and it takes what it took."""
+        """Count `holder` with that many bytes from now on; as before where it raises TooLarge or Unavailable."""
         if size > self.each:
             allowed = f"the {self.each / MIB:g} MiB of memory allowed (SUNBOX_MAX_STREAM_MEMORY)"
             raise TooLarge(f"This scene takes more than {allowed}: big geometry goes through assets.")

@@ -1,4 +1,4 @@
-"""A stream's scene as it is edited: the documents, what they mean, and what the renderer was given of them."""
+"""A stream's scene as it is edited: its documents, their meaning, and the part that the renderer already has."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from service.scene import Scene, merge_patch
 from service.scene.document import Parsed
 from service.scene.text import weigh
 
-MOST_GOOD = 4  # while the renderer compiles for one, a hand makes hundreds of them
+MOST_GOOD = 4  # generations; while the renderer compiles for one, dragging a slider makes hundreds
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class Accepted:
 
 
 class EditSession:
-    """Not for the event loop: its methods parse and pack. One call at a time."""
+    """The documents of one stream. Its methods parse and pack: not on the event loop, and one call at a time."""
 
     def __init__(self, reader: RequestReader, task: int) -> None:
         self.version: Version | None = None  # the last valid one
@@ -55,7 +55,7 @@ class EditSession:
         self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
 
     def take(self, message: protocol.Start | protocol.Update) -> Update | None:
-        """What the renderer must be told at once; None where that can wait for `settle`, after newer updates.
+        """The update that the renderer needs at once; None where that can wait for `settle`, after newer ones.
 
         Raises InvalidDocument or Conflict, and nothing has changed then.
         """
@@ -71,7 +71,7 @@ class EditSession:
         return update
 
     def settle(self) -> Update | None:
-        """What the renderer must be told to be where the documents are; None when it is there."""
+        """The update that brings the renderer up to the documents; None when it is there."""
         version = self.version
         if version is None or version is self._given:
             return None
@@ -82,7 +82,7 @@ class EditSession:
             raise
 
     def failed(self, generation: int, fallback: int | None) -> Update | None:
-        """The renderer failed at `generation` and goes on with `fallback`; what to tell it where newer is wanted."""
+        """The renderer failed at `generation` and goes on with `fallback`: the update that it needs then, if any."""
         version, given = self.version, self._given
         good = None if fallback is None else self._good.get(fallback)
         self._given = None
@@ -90,7 +90,7 @@ class EditSession:
             self._given, self._arrays = good.version, good.arrays
         if version is None or version.generation <= generation:
             self.version = self._given
-        elif given is not None and given.generation > generation:  # it was told as a change of what failed
+        elif given is not None and given.generation > generation:  # it was sent as a change of the one that failed
             self._given = None
             return self._give(version)
         return None

@@ -1,4 +1,4 @@
-"""Which frame a client gets next, and when: never more than two on the way, never an old one."""
+"""Decides which frame a client gets next, and when: at most two are unacknowledged, and no old one is sent."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from service.rendering.streams.protocol import View
 
 CREDITS = 2  # frames unacknowledged; without a bound a slow client had 857 of them queued
 MOST_FPS = 30  # unless the view says otherwise: every frame costs the renderer and the encoder some milliseconds
-# A picture that has been refined for a while changes little: frames at most every 5 % of its time, and every .2 s.
+# A picture that has been refined for a while changes little: frames at most every 5 % of its time, and every 0.2 s.
 PACE, SLOWEST_S = 0.05, 0.2
 # How long an update waits for the first frame of the one before it. Taken at once, each of a hand's sixty updates a
 # second would stop its predecessor's frame, and nothing would be seen until the hand rests.
@@ -28,7 +28,7 @@ class FlowControl:
         self._sent = 0  # the last frame's `seq`
         self._unacknowledged: set[int] = set()
         self._serial = 0  # of the last want
-        self._here = False  # somebody looks
+        self._here = False  # a connection is attached
         self._asked = False  # a frame is wanted, or on its way out
         self._anyway = False  # the view was changed and not seen yet
         self._answered = asyncio.Event()  # something of this generation was sent
@@ -43,11 +43,11 @@ class FlowControl:
 
     @property
     def waited_s(self) -> float | None:
-        """How long the present generation has been waiting for its first frame; None: it was sent."""
+        """How long the present generation has been waiting for its first frame, s; None once that was sent."""
         return None if self._answered.is_set() else self._loop.time() - self._updated_at
 
     def update(self, generation: int, since: float) -> None:
-        """An update was taken that came at the loop's time `since`: older generations are worth nothing any more."""
+        """Note an update that came at the loop's time `since`: older generations' frames are dropped from now on."""
         self._updated_at = since
         self.generation = generation
         self._answered.clear()
@@ -89,14 +89,14 @@ class FlowControl:
         self._ask()
 
     def detach(self) -> None:
-        """Nobody is there to take a frame; one that is on its way out is none."""
+        """Count no client as attached; a frame that is being sent is lost."""
         self._here = False
         self._serial += 1
         self._unacknowledged.clear()
         self._asked = False
 
     def attach(self) -> None:
-        """Somebody is there, who has seen nothing yet."""
+        """Count a client as attached that has seen nothing yet."""
         self._here = True
         if self.generation is not None:
             self._anyway, self._asked = True, False
@@ -137,7 +137,7 @@ class FlowControl:
         self._send(Want(self._task, self._serial, self.view.for_renderer(), self._anyway))
 
     def _interval_s(self) -> float:
-        """Between two frames. What a person has just asked for waits only if its view says so."""
+        """Seconds between two frames; the first frame after an edit waits only where the view sets a rate."""
         asked_for = self._anyway or not self._answered.is_set()
         if self.view.max_fps is not None:
             return 1 / self.view.max_fps if asked_for else max(1 / self.view.max_fps, self._pace_s)

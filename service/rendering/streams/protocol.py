@@ -1,4 +1,4 @@
-"""What a client may say on the stream, and how a frame is written."""
+"""The messages that a client may send on the stream, and how a frame is written."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ MOST_FPS = 240
 
 
 class View(Model):
-    """How frames are to look; what a message leaves out stays as it was."""
+    """How frames are to look; fields that a message leaves out stay as they were."""
 
     format: StreamFormat = "jpeg"
     quality: Annotated[int, Field(ge=1, le=100)] | None = None
@@ -45,7 +45,7 @@ class View(Model):
         return messages.View(self.aov, self.exposure, self.tone_map, encoding)
 
     def over(self, view: View) -> View:
-        """`view` with what this one says."""
+        """`view` with the fields that this message gives."""
         said = {name: getattr(self, name) for name in self.model_fields_set if name in View.model_fields}
         return view.model_copy(update=said)
 

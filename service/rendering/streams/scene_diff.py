@@ -1,4 +1,4 @@
-"""What an edit touches, decided from the two documents and nothing else."""
+"""The parts of a scene that an edit touches, decided from the two documents and nothing else."""
 
 from __future__ import annotations
 
@@ -40,7 +40,7 @@ def may_be_refused(old: Scene, new: Scene) -> bool:
 
 
 def _asked(scene: Scene) -> list[object]:
-    """What a texture, or a mesh's coordinates, could turn out not to have."""
+    """The demands on textures and meshes that these could turn out not to meet."""
     sets = [getattr(texture, "uv", 0) for texture in scene.textures.values()]
     return [sets, [_looks(m) for m in scene.materials.values()], [shape.material for shape in scene.shapes]]
 

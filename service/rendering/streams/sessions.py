@@ -1,4 +1,4 @@
-"""Streams and who attends to them: a client whose connection dropped takes its own up again, and nobody else's."""
+"""Streams by session: a client whose connection dropped takes its own stream up again, and no other client's."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.stream import Stream
 
-ID_BYTES = 32  # 256 bits: nobody guesses one
+ID_BYTES = 32  # 256 bits: an id cannot be guessed
 KEPT_S = 60.0  # of the contract: how long a session waits for its client to come back
 GOING_AWAY = 1001  # close code
 
@@ -21,9 +21,9 @@ log = logging.getLogger(__name__)
 class Session:
     def __init__(self, stream: Stream, owner: str) -> None:
         self.id = secrets.token_urlsafe(ID_BYTES)
-        self.owner = owner  # whose key opened it
+        self.owner = owner  # the owner of the key that opened it
         self.stream = stream
-        self.connections = 0  # being served; while one takes another's place there are two
+        self.connections = 0  # at present; two while one replaces the other
         self.beside: Session | None = None  # whose second variant this is: a client's two count as one
         self.running = asyncio.create_task(stream.run())
         self.timer: asyncio.TimerHandle | None = None
@@ -42,7 +42,7 @@ class Sessions:
 
     @property
     def waiting(self) -> int:
-        """Sessions whose clients may come back."""
+        """How many sessions wait for their clients to come back."""
         return len(self._kept) - self.attended
 
     def enter(self, id: str | None, beside: str | None = None, owner: str = "") -> Session:
@@ -92,11 +92,11 @@ class Sessions:
             return
         session.timer = asyncio.get_running_loop().call_later(KEPT_S, self._end, session)
         self._kept[session.id] = self._kept.pop(session.id)
-        if self.waiting > self._most:  # who comes and goes all the time must not fill the renderer's memory
+        if self.waiting > self._most:  # clients that come and go all the time must not fill the renderer's memory
             self._end(next(kept for kept in self._kept.values() if not kept.connections))
 
     def close(self, reason: str) -> None:
-        """Ends them all; who attends is told that the server goes away."""
+        """End all streams; their clients are told that the server goes away."""
         for session in list(self._kept.values()):
             session.stream.end(GOING_AWAY, reason)
             if not session.connections:

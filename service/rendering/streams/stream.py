@@ -26,7 +26,7 @@ WAITING = 64  # messages to take, or to send; more of them wait in the network
 WAITING_CHARACTERS = 256 * 1024  # of messages behind another one: as values they are 30 times larger
 SMALL = 16 * 1024  # characters of JSON that are parsed faster than a thread is woken
 STALLED_S = 30.0  # a client that takes nothing for so long is gone: its network may never say so
-CLOSING_S = 1.0  # for one that reads slowly to be told why
+CLOSING_S = 1.0  # for the reason to reach a client that reads slowly
 
 log = logging.getLogger(__name__)
 
@@ -55,7 +55,7 @@ class _Heard:
 
 
 class Attendance:
-    """One connection's time at a stream."""
+    """One connection to a stream."""
 
     def __init__(self, socket: Socket) -> None:
         self.socket = socket
@@ -67,7 +67,7 @@ class Attendance:
 
 
 class Stream:
-    """`hear` takes what the client says, `attend` sends it what there is; `run` works until it is cancelled."""
+    """`hear` takes the client's messages, `attend` sends frames and answers; `run` works until it is cancelled."""
 
     def __init__(self, renderers: Renderers, reader: RequestReader) -> None:
         self.ended: Closing | None = None  # for good, and why
@@ -75,11 +75,9 @@ class Stream:
         self._task = renderers.open(self)
         self._flow = FlowControl(self._task, renderers.send)
         self._live = EditSession(reader, self._task)
-        self._executor = ClientExecutor(
-            "stream"
-        )  # what this client asks to be parsed and packed waits for nobody else's
+        self._executor = ClientExecutor("stream")  # parses and packs for this client alone
         self._paused = False  # by the client
-        self._done: dict[str, Any] | None = None  # what was said last of the present generation
+        self._done: dict[str, Any] | None = None  # the last `done` of the present generation
         self._attendance: Attendance | None = None
         self._inbox: deque[_Heard] = deque()
         self._outbox: deque[dict[str, Any] | Frame] = deque()
@@ -93,10 +91,12 @@ class Stream:
         return self._attendance is not None
 
     async def hear(self, text: str | None) -> None:
-        """Takes one message; None stands for what is no text. Waits while too many are still to be dealt with."""
+        """Take one message; None stands for one that is not text. Waits while too many are unhandled."""
         try:
             message: protocol.Message | ServiceError = await self._parsed(text)
-            if isinstance(message, protocol.Ack):  # it is about frames, not about the picture, and may overtake
+            if isinstance(
+                message, protocol.Ack
+            ):  # acknowledgements concern frames, not the picture, and may overtake
                 self._flow.acknowledge(message.seq)
                 return
         except ServiceError as error:
@@ -107,7 +107,7 @@ class Stream:
             await self._stirring()
 
     async def run(self) -> None:
-        """Deals with what was heard; its end is the stream's."""
+        """Handle messages in order; when this returns, the stream has ended."""
         try:
             await self._handle_all()
         finally:
@@ -117,7 +117,7 @@ class Stream:
             self._live.close()
 
     def attach(self, socket: Socket) -> Attendance:
-        """From now on this connection is the client's; one that was is told so and closed."""
+        """Make this connection the client's; an earlier one is told so and closed."""
         if self._attendance is not None:
             self._attendance.end(Closing(TAKEN_UP, "This session was taken up by another connection."))
             self._leave()
@@ -132,7 +132,7 @@ class Stream:
         return self._attendance
 
     async def attend(self, attendance: Attendance) -> None:
-        """Sends what there is until it is cancelled, or has closed the connection and said why."""
+        """Send frames and answers until cancelled, or until the connection was closed with its reason."""
         sending = asyncio.create_task(self._send_all(attendance.socket))
         try:
             either: set[asyncio.Future[Any]] = {sending, attendance.over}
@@ -154,14 +154,14 @@ class Stream:
                 self._leave()
 
     def _leave(self) -> None:
-        """Nobody looks: the render rests until somebody does."""
+        """Pause the render until a client attends again."""
         self._attendance = None
         self._outbox = deque(item for item in self._outbox if not isinstance(item, Frame))
         self._flow.detach()
         self._renderers.send(Pause(self._task, away=True))
 
     def end(self, code: int, reason: str) -> None:
-        """For good: who attends is told, and who comes later too."""
+        """End the stream for good; the client is told so, now or when it comes back."""
         self.ended = Closing(code, reason)
         if self._attendance is not None:
             self._attendance.end(self.ended)
@@ -186,7 +186,7 @@ class Stream:
             self._live.works = message.generation
 
     def again(self) -> None:
-        """The same generation begins again, at one sample; who acknowledges frames sees nothing else of it."""
+        """Another renderer begins the generation again, at one sample; the client sees nothing else of the loss."""
 
     def lost(self, detail: str) -> None:
         self._refuse(Internal(detail), self._flow.generation)
@@ -228,7 +228,7 @@ class Stream:
             self._refuse(error, message.generation)
 
     async def _fall_back(self, failed: Failed) -> None:
-        """To the last scene that was good; a newer one is tried anew."""
+        """Go back to the last scene that worked; a newer one is tried again."""
         try:
             update = await self._executor.run(partial(self._live.failed, failed.generation, failed.fallback))
         except ServiceError as error:
@@ -265,7 +265,7 @@ class Stream:
                 self._renderers.send(ORDERS[message.type](self._task))
 
     async def _send_all(self, socket: Socket) -> None:
-        """Raises TimeoutError when the client takes nothing any more."""
+        """Send all that is due. Raises TimeoutError when the client takes nothing any more."""
         while True:
             while not self._outbox:
                 await self._stirring()

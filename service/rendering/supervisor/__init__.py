@@ -1,6 +1,6 @@
-"""The renderer's process, kept alive: what it is told, and what it takes to tell a new one all of it again.
+"""The renderer's process, kept alive: what was sent to it can be sent again to a new one.
 
 supervisor  starts the process, routes its messages to listeners, and replaces it when it is lost
 process     one process: how it is started, watched and ended
-replay_log  what one task was told, so that another renderer can go on with it
+replay_log  the messages of one task, so that another renderer can go on with it
 """

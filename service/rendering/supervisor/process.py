@@ -1,4 +1,4 @@
-"""One renderer's process, seen from the server: begun, watched, ended, and what it died of."""
+"""One renderer's process, seen from the server: how it is started, watched and ended, and why it died."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from service.rendering.executors import tending
 from service.rendering.ipc import channel, heartbeat
 
 ROOT = Path(__file__).parents[3]
-TURNS = 10  # a piece of work may take so many times as long as the last one, and the patience on top
+TURNS = 10  # how many times as long as the last one a piece of work may take, beyond the patience
 STARTING_S = 60.0  # it imports, finds a driver and asks for a context before it can beat
 KILLS = {-signal.SIGKILL, -signal.SIGTERM}
 
@@ -39,7 +39,7 @@ class Options:
 
 
 class Process:
-    """`received` hears its messages; `lost`, once, that its end of the link is closed."""
+    """Calls `received` with each message of the process, and `lost` once when its end of the channel is closed."""
 
     def __init__(
         self, options: Options, received: Callable[[Any], None], lost: Callable[[], None], lifeline: int | None = None
@@ -69,7 +69,7 @@ class Process:
         return self._process.pid
 
     def watch(self, excused: bool = False) -> None:
-        """To be called now and then: ends a renderer that owes something and makes no progress."""
+        """End a renderer that has work and makes no progress; to be called now and then."""
         if excused:
             self.heartbeat.excuse()
         silent_s = self.heartbeat.silent_s(self.link.sent)
@@ -81,7 +81,7 @@ class Process:
             self._process.kill()
 
     async def end(self, patience_s: float) -> Cause:
-        """Gives it that time to end, kills it, buries it; what it died of. The heartbeat still says where it was."""
+        """Let it end within that time or kill it; why it died. The heartbeat still names its last task."""
         self.link.close()
         code = await tending(partial(_reap, self._process, patience_s))
         self.heartbeat.read()
@@ -97,7 +97,7 @@ class Process:
 
 
 class _Watched(heartbeat.Heartbeat):
-    """A heartbeat with the time since it last beat, as much of it as its process had."""
+    """A heartbeat with the time since its last beat, in which the process was able to run."""
 
     def __init__(self) -> None:
         self.descriptor = heartbeat.memory()
@@ -155,7 +155,7 @@ def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | None:
 
 
 def _is_stopped(pid: int) -> bool:
-    """Whether somebody has stopped the process (SIGSTOP, a debugger): then its work is not to blame."""
+    """Whether the process is stopped (SIGSTOP, a debugger): then its silence is not the work's fault."""
     try:
         return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] in "Tt"
     except OSError:

@@ -1,4 +1,4 @@
-"""What the renderer was told of a task, so that another one can be told it again."""
+"""The messages of a task that a new renderer needs in order to go on with it."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ class _State:
 
 
 class ReplayLog:
-    """Closed, it gives back the scenes' memory."""
+    """One task's state as the renderer has it. `close` frees the memory of its scenes."""
 
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
@@ -61,7 +61,7 @@ class ReplayLog:
 
     @property
     def kept(self) -> Restore | None:
-        """What there is of its picture outside the renderer."""
+        """The picture as the server keeps it, if it does."""
         return self.saved or self._checkpoint
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
@@ -84,7 +84,7 @@ class ReplayLog:
             self._stopped = True
 
     def heard(self, message: FromRenderer) -> FromRenderer:
-        """The message, as whoever opened the task should hear it."""
+        """Note what a message changes; the message as the task's listener is to get it."""
         if isinstance(message, Failed):
             if message.serial is not None:
                 self.reads.pop(message.serial, None)
@@ -158,7 +158,7 @@ class ReplayLog:
             channel.discard(self._states.pop(0).scene)
 
     def _fall_back(self, failed: Failed) -> None:
-        """Forgets what failed and what was built on it, but not a whole scene that was sent later."""
+        """Forget the state that failed and the edits of it, but not a whole scene that was sent later."""
         kept, later = [], False
         for state in self._states:
             later = later or (state.whole and state.began > failed.generation)

@@ -1,4 +1,4 @@
-"""The server's hold on the renderer: speaks with its process, starts another when it is lost, tells that one all."""
+"""Supervises the renderer's process: routes its messages, replaces it when it is lost, and replays its tasks."""
 
 from __future__ import annotations
 
@@ -39,12 +39,12 @@ from service.rendering.statistics import Kind, Statistics
 from service.rendering.supervisor.process import Cause, Options, Process
 from service.rendering.supervisor.replay_log import ReplayLog
 
-TRIES = 3  # in a row that don't get as far as rendering; then there is no renderer, and the reason is told
-BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # nobody's fault here, and no failure to start, ever
-LAST_WORDS_S = 5.0  # for a renderer whose end of the link is closed to be gone: then its exit code tells why
+TRIES = 3  # starts in a row that end before rendering; then there is no renderer, and the reason is given
+BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped")  # causes from outside, which never count as a failure to start
+LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
 BETWEEN_TRIES_S = 0.5
-AFTER_KILLS_S = 5.0  # ... at most, between renderers that others kill as soon as they begin
-HOPELESS_S = 15.0  # ... between those that come then, and find nobody waiting
+AFTER_KILLS_S = 5.0  # between starts of renderers that others kill as soon as they begin, at most
+HOPELESS_S = 15.0  # between tries after that, while nobody waits
 STRIKES = 3  # renderers that a task may bring down
 FORGIVEN_S = 5.0  # of life with that task, after which an earlier loss was not its fault
 WATCH_S = 0.5
@@ -65,7 +65,7 @@ class _Task:
 
 
 class Supervisor:
-    """One renderer's process; fulfils `Renderers`."""
+    """Fulfils `Renderers` with one process."""
 
     def __init__(self, options: Options | None = None) -> None:
         self.statistics = Statistics()
@@ -108,7 +108,7 @@ class Supervisor:
 
     @property
     def info(self) -> dict[str, Any] | None:
-        """What renders; None while nothing can."""
+        """The device that renders; None while nothing can."""
         ready = self._ready
         return ready.result() if ready is not None and ready.done() and not self.hopeless else None
 
@@ -117,7 +117,7 @@ class Supervisor:
         return self._failures >= TRIES
 
     async def ready(self, timeout_s: float) -> dict[str, Any]:
-        """What renders, as soon as it does. Raises Unavailable saying why nothing does."""
+        """The device that renders, as soon as one does. Raises Unavailable with the reason why none does."""
         if self._ready is None or self._closed or self.hopeless:
             raise Unavailable(self._detail)
         try:
@@ -204,7 +204,7 @@ class Supervisor:
                 self._send(message)
 
     async def _bring_back(self, task: int, held: _Task) -> None:
-        """Gives the renderer a picture that it has no more, to go on with or to be read."""
+        """Send the renderer a picture that it no longer has, to go on with or to be read."""
         process = self._process
         encoded = await tending(partial(channel.encode, held.record.kept))
         if held.resident or process is None or process is not self._process or task not in self._tasks:
@@ -246,7 +246,7 @@ class Supervisor:
         held.listener.heard(held.record.heard(message))
 
     def _not_measured(self, held: _Task, why: str) -> None:
-        """Nobody is tempted to try again and again what may have been too much."""
+        """Answer that the kernel was not measured; to retry unasked might bring down one renderer after another."""
         if (asked := held.record.measure_kernel) is not None:
             held.listener.heard(held.record.heard(KernelMeasured(asked.task, why)))
 
@@ -290,7 +290,7 @@ class Supervisor:
                 self._process.watch(excused=late)
 
     def _lose(self, process: Process) -> None:
-        """That renderer's end of the link is closed."""
+        """Replace a renderer whose end of the channel is closed."""
         if self._closed or process is not self._process:
             return
         self._process = None
@@ -303,7 +303,9 @@ class Supervisor:
     async def _replace(self, process: Process) -> None:
         cause = await process.end(LAST_WORDS_S)
         if not process.ready:
-            by_others = cause in BY_OTHERS and not process.unable  # which, dying slowly, was given the last blow
+            by_others = (
+                cause in BY_OTHERS and not process.unable
+            )  # a process that was dying slowly may be killed at last by others
             self._failures += not by_others
             self._shots += by_others
         self.statistics.restarts[cause] += 1
@@ -321,12 +323,12 @@ class Supervisor:
         self._begin()
 
     def _pause_s(self, lived_s: float) -> float:
-        """Before the next try; what was killed after a while need not wait for that."""
+        """Seconds before the next start: more after each failure to start, or after kills in quick succession."""
         after_kill_s = min(BETWEEN_TRIES_S * self._shots, AFTER_KILLS_S) - lived_s
         return max(BETWEEN_TRIES_S * self._failures, after_kill_s, 0.0)
 
     def _blame(self, process: Process, cause: Cause) -> None:
-        """Three strikes against the task that was worked on, where nobody from outside ended the renderer."""
+        """Count the loss against the task that was worked on, unless the renderer was ended from outside."""
         task = process.heartbeat.task
         held = self._tasks.get(task)
         if held is None or cause in BY_OTHERS:

@@ -1,4 +1,4 @@
-"""The process that owns the GPU: takes the newest messages, traces a slice for whose turn it is, publishes.
+"""The process that owns the GPU: takes the newest messages, traces a slice of the task whose turn it is, publishes.
 
 `python -m service.rendering.worker DESCRIPTOR` with one end of `channel.pair()`.
 

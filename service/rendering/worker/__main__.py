@@ -63,7 +63,7 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     except GpuError as error:
         channel.send(end, Unable(str(error)))
         return 1
-    # Only now: beside a dozen busy programs, starting at this priority took half a minute instead of three seconds.
+    # Not earlier: beside a dozen busy programs, starting at this priority took 30 s instead of 3 s.
     raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS)
     channel.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
     log.info("started renderer=%s", renderer.info.get("renderer"))

@@ -1,4 +1,4 @@
-"""What all tasks of a process share."""
+"""The services that all tasks of a process share."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ class WorkerContext:
     renderer: Renderer
     send: Callable[[FromRenderer], None]
     denoiser: DenoiseClient
-    spare: CompileClient | None = None  # compiles in time that nobody wants: for measuring, and for edits to come
+    spare: CompileClient | None = None  # compiles in idle time: for measuring, and for edits to come
     compiler: CompileClient | None = None  # compiles what a task waits for; None: in the task's own turn
     memory: Memory = field(default_factory=_unlimited)
     # Lets go of a task, by its number: the server keeps the pictures of renders and can bring them back. With it Done

@@ -20,7 +20,7 @@ PROGRESS_S = 0.1  # between two reports of how far a render is
 
 
 class Ending:
-    """Ends the render when it has had enough. Done waits for the denoised picture, and for the server's copy."""
+    """Ends the render at its stop rule. Done waits for the denoised picture and for the server's copy."""
 
     def __init__(
         self,
@@ -98,13 +98,13 @@ class Ending:
 
     @property
     def warnings(self) -> list[str]:
-        """What the user should know of the picture."""
+        """The warnings about the picture, for the user."""
         warnings = list(self._residency.full.warnings) if self._residency.loaded is not None else []
         why = self._frames.denoising.warning
         return warnings + ([why] if why else [])
 
     def report(self) -> None:
-        """Say how far a render is, now and then; who watches a stream learns it with each frame."""
+        """Report a render's progress now and then; a stream reports it with each frame."""
         now = time.monotonic()
         due = not self._tracker.interactive and now - self._reported >= PROGRESS_S
         if due and self._residency.full.samples:

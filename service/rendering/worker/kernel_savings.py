@@ -17,7 +17,7 @@ if TYPE_CHECKING:
     from gpu import Picture
     from gpu.analysis.kernel_cost import KernelCost
 
-SLICE_S = 0.015  # how long who comes may have to wait
+SLICE_S = 0.015  # how long a task that comes meanwhile may have to wait
 NO_KERNEL = (
     "Not measured: the kernel with everything on is not in the driver's disk cache, and nobody shall wait for it; "
     "`sunbox info` compiles it and measures."
@@ -37,14 +37,14 @@ class KernelSavings:
 
     @property
     def due(self) -> bool:
-        """There is a step to be done, when nothing else is."""
+        """Whether there is a step to be done while the loop has nothing else to do."""
         return self._asked and not self._wait.compiling
 
     def ask(self) -> None:
         self._asked = True
 
     def part(self) -> None:
-        """The picture leaves the device, or is another: what is under way begins again."""
+        """The picture leaves the device or is replaced: a measurement under way begins again."""
         if self._steps is not None:
             self._steps.close()
         self._wait.forget()
@@ -65,7 +65,7 @@ class KernelSavings:
             self._tell(KernelMeasured(self._number, f"Not measured: {error}"))
 
     def _waits(self, picture: Picture) -> bool:
-        """Whether the kernel with everything on is not there yet, or can't be had."""
+        """Whether the kernel with every feature is not compiled yet, or cannot be."""
         wanted = full_kernel(picture.scene.arrays, picture.settings)
         if self._spare is not None and (self._wait.begin(wanted) or self._spare.has(wanted)):
             return self._wait.compiling

@@ -40,7 +40,7 @@ from service.rendering.worker.scheduler import Scheduler
 from service.rendering.worker.task import Task
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
-COMPILING_S = 60.0  # no hang: some drivers take as long for a kernel with everything in it
+COMPILING_S = 60.0  # no hang: some drivers take this long for a kernel with every feature
 
 log = logging.getLogger(__name__)
 
@@ -82,7 +82,7 @@ class Loop:
         self._reported = 0.0
 
     def run(self) -> None:
-        """Until the server is gone: raises channel.Closed. Sleeps on its sockets when there is nothing to do."""
+        """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
         busy = False
         self._spare.prepare(kernel_keys.common_keys())
         while True:
@@ -108,7 +108,7 @@ class Loop:
         return [*self._tasks.values(), *self._questions.values()]
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
-        """What has come in by now; with `wait`, as soon as there is anything, or a helper has spoken."""
+        """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
         if wait:
             ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._spare.ends]
             waits = [self._compiler.left_s, self._spare.left_s, self._renderer.tidy()]
@@ -157,7 +157,7 @@ class Loop:
         return sum(task.awaited for task in self._tasks.values()) + questions > 1
 
     def _account(self, at_once: bool) -> None:
-        """Tells what was used, now and then; at once before there is nothing to do."""
+        """Report the GPU time that was used, now and then, and at once before the loop sleeps."""
         now = time.monotonic()
         if self._used_s and (at_once or now - self._reported >= REPORT_S):
             traced = sum(task.traced for task in self._tasks.values())

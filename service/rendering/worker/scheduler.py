@@ -1,4 +1,4 @@
-"""Whose turn it is: every client gets the same time on the GPU, a picture that nobody has seen yet goes first."""
+"""Decides whose turn it is: clients share the GPU equally, and a picture that nobody has seen yet goes first."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ class Turn(Protocol):
 
     @property
     def ready(self) -> bool:
-        """Has something to do."""
+        """Whether it has something to do."""
 
     @property
     def unseen(self) -> bool:
-        """Has nothing to show yet, and somebody waits for it."""
+        """Whether somebody waits for its first frame."""
 
 
 T = TypeVar("T", bound=Turn)
@@ -30,8 +30,8 @@ T = TypeVar("T", bound=Turn)
 class Scheduler:
     """Virtual time: the client served least goes next, and of its tasks the one served least.
 
-    Who was idle starts level with the others and saves nothing up; what somebody had too much stays in the books
-    until the others have had it too.
+    A client that was idle starts level with the others and gets no credit for its rest; time beyond its share is
+    remembered until the others have caught up.
     """
 
     def __init__(self) -> None:
@@ -60,7 +60,7 @@ class Scheduler:
         self._used_s[task.client] += seconds
 
     def _level(self, ready: dict[str, list[T]]) -> None:
-        """Who has just become ready starts where the others are."""
+        """Raise the virtual time of clients that have just become ready to that of the others."""
         waiting: set[Hashable] = set()
         for client, tasks in ready.items():
             waiting |= {client, *map(id, tasks)}

@@ -1,4 +1,4 @@
-"""One client's picture: loaded, edited, traced slice by slice, shown when wanted, ended when it has had enough."""
+"""One client's picture: loaded, edited, traced slice by slice, shown on demand, ended by its stop rule."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Phase(Enum):
 
 
 class Task:
-    """What it was told is done in its turns: `turn` while it is `ready`, and `answer` when a frame is wanted."""
+    """Applies messages in its turns: call `turn` while it is `ready`, and `answer` when a frame is wanted."""
 
     def __init__(self, context: WorkerContext, number: int, client: str = "") -> None:
         self.number, self.client = number, client
@@ -64,12 +64,12 @@ class Task:
 
     @property
     def wanted(self) -> bool:
-        """A frame."""
+        """Whether a frame is wanted."""
         return self._frames.want is not None
 
     @property
     def ready(self) -> bool:
-        """Whether a turn would get it any further."""
+        """Whether a turn would do anything."""
         phase, stands = self.phase, self._paused or self._frames.denoising.holds
         if self._away or phase is Phase.EMPTY:
             return False
@@ -91,12 +91,12 @@ class Task:
 
     @property
     def loads(self) -> bool:
-        """Its next turn may take as long as a compilation does."""
+        """Whether its next turn may take as long as a compilation does."""
         return self.phase in (Phase.COMPILING, Phase.UPDATING)
 
     @property
     def awaited(self) -> bool:
-        """Somebody would notice if the loop stood still: there is work, or a person who may edit at any moment."""
+        """Whether a stall of the loop would be noticed: there is work, or a person who may edit at any moment."""
         if self.loads:
             return True
         return self._residency.there and not self._away and (self._tracker.interactive or self.ready)
@@ -116,11 +116,11 @@ class Task:
         return self._residency.rested_since
 
     def update(self, update: Update) -> None:
-        """To be applied in the next turn, joined with what else waits for it."""
+        """Take an update, which the next turn applies together with others that wait."""
         self._updates.join(update)
 
     def turn(self) -> None:
-        """Applies what has changed, traces a slice, and ends the render when that was the last."""
+        """Apply updates, trace a slice, and end the render when that was the last."""
         pending = self._updates.pending
         if self.phase is Phase.COMPILING:
             self.traced += self._updates.preview.step()
@@ -165,7 +165,7 @@ class Task:
                 self._ending.report()
 
     def _apply(self, update: Update) -> None:
-        """Makes the pending update true, or says that it failed and leaves everything as it was."""
+        """Apply the pending update; where it fails, report that and leave everything as it was."""
         self._updates.pending, self.attempted = None, update.generation
         self._try(update)
         self._updates.applied(update)
@@ -204,7 +204,7 @@ class Task:
             updates.foresee(settings)
 
     def evict(self) -> None:
-        """Leaves the device: to the machine's memory, or where the server has it already, altogether."""
+        """Leave the device: for the machine's memory, or for good where the server has the picture already."""
         if self._forget is not None and self._ending.kept:
             self._part()
             self._forget(self.number)
@@ -212,7 +212,7 @@ class Task:
             self._residency.offload()
 
     def settle(self) -> None:
-        """Applies what waits to be, for what comes next to fall back to."""
+        """Apply the pending update now, so that the next one can fall back to it."""
         if self._updates.pending is not None:
             self._apply(self._updates.pending)
 
@@ -233,7 +233,7 @@ class Task:
         self._frames.want = want
 
     def answer(self) -> bool:
-        """Sends the frame that is wanted if there is something new to see in it."""
+        """Send the frame that is wanted, if it would show something new."""
         if self._updates.pending is None:
             return self._frames.answer()
         seen = self._updates.compiling and self._updates.preview.answer(self._frames.want)
@@ -271,14 +271,14 @@ class Task:
                 self._ending.end("stopped")
 
     def release(self) -> None:
-        """Gives the GPU's memory back; the task can be loaded again."""
+        """Free the GPU's memory; the task can be loaded again."""
         self._ending.checkpoints.restart()
         self._updates.release()
         self._residency.release()
         self._frames.forget()
 
     def fail(self) -> None:
-        """Nothing of it can be relied on any more; a whole scene revives it."""
+        """Give up its state after an unexpected error; a whole scene revives it."""
         self._updates.pending, self._updates.stops = None, False
         self.release()
 
@@ -286,7 +286,7 @@ class Task:
         self._ending.finish()
 
     def _part(self) -> None:
-        """What is on the device leaves it, and who works on that must let it go."""
+        """Have all helpers of the task let go of resources that are about to leave the device."""
         self._frames.part()
         self._tracker.truncated.restart()
         self.savings.part()

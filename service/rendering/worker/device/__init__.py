@@ -1,4 +1,4 @@
-"""What a task has on the device.
+"""The resources of a task on the device.
 
 residency          a task's GPU resources: loading, evicting idle tasks to make room, offloading, restoring
 loaded_scene       a scene on the device with its pictures, and the kernel that an update needs

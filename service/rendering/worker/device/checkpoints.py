@@ -13,12 +13,12 @@ from service import shared_memory
 if TYPE_CHECKING:
     from gpu import Picture, Saved
 
-REST = 100  # times what the last one took until the next, which so cost 1 % at most
-MOST_BYTES = 256 << 20  # of a picture under way, as the server has one of each render
+REST = 100  # times the duration of a checkpoint pass until the next one: they cost 1 % at most
+MOST_BYTES = 256 << 20  # of a picture under way: the server keeps one for each render
 
 
 class Checkpointer:
-    """Steps, between which others have their turns."""
+    """Saves pictures in steps, between which other tasks have their turns."""
 
     def __init__(self, every_s: float) -> None:
         """`every_s`: between two of a picture under way, at least."""
@@ -29,7 +29,7 @@ class Checkpointer:
         self.restart()
 
     def restart(self) -> None:
-        """Another picture, or this one is not wanted any more."""
+        """Begin anew: the picture is another one, or no longer wanted."""
         self._steps, self._took_s = None, 0.0
         self._due_at = time.monotonic() + self._every_s
 
@@ -49,7 +49,7 @@ class Checkpointer:
         self._took_s = 0.0
 
     def step(self) -> Saved | None:
-        """The picture, with the last step."""
+        """Do a step; the saved picture with the last one, else None."""
         assert self._steps is not None
         began = time.monotonic()
         saved = self._steps.step()

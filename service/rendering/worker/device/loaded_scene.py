@@ -1,4 +1,4 @@
-"""A scene on the device with its pictures; and the same put aside in the machine's memory, to be taken up again."""
+"""A scene on the device with its pictures; and the same offloaded to the machine's memory, to be restored."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Offloaded:
-    """What was on the device, in full: it goes on to the same bits."""
+    """All that was on the device of a scene: restored, it goes on to the same bits."""
 
     arrays: SceneArrays
     settings: RenderSettings
@@ -26,7 +26,7 @@ class Offloaded:
 
 
 class LoadedScene:
-    """Raises what the renderer raises, and then holds nothing."""
+    """A scene on the device. Its methods raise what the renderer raises; then nothing is left on the device."""
 
     def __init__(
         self,
@@ -57,13 +57,13 @@ class LoadedScene:
         return scene_bytes(self.scene.arrays) + self.ladder.bytes
 
     def resize(self, settings: RenderSettings) -> None:
-        """Takes settings of another size; what there is stays when that can't be had."""
+        """Change to settings of another size; where there is no memory for it, the old pictures stay."""
         ladder = ResolutionLadder(self._renderer, self.scene, settings)
         self.ladder.release()
         self.ladder = ladder
 
     def offloaded(self) -> Offloaded:
-        """Off the device; this holding is released."""
+        """Move everything to the machine's memory and release this object."""
         pictures = {scale: Steps(made.save()).finish() for scale, made in self.ladder.begun.items()}
         out = Offloaded(self.scene.arrays, self.ladder.full.settings, self._editing, self.scene.flags, pictures)
         self.release()
@@ -86,13 +86,13 @@ class LoadedScene:
 
 
 def needed(arrays: SceneArrays | None, settings: RenderSettings) -> int:
-    """About what a scene and its picture take on the device."""
+    """About the bytes that a scene and its picture take on the device."""
     return (0 if arrays is None else scene_bytes(arrays)) + picture_bytes(settings)
 
 
 @dataclass(frozen=True)
 class KernelRequest:
-    """What an update comes to, and the kernel that it takes."""
+    """The arrays and settings that an update leads to, and the kernel that they need."""
 
     arrays: SceneArrays
     settings: RenderSettings
@@ -102,7 +102,7 @@ class KernelRequest:
 def kernel_request(
     update: Update, old: RenderSettings | None, loaded: LoadedScene | None, offloaded: Offloaded | None
 ) -> KernelRequest | None:
-    """The picture that the update makes; None: its kernel is the one there is, or nothing can come of it."""
+    """The request for an update's kernel; None where the present one serves, or the update cannot be applied."""
     settings = old if update.settings is None else RenderSettings(**update.settings)
     edits, raised = update.edits, frozenset[str]()
     if settings is None:

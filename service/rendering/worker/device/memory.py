@@ -1,4 +1,4 @@
-"""What the tasks hold on the device, and who makes room when it is too much: who has rested longest."""
+"""The memory of all tasks on the device; where it is too much, those that have rested longest make room."""
 
 from __future__ import annotations
 
@@ -26,13 +26,13 @@ class Holder(Protocol):
 
     @property
     def idle(self) -> bool:
-        """Can give back what it holds, and get it again."""
+        """Whether its memory on the device can be taken, and restored later."""
 
     def evict(self) -> None: ...
 
 
 class Memory:
-    """Counted in what was asked of the driver, which doesn't say what it really takes."""
+    """Counts the bytes that were requested from the driver, which does not say what it really takes."""
 
     def __init__(self, limit: int, holders: Callable[[], Iterable[Holder]]) -> None:
         self.limit = limit
@@ -43,7 +43,7 @@ class Memory:
         return sum(holder.bytes for holder in self._holders())
 
     def make_room(self, needed: int, asking: Holder) -> None:
-        """Evicts the idle, the longest at rest first, until so many bytes more would fit. Raises OutOfMemory."""
+        """Evict idle tasks, the longest at rest first, until that many bytes fit. Raises OutOfMemory."""
         while self.used + needed > self.limit and self.evict_one(asking):
             pass
         if self.used + needed > self.limit:

@@ -1,4 +1,4 @@
-"""What one task has on the device: had at the expense of who rests, put aside, and had back."""
+"""A task's GPU resources: loading, evicting idle tasks to make room, offloading to host memory, restoring."""
 
 from __future__ import annotations
 
@@ -17,10 +17,10 @@ if TYPE_CHECKING:
 
 
 class Residency:
-    """Nothing, before something was loaded and when that failed. Raises what the renderer raises."""
+    """One task's scene on the device, offloaded, or absent. Its methods raise what the renderer raises."""
 
     def __init__(self, renderer: Renderer, memory: Memory, owner: Holder, parting: Callable[[], None]) -> None:
-        """`owner` is whom others ask to evict it; `parting` is called before what is there leaves the device."""
+        """Others evict the resources through `owner`; `parting` is called before these leave the device."""
         self.loaded: LoadedScene | None = None
         self.rested_since = 0.0
         self._offloaded: Offloaded | None = None
@@ -29,7 +29,7 @@ class Residency:
 
     @property
     def there(self) -> bool:
-        """On the device or aside."""
+        """Whether there is a scene, on the device or offloaded."""
         return self.loaded is not None or self._offloaded is not None
 
     @property
@@ -50,7 +50,7 @@ class Residency:
         return self.ladder.full
 
     def rests(self) -> None:
-        """It was worked on, or looked at, until now."""
+        """Note that it was in use until now."""
         self.rested_since = time.monotonic()
 
     def change(self, update: Update, settings: RenderSettings) -> LoadedScene | None:
@@ -80,11 +80,11 @@ class Residency:
         return self._with_room(needed(update.scene, settings), make, update.scene is not None)
 
     def make_room(self, size: int) -> None:
-        """For so many bytes more. Raises OutOfMemory."""
+        """Make room on the device for that many more bytes. Raises OutOfMemory."""
         self._memory.make_room(size, self._owner)
 
     def _with_room(self, size: int, make: Callable[[], LoadedScene | None], whole: bool) -> LoadedScene | None:
-        """What `make` makes, where need be at the expense of who rests, and of what is held here."""
+        """The result of `make`; where memory is short, idle tasks and then this one's own resources make room."""
         try:
             self.make_room(size)
             return self._insist(make)
@@ -96,7 +96,7 @@ class Residency:
             return self._insist(make)
 
     def _insist(self, make: Callable[[], LoadedScene | None]) -> LoadedScene | None:
-        """The driver may have less than is allowed."""
+        """Retry after evicting: the driver may have less memory than is allowed."""
         while True:
             try:
                 return make()
@@ -105,7 +105,7 @@ class Residency:
                     raise
 
     def wake(self) -> None:
-        """Has back on the device what was put aside."""
+        """Restore to the device what was offloaded."""
         offloaded = self._offloaded
         if offloaded is not None and self.loaded is None:
             self.make_room(needed(offloaded.arrays, offloaded.settings))
@@ -113,7 +113,7 @@ class Residency:
             self._offloaded = None
 
     def offload(self) -> None:
-        """To the machine's memory."""
+        """Move everything to the machine's memory."""
         assert self.loaded is not None
         self._parting()
         self._offloaded, self.loaded = self.loaded.offloaded(), None

@@ -41,7 +41,7 @@ class ResolutionLadder:
 
     @property
     def bytes(self) -> int:
-        """On the device."""
+        """The bytes that the pictures take on the device."""
         return sum(picture_bytes(picture.settings, picture.guided) for picture in self._pictures.values())
 
     def picture(self, scale: float) -> Picture:
@@ -73,7 +73,7 @@ class ResolutionLadder:
             picture.reset()
 
     def configure(self, settings: RenderSettings) -> None:
-        """Takes other settings; accumulation starts again."""
+        """Change to other settings; accumulation starts again."""
         if (settings.width, settings.height) == (self._settings.width, self._settings.height):
             self._settings = settings
             for scale, picture in self._pictures.items():

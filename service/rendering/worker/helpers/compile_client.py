@@ -1,4 +1,4 @@
-"""The renderer's hold on the process that compiles: one kernel at a time, while all other clients are traced."""
+"""The renderer's side of the process that compiles: one kernel at a time, while other tasks are traced."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from service.rendering.worker.helpers.process import HelperProcess
 if TYPE_CHECKING:
     from gpu import KernelKey
 
-TRIES = 3  # misfortunes in a row; then everything is compiled in the loop
+TRIES = 3  # failures in a row; then everything is compiled in the loop
 LIMIT_S = 60.0  # for one kernel, the helper's start included
 SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others leave
-REMEMBERED = 256  # kernels; of thousands that were asked for the records tell
+REMEMBERED = 256  # kernels in memory; records on the disk tell of the others
 RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
 DISABLED = {"1", "true", "yes", "y", "t"}
 
@@ -47,7 +47,7 @@ class _CompileRequest:
 
 
 class CompileClient:
-    """Its process starts with the first order and ends when idle for a while."""
+    """Compiles kernels in a process that starts at the first request and ends when idle for a while."""
 
     def __init__(
         self,
@@ -68,7 +68,7 @@ class CompileClient:
         self._limit_s = SPARE_LIMIT_S if spare else LIMIT_S
         self._able = _has_cache()
         self._records = records()
-        self._known: set[KernelKey] = set()  # what needs no helper any more, or was not helped
+        self._known: set[KernelKey] = set()  # kernels that need no helper any more, or that it could not compile
         self._met: set[KernelKey] = set()
         self._orders: list[_CompileRequest] = []  # the first is under way
         self._until = 0.0
@@ -77,16 +77,16 @@ class CompileClient:
 
     @property
     def ends(self) -> list[socket.socket]:
-        """Where it may be heard from."""
+        """The sockets to wait on."""
         return self._helper.ends
 
     @property
     def left_s(self) -> float | None:
-        """How long it makes sense to wait for that."""
+        """How many more seconds a wait for the kernel under way makes sense."""
         return max(0.0, self._until - time.monotonic()) if self._orders else None
 
     def knows(self, key: KernelKey) -> bool:
-        """Whether nobody need wait for it any more."""
+        """Whether nobody needs to wait for this kernel any more."""
         return key in self._known
 
     def waits(self, key: KernelKey, told: Told, alone: bool = False) -> bool:
@@ -106,18 +106,18 @@ class CompileClient:
             self._orders.append(order)
             if len(self._orders) == 1:
                 self._begin()
-        if order not in self._orders:  # no helper is to be had
+        if order not in self._orders:  # the helper cannot be started
             return False
         order.told.add(told)
         return True
 
     def prepare(self, keys: list[KernelKey]) -> None:
-        """Has them compiled, those that no renderer here has met yet, though nobody waits."""
+        """Compile those of the kernels that no renderer here has had yet, although nobody waits for them."""
         for key in keys:
             self.waits(key, _nobody)
 
     def met(self, key: KernelKey) -> None:
-        """The renderer has this kernel: the driver's disk cache too."""
+        """Note that the renderer has this kernel, and so has the driver's disk cache."""
         if key in self._met:
             return
         if len(self._known) >= REMEMBERED:  # the records know them, too
@@ -129,14 +129,14 @@ class CompileClient:
         self._record(key)
 
     def has(self, key: KernelKey) -> bool:
-        """Whether it loads at once."""
+        """Whether the kernel loads at once, from the driver's disk cache."""
         return key in self._met or self._is_recorded(key)
 
     def _is_recorded(self, key: KernelKey) -> bool:
         return self._able and os.path.exists(self._records / key.digest(self._driver))
 
     def _record(self, key: KernelKey) -> None:
-        """It is in the driver's disk cache."""
+        """Record that a kernel is in the driver's disk cache."""
         if self._able:
             try:
                 self._records.mkdir(parents=True, exist_ok=True)
@@ -145,13 +145,13 @@ class CompileClient:
                 log.info("could not record a compiled kernel error=%s", error)
 
     def forget(self, told: Told) -> None:
-        """Nobody waits there any more; what nobody waits for is not begun."""
+        """Drop one caller's wait; a kernel that nobody waits for is not begun."""
         for order in self._orders:
             order.told.discard(told)
         self._orders[1:] = [order for order in self._orders[1:] if order.told]
 
     def hear(self) -> None:
-        """Tells who waits, if there is anything to tell, and begins the next."""
+        """Pass answers on to the callers that wait, and begin the next kernel."""
         try:
             answer: Compiled = self._helper.hear()
         except BlockingIOError:
@@ -175,7 +175,7 @@ class CompileClient:
             self._begin()
 
     def _is_starved(self) -> bool:
-        """Whether it had no processor for some of its time; that much it gets on top."""
+        """Whether the process lacked a processor for some of its time; its limit grows by that much."""
         left_s = 0.0 if self._runnable is None else self._limit_s - self._runnable.elapsed_s
         self._until = time.monotonic() + left_s
         return left_s > 0
@@ -197,7 +197,7 @@ class CompileClient:
             told(milliseconds)
 
     def _begin(self) -> None:
-        """Sends the first order; where that can't be, all are told to do without."""
+        """Send the first request; where the process cannot be started, all callers are told to compile themselves."""
         try:
             if self._failures < TRIES:
                 self._helper.ask(self._orders[0].key)
@@ -214,11 +214,11 @@ class CompileClient:
 
 
 def _nobody(milliseconds: float) -> None:
-    """Waits."""
+    """A caller that does not wait."""
 
 
 def _has_cache() -> bool:
-    """As far as the environment says; the helper finds out the rest."""
+    """Whether the environment leaves the driver's disk cache on; the helper finds out the rest."""
     disabled = ("MESA_SHADER_CACHE_DISABLE", "MESA_GLSL_CACHE_DISABLE")
     if any(os.environ.get(name, "").lower() in DISABLED for name in disabled):
         return False
@@ -226,7 +226,7 @@ def _has_cache() -> bool:
 
 
 def _prune(records: Path) -> None:
-    """Forgets the older half of too many."""
+    """Delete the older half of the records where there are too many."""
     with suppress(OSError):  # another server's renderer prunes them as well
         found = sorted(records.iterdir(), key=lambda path: path.stat().st_mtime)
         for path in found[: len(found) - RECORDS // 2] if len(found) > RECORDS else []:
@@ -234,6 +234,6 @@ def _prune(records: Path) -> None:
 
 
 def records() -> Path:
-    """Where an empty file says of a kernel that it is in the driver's cache: beside that."""
+    """The folder beside the driver's cache in which an empty file says that a kernel is in there."""
     base = os.environ.get("MESA_SHADER_CACHE_DIR") or os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache"
     return Path(base) / "sunbox" / "kernels"

@@ -70,7 +70,7 @@ def main() -> int:
 
 @contextmanager
 def _alone(record: Path, end: socket.socket) -> Iterator[None]:
-    """While nobody else compiles this: one whose renderer was lost may. Raises channel.Closed when ours is lost."""
+    """Wait for a lock, so that no other process compiles the same kernel. Raises channel.Closed."""
     path = record.with_suffix(".lock")
     try:
         record.parent.mkdir(parents=True, exist_ok=True)

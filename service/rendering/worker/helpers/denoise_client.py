@@ -1,4 +1,4 @@
-"""The renderer's hold on the process that denoises: one picture at a time, and nobody waits for it."""
+"""The renderer's side of the process that denoises: one picture at a time, and no task waits for it."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ class DenoiseResult:
 
 
 class DenoiseClient:
-    """Its process starts with the first order and ends when idle for a while."""
+    """Denoises in a process that starts at the first request and ends when idle for a while."""
 
     def __init__(self) -> None:
-        self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why it does nothing
+        self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why nothing is denoised
         self._helper = HelperProcess("service.rendering.worker.helpers.denoise_main")
         self._told: Callable[[DenoiseResult], None] | None = None
         self._deaths = 0
@@ -70,7 +70,7 @@ class DenoiseClient:
 
     @property
     def ends(self) -> list[socket.socket]:
-        """Where it may be heard from."""
+        """The sockets to wait on."""
         return self._helper.ends
 
     @property
@@ -83,7 +83,7 @@ class DenoiseClient:
         self._helper.ask(order)
 
     def hear(self) -> None:
-        """Hands on what was denoised, if anything was."""
+        """Pass on a denoised picture, if there is one."""
         try:
             delivery: DenoiseResult = self._helper.hear()
         except BlockingIOError:
@@ -106,7 +106,7 @@ class DenoiseClient:
             told(delivery)
 
     def sleep(self, other: socket.socket | None = None, timeout_s: float | None = None) -> None:
-        """Until there is something to hear here, or from `other`."""
+        """Sleep until there is an answer here, or a message on `other`."""
         select.select([*self.ends, *([] if other is None else [other])], [], [], timeout_s)
 
     def close(self) -> None:

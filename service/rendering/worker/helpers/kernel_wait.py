@@ -1,4 +1,4 @@
-"""Waiting for a kernel that a helper compiles, so that nobody else has to."""
+"""Waits for a kernel that a helper compiles, so that other tasks go on meanwhile."""
 
 from __future__ import annotations
 

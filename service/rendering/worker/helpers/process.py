@@ -1,4 +1,4 @@
-"""A process beside the renderer that does one kind of work for it: begun when first asked, ended when not needed."""
+"""A process beside the renderer that does one kind of work for it: started on demand, ended when not needed."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class HelperProcess:
 
     @property
     def ends(self) -> list[socket.socket]:
-        """Where it may be heard from."""
+        """The sockets to wait on."""
         return [] if self._end is None else [self._end]
 
     @property
@@ -37,7 +37,7 @@ class HelperProcess:
         return None if self._process is None else self._process.pid
 
     def ask(self, message: object) -> None:
-        """Raises channel.Closed where it ends as soon as it begins, OSError where it can't be started."""
+        """Send a request. Raises channel.Closed where the process ends at once, OSError where it cannot start."""
         try:
             channel.send(self._begin(), message)
         except channel.Closed:  # it had just ended, being idle
@@ -45,7 +45,7 @@ class HelperProcess:
             channel.send(self._begin(), message)
 
     def hear(self) -> Any:
-        """What it said. Raises BlockingIOError when that is nothing, channel.Closed when it has ended."""
+        """The next answer. Raises BlockingIOError where there is none, channel.Closed when the process has ended."""
         if self._end is None:
             raise BlockingIOError
         return channel.receive(self._end)

@@ -1,4 +1,4 @@
-"""How fast a picture's samples come and its noise falls, of late; and how long the rest will so take."""
+"""Estimates the time left from how fast samples have come and noise has fallen of late."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ class EtaEstimate:
         self._noise: tuple[int, float] | None = None
 
     def passed(self, samples: int, elapsed_s: float) -> None:
-        """So many are complete now."""
+        """Note how many samples are complete now."""
         if samples > self._latest[0]:
             self._pass_s = elapsed_s - self._latest[1]
             self._latest = samples, elapsed_s
@@ -37,7 +37,7 @@ class EtaEstimate:
                 self._marks.append(self._latest)
 
     def heard(self, samples: int, noise: float | None) -> None:
-        """The noise of so many."""
+        """Note the noise at this number of samples."""
         if noise is None or (self._noise is not None and samples <= self._noise[0]):
             return
         self._noise = samples, noise
@@ -45,7 +45,7 @@ class EtaEstimate:
             self._noises.append(self._noise)
 
     def eta_s(self, stop: StopRule, elapsed_s: float) -> float | None:
-        """Seconds from `elapsed_s` to the first of the limits; None: can't be said."""
+        """Seconds from `elapsed_s` to the first of the limits; None where there is too little to go by."""
         totals = [] if stop.time_limit is None else [stop.time_limit]
         if stop.max_samples is not None and self._latest[0]:
             totals.append(self._time_of(stop.max_samples))
@@ -55,7 +55,7 @@ class EtaEstimate:
         return max(0.0, min(totals) - elapsed_s) if totals else None
 
     def _time_of(self, samples: float) -> float:
-        """By the rate over as many samples as are still to come, where there were as many."""
+        """The time of a sample count, by the rate over as many past samples as are still to come."""
         taken, seconds = self._latest
         more = max(samples - taken, LEAST_SHARE * taken)
         marks = [mark for mark in self._marks if mark[0] < taken and (mark[0] >= SETTLED or mark[0] == 0)]
@@ -73,7 +73,7 @@ class EtaEstimate:
         return max(float(TRUSTED_SAMPLES), wanted, (1 + LEAST_LEFT) * max(samples, self._latest[0]))
 
     def _line(self, samples: int, noise: float) -> tuple[float, float]:
-        """The logarithm of the noise of so many samples, and the power of these with which it falls."""
+        """The logarithm of the noise at a number of samples, and the power of these with which it falls."""
         marks = [(math.log(n), math.log(each)) for n, each in self._noises if n * LOOK_BACK >= samples]
         last = math.log(noise)
         if not marks:

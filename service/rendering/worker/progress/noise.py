@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from gpu import Picture
 
-PAUSE = 20  # times what reading took until the next reading, which so costs 5 % at most
+PAUSE = 20  # times the duration of a reading until the next one: readings cost 5 % at most
 
 
 class NoiseReading:

@@ -1,4 +1,4 @@
-"""How far one task's picture is, when that is enough, and what there is to tell of it."""
+"""Tracks one task's progress: samples, time and noise, when the render should end, and what is reported."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ if TYPE_CHECKING:
 
 class ProgressTracker:
     def __init__(self, renderer: Renderer) -> None:
-        self.generation = 0  # of what is there
+        self.generation = 0  # the generation that is rendered
         self.interactive = False  # a person looks on, and may edit at any moment
         self.stop = StopRule()
         self.reason: Reason | None = None  # why it ended
@@ -26,7 +26,7 @@ class ProgressTracker:
         self.restart()
 
     def restart(self) -> None:
-        """At zero samples; what was learnt of their price stays."""
+        """Start again at zero samples; the measured cost of a sample stays."""
         self.truncated.restart()
         self.clock, self.meter, self.eta = Clock(), NoiseReading(), EtaEstimate()
         self.even = True  # as many samples in every pixel, as far as is known
@@ -42,13 +42,13 @@ class ProgressTracker:
         return Progress(samples, noise, elapsed_s, None if stopped else eta, self.truncated.shares)
 
     def noise(self, residency: Residency, fresh: bool = False) -> float | None:
-        """Of the picture at full size, as the meter has it."""
+        """The noise of the picture at full size, as last measured."""
         noise = self.meter.read(residency.full, fresh)
         self.eta.heard(self.meter.at, noise)
         return noise
 
     def cap(self, residency: Residency) -> int:
-        """How many samples to trace for: all, or what fits into the time, so that every pixel ends with as many."""
+        """How many samples to aim at: all, or as many as fit into the time; every pixel ends with the same number."""
         limit, samples = self.stop.max_samples or MAX_SAMPLES, residency.full.samples
         if residency.full.under_way[0] and reached(self.stop, samples, self.meter.noise) is not None:
             return samples + residency.full.under_way[0]  # see `enough`
@@ -59,7 +59,7 @@ class ProgressTracker:
         return min(limit, samples + max(1, int(0.5 * left_s / sample_s) if sample_s else 1))
 
     def enough(self, residency: Residency) -> Reason | None:
-        """Why it ends now, if it does."""
+        """The reason to end now; None to go on."""
         noise = self.noise(residency) if self.stop.target_noise is not None else None
         reason = reached(self.stop, residency.full.samples, noise)
         if residency.full.under_way[0]:  # the pass is finished first, so that as many samples give the same picture

@@ -1,4 +1,4 @@
-"""When a render has had enough, and what time it is by its own clock."""
+"""When a render ends, by its limits and its own clock."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ class Clock:
             self._began = self._ended = time.monotonic()
 
     def lap(self) -> None:
-        """A dispatch has ended."""
+        """Note that a dispatch has ended."""
         self._ended = time.monotonic()
 
     def set(self, elapsed_s: float) -> None:

@@ -1,4 +1,4 @@
-"""The share of this scene's light that bounces beyond each preset's would add: measured when a picture affords it."""
+"""The share of this scene's light that bounces beyond each preset's would add, measured beside the render."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if TYPE_CHECKING:
     from gpu import Picture, Renderer
 
 LIMITS = (3, 5, 8, 16, 64)  # of the quality presets
-WORTH = 50  # as many times its own paths are to be in the picture first: 2 % of its time, as some are longer
+WORTH = 50  # the estimate starts once the picture holds 50 times its paths: it costs 2 % of the render at most
 
 log = logging.getLogger(__name__)
 
@@ -24,7 +24,7 @@ class TruncatedLight:
         self._given_up = False
 
     def restart(self) -> None:
-        """Another picture, or none."""
+        """Forget the measurement: the picture is another one, or none."""
         self.cancel()
         self.shares, self._given_up = None, False
 
@@ -35,7 +35,7 @@ class TruncatedLight:
         self._steps = None
 
     def step(self, picture: Picture) -> bool:
-        """A slice of measuring, where that is due."""
+        """Measure for a slice, where that is due."""
         if self.shares is not None or self._given_up:
             return False
         settings = picture.settings

@@ -1,4 +1,4 @@
-"""What a client is shown.
+"""The frames and images that a client gets.
 
 frames            frames and images of a task's picture, on demand
 fallback_preview  first frames by a kernel for many scenes, until a scene's own is compiled

@@ -1,4 +1,4 @@
-"""The denoised form of one task's picture: whether it is wanted, when it is due, and the newest there is."""
+"""The denoised form of one task's picture: whether it is wanted, when it is due, and the newest one."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class Denoised:
 
 class DenoisePolicy:
     def __init__(self, denoiser: DenoiseClient, yields: bool) -> None:
-        """`yields`: the renderer computes where the denoiser does, and goes on when that is through."""
+        """`yields`: renderer and denoiser share the processor, so that tracing pauses while a picture is denoised."""
         self.wanted = False
         self.latest: Denoised | None = None
         self.pending = False
@@ -43,7 +43,7 @@ class DenoisePolicy:
         self.restart()
 
     def restart(self) -> None:
-        """Another picture: what there was, and what is under way, is worth nothing."""
+        """Begin anew with another picture: forget the denoised one and any under way."""
         self.latest, self.pending, self._failed = None, False, None
         self._age += 1
         self._due_at = 0.0
@@ -56,12 +56,12 @@ class DenoisePolicy:
 
     @property
     def holds(self) -> bool:
-        """The denoiser needs the processor that would trace this picture."""
+        """Whether tracing pauses, as the denoiser needs the processor."""
         return self.pending and self._yields and not self._denoiser.late
 
     @property
     def under_way(self) -> bool:
-        """A denoised picture will be there soon."""
+        """Whether a denoised picture will be there soon."""
         return (self.pending or not self._denoiser.busy) and not self._denoiser.late
 
     def covers(self, aov: str, noise: float | None) -> bool:
@@ -69,7 +69,7 @@ class DenoisePolicy:
         return self.wanted and aov == "color" and self.warning is None and not (noise is not None and noise < CLEAN)
 
     def has(self, samples: int) -> Denoised | None:
-        """The final form of a picture of so many samples."""
+        """The final denoised form of a picture with that many samples; None where there is none yet."""
         latest = self.latest
         return latest if latest is not None and latest.fine and latest.progress.samples == samples else None
 
@@ -81,7 +81,7 @@ class DenoisePolicy:
         return samples > self.latest.progress.samples and time.monotonic() >= self._due_at
 
     def begin(self, picture: Picture, progress: Progress, fine: bool, told: Callable[[], None]) -> None:
-        """Has the picture denoised as it is now; `told` is called when that is done or has failed."""
+        """Have the picture denoised as it is now; `told` is called when that is done or has failed."""
         self.pending = True
         age, began = self._age, time.monotonic()
 

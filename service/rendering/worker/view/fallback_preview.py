@@ -21,7 +21,7 @@ from service.rendering.worker.view.frames import SLICE_S, pixels_of
 if TYPE_CHECKING:
     from gpu import Renderer, RenderSettings, Scene, SceneArrays
 
-MOST_BYTES = 1 << 28  # of a scene: it is on the device twice, and of this size it loads in .1 s
+MOST_BYTES = 1 << 28  # of a scene: it is on the device twice, and of this size it loads in 0.1 s
 ENOUGH_S = 0.25  # of tracing: on llvmpipe it takes from the compiler what it is there to bridge
 LARGEST = 1 / 2  # of the scales
 BEGIN_S = 4e-6  # a sample of a pixel, before there was one (llvmpipe with 2 cores)
@@ -30,12 +30,12 @@ log = logging.getLogger(__name__)
 
 
 class FallbackPreview:
-    """Between `begin` and `release` there is a picture of that update."""
+    """Shows an update between `begin` and `release` with a kernel that suits many scenes."""
 
     def __init__(
         self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, spare: CompileClient | None
     ) -> None:
-        """`spare` compiles in time that nobody wants; without it there is never anything to see."""
+        """`spare` compiles in idle time; without it there is never a preview."""
         self.generation = 0
         self.scale: float | None = None  # of what there is to see
         self._number, self._send, self._renderer, self._spare = number, send, renderer, spare
@@ -56,24 +56,24 @@ class FallbackPreview:
 
     @property
     def due(self) -> bool:
-        """There is more to trace."""
+        """Whether there is more to trace."""
         return self._ladder is not None and (self.scale != self._next or self._spent_s < ENOUGH_S)
 
     def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> None:
-        """Has the kernel compiled, some time, that edits of these will need."""
+        """Have the kernel compiled in idle time that edits of these arrays will need."""
         key = fallback.kernel_key(arrays, settings)
         if key is not None and self._spare is not None:
             self._spare.prepare([key])
 
     def can(self, wanted: KernelRequest) -> bool:
-        """Whether there would be anything to see at once."""
+        """Whether the update could be shown at once."""
         if self._spare is None or min(wanted.settings.width, wanted.settings.height) * LARGEST < SMALLEST_SIDE:
             return False
         key = fallback.kernel_key(wanted.arrays, wanted.settings)
         return key is not None and self._spare.has(key) and scene_bytes(wanted.arrays) <= MOST_BYTES
 
     def begin(self, wanted: KernelRequest, generation: int) -> None:
-        """Begins with what `can` be shown; where it can't after all, there is nothing to see."""
+        """Begin to show what `can` be shown; where loading fails, nothing is shown."""
         settings = fallback.settings_for(wanted.settings)
         key = fallback.kernel_key(wanted.arrays, wanted.settings)
         assert settings is not None and key is not None and self._spare is not None
@@ -96,7 +96,7 @@ class FallbackPreview:
             self.release()
 
     def step(self) -> int:
-        """Traces for a slice; how many samples of pixels."""
+        """Trace for a slice; how many samples of pixels that were."""
         try:
             return 0 if self._ladder is None else self._trace(self._ladder)
         except OutOfMemory as error:
@@ -121,7 +121,7 @@ class FallbackPreview:
         return next((s for s in scales if ladder.pixels(s) * self._pixel_s <= seconds), scales[-1])
 
     def answer(self, want: Want | None) -> bool:
-        """Sends the frame that is wanted if there is something new to see in it."""
+        """Send the frame that is wanted, if it would show something new."""
         if want is None or self.scale is None or self._ladder is None or want.view.aov in FIRST_HIT_AOVS:
             return False
         picture = self._ladder.picture(self.scale)
@@ -135,7 +135,7 @@ class FallbackPreview:
         return True
 
     def shown(self, generation: int) -> float:
-        """The scale at which that one was seen; 0: not at all."""
+        """The scale at which that generation was shown; 0 where it was not."""
         return self._shown[1] if self._shown[0] == generation else 0.0
 
     def release(self) -> None:

@@ -1,4 +1,4 @@
-"""One task's picture as it is looked at: frames that are wanted, readings, and the denoised form of both."""
+"""One task's picture as clients see it: frames and images on demand, and the denoised form of both."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU i
 
 
 class FrameSource:
-    """What cannot be shown at once is prepared in steps, while `due`."""
+    """Frames and images of a task; what cannot be shown at once is prepared in steps, while `due`."""
 
     def __init__(
         self,
@@ -47,22 +47,22 @@ class FrameSource:
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
         self._denoised_reads: list[Read] = []  # waiting for the denoised picture
-        self._denoiser_answered = False  # the denoiser has spoken, and who waits for that is to be told
+        self._denoiser_answered = False  # the denoiser has answered, and pending reads are to be served
 
     def restart(self) -> None:
-        """Another picture: nothing of it was seen yet."""
+        """Begin with another picture, of which nothing was shown yet."""
         self.part()
         self.denoising.restart()
         self._denoiser_answered = False
         self.scale = None
 
     def part(self) -> None:
-        """The pictures are leaving the device."""
+        """Let go of the pictures, which are about to leave the device."""
         self._guided = None
         self._wait.forget()
 
     def forget(self) -> None:
-        """Nothing is there any more, which is what who waits for a reading is given."""
+        """Forget everything; pending reads are answered with no image."""
         reads = self._reads + self._denoised_reads
         self._reads, self._denoised_reads = [], []
         self.restart()
@@ -72,20 +72,20 @@ class FrameSource:
 
     @property
     def awaited(self) -> bool:
-        """Somebody waits for something that takes steps."""
+        """Whether a client waits for something that takes steps."""
         return self._guided is not None or bool(self._reads) or self._denoiser_answered or self._denoising_due
 
     @property
     def due(self) -> bool:
-        """There is a step to be done."""
+        """Whether there is a step to be done."""
         return self.awaited and not self._wait.compiling
 
     def step(self) -> bool:
-        """Does it; whether there was one."""
+        """Do a step; whether there was one."""
         return self._denoise() or self._trace_guides()
 
     def answer(self) -> bool:
-        """Sends the frame that is wanted if there is something new to see in it."""
+        """Send the frame that is wanted, if it would show something new."""
         want, shown, tracker = self.want, self.scale, self._tracker
         if want is None or shown is None:
             return False
@@ -165,7 +165,7 @@ class FrameSource:
         return self._tracker.reason is not None or bool(self._denoised_reads)
 
     def _denoise(self) -> bool:
-        """A slice of what denoising needs on this side, where any is due."""
+        """Do a slice of the renderer's part of denoising, where any is due."""
         if self._denoiser_answered:
             self._denoiser_answered = False
             reads, self._denoised_reads = self._denoised_reads, []
@@ -209,7 +209,7 @@ class FrameSource:
         return True
 
     def _trace_guides(self) -> bool:
-        """A slice of them, where somebody waits for them; then the readings that they held up."""
+        """Trace a slice of the AOVs of the first hit where a read waits for them; then answer those reads."""
         picture = self._guided
         if picture is None and self._reads and self._residency.loaded is not None:  # it was aside meanwhile
             picture = self._residency.full
@@ -226,7 +226,7 @@ class FrameSource:
 
 
 def pixels_of(picture: Picture, view: View, clean: Denoised | None) -> np.ndarray:
-    """What is shown of it: (height, width, 4) as the view wants it."""
+    """The pixels of a picture, (height, width, 4), as the view wants them."""
     color = clean.pixels if clean else None
     if view.encoding == "linear":
         return picture.read(view.aov) if color is None else color
