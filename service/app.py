@@ -1,4 +1,4 @@
-"""The application: routes and the editor's files; and the server that runs it until it is told to end."""
+"""The application, which serves the routes and the editor's files, and the server that runs it."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ from service.storage import storage
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # proxies cut connections that are idle for a minute
 KEEP_ALIVE_S = 150  # longer than proxies keep idle connections (Caddy two minutes), or they meet a closed one
-TICKS = 10  # of uvicorn, ten a second: how often connections are looked at
+TICKS = 10  # of uvicorn, ten a second, between two checks of the connections
 GRACE_S = 10  # for answers under way when the server ends
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
 DESCRIPTORS = 65_536
@@ -101,7 +101,7 @@ def create_app(config: Config) -> FastAPI:
 
 
 def run(config: Config) -> int:
-    """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 when the address can't be had."""
+    """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 where the address cannot be used."""
     _give_memory_back()
     sys.setswitchinterval(SWITCH_S)
     if unknown := unknown_variables():
@@ -143,8 +143,8 @@ def run(config: Config) -> int:
 
 
 def _take_descriptors() -> int:
-    """As many as the system lets this process have; how many that is. Clients, scenes and assets in memory hold some
-    each, and what a shell gives its programs by default (1 024) is meant for such as wait with select().
+    """Raise the limit of descriptors as far as the system allows; what it is then. Clients, scenes and assets
+    take some each, and what a shell gives its programs by default (1 024) is meant for such as wait with select().
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
@@ -155,7 +155,7 @@ def _take_descriptors() -> int:
 
 
 class _Server(uvicorn.Server):
-    """Says where it is once it answers; ends by closing its clients as going away, with exit code 0."""
+    """Prints its address once it answers; at its end it closes clients as going away, with exit code 0."""
 
     def __init__(self, config: uvicorn.Config, state: AppState, address: str) -> None:
         super().__init__(config)
@@ -187,7 +187,7 @@ class _Server(uvicorn.Server):
 
     @contextlib.contextmanager
     def capture_signals(self) -> Iterator[None]:
-        """uvicorn's own raises the signal again in the end, which would be the exit code."""
+        """Handle signals until the end; uvicorn's own raises the signal again, which would be the exit code."""
         loop = asyncio.get_running_loop()
         for number in (signal.SIGINT, signal.SIGTERM):
             loop.add_signal_handler(number, self._end)
@@ -233,7 +233,7 @@ async def _docs() -> Response:
 
 
 def _give_memory_back() -> None:
-    """Has glibc return freed blocks of a megabyte at once. It learns to keep ones of up to 32 MiB for the next, and
+    """Make glibc return freed blocks of a megabyte at once. It learns to keep ones of up to 32 MiB for the next, and
     here they are a scene's arrays: 95 MB stayed after a mesh of a million triangles was packed."""
     with contextlib.suppress(AttributeError):  # another C library
         libc = ctypes.CDLL(None)

@@ -1,4 +1,4 @@
-"""Bodies that are JSON: taken in, counted, and parsed where they keep nobody waiting."""
+"""JSON bodies: received, counted, and parsed where no other request waits for that."""
 
 from __future__ import annotations
 
@@ -15,23 +15,23 @@ from service.rendering.executors import parsing, waiting_for_parsers
 from service.rendering.requests.parser_pool import ParserPool
 from service.rendering.requests.request_parser import PARSERS, Kind
 
-# The last three are what programs say who have not been told what they send (curl, urllib, fetch).
+# The last three are the defaults of programs that set no content type (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
-SMALL = 64 * 1024  # bytes that are parsed in some ms: a process beside would take as long to be told
+SMALL = 64 * 1024  # bytes that are parsed in some ms: handing them to another process would take as long
 AT_ONCE = 4  # as many of the largest bodies may wait
 RETRY_S = 5
 
 
 class Bodies:
-    """Of the whole service."""
+    """The JSON bodies of all requests."""
 
     def __init__(self, config: Config) -> None:
         self._config = config
         self._pool = ParserPool(config)
-        self._held = 0  # bytes of large ones
+        self._held = 0  # bytes of large bodies in memory
 
     async def parsed(self, kind: Kind, body: bytearray) -> Any:
-        """What PARSERS[kind] makes of it, or raises; TooLarge too."""
+        """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge."""
         if len(body) <= SMALL:
             return await parsing(partial(PARSERS[kind], self._config, body))
         return await waiting_for_parsers(partial(self._pool.parse, kind, body))
@@ -49,7 +49,7 @@ class Bodies:
         try:
             async for chunk in request.stream():
                 received += len(chunk)
-                if received > self._config.max_json:  # taken to its end, so that its sender hears the answer
+                if received > self._config.max_json:  # received to its end, so that its sender reads the answer
                     body = bytearray()
                     continue
                 body += chunk

@@ -22,7 +22,7 @@ Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
 class ConfigError(Exception):
-    """The environment says something that cannot be; for whoever started the service."""
+    """A variable of the environment is invalid; the text is for the person who started the service."""
 
 
 def _default_data_dir() -> Path:
@@ -132,13 +132,13 @@ class Config(BaseSettings):
 
     @property
     def limits(self) -> dict[str, float | None]:
-        """What a caller may run into, by name; None: no such limit."""
+        """The limits that a caller may meet, by name; None: no such limit."""
         return {name: getattr(self, name) for name in type(self).model_fields if name.startswith(LIMITS)}
 
     @model_validator(mode="before")
     @classmethod
     def _given(cls, values: dict[str, Any]) -> dict[str, Any]:
-        """Leaves out what is set to nothing, as `SUNBOX_DEVICE: ${SUNBOX_DEVICE:-}` in a compose file does.
+        """Leave out variables that are set to nothing, as `SUNBOX_DEVICE: ${SUNBOX_DEVICE:-}` in a compose file does.
 
         Not the keys: a secret that is empty by mistake would open the service to everybody.
         """

@@ -1,4 +1,4 @@
-"""What a process gives up that works on what strangers sent: it can cost no more than its limits."""
+"""What a process gives up before it works on strangers' data, so that these can cost no more than its limits."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ CLONE_NEWUSER, CLONE_NEWNET = 0x10000000, 0x40000000
 
 
 def confine(niceness: int) -> None:
-    """Never a core file, no network where the kernel lets us drop it, and the first to go when memory runs out."""
+    """Write no core file, drop the network where the kernel allows it, be the first to go when memory runs out."""
     _limit(resource.RLIMIT_CORE, 0)
     libc = ctypes.CDLL(None, use_errno=True)
     if libc.unshare(CLONE_NEWNET) != 0:
@@ -25,7 +25,7 @@ def confine(niceness: int) -> None:
 
 
 def bound(memory: int, seconds: float) -> None:
-    """From now on at most so many bytes more than it has taken already, and so much more processor time."""
+    """Allow this process `memory` more bytes than it has taken, and `seconds` more processor time."""
     with open("/proc/self/statm") as sizes:
         taken = int(sizes.read().split()[0]) * mmap.PAGESIZE
     _limit(resource.RLIMIT_AS, taken + memory)
@@ -34,12 +34,12 @@ def bound(memory: int, seconds: float) -> None:
 
 
 def unbind() -> None:
-    """Takes the bound on memory back, so that an answer can be given."""
+    """Lift the bound on memory, so that an answer can be sent."""
     hard = resource.getrlimit(resource.RLIMIT_AS)[1]
     resource.setrlimit(resource.RLIMIT_AS, (hard, hard))
 
 
 def _limit(which: int, value: int) -> None:
-    """The soft limit, as far as the hard one that we were given lets us; it can be lifted again for the next work."""
+    """Set the soft limit, within the hard one; it can be lifted again for the next work."""
     hard = resource.getrlimit(which)[1]
     resource.setrlimit(which, (value if hard == resource.RLIM_INFINITY else min(value, hard), hard))

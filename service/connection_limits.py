@@ -20,12 +20,12 @@ from typing import Any, Literal
 import h11
 
 HEAD_S = 10.0  # for a request's head, from its first byte, or from the connection
-REST_S = 30.0  # for the rest of a body whose answer was sent already
+REST_S = 30.0  # for the rest of a body that was answered already
 UNREAD_S = 30.0  # in which an answer must go on by LEAST_RATE: a client that vanished or stalled takes nothing
 LEAST_RATE = 1024  # bytes a second
 SETTLED_S = 1.0  # a head that takes longer makes room for another connection where there is none
 REFUSALS = 64  # connections beyond the most that are still told why they are refused
-NETWORK_BITS = 64  # of an IPv6 address: what one customer of a provider has
+NETWORK_BITS = 64  # of an IPv6 address that one customer of a provider has
 
 Owed = Literal["head", "rest", "reading"]
 
@@ -40,7 +40,7 @@ class _Wait:
 
 
 class Watch:
-    """Ends connections on which nothing goes on. `look` is to be called about once a second."""
+    """Ends connections without progress. `look` is to be called about once a second."""
 
     def __init__(self) -> None:
         self._waits: dict[Any, _Wait] = {}
@@ -55,7 +55,7 @@ class Watch:
         self._waits = waits
 
     def _wait(self, connection: Any, now: float) -> _Wait | None:
-        """What it has been waiting for without enough of it, and since when."""
+        """What a connection has been waiting for in vain, and since when."""
         owed = _owed(connection)
         if owed is None:
             return None
@@ -94,7 +94,7 @@ BUSY = (2, 0.0)
 
 
 def _rest_order(connection: Any) -> tuple[int, float]:
-    """Who goes first: the longest idle between two requests, then the longest without a whole first one."""
+    """A key that sorts connections that make room: those idle between requests first, the longest idle first."""
     idle = getattr(connection, "timeout_keep_alive_task", None)
     if idle is not None:
         return 0, idle.when()
@@ -104,7 +104,7 @@ def _rest_order(connection: Any) -> tuple[int, float]:
 
 
 def _owed(connection: Any) -> Owed | None:
-    """What a connection of uvicorn's waits for from its client; None: for nothing, or for a next request."""
+    """What uvicorn's connection is waiting for from its client; None: for nothing, or for a next request."""
     if connection.transport.get_write_buffer_size():
         return "reading"
     if not hasattr(connection, "cycle"):  # a WebSocket's, which has pings
@@ -120,7 +120,7 @@ def _limit_s(owed: Owed) -> float:
 
 
 def _delivered(transport: Any) -> int:
-    """Bytes that the other side has acknowledged: the kernel takes megabytes that nobody has read."""
+    """Bytes that the other side has acknowledged; the kernel buffers megabytes before that."""
     sent = transport.written - transport.get_write_buffer_size()
     try:
         queued = fcntl.ioctl(transport.get_extra_info("socket").fileno(), termios.TIOCOUTQ, b"\0" * 4)
@@ -130,7 +130,7 @@ def _delivered(transport: Any) -> int:
 
 
 def _network(connection: Any) -> str:
-    """Whose it is, as far as an address tells: all that one customer of a provider can come from."""
+    """The network of an address: all the addresses that one customer of a provider can use."""
     return _network_of(connection.client[0] if connection.client else "")
 
 

@@ -1,4 +1,4 @@
-"""Connections below HTTP: how they are listened for, how many there are, how bytes are written to them."""
+"""Connections below HTTP: how they are accepted, how many are allowed, how bytes are written to them."""
 
 from __future__ import annotations
 
@@ -42,8 +42,8 @@ class JoinedWrites(asyncio.Transport):
         super().__init__()
         self._transport = transport
         self._pending: list[bytes] = []
-        self._size = 0  # of these
-        self.written = 0  # bytes in all
+        self._size = 0  # bytes of these
+        self.written = 0  # bytes since the connection began
         self._loop = asyncio.get_running_loop()
 
     def write(self, data: Any) -> None:
@@ -70,7 +70,7 @@ class JoinedWrites(asyncio.Transport):
         self._transport.close()
 
     def abort(self) -> None:
-        """Drops what was not read yet, in the kernel too, which would go on offering it for minutes."""
+        """Drop unsent bytes, also in the kernel, which would go on offering them for minutes."""
         self._pending.clear()
         self._size = 0
         with suppress(OSError):

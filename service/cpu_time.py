@@ -1,4 +1,4 @@
-"""How much of the time that passed a process had: what it waited for a processor is not held against it."""
+"""Elapsed time minus the time a process was runnable but not scheduled (Linux schedstat)."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from collections.abc import Mapping
 from contextlib import suppress
 from pathlib import Path
 
-# Of the time by the clock that counts in any case, or a renderer that spins on a busy machine would never be noticed.
+# The share of wall time that counts in any case, or a renderer that hangs on a busy machine would never be noticed.
 # Ten steps of niceness below a dozen busy programs, a process gets a fiftieth of a processor.
 LEAST = 0.05
 
@@ -17,7 +17,7 @@ Ran = Mapping[int, tuple[int, int]]  # by thread: ns on a processor, ns ready fo
 
 
 class RunnableTime:
-    """From now on."""
+    """The time since this object was made in which a process was able to run."""
 
     def __init__(self, pid: int) -> None:
         self._pid = pid
@@ -29,7 +29,7 @@ class RunnableTime:
 
 
 def answers(link: socket.socket, pid: int, seconds: float) -> bool:
-    """Whether something comes from that process within so many seconds of its own."""
+    """Whether a message comes on `link` within `seconds` in which the process was able to run."""
     poll = select.poll()
     poll.register(link, select.POLLIN)
     runnable, left = RunnableTime(pid), seconds
@@ -41,7 +41,7 @@ def answers(link: socket.socket, pid: int, seconds: float) -> bool:
 
 
 def elapsed_s(passed_s: float, before: Ran, after: Ran) -> float:
-    """Of `passed_s` what was the process's own: all of it where it slept, was stopped or ran undisturbed."""
+    """The part of `passed_s` in which a process could run: all of it where it slept, was stopped or ran alone."""
     both = before.keys() & after.keys()
     ran_s = sum(after[thread][0] - before[thread][0] for thread in both) / 1e9
     waited_s = sum(after[thread][1] - before[thread][1] for thread in both) / 1e9
@@ -52,7 +52,7 @@ def elapsed_s(passed_s: float, before: Ran, after: Ran) -> float:
 
 
 def ran(pid: int) -> Ran:
-    """Nothing where the system does not say; then all time that passes counts."""
+    """A process's times by thread; empty where the system does not give them, so that all time counts."""
     found: dict[int, tuple[int, int]] = {}
     with suppress(OSError, ValueError):
         for thread in Path(f"/proc/{pid}/task").iterdir():

@@ -59,19 +59,19 @@ _MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
 
 
 class DamagedFile(Exception):
-    """The file of the documents can't be used; the text is for whoever started the service."""
+    """The file of the documents cannot be used; the text is for the person who started the service."""
 
 
 @dataclass(frozen=True)
 class CheckedDocument:
-    """A valid document as it is stored, and where it refers to assets, which may not be there."""
+    """A valid document as it is stored, and its references to assets, which may be missing."""
 
     body: str
     uses: list[tuple[str, str]]  # JSON pointer, reference
 
 
 def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDocument:
-    """Raises InvalidDocument with pointers from the document's root. Of a large document in seconds."""
+    """Raises InvalidDocument with pointers from the document's root. A large document takes seconds."""
     if kind == "materials":
         validated(_MATERIAL, document, "")
     else:
@@ -84,7 +84,7 @@ def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDo
 class Documents:
     """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails.
 
-    `quota` makes room for what is saved; None: there is room.
+    `quota` makes room for documents; without it there always is room.
     """
 
     def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None) -> None:
@@ -107,7 +107,9 @@ class Documents:
         except (OSError, sqlite3.Error) as error:
             if _is_full(error):
                 log.warning("could not compact the saved documents file=%s error=%s", self._path, error)
-            elif isinstance(error, sqlite3.OperationalError | OSError):  # that may pass: others have it, or rights
+            elif isinstance(
+                error, sqlite3.OperationalError | OSError
+            ):  # such an error may pass: a lock, or missing rights
                 log.error("could not open the saved documents file=%s error=%s", self._path, error)
             else:
                 raise DamagedFile(
@@ -133,14 +135,14 @@ class Documents:
         return text.encode()
 
     def put(self, kind: str, name: str, document: CheckedDocument, title: str | None = None) -> tuple[str, bool]:
-        """Saves a document in the place of what had the name; its title now, and whether nothing had it.
+        """Save a document under a name; its title, and whether the name is new.
 
         Raises InvalidDocument, with pointers from the document's root, where an asset is missing.
         """
         check_kind(kind)
         body, uses = document.body, list(dict.fromkeys(reference for _, reference in document.uses))
         key = (kind, name)
-        # Whoever makes room meanwhile spares these assets, so that a document which is refused costs nobody anything.
+        # These assets stay while others make room, so that a refused document costs no asset.
         with self._quota.pinned(uses) if self._quota else nullcontext():
             self._find_assets(document, uses)
             room = self._quota.room(len(body.encode())) if self._quota else nullcontext()
@@ -177,7 +179,7 @@ class Documents:
 
     @property
     def bytes(self) -> int:
-        """What the documents take, without the log beside them, which goes when nobody has the file open."""
+        """The bytes of the documents, without the log beside them, which is deleted when the file is closed."""
         if not self._is_there():
             return 0
         with self._open() as database:

@@ -1,7 +1,7 @@
 """Large answers: sent in pieces, as the client takes them, from files that hold no memory.
 
-Pictures are written one at a time for each client, so that whoever asks for many waits for himself, and what one
-client does not fetch leaves room for others.
+Pictures are written one at a time for each client, so that a client that asks for many delays itself alone, and what
+one client does not fetch leaves room for others.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ log = logging.getLogger(__name__)
 
 
 class Pieces:
-    """ASGI middleware: a body in memory goes out in pieces too; nothing is copied whole into the connection."""
+    """ASGI middleware that sends bodies from memory in pieces: nothing is copied whole into the connection."""
 
     def __init__(self, app: ASGIApp) -> None:
         self._app = app
@@ -87,13 +87,13 @@ async def present(receive: Receive) -> AsyncIterator[Callable[[], bool]]:
 
 
 async def disconnected(receive: Receive) -> None:
-    """Returns when nobody is there any more."""
+    """Return once the client has gone away."""
     while (await receive())["type"] != "http.disconnect":
         pass
 
 
 class Written:
-    """A picture's file. It has no name, and is gone with the last that refers to this object."""
+    """A picture's file. It has no name, and is deleted with the last reference to this object."""
 
     def __init__(self, file: BinaryIO) -> None:
         self.file = file
@@ -112,7 +112,7 @@ class Downloads:
 
     @asynccontextmanager
     async def turn(self, client: str) -> AsyncIterator[None]:
-        """The client's turn to have a picture written, of which each has one at a time."""
+        """Wait for the client's turn to have a picture written: each client has one at a time."""
         mine = self._turns.setdefault(client, asyncio.Lock())
         async with mine, self._room:
             yield
@@ -133,7 +133,7 @@ class Downloads:
         return self._written.get(key)
 
     def admit(self, client: str, most_bytes: int) -> None:
-        """Raises Unavailable where so many more would be too much, for the client or for all."""
+        """Raise Unavailable where that many more bytes would be too much, for the client or for all."""
         held, total = self._held[client], self._held.total()
         if (held and held + most_bytes > ROOM // 2) or (total and total + most_bytes > ROOM):
             raise Unavailable("Too much is being sent already, to clients that take it slowly.", RETRY_S)
@@ -160,7 +160,7 @@ class Downloads:
             return tempfile.TemporaryFile()
 
     def keep(self, client: str, key: Hashable | None, written: Written) -> None:
-        """Counts a picture as long as it is being sent; with `key` another request for it finds it."""
+        """Count a picture while it is being sent; with `key`, `find` leads other requests to it."""
         if key is not None:
             self._written[key] = written
         self._held[client] += written.bytes

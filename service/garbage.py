@@ -1,4 +1,4 @@
-"""Python's cyclic garbage collector, out of the way of work that makes many objects and keeps them.
+"""Pauses Python's cyclic garbage collector for work that makes many objects and keeps them.
 
 While the number of objects grows it looks through all of them again and again, and stops all threads meanwhile for
 tenths of a second: a third of the time of an import of 60 000 nodes.
@@ -18,7 +18,7 @@ _was_enabled = False
 
 @contextmanager
 def collector_paused() -> Iterator[None]:
-    """No cycles are collected meanwhile; several threads may ask for it at once."""
+    """Pause the collector while the context lasts; several threads may do so at once."""
     global _pauses, _was_enabled
     with _lock:
         if _pauses == 0:

@@ -1,4 +1,4 @@
-"""What stands between the network and the routes: who may ask, from which hosts and pages, and how much a body holds.
+"""Stands between the network and the routes: checks keys, hosts and origins, and bounds bodies.
 
 Plain ASGI. Refusals are the errors of `problems.py`, answered by `refuse`; a stream is accepted, then closed.
 """
@@ -32,7 +32,7 @@ LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}
 CLOSE_CODES: dict[type[ServiceError], int] = {Unauthorized: 4401, Forbidden: 4403}  # of the stream
 REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
-RETRY_S = 5  # when to come again with a body that there is no room for
+RETRY_S = 5  # for a client to retry a body for which there is no room
 LEAST_RATE, FREE_S = 1024, 30.0  # bytes a second that a body must come with, once it has taken so long
 LINGER_S, SILENT_S = 30.0, 2.0  # for a refused body: in all, and without a byte
 # Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are made.
@@ -64,7 +64,7 @@ class Guard:
         self._origins = {_origin(origin) for origin in config.allowed_origins}
         self._hosts = LOOPBACK_NAMES | set(config.allowed_hosts) | {host for _, host, _ in self._origins}
         self._refuse = refuse
-        self._held = 0  # bytes of bodies that are being dealt with
+        self._held = 0  # bytes of bodies in memory
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -96,7 +96,7 @@ class Guard:
             self._held -= body.received
 
     def take(self, received: int, more: int) -> None:
-        """Lets `more` bytes of a body in that has `received` already. Raises TooLarge, Unavailable."""
+        """Count `more` bytes of a body that already has `received`. Raises TooLarge, Unavailable."""
         if received + more > self._config.max_body:
             raise self._too_large()
         if self._held + more > self._config.max_bodies:
@@ -108,7 +108,7 @@ class Guard:
         return self._config.body_timeout
 
     def _owner(self, scope: Scope, headers: Headers) -> str:
-        """Whose key it is; "" where none is asked for. Raises Unauthorized."""
+        """The name of the key's owner; "" where no key is needed. Raises Unauthorized."""
         path = _route_path(scope)
         if not self._keys.asked_for or not (path == "/v1" or path.startswith("/v1/")):
             return ""
@@ -116,7 +116,7 @@ class Guard:
         return self._keys.owner(headers.get("authorization"), offered)
 
     def _check_host(self, scope: Scope, headers: Headers) -> None:
-        """A foreign name that resolves to this server is an attack on whoever browses beside it (DNS rebinding).
+        """Refuse foreign host names that resolve to this server: an attack on browsers beside it (DNS rebinding).
 
         On an address that is not loopback every name is accepted unless SUNBOX_ALLOWED_HOSTS lists the right ones.
         """
@@ -125,7 +125,7 @@ class Guard:
             raise Forbidden(f"Host {host!r} is not 127.0.0.1 or localhost, and SUNBOX_ALLOWED_HOSTS does not name it")
 
     def _check_origin(self, headers: Headers) -> None:
-        """No Origin: not a browser. Behind a proxy the scheme is unknown, so the host and port decide."""
+        """Refuse foreign origins. Programs send none. A proxy hides the scheme, so host and port decide."""
         origin = headers.get("origin")
         if origin is None or _origin(origin) in self._origins:
             return
@@ -134,7 +134,7 @@ class Guard:
             raise Forbidden(f"Origin {origin!r} may not do this: SUNBOX_ALLOWED_ORIGINS does not name it")
 
     def _grant(self, headers: Headers) -> str | None:
-        """The page's origin where it is one of those that may read answers."""
+        """The page's origin where it is one that may read answers, else None."""
         origin = headers.get("origin")
         return origin if origin is not None and _origin(origin) in self._origins else None
 
@@ -150,7 +150,7 @@ class Guard:
 
 
 class _Body:
-    """Counts what comes in: a body of unannounced length has its limit too, and one that does not go on is ended."""
+    """Counts a body as it comes in: one of unannounced length is bounded too, and one that stalls is refused."""
 
     def __init__(self, guard: Guard, receive: Receive) -> None:
         self.received = 0
@@ -235,7 +235,7 @@ async def _answer_preflight(send: Send, origin: str) -> None:
 
 
 async def _close(scope: Scope, receive: Receive, send: Send, code: int, reason: str) -> None:
-    """Accepts, so that a browser tells its page the code, and closes."""
+    """Accept a stream, so that a browser tells its page the close code, and close it."""
     await receive()
     # A browser fails the handshake when none of its offers is taken; a key is not to be sent back.
     offered = [offer for offer in scope.get("subprotocols", []) if not offer.startswith(PROTOCOL)]
@@ -244,7 +244,7 @@ async def _close(scope: Scope, receive: Receive, send: Send, code: int, reason: 
 
 
 def _route_path(scope: Scope) -> str:
-    """The path as the routes see it: below the one that the application is mounted at."""
+    """The path as the routes see it, relative to the one that the application is mounted at."""
     path: str = scope["path"]
     below = path.removeprefix(scope.get("root_path", ""))
     return below if below.startswith("/") or not below else path

@@ -1,4 +1,4 @@
-"""Keys: which of them somebody shows, and a name for its owner that gives nothing of it away."""
+"""Keys: which one a request carries, and a name for its owner that reveals nothing of the key."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ class Keys:
         return bool(self._keys)
 
     def owner(self, authorization: str | None, protocols: Sequence[str] = ()) -> str:
-        """Of the key in the `Authorization` header or among the subprotocols. Raises Unauthorized."""
+        """The owner of the key in the `Authorization` header or among the subprotocols. Raises Unauthorized."""
         scheme, _, bearer = (authorization or "").partition(" ")
         shown = [bearer.strip()] if scheme.lower() == "bearer" else []
         shown += [protocol.removeprefix(PROTOCOL) for protocol in protocols if protocol.startswith(PROTOCOL)]

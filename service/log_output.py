@@ -1,4 +1,4 @@
-"""Where log records go: to a stream, from a thread of their own in the server, and no traceback again and again."""
+"""Where log records go: to a stream, in the server from a thread of their own, each traceback once in a while."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ Place = tuple[str, ...]
 
 
 class Redacting(structlog.stdlib.ProcessorFormatter):
-    """Leaves out what only its owner may know, wherever in a line it stands, traceback included."""
+    """Removes secrets from a line, wherever they stand, tracebacks included."""
 
     def __init__(self, secrets: Iterable[str], **options: Any) -> None:
         super().__init__(**options)
@@ -44,7 +44,7 @@ class Redacting(structlog.stdlib.ProcessorFormatter):
 @dataclass
 class _Repeated:
     first: logging.LogRecord
-    until: float  # by the monotonic clock: others like it are only counted
+    until: float  # the monotonic time up to which equal tracebacks are only counted
     more: int = 0
 
 
@@ -85,7 +85,7 @@ class Output(logging.StreamHandler):  # type: ignore[type-arg]
 
 
 class Queued(QueueHandler):
-    """Takes records from any thread at once; `Written` writes them."""
+    """Takes records from any thread without waiting; `Written` writes them."""
 
     def __init__(self) -> None:
         self.records: queue.Queue[logging.LogRecord | None] = queue.Queue(MOST_QUEUED)
@@ -151,7 +151,7 @@ def _place(kind: type[BaseException] | None, error: BaseException | None, trace:
 
 
 def _without_traceback(record: logging.LogRecord) -> logging.LogRecord:
-    """Kept for seconds, it must not keep alive what the frames refer to."""
+    """A copy of an exception that keeps nothing alive to which its frames refer."""
     record = copy.copy(record)
     record.exc_info = record.exc_text = record.stack_info = None
     return record

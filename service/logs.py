@@ -32,7 +32,7 @@ Heard = Callable[[str, str, int, float], None]  # method, route, status, seconds
 
 
 def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str] = ()) -> None:
-    """Has everything that is logged through the standard library written to stderr, as `form`: "console" or "json".
+    """Have all records of the standard library's logging written to stderr, as `form`: "console" or "json".
 
     `level` is the least that is written of our own; libraries have theirs from warnings on. With `queued` a thread of
     its own writes it, so that whoever logs never waits. `secrets` are left out of every line.
@@ -75,7 +75,7 @@ def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str
 
 
 def level() -> int:
-    """The least that is logged of our own."""
+    """The level from which our own loggers write."""
     return logging.getLogger(ROOMS[0]).getEffectiveLevel()
 
 
@@ -85,7 +85,7 @@ def _uncaught(kind: type[BaseException], error: BaseException | None, trace: Tra
 
 
 def _fields(logger: Any, method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """Takes `name=%s` out of a message's text: its values become fields, and what is left is one line."""
+    """Turn each `name=%s` of a message into a field; the rest of the text is one line."""
     arguments = event.pop("positional_args", None)
     message = event["_record"].msg
     found = list(CONVERSION.finditer(message)) if isinstance(message, str) else []
@@ -100,7 +100,7 @@ def _fields(logger: Any, method: str, event: MutableMapping[str, Any]) -> Mutabl
 
 
 def _text(match: re.Match[str], value: Any) -> str:
-    """What stands in the text instead of a conversion."""
+    """The text in place of a conversion."""
     if match["how"] == "%":
         return f"{match['field'] or ''}%"
     return "" if match["field"] else f"%{match['how']}" % (value,)
@@ -113,21 +113,21 @@ def _plain(value: Any, digits: str | None) -> Any:
 
 
 def _time(logger: Any, method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """When it was logged, not when it is written."""
+    """Add the time when the record was logged, not when it is written."""
     when = datetime.fromtimestamp(event["_record"].created, UTC)
     event["timestamp"] = when.isoformat(timespec="microseconds").replace("+00:00", "Z")
     return event
 
 
 def _context(logger: Any, method: str, event: MutableMapping[str, Any]) -> MutableMapping[str, Any]:
-    """Adds what the record belongs to: the request's id."""
+    """Add the id of the request that the record belongs to."""
     record = event["_record"]
     event.update(getattr(record, "context", None) or structlog.contextvars.get_contextvars())
     return event
 
 
 class Requests:
-    """ASGI middleware: gives each request an id, logs and counts it, and answers what nobody had foreseen."""
+    """ASGI middleware: gives each request an id, logs and counts it, and answers unexpected exceptions."""
 
     def __init__(self, app: ASGIApp, *, refuse: Callable[[ServiceError], ASGIApp], heard: Heard) -> None:
         self._app = app
@@ -167,6 +167,6 @@ class Requests:
 
 
 def _path(scope: Scope) -> str:
-    """As it was sent, percent-encoded: nothing in it can end a line. The query may hold a session's id."""
+    """The path, percent-encoded, so that it cannot end a line; without the query, which may hold a session's id."""
     raw: bytes = scope.get("raw_path") or b""
     return raw.partition(b"?")[0].decode("ascii", "replace")[:500]

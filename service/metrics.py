@@ -1,4 +1,4 @@
-"""/metrics: what the server, the renderer and the clients have been through, in Prometheus' words."""
+"""/metrics: counters of the server, the renderer and the clients, as Prometheus' text."""
 
 from __future__ import annotations
 
@@ -96,7 +96,7 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
             yield gauge("renderer_tasks", "Pictures that the renderer holds.", seen.tasks)
             yield gauge("gpu_bytes", "What they hold on the GPU.", seen.gpu_bytes)
             yield gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(state))
-            with suppress(Unavailable):  # the disk fails: all else is still to be told
+            with suppress(Unavailable):  # the disk fails: all other metrics are still given
                 yield gauge("data_bytes", "Assets and documents on the disk.", state.quota.used())
             yield gauge("data_quota_bytes", "What they may take.", state.config.data_quota)
 

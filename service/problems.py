@@ -1,4 +1,4 @@
-"""What a caller did wrong, or what the service could not do, and how HTTP says so.
+"""Errors of callers and of the service, and how HTTP reports them.
 
 ServiceError
     MalformedJson  InvalidDocument  AssetError            the body
@@ -151,8 +151,8 @@ def answer(error: Exception) -> Answer:
 def problem(error: Exception) -> dict[str, Any]:
     """The body of an `application/problem+json` answer (RFC 9457).
 
-    A URN as `type` needs no host and stays true under any subpath. Of an exception that is no ServiceError nothing
-    is told: its text is about the server, not about the request.
+    A URN as `type` needs no host and stays true under any subpath. The text of an exception that is no
+    ServiceError is left out: it is about the server, not about the request.
     """
     row = answer(error)
     known = isinstance(error, ServiceError)

@@ -83,12 +83,12 @@ def resolve(settings: Settings) -> ResolvedSettings:
 
 @cache
 def price_list() -> dict[str, Any]:
-    """What presets and knobs cost, as measured: on which machine it says itself. Empty where nobody measured."""
+    """The measured cost of presets and knobs, with the machine's name. Empty where nothing was measured."""
     return dict(json.loads(PRICES_FILE.read_text())) if PRICES_FILE.exists() else {}
 
 
 def priced() -> dict[str, Any]:
-    """The presets, each with what it was measured to cost and what it gives up."""
+    """The presets, each with its measured cost and what it gives up."""
     prices = price_list()
     if not prices:
         return PRESETS
@@ -110,7 +110,7 @@ def text(name: str, prices: dict[str, Any]) -> str:
 
 
 def short(seconds: float) -> str:
-    """So many seconds as a menu says them."""
+    """Seconds as a menu shows them."""
     return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}"
 
 

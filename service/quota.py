@@ -1,4 +1,4 @@
-"""Room on the disk: what was unused longest makes way, never what a saved document refers to."""
+"""Room on the disk: assets that were unused longest make room, never those that a saved document refers to."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ RETRY_S = 60
 
 
 class Quota:
-    """Of the assets in `folder` and of `others` bytes beside them.
+    """Bounds the assets in `folder` together with `others` bytes beside them.
 
     `in_use` gives the ids of the assets that must stay; while its context lasts no other asset becomes one of them.
     """
@@ -36,8 +36,8 @@ class Quota:
         self._in_use = in_use
         self._others = others
         self._lock = threading.Lock()
-        self._promised = 0  # bytes, to what is being stored
-        self._pinned: Counter[str] = Counter()  # ids, by how many want them to stay
+        self._promised = 0  # bytes that are being stored
+        self._pinned: Counter[str] = Counter()  # how many contexts keep each id
 
     @contextmanager
     def room(self, size: int) -> Iterator[None]:
@@ -62,7 +62,7 @@ class Quota:
 
     @contextmanager
     def pinned(self, ids: Collection[str]) -> Iterator[None]:
-        """While it lasts these assets stay, as far as they are there."""
+        """Keep these assets, as far as they are there, while the context lasts."""
         with self._lock:
             self._pinned.update(ids)
         try:
@@ -72,11 +72,11 @@ class Quota:
                 self._pinned -= Counter(ids)
 
     def used(self) -> int:
-        """Bytes."""
+        """The bytes that are used."""
         return self._others() + self._files.bytes()
 
     def clear(self) -> None:
-        """Deletes what a crash left."""
+        """Delete what a crash left."""
         self._files.clear()
 
     def _make_room(self, size: int) -> None:

@@ -18,7 +18,7 @@ from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, AovOr
 
 
 class PictureView(Model):
-    """How it was written. Linear formats take no notice of exposure and tone map, "all" is every AOV as a layer."""
+    """How a picture was written. Linear formats ignore exposure and tone map; "all" is every AOV as a layer."""
 
     aov: AovOrAll = "color"
     exposure: Annotated[float, Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE)] = 0.0

@@ -1,4 +1,4 @@
-"""Arrays in memory that another process may map: laid there once, and not copied on their way to the renderer."""
+"""Arrays in memory that another process may map: written once, and not copied on their way to the renderer."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _TRIM_THRESHOLD, _TOP_PAD, _MMAP_THRESHOLD = -1, -2, -3  # of mallopt(3)
 
 
 class Block(mmap.mmap):
-    """Zeros at first. It has a descriptor, and lasts as long as an array in it."""
+    """A block of shared memory, zeros at first. It has a descriptor, and lasts as long as an array in it."""
 
     descriptor: int
 
@@ -61,7 +61,7 @@ class SharedArena:
         self._end = 0
 
     def room(self, shape: tuple[int, ...], dtype: np.dtype[Any]) -> np.ndarray:
-        """Zeros to be written over."""
+        """An array of zeros to be written over."""
         count = math.prod(shape)
         if self._block is None or not count:
             return np.zeros(shape, dtype)
@@ -70,7 +70,7 @@ class SharedArena:
         return out
 
     def put(self, array: np.ndarray, rows: np.ndarray | None = None) -> np.ndarray:
-        """The array, or the rows of it in that order: on the shelf, where there is one."""
+        """A copy of the array, or of its `rows` in that order, in the block where there is one."""
         if self._block is None:
             return array if rows is None else array[rows]
         out = self.room((len(array) if rows is None else len(rows), *array.shape[1:]), array.dtype)
@@ -82,7 +82,7 @@ class SharedArena:
 
 
 def reuse_freed() -> None:
-    """Has the C library keep what is freed for what is asked for next, for a process that soon ends.
+    """Make the C library keep freed memory for later requests, in a process that soon ends.
 
     Pages that are new to a process cost 2 to 3 us each in a virtual machine: of packing a million triangles, a tenth.
     """
@@ -93,7 +93,7 @@ def reuse_freed() -> None:
 
 
 def trim() -> None:
-    """Gives the system what the C library keeps for later: after hundreds of megabytes of numpy's temporaries."""
+    """Return freed memory to the system, after hundreds of megabytes of numpy's temporaries."""
     with suppress(OSError, AttributeError):  # only glibc has it
         ctypes.CDLL(None).malloc_trim(0)
 

@@ -1,4 +1,4 @@
-"""What the routes share: the configuration, the assets, the renderer, who is connected."""
+"""The state that the routes share: configuration, assets, renderers, sessions."""
 
 from __future__ import annotations
 
@@ -28,8 +28,8 @@ from service.traffic import Traffic
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
-GPU_S = 60.0  # ... when without one nothing is to be served at all
-FAREWELL_S = 4.0  # for a client that reads slowly to be told
+GPU_S = 60.0  # the same at start, where SUNBOX_REQUIRE_GPU is set
+FAREWELL_S = 4.0  # for the farewell to reach a client that reads slowly
 
 
 @dataclass
@@ -56,7 +56,7 @@ class AppState:
         self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients)
 
     async def info(self) -> dict[str, Any]:
-        """What GET /v1/info says. Waits for a renderer that is being started; null when there is none."""
+        """The answer of GET /v1/info. Waits for a renderer that is being started; null where there is none."""
         try:
             renderer: dict[str, Any] | None = await self.renderers.ready(STARTING_S)
         except Unavailable:
@@ -80,7 +80,7 @@ class AppState:
         return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None
 
     async def farewell(self) -> None:
-        """Tells everybody that the server ends: closes streams, cancels renders, so that who waits gets an answer."""
+        """Tell all clients that the server ends: close streams and cancel renders, so that requests are answered."""
         self.renders.close()
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S
@@ -94,11 +94,11 @@ def app_state(connection: HTTPConnection) -> AppState:
 
 
 def caller(connection: HTTPConnection) -> str:
-    """Whom to count what is sent against: the key, or else the address."""
+    """The client whose limits count: the owner of the key, or else the address."""
     return owner(connection) or (connection.client.host if connection.client else "")
 
 
 def owner(connection: HTTPConnection) -> str:
-    """Whose key it was, by a name that the guard gave it; "" where no keys are asked for."""
+    """The name that the guard gave the key's owner; "" where no keys are needed."""
     found: str = connection.scope.get("owner", "")
     return found

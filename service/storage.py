@@ -18,7 +18,7 @@ class Storage:
 
 
 def storage(config: Config) -> Storage:
-    # Each asks another one: assets for room, the quota for what documents use, documents for assets.
+    # They depend on each other: assets need room, the quota the documents' references, documents the assets.
     quota = Quota(config.data_dir, config.data_quota, lambda: documents.assets_in_use(), lambda: documents.bytes)
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota)

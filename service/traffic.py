@@ -1,4 +1,4 @@
-"""How many requests there were since the server began, and how long they took."""
+"""Counts requests and their duration since the server began."""
 
 from __future__ import annotations
 

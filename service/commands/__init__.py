@@ -36,6 +36,6 @@ class Failed(CommandError):
 
 
 class BadInput(CommandError):
-    """What was asked for was wrong: each line names the place and says what would be right."""
+    """The input was wrong: each line names the place and says what would be right."""
 
     exit_code = 2

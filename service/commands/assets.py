@@ -32,7 +32,7 @@ class SourceAssets:
     def keep(self, scene: Any) -> None:
         """Copies the files that a document refers to into the data folder: a picture of it can be made again.
 
-        Without room there, only beside these files it can.
+        Without room there the picture can be made again only beside these files.
         """
         for ref in recipe.references(scene):
             if not ref.startswith("sha256:"):

@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from service.recipe import PictureView
     from service.scene import Scene, Settings
 
-WIDEST = 16.0  # width over height of a picture that nobody asked for: no file makes it a line
+WIDEST = 16.0  # width over height, at most, of a picture whose size a model's file decides
 SHOWN_ERRORS = 8  # a mesh of NaN has a mistake in every line
 
 
 @contextmanager
 def refusals(place: str = "") -> Iterator[None]:
-    """Turns a caller's mistake into BadInput, a line for each, `place` before the pointer."""
+    """Turn a caller's mistakes into BadInput, a line for each, with `place` before the pointer."""
     try:
         yield
     except InvalidDocument as error:
@@ -121,7 +121,7 @@ def read_settings(assignments: Sequence[str], config: Config, base: dict[str, An
 
 
 def picture_size(settings: Settings, aspect: float | None) -> dict[str, int]:
-    """What is not given of a picture's width and height, for a model whose camera has this aspect ratio.
+    """The width or height that is not given, or both, for a model whose camera has this aspect ratio.
 
     Where neither is given there are about as many pixels as by default.
     """

@@ -10,7 +10,7 @@ from service.commands import BadInput, Failed
 
 
 def read(path: Path) -> bytes:
-    """The file's bytes; BadInput naming it when there is none to read."""
+    """The file's bytes. Raises BadInput, which names the file, where it cannot be read."""
     try:
         return path.read_bytes()
     except (OSError, ValueError) as error:  # ValueError: a NUL in the name
@@ -18,7 +18,7 @@ def read(path: Path) -> bytes:
 
 
 def writable(path: Path) -> Path:
-    """Where to write for `path` (its links followed); BadInput now rather than after an hour of rendering."""
+    """The path to write to, links followed. Raises BadInput now rather than after an hour of rendering."""
     try:
         target = Path(os.path.realpath(path))
         if target.is_dir():

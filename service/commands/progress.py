@@ -1,4 +1,4 @@
-"""How far a render is, on stderr: a bar that redraws itself on a terminal, else a line now and then."""
+"""Shows a render's progress on stderr: a bar that redraws itself on a terminal, else a line now and then."""
 
 from __future__ import annotations
 

@@ -119,7 +119,7 @@ def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, flo
 def _view(
     arguments: argparse.Namespace, format: str, exposure: float | None, before: PictureView | None
 ) -> PictureView:
-    """As given; what is not, as the picture had it that is made again."""
+    """The view as given; the rest comes from the picture that is made again, if it is one."""
     from service.recipe import PictureView
 
     options = {"aov": arguments.aov, "exposure": exposure, "tone_map": arguments.tone_map}
@@ -129,7 +129,7 @@ def _view(
 
 
 def _tell(source: Source, output: Output, exposure: float | None, size: tuple[int, int] | None) -> None:
-    """Says what was taken from a model because the command line did not say it."""
+    """Report what was taken from a model because the command line did not give it."""
     if size:
         print(f"note: {size[0]} x {size[1]} pixels, as wide for its height as the camera's picture", file=sys.stderr)
     is_model = source.store is not None

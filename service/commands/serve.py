@@ -29,7 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _closed(folder: Path) -> Path | None:
-    """The first thing in the way of storing data: what another user, root above all, left or did not permit."""
+    """The first path that prevents storing data: left by another user, root above all, or without permission."""
     for wanted in (folder, folder / "assets", folder / "documents.sqlite3"):
         path = wanted.absolute()
         while not os.path.exists(path):  # it will be made, in the folder above

@@ -1,4 +1,4 @@
-"""One render in this process: the renderer's own task, whose messages are heard here instead of by a server."""
+"""One render in this process: the renderer's own task, whose messages go here instead of to a server."""
 
 from __future__ import annotations
 
@@ -77,7 +77,9 @@ class Tracing:
         self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
         self._denoiser = DenoiseClient()
-        at_hand = CompileClient(renderer.info, None, crowded=lambda: False)  # compiles nothing, knows what was
+        at_hand = CompileClient(
+            renderer.info, None, crowded=lambda: False
+        )  # compiles nothing, but knows which kernels are compiled
         self._task = Task(WorkerContext(renderer, self._hear, self._denoiser, at_hand), NUMBER)
         update = Update(NUMBER, 1, packed.arrays, settings.for_gpu(), stop, denoise=settings.denoise)
         self._task.update(update)
@@ -103,7 +105,7 @@ class Tracing:
         return self._pixels
 
     def measure_kernel(self) -> None:
-        """Measures what its kernel saves, where that takes no compiling."""
+        """Measure what the kernel saves, where that takes no compilation."""
         self._task.savings.ask()
         while self._task.savings.due:
             self._task.measure_kernel()
@@ -119,7 +121,7 @@ class Tracing:
         self._denoiser.hear()
 
     def status(self, setup_s: float) -> dict[str, Any]:
-        """What GET /v1/renders/{id} says of a render at its end."""
+        """The answer of GET /v1/renders/{id} for an ended render."""
         now = self.progress
         return {
             "state": "cancelled" if self._reason == "stopped" else "done",

@@ -52,7 +52,7 @@ class Format:
     by_openimageio: bool = False
 
     def encoding(self, bits: int) -> Encoding:
-        """What the renderer is to give for this format; a number of bits that it does not have is ignored."""
+        """The encoding that the renderer gives for this format; a number of bits that it lacks is ignored."""
         if not self.is_displayed:
             return "linear"
         return "f4" if bits == 16 and 16 in self.bits else "u1"

@@ -43,7 +43,7 @@ def write_png(file: BinaryIO, pixels: Array, choices: Choices) -> None:
 
 
 def write_jpeg(file: BinaryIO, pixels: Array, choices: Choices) -> None:
-    """Laid over black: JPEG has no alpha."""
+    """Write a JPEG, over black, as it has no alpha."""
     quality = QUALITY if choices.quality is None else choices.quality
     sampling = "4:4:4" if quality >= FULL_COLOUR else "4:2:0"
     file.write(_pillow(_over_black(_bytes(pixels)), "JPEG", quality=quality, subsampling=sampling))
@@ -59,7 +59,7 @@ def write_exr(file: BinaryIO, pixels: Array, choices: Choices) -> None:
 
 
 def write_hdr(file: BinaryIO, pixels: Array, choices: Choices) -> None:
-    """Without alpha, which the format does not have."""
+    """Write a Radiance HDR, which has no alpha."""
     _write(file, "hdr", [_three(pixels)], "float", {})
 
 
@@ -84,7 +84,7 @@ def write_exr_layers(
 
 
 def in_memory(write: Callable[[BinaryIO], None]) -> bytes:
-    """What `write` writes; the file has a descriptor, without which OpenImageIO cannot write."""
+    """The bytes that `write` writes to a file with a descriptor, without which OpenImageIO cannot write."""
     with os.fdopen(os.memfd_create("sunbox-image", os.MFD_CLOEXEC), "w+b") as file:
         write(file)
         file.flush()
@@ -92,7 +92,7 @@ def in_memory(write: Callable[[BinaryIO], None]) -> bytes:
 
 
 def _png16(pixels: Array) -> bytes:
-    """Pillow knows no colour of 16 bits."""
+    """A PNG of 16 bits, by OpenImageIO: Pillow has no such colour images."""
     whole = pixels if pixels.dtype == np.uint16 else np.rint(_unit(pixels) * 65535).astype(np.uint16)
     attributes = {"oiio:UnassociatedAlpha": 1, "png:compressionLevel": PNG_LEVEL}
     return in_memory(lambda file: _write(file, "png", [whole], "uint16", attributes))
@@ -166,5 +166,5 @@ def _three(pixels: Array) -> Array:
 
 
 def _text(metadata: Metadata) -> str:
-    """ASCII, so that the plainest text chunk carries any name."""
+    """JSON in ASCII, so that the plainest text chunk can hold any name."""
     return metadata if isinstance(metadata, str) else json.dumps(metadata, separators=(",", ":"))

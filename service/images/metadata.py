@@ -9,7 +9,7 @@ from typing import Any
 KEY = "sunbox"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 EXR_MAGIC = b"\x76\x2f\x31\x01"
-LONG_TEXT = 4096  # what image viewers still show whole
+LONG_TEXT = 4096  # characters that image viewers still show whole
 TEXT_BYTES = 256 << 20  # of one inflated text chunk: a few kilobytes can claim gigabytes
 
 

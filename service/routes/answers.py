@@ -1,4 +1,4 @@
-"""What answers look like, for the API's description: shapes, statuses, and examples that work when pasted."""
+"""The shapes of answers for the API's description: models, statuses, and examples that work when pasted."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ class BsdfAlbedo(BaseModel):
 
 
 def problems(*statuses: int) -> Responses:
-    """What else may be answered."""
+    """The errors that a call may be answered with."""
     content = {"application/problem+json": {"schema": PROBLEM}}
     return {status: {"description": TITLES[status], "content": content} for status in statuses}
 

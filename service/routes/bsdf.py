@@ -24,7 +24,7 @@ from service.state import STARTING_S, app_state, owner
 router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
 
 AT_ONCE = 1 << 12  # numbers that are written in a few milliseconds
-PIECE = 1 << 10  # ... without letting anybody else run
+PIECE = 1 << 10  # numbers that are written without giving way to other requests
 
 Arrays = dict[str, np.ndarray]
 

@@ -16,7 +16,7 @@ HERE, THERE = "#/$defs/", "#/components/schemas/"
 
 
 def describe(app: FastAPI, keyed: bool) -> None:
-    """Has `app` describe itself; `keyed`: a key is asked for."""
+    """Make `app` describe itself; `keyed`: calls need a key."""
     app.openapi = partial(_described, app, keyed)  # type: ignore[method-assign]
 
 

@@ -24,7 +24,7 @@ def respond(error: Exception) -> Response:
 
 
 def tell_errors(app: FastAPI) -> None:
-    """Has `app` answer in this form whatever goes wrong, the framework's own refusals included."""
+    """Make `app` answer every error in this form, the framework's own included."""
     app.add_exception_handler(ServiceError, _refused)
     app.add_exception_handler(RequestValidationError, _invalid)
     app.add_exception_handler(HTTPException, _unrouted)
@@ -37,12 +37,12 @@ async def _refused(request: Request, error: Exception) -> Response:
 
 
 async def _gone(request: Request, error: Exception) -> Response:
-    """The sender went away in the middle of its body, which is no error of anybody's."""
+    """The client went away in the middle of its body, which is no error."""
     return Response(status_code=GONE)
 
 
 async def _invalid(request: Request, error: Exception) -> Response:
-    """Of parameters in the address; documents are not FastAPI's to validate."""
+    """Answer invalid parameters of the address; documents are not validated by FastAPI."""
     assert isinstance(error, RequestValidationError)
     # Not `input` nor `ctx`: they may hold NaN, which is no JSON.
     errors = [FieldError("/" + "/".join(map(str, e["loc"][1:])), e["msg"]) for e in error.errors()]
@@ -62,7 +62,7 @@ async def _unrouted(request: Request, error: Exception) -> Response:
 
 
 def _allowed(request: Request) -> str:
-    """Every method of the address: the framework names those of one route."""
+    """Every method that the address allows; the framework names those of one route."""
 
     def fits(method: str) -> bool:
         asked = {**request.scope, "method": method}

@@ -1,4 +1,4 @@
-"""What the service is, whether it lives, and what its documents look like."""
+"""The service's version and limits, its health, and the schema of its documents."""
 
 from __future__ import annotations
 
@@ -64,6 +64,6 @@ async def schema() -> Response:
 
 @cache
 def _schema() -> bytes:
-    """The same for everybody, and 0.2 s of work."""
+    """The schemas as JSON; they never change, and making them takes 0.2 s."""
     document = scene.schema() | {"view": protocol.View.model_json_schema()}
     return json.dumps(document, ensure_ascii=False, separators=(",", ":")).encode()

@@ -165,7 +165,7 @@ async def _job(request: Request) -> Job:
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:
-    """Returns when the job is finished, or the connection closed."""
+    """Return when the job is finished, or the connection closed."""
     gone = asyncio.ensure_future(disconnected(request.receive))
     finished = asyncio.ensure_future(job.finished.wait())
     await asyncio.wait({gone, finished}, return_when=asyncio.FIRST_COMPLETED)
@@ -204,7 +204,7 @@ def _aovs(query: ImageQuery) -> list[Aov]:
 
 
 def _most_bytes(job: Job, query: ImageQuery) -> int:
-    """About as many as a file takes that can't be compressed."""
+    """About the bytes of a file that cannot be compressed."""
     format = images.FORMATS[query.format]
     channels = sum(len(images.LAYERS[aov]) for aov in _aovs(query))
     bits = query.bits if query.bits in format.bits else format.bits[0]

@@ -1,4 +1,4 @@
-"""What every model of the document shares: strictness, and the way a validator says what is wrong."""
+"""What every model of the document shares: strictness, and how a validator reports an error."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetPyda
 from pydantic_core import CoreSchema, PydanticCustomError
 
 REFUSAL = "refusal"  # the type of our own errors among pydantic's
-MOST_MISTAKES = 100  # that are looked for in one document: a list of ten thousand wrong spheres only repeats itself
+MOST_MISTAKES = 100  # that are searched for in one document: a list of ten thousand wrong spheres only repeats itself
 
 
 class Model(BaseModel):
@@ -56,7 +56,7 @@ def hint(
     absent: str | None = None,
     follows: tuple[str, Callable[[float], float]] | None = None,
 ) -> Any:
-    """What the editor says about a field, as metadata for Annotated.
+    """The editor's hints for a field, as metadata for Annotated.
 
     `soft` is where a slider ends whose range goes on, or both its ends; `default` is told where the model's is None.
     For a field that may be left out: `absent` is a word for what holds then; `follows` names the field, of the range

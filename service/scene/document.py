@@ -53,7 +53,7 @@ _ENTRIES: dict[str, TypeAdapter[Any]] = {
 
 
 class Limits(Protocol):
-    """What of the service's configuration bounds a scene."""
+    """The part of the service's configuration that bounds a scene."""
 
     @property
     def max_shapes(self) -> int: ...
@@ -89,7 +89,7 @@ def parse_scene(
     errors = _too_many(held, limits)
     if errors:  # nothing in there is looked at
         raise InvalidDocument(errors).under(pointer)
-    # What the scene holds is validated one entry after the other, and the rest of it without.
+    # The scene's entries are validated one by one, and the rest of the scene without them.
     head = {**document, **{name: type(entries)() for name, entries in held.items()}} if held else document
     try:
         scene = Scene.model_validate(head)

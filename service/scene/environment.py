@@ -1,4 +1,4 @@
-"""What surrounds the scene. None at all is black."""
+"""The environment around the scene; without one it is black."""
 
 from __future__ import annotations
 

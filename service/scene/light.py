@@ -1,4 +1,4 @@
-"""Lights that are no shapes. Area lights are shapes whose material has an emission."""
+"""Lights that are not shapes. Area lights are shapes whose material has an emission."""
 
 from __future__ import annotations
 

@@ -38,7 +38,7 @@ def is_number(value: object) -> bool:
 
 
 def check_number(value: Any, low: float, high: float, name: str = "") -> float:
-    """`value` as a float; refuses what is no number or out of range. `name` says which number of several it is."""
+    """`value` as a float; refuses anything but a number within the range. `name` says which of several it is."""
     subject = name and name + " "
     if not is_number(value):
         raise refusal(f"{subject}must be a number, not {described(value)}")

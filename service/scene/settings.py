@@ -20,7 +20,7 @@ Amount = Annotated[float, Field(gt=0, le=LARGEST)]
 
 
 class Limits(Protocol):
-    """What of the service's configuration bounds the settings."""
+    """The part of the service's configuration that bounds the settings."""
 
     @property
     def max_pixels(self) -> int: ...

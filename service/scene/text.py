@@ -23,8 +23,8 @@ def load_json(data: bytes | bytearray | memoryview | str) -> Any:
     pointer of their field, which is of more use than a line and a column.
     """
     text = _decoded(data)
-    # The scanner is written in C and lets no other thread run where there are no objects. One at a time, or those who
-    # want to answer meanwhile would have to win against all of them.
+    # The scanner is written in C and lets no other thread run where there are no objects. One text at a time,
+    # or threads that want to answer meanwhile would compete with all of them.
     with _one_large if len(text) > LARGE else nullcontext():
         value = _loaded(text)
     _check_depth(value)

@@ -41,7 +41,7 @@ Pair = Annotated[Vec2, PlainValidator(_pair), WithJsonSchema(_PAIR)]
 
 
 class ImageTexture(Model):
-    """An image file; row 0 is v = 1, texel centres lie at (i + .5) / n."""
+    """An image file; row 0 is v = 1, texel centres lie at (i + 0.5) / n."""
 
     asset: Annotated[str, Field(min_length=1), hint("Image", "PNG, JPEG, WebP, EXR or Radiance HDR.")]
     color_space: Annotated[

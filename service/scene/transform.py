@@ -1,4 +1,4 @@
-"""Where a shape stands: translate, rotate and scale, or a matrix."""
+"""The transform of a shape: translate, rotate and scale, or a matrix."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pydantic's errors in plain words, each with the JSON pointer of the place a person would correct."""
+"""Pydantic's errors in plain words, each with the JSON pointer of the place to correct."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def validated_entries(
 
 
 def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
-    """Where and what, in the order of the document; `kind` is the type that was validated."""
+    """The errors with their pointers, in the order of the document; `kind` is the type that was validated."""
     found: dict[str, tuple[Any, ErrorLocation]] = {}
     kinds: set[str] = set()
     for entry in error.errors(include_url=False):
@@ -74,13 +74,13 @@ def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
 
 
 def among(names: Iterable[str]) -> str:
-    """The names as a list for an error message, cut off where nobody would read on."""
+    """The names as a list for an error message, cut off where it gets too long."""
     known = [repr(name[:40]) for name in islice(names, 21)]
     return ", ".join(known[:20]) + (", ..." if len(known) > 20 else "") if known else "none"
 
 
 def escaped(step: object) -> str:
-    """One step of a JSON pointer (RFC 6901); a name that nobody would read to its end is cut off."""
+    """One step of a JSON pointer (RFC 6901); a very long name is cut off."""
     return str(step)[:LONGEST_STEP].replace("~", "~0").replace("/", "~1")
 
 
