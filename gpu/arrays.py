@@ -80,6 +80,9 @@ class SceneArrays:
     boxes: np.ndarray = field(default_factory=lambda: _empty(layout.Solid))
     ellipsoids: np.ndarray = field(default_factory=lambda: _empty(layout.Solid))
     triangles: np.ndarray = field(default_factory=lambda: _empty(layout.Triangle))
+    microfacets: np.ndarray = field(
+        default_factory=lambda: np.zeros((0, 4), np.uint32)
+    )  # as layout.microfacet_records says; none without such a material
     triangle_normals: np.ndarray = field(default_factory=lambda: _empty(layout.TriangleNormals))  # none: all flat
     tangents: bool = False  # whether these have tangents, of meshes whose materials run along them
     triangle_uvs: np.ndarray = field(default_factory=lambda: np.zeros((0, 3, 2), np.float32))  # none, or all
@@ -120,13 +123,14 @@ def apply_edit(
     camera: np.void | None = None,
     materials: np.ndarray | None = None,
     texture_words: np.ndarray | None = None,
+    microfacets: np.ndarray | None = None,
     environment: tuple[float, float] | None = None,
     moved: Mapping[str, Any] | None = None,
 ) -> SceneArrays:
     """The arrays after an edit: the camera, the materials' bytes (as many as before), what they have of textures
-    (`TextureArrays.words`), the environment's (rotation, scale); `moved` are members of the arrays that tell where
-    shapes stand, with the scene's tree and the lights, as many as before. The tree may change where there are
-    instances. Raises ValueError for another number of materials.
+    (`TextureArrays.words`), the words of the model `microfacet`, the environment's (rotation, scale); `moved` are
+    members of the arrays that tell where shapes stand, with the scene's tree and the lights, as many as before. The
+    tree may change where there are instances. Raises ValueError for another number of materials.
     """
     changes: dict[str, Any] = dict(moved or {})
     if camera is not None:
@@ -137,6 +141,8 @@ def apply_edit(
         changes["materials"] = materials
     if texture_words is not None and arrays.textures is not None:
         changes["textures"] = replace(arrays.textures, words=texture_words)
+    if microfacets is not None:
+        changes["microfacets"] = microfacets
     if environment is not None and arrays.environment is not None:
         rotation, scale = environment
         changes["environment"] = replace(arrays.environment, rotation=rotation, scale=scale)

@@ -8,6 +8,12 @@
 #include "lobes/disney/clearcoat.glsl"
 #include "lobes/metal_rough.glsl"
 #include "lobes/blinn_phong.glsl"
+#include "lobes/microfacet/precise.glsl"
+#include "lobes/microfacet/distribution.glsl"
+#include "lobes/microfacet/geometry.glsl"
+#include "lobes/microfacet/fresnel.glsl"
+#include "lobes/microfacet/diffuse.glsl"
+#include "lobes/microfacet/model.glsl"
 #include "energy.glsl"
 #include "lobes/principled/diffuse.glsl"
 #include "lobes/principled/sheen_charlie.glsl"
@@ -113,6 +119,14 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
         r = Scatter(blinn_phong_eval(s, wi, wm), blinn_phong_pdf(s, wi, wm, dot(wi, wm)));
     }
 #endif
+#if HAS_MICROFACET
+    if (s.model == MODEL_MICROFACET) {
+        vec3 sum = wo + wi;
+        float cos_d = 0.5 * length(sum); // a dot product would cancel at grazing angles
+        vec3 wm = sum / (2.0 * cos_d);
+        r = Scatter(microfacet_model_eval(s, wo, wi, wm, cos_d), microfacet_model_pdf(s, wo, wi, wm, cos_d));
+    }
+#endif
 #if HAS_PRINCIPLED_LOBES
     if (s.model == MODEL_PRINCIPLED) r = principled_eval(s, wo, wi);
 #endif
@@ -149,6 +163,9 @@ LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
 #if HAS_BLINN_PHONG
     if (s.model == MODEL_BLINN_PHONG) wi = blinn_phong_sample(s, wo, u_lobe, u);
+#endif
+#if HAS_MICROFACET
+    if (s.model == MODEL_MICROFACET) wi = microfacet_model_sample(s, wo, u_lobe, u);
 #endif
     LobeSample r = LobeSample(wi, false, Scatter(vec3(0.0), 0.0), false);
 #if HAS_PRINCIPLED_LOBES

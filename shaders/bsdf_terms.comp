@@ -36,6 +36,15 @@ void main() {
         facets = !s.is_delta;
     }
 #endif
+#if HAS_MICROFACET
+    if (s.model == MODEL_MICROFACET) {
+        vec3 sum = wo + wi;
+        float cos_d = 0.5 * length(sum);
+        f = fresnel_term(s, w.z);
+        d = distribution_d(s, w);
+        visibility = geometry_term(s, wo, wi, sum / (2.0 * cos_d), cos_d);
+    }
+#endif
     terms[2u * i] = vec4(f, d);
     terms[2u * i + 1u] = vec4(4.0 * wo.z * wi.z * visibility, facets ? 1.0 : 0.0, 0.0, 0.0);
 }

@@ -35,6 +35,14 @@ struct Surface {
     Basis coat;            // the coat's own frame, in the shading frame
 #endif
 #endif
+#if HAS_MICROFACET
+    Microfacet terms;    // the terms of the model `microfacet`, with their parameters
+    float terms_ior;     // of its dielectric
+    float log_factor;    // of its distribution, from its table
+    uint row;            // the texel where its table's row for its alpha begins,
+    uint row_above;      // that of the next one,
+    float row_share;     // and how far alpha is on the way there
+#endif
 };
 
 // A roughness below this is a mirror.
@@ -79,6 +87,32 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
     float rough = max(m.clearcoat_roughness, SURFACE_LEAST_ROUGHNESS);
     s.alpha_coat = m.clearcoat_roughness >= 0.0 ? rough * rough : mix(0.1, 0.001, m.clearcoat_gloss);
     s.coat_roughness = s.coat_is_delta ? 0.0 : sqrt(s.alpha_coat);
+#endif
+}
+#endif
+
+#if HAS_MICROFACET
+// Sets what `microfacet` has.
+void surface_microfacet(Material m, inout Surface s) {
+    s.terms = microfacet_load(m.number);
+    s.terms_ior = m.ior;
+    s.spec0 = m.specular_color;
+    s.alpha = vec2(clamp(m.alpha, s.terms.alpha_low, s.terms.alpha_high));
+    s.log_factor = 0.0;
+    s.row = s.row_above = s.terms.table;
+    s.row_share = 0.0;
+#if HAS_MICROFACET_TABLES && TEXTURE_ALPHA >= 0
+    float place = (log(s.alpha.x + s.terms.row_offset) - s.terms.row_start) * s.terms.row_scale;
+    uint first = min(uint(max(place, 0.0)), max(s.terms.rows, 2u) - 2u);
+    s.row += first * s.terms.row_texels;
+    s.row_above = s.row + (s.terms.rows > 1u ? s.terms.row_texels : 0u);
+    s.row_share = clamp(place - float(first), 0.0, 1.0);
+#endif
+#if HAS_MICROFACET_TABLES
+    s.log_factor = microfacet_texel(s.row).x;
+#if TEXTURE_ALPHA >= 0
+    s.log_factor = mix(s.log_factor, microfacet_texel(s.row_above).x, s.row_share);
+#endif
 #endif
 }
 #endif
@@ -144,6 +178,9 @@ Surface surface_make(Material m, vec2 tangent) {
         s.alpha = vec2(s.alpha_mask);
         s.tangent = vec2(1.0, 0.0);
     }
+#endif
+#if HAS_MICROFACET
+    if (m.model == MODEL_MICROFACET) surface_microfacet(m, s);
 #endif
 #if HAS_PRINCIPLED
 #if HAS_CLEARCOAT

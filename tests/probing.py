@@ -11,6 +11,7 @@ import numpy as np
 
 from gpu import Renderer, layout
 from gpu.device.scene import upload_tables
+from gpu.device.textures import linear_texture
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS
@@ -58,9 +59,13 @@ class Prober:
         raised: frozenset[str] = frozenset(),
         frame: np.ndarray | None = None,
         filter_name: str = "box",
+        microfacets: np.ndarray | None = None,
         **uniforms: Any,
     ) -> list[np.ndarray]:
-        """(count, 4) float32 of each output slot after one run over `count` invocations."""
+        """(count, 4) float32 of each output slot after one run over `count` invocations.
+
+        `microfacets` are the words of `SceneArrays.microfacets`.
+        """
         kernel = self._kernels.get(entry, {**features.defines(raised), **(defines or {})})
         made = {slot: self.context.buffer(np.ascontiguousarray(a).tobytes()) for slot, a in (inputs or {}).items()}
         made |= {slot: self.context.buffer(reserve=16 * count) for slot in outputs}
@@ -77,9 +82,12 @@ class Prober:
         if "HAS_PRINCIPLED" in raised:
             for unit, texture in self._tables.items():
                 texture.use(unit)
+        lab = [] if microfacets is None else [linear_texture(self.context, microfacets, 4, "u4")]
+        for texture in lab:
+            texture.use(bindings.MICROFACETS_TEXTURE)
         kernel.run(-(-count // 64))
         results = [np.frombuffer(made[slot].read(), np.float32).reshape(count, 4) for slot in outputs]
-        for buffer in (*made.values(), *blocks):
+        for buffer in (*made.values(), *blocks, *lab):
             buffer.release()
         return results
 

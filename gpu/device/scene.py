@@ -171,6 +171,7 @@ class Scene:
         camera: np.void | None = None,
         materials: np.ndarray | None = None,
         texture_words: np.ndarray | None = None,
+        microfacets: np.ndarray | None = None,
         environment: tuple[float, float] | None = None,
         moved: Mapping[str, Any] | None = None,
     ) -> None:
@@ -179,10 +180,17 @@ class Scene:
         The caller resets its pictures. Raises OutOfMemory or ValueError, and changes nothing then.
         """
         contexts.use(self._context)
-        arrays = apply_edit(self.arrays, camera, materials, texture_words, environment, moved)
+        arrays = apply_edit(self.arrays, camera, materials, texture_words, microfacets, environment, moved)
+        tables = None
+        if microfacets is not None and not np.array_equal(microfacets, self.arrays.microfacets):
+            unit = bindings.MICROFACETS_TEXTURE
+            tables = linear_texture(self._context, microfacets, *KINDS[unit])
         if moved is not None:
             self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
         self.arrays = arrays
+        if tables is not None:
+            self._details[bindings.MICROFACETS_TEXTURE].release()
+            self._details[bindings.MICROFACETS_TEXTURE] = tables
         if len(arrays.materials) and (materials is not None or texture_words is not None):
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._raise_flags()

@@ -21,19 +21,22 @@ KINDS = {  # channels and dtype, by texture unit
     bindings.FLOATS_TEXTURE: (4, "f4"),
     bindings.LIGHT_TREE_TEXTURE: (4, "u4"),
     bindings.INSTANCES_TEXTURE: (4, "u4"),
+    bindings.MICROFACETS_TEXTURE: (4, "u4"),
 }
 IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
 
 
 def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.ndarray]:
     """The values behind each texture unit that kernels with these flags read of a scene, where it has any: what
-    triangles have at their corners, instances, the lights' tree, images. See KINDS for their format."""
+    triangles have at their corners, instances, parameters and tables of `microfacet`, the lights' tree, images. See
+    KINDS for their format."""
     colors = arrays.corner_colors if "HAS_VERTEX_COLORS" in flags else arrays.triangle_colors
     values = {
         bindings.UVS_TEXTURES[0]: arrays.triangle_uvs,
         bindings.UVS_TEXTURES[1]: arrays.triangle_uvs_1,
         bindings.COLORS_TEXTURE: colors,
         bindings.INSTANCES_TEXTURE: arrays.instances,
+        bindings.MICROFACETS_TEXTURE: arrays.microfacets,
     }
     if arrays.textures is not None:
         values[bindings.BYTES_TEXTURE] = arrays.textures.texels

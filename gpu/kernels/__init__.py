@@ -5,6 +5,7 @@ visibility      the share of a picture that shows nothing, by which a kernel is 
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
 textures_glsl   how materials read textures, as GLSL
 instances_glsl  records of instances as GLSL
+microfacets_glsl  parameters and tables of the model `microfacet` as GLSL
 source          shader text with its includes and flags; errors by file and line
 cache           compiled kernels, with a bound on how many are in memory
 """

@@ -13,7 +13,7 @@ from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
 from gpu.kernels.visibility import background_share
-from gpu.layout import LightKind, MaterialModel, ShapeKind, texture_records
+from gpu.layout import LightKind, MaterialModel, ShapeKind, microfacet_records, texture_records
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
@@ -49,6 +49,24 @@ def _model(model: MaterialModel) -> Callable[[SceneArrays], bool]:
 def _disney(member: str) -> Callable[[SceneArrays], bool]:
     models = (MaterialModel.DISNEY, MaterialModel.PRINCIPLED)
     return lambda s: bool((np.isin(s.materials["model"], models) & (s.materials[member] > 0)).any())
+
+
+def _microfacets(s: SceneArrays) -> np.ndarray:
+    """The records of the materials of that model."""
+    words = s.microfacets.reshape(-1)[: len(s.materials) * microfacet_records.Microfacet.words]
+    records: np.ndarray = np.ascontiguousarray(words).view(microfacet_records.Microfacet.dtype)
+    found: np.ndarray = records[s.materials["model"][: len(records)] == MaterialModel.MICROFACET]
+    return found
+
+
+def _term(kind: str, value: int) -> Callable[[SceneArrays], bool]:
+    return lambda s: bool((_microfacets(s)[kind] == value).any())
+
+
+def _terms() -> dict[str, Callable[[SceneArrays], bool]]:
+    """A flag for each term of `microfacet`: HAS_MICROFACET_DISTRIBUTION_GTR."""
+    kinds = microfacet_records.TERMS.items()
+    return {f"HAS_MICROFACET_{kind.upper()}_{e.name}": _term(kind, e) for kind, terms in kinds for e in terms}
 
 
 def _transmits(materials: np.ndarray) -> np.ndarray:
@@ -191,6 +209,9 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_METAL_ROUGH": _model(MaterialModel.METAL_ROUGH),
     "HAS_BLINN_PHONG": _model(MaterialModel.BLINN_PHONG),
     "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
+    "HAS_MICROFACET": _model(MaterialModel.MICROFACET),
+    **_terms(),
+    "HAS_MICROFACET_TABLES": lambda s: bool((_microfacets(s)["rows"] > 0).any()),
     "HAS_PRINCIPLED": _model(MaterialModel.PRINCIPLED),
     "HAS_PRINCIPLED_LOBES": _spreads,
     "HAS_TRANSMISSION": lambda s: bool(_transmits(s.materials).any()),

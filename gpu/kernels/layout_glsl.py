@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from gpu import layout
-from gpu.kernels import instances_glsl, textures_glsl
+from gpu.kernels import instances_glsl, microfacets_glsl, textures_glsl
 from gpu.layout import Frame, LightKind, MaterialModel, ShapeKind, bindings
 from gpu.layout.bindings import Slot
 from gpu.layout.record import Record
@@ -138,6 +138,7 @@ def text() -> str:
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     parts = [_constants(), *structs, *loaders, nodes, _frame(), instances_glsl.text(), textures_glsl.text()]
+    parts.append(microfacets_glsl.text())
     return "\n".join(parts) + "\n"
 
 

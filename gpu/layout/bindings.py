@@ -36,5 +36,6 @@ UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
 COLORS_TEXTURE = 12
 LIGHT_TREE_TEXTURE = 13
 INSTANCES_TEXTURE = 14  # records: all storage buffers are taken
+MICROFACETS_TEXTURE = 5  # records of the model `microfacet` and their tables
 ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.tables.energy
 TEXELS_A_ROW = 8192  # of the textures that hold texels and coordinates, one after the other

@@ -55,6 +55,7 @@ class MaterialModel(IntEnum):
     PRINCIPLED = 2
     METAL_ROUGH = 3
     BLINN_PHONG = 4
+    MICROFACET = 5
 
 
 class Material(Record):
@@ -87,6 +88,8 @@ class Material(Record):
     anisotropic_rotation: f32  # degrees
     ior: f32  # inside over outside; ABSENT: from `specular`
     cutoff: f32  # an opacity of at least this counts as 1, any other as 0; ABSENT: it is a chance
+    alpha: f32  # parameter of microfacet's distribution; its f0 is specular_color, its diffuse base_color
+    number: u32  # of the material in the scene: microfacet's record
 
 
 class Sphere(Record):

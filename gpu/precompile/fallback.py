@@ -16,10 +16,11 @@ from gpu.kernels import features
 from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
 
-# Textures are laid out anew for each scene; instances are rare, and would cost all others time.
+# Textures are laid out anew for each scene; instances and the lab's terms are rare, and would cost all others time.
 UNKNOWN = frozenset({
     "HAS_TEXTURES", "HAS_BYTE_TEXELS", "HAS_FLOAT_TEXELS", "HAS_SRGB_TEXELS", "HAS_CHECKERS", "HAS_UVS", "HAS_UVS_1",
     "HAS_VERTEX_COLORS", "HAS_NORMAL_MAPS", "HAS_COAT_NORMALS", "HAS_TEXTURED_LIGHTS", "HAS_INSTANCES",
+    *(name for name in features.everything() if name.startswith("HAS_MICROFACET")),
 })  # fmt: skip
 _EDITED = {"camera", "materials", "environment"}  # what `Scene.edit` can change, as far as `edits` goes
 

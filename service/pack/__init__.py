@@ -2,6 +2,7 @@
 
 scene               the whole, from a document and its assets
 parameters          camera, materials, the environment's rotation: an edit of one of them needs nothing else from here
+microfacets         the terms of `microfacet`, and the tables for those that have no closed form
 geometry            shapes in world space, as records, triangles and the tree over them
 lights              lights with how often each is picked, and environments with the tables that draw from them
 textures            images -> texels, and which number of which material reads which of them
@@ -12,6 +13,7 @@ edits               what serves again after an edit, and which arrays differ
 from service.pack.edits.cache import CacheBudget, PackCache
 from service.pack.edits.scene_delta import scene_delta
 from service.pack.geometry.scene_bvh import warm_builder
+from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.scene import Packed, pack, pack_material
 from service.pack.textures.words import repacked
@@ -24,6 +26,7 @@ __all__ = [
     "pack_camera",
     "pack_material",
     "pack_materials",
+    "pack_microfacets",
     "pack_turn",
     "repacked",
     "scene_delta",

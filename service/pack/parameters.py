@@ -10,7 +10,7 @@ from gpu import layout
 from service.scene import Scene
 from service.scene.camera import Camera
 from service.scene.environment import Environment, SkyEnvironment
-from service.scene.material import Material
+from service.scene.material import Material, MicrofacetMaterial
 from service.scene.numbers import Vec3
 from service.scene.texture import ColorTexture, ScalarTexture
 
@@ -18,7 +18,10 @@ from service.scene.texture import ColorTexture, ScalarTexture
 RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}
 RENAMED |= {"normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
 # Where a name means another thing in one model.
-RENAMED_IN = {"blinn_phong": {"specular": "phong_specular"}}
+RENAMED_IN = {
+    "blinn_phong": {"specular": "phong_specular"},
+    "microfacet": {"alpha": "alpha", "f0": "specular_color"},
+}
 SIDES = {"front": 1, "both": 2}
 
 
@@ -44,6 +47,7 @@ def pack_camera(camera: Camera, origin: Vec3 = (0.0, 0.0, 0.0)) -> np.void:
 def pack_materials(scene: Scene) -> np.ndarray:
     """`layout.Material` records in the order of the document's names, unused ones included."""
     records = np.zeros(len(scene.materials), layout.Material.dtype)
+    records["number"] = np.arange(len(records))
     for record, material in zip(records, scene.materials.values(), strict=True):
         record["model"] = layout.MaterialModel[material.type.upper()]
         for name in type(material).model_fields:
@@ -57,7 +61,9 @@ def pack_materials(scene: Scene) -> np.ndarray:
                     value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
                 record[member] = layout.ABSENT if value is None else value
         record["opacity"] = opacity(material)
-        if isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
+        if isinstance(material, MicrofacetMaterial):
+            record["cutoff"] = layout.ABSENT
+        elif isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
             record["cutoff"] /= material.alpha  # the opacity is 1 or 0 already, and a vertex's alpha a share of that
     return records
 
@@ -69,6 +75,8 @@ def member_of(material: Material, name: str) -> str:
 
 def opacity(material: Material) -> float:
     """The chance that a ray meets the surface."""
+    if isinstance(material, MicrofacetMaterial):
+        return 1.0  # its alpha is another thing
     if isinstance(material.alpha, ScalarTexture):
         return layout.TEXTURED
     if material.alpha_cutoff is None or isinstance(material.alpha_cutoff, ScalarTexture):

@@ -21,6 +21,7 @@ from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights
 from service.pack.lights.environment import PackedEnvironment, environment_key, pack_environment
 from service.pack.lights.light_bounds import Grown, grow_light_tree
+from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.textured_emission import dark, mean_emission
 from service.pack.textures.uses import required_charts
@@ -87,6 +88,7 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
     arrays = SceneArrays(
         camera=pack_camera(scene.camera, built.origin),
         materials=materials,
+        microfacets=pack_microfacets(scene),
         lights=picked.records,
         light_tree=picked.tree,
         environment=sky.arrays,

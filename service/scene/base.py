@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from itertools import islice
 from types import NoneType
 from typing import Any, get_args
@@ -55,12 +55,13 @@ def hint(
     default: float | None = None,
     absent: str | None = None,
     follows: tuple[str, Callable[[float], float]] | None = None,
+    ranges: tuple[str, Mapping[Any, tuple[float, float]]] | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
     `soft` is where a slider ends whose range goes on, or both its ends; `default` is told where the model's is None.
     For a field that may be left out: `absent` is a word for what holds then; `follows` names the field, of the range
-    0 to 1, that sets it then, and how.
+    0 to 1, that sets it then, and how. `ranges` names a field with a choice, and the range for each of its values.
     """
     extra: dict[str, Any] = {}
     if unit is not None:
@@ -78,6 +79,9 @@ def hint(
     if follows is not None:
         name, function = follows
         extra["x-follows"] = {"field": name, "points": [[x, function(x)] for x in FOLLOWED]}
+    if ranges is not None:
+        name, bounds = ranges
+        extra["x-ranges"] = {"field": name, "bounds": {key: list(ends) for key, ends in bounds.items()}}
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

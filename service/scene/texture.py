@@ -128,30 +128,30 @@ class NormalTexture(_Reference):
 VALUE_TAG, REFERENCE_TAG = "<value>", "<reference>"
 
 
-def _form(value: Any) -> str:
+def form_of(value: Any) -> str:
     return REFERENCE_TAG if isinstance(value, dict | _Reference) else VALUE_TAG
 
 
 AnyFraction = Annotated[
-    Annotated[Fraction, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[Fraction, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyFactor = Annotated[
-    Annotated[Factor, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[Factor, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyDegrees = Annotated[
-    Annotated[Degrees, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[Degrees, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyLength = Annotated[
-    Annotated[PositiveLength, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[PositiveLength, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyIndex = Annotated[
-    Annotated[RefractiveIndex, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[RefractiveIndex, Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyReflectance = Annotated[
-    Annotated[Reflectance, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[Reflectance, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 AnyRadiometric = Annotated[
-    Annotated[Radiometric, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(_form)
+    Annotated[Radiometric, Tag(VALUE_TAG)] | Annotated[ColorTexture, Tag(REFERENCE_TAG)], Discriminator(form_of)
 ]
 
 Reference = ScalarTexture | ColorTexture | NormalTexture

@@ -13,6 +13,7 @@ from gpu.arrays import SceneArrays
 from gpu.kernels.features import FLAGS, LEAST_ROUGHNESS, flags, grown
 from gpu.kernels.source import SHADERS
 from gpu.kernels.visibility import background_share
+from gpu.layout.microfacet_records import TERMS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
 from service.pack import Packed, pack
 from service.scene import parse_scene
@@ -55,6 +56,7 @@ def textured(material: Doc, *shapes: Doc, **texture: Any) -> Doc:
 
 
 T = {"texture": "t"}
+MICROFACET = {"type": "microfacet", "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}
 LAMP = {"type": "diffuse", "albedo": 0, "emission": 3}
 SCENES: dict[str, Doc] = {
     "SPHERES": lit(ball("m")), "QUADS": lit(), "BOXES": lit(BOX), "ELLIPSOIDS": lit(ball("m", **ODD)),
@@ -93,6 +95,9 @@ SCENES: dict[str, Doc] = {
     "TANGENTS": made_of({"type": "disney", "anisotropic": 1}, icosphere("m", 1)),
     "CLEARCOAT": made_of({"type": "disney", "clearcoat": 1}), "METAL_ROUGH": made_of(GLTF),
     "BLINN_PHONG": made_of(PHONG), "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
+    "MICROFACET": made_of(MICROFACET), "MICROFACET_TABLES": made_of({**MICROFACET, "distribution": "abc"}),
+    **{f"MICROFACET_{kind}_{e.name}".upper(): made_of({**MICROFACET, kind: e.name.lower()})
+       for kind, terms in TERMS.items() for e in terms},
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),

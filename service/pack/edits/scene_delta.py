@@ -15,7 +15,7 @@ MOVED = (
     "node_origin", "node_scale", "radiance_scale",
 )  # fmt: skip
 MANY = ("nodes", "light_tree")
-EDITED = ("camera", "materials")  # as many as before; see Scene.edit
+EDITED = ("camera", "materials", "microfacets")  # as many as before; see Scene.edit
 SMALL = 1 << 20  # bytes that are compared; of more it is asked whether they are the very same
 
 

@@ -5,11 +5,12 @@ from __future__ import annotations
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 
+from gpu.layout import texture_records
 from service.assets import ImageData
 from service.pack.parameters import member_of
 from service.problems import FieldError, InvalidDocument
 from service.scene import Scene
-from service.scene.material import Material, stretches
+from service.scene.material import Material, MicrofacetMaterial, stretches
 from service.scene.texture import (
     CheckerTexture,
     ColorTexture,
@@ -33,6 +34,7 @@ class TextureReference:
     texture: ImageTexture | CheckerTexture
     srgb: bool  # bytes that the kernel decodes
     pointer: str
+    bounds: tuple[float, float]  # that its values are clamped to
     decoded: bool = False  # floats that are said to be sRGB
 
     @property
@@ -90,7 +92,11 @@ def uses_of(scene: Scene, images: Mapping[str, ImageData]) -> Iterator[TextureRe
                 srgb = assumed if texture.color_space is None else texture.color_space == "srgb"
             pointer = f"/materials/{escaped(name)}/{key}"
             member = member_of(material, key)
-            yield TextureReference(i, member, reference, texture, srgb and is_8bit, pointer, srgb and not is_8bit)
+            bounds = texture_records.TEXTURABLE.get(member, texture_records.UNIT)
+            if isinstance(material, MicrofacetMaterial) and key == "alpha":
+                bounds = material.alpha_range
+            decoded = srgb and not is_8bit
+            yield TextureReference(i, member, reference, texture, srgb and is_8bit, pointer, bounds, decoded)
 
 
 def check_channels(uses: list[TextureReference], images: Mapping[str, ImageData]) -> None:

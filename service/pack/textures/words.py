@@ -173,7 +173,7 @@ def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[st
             if own != along:
                 yield f"{use.pointer}: reads uv set {own}, but runs along set {along}, that of the normal map"
             continue
-        low, high = texture_records.TEXTURABLE[use.member]
+        low, high = use.bounds
         pixels: np.ndarray
         if isinstance(use.texture, CheckerTexture):
             pixels = np.array([[use.texture.a, use.texture.b]], np.float32)

@@ -12,7 +12,7 @@ from service.views import DEFAULT_TONE_MAP, Encoding
 BsdfQuestion = Literal["values", "albedo", "terms"]
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 
-EDITS = ("camera", "materials", "texture_words", "environment", "moved")  # what `Scene.edit` takes
+EDITS = ("camera", "materials", "texture_words", "microfacets", "environment", "moved")  # what `Scene.edit` takes
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,7 @@ class Update:
     camera: np.void | None = None  # gpu.layout.Camera
     materials: np.ndarray | None = None
     texture_words: np.ndarray | None = None
+    microfacets: np.ndarray | None = None
     environment: tuple[float, float] | None = None
     moved: dict[str, Any] | None = None
     denoise: bool | None = None

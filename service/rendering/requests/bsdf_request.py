@@ -20,7 +20,8 @@ from service.scene.validation import validated
 MOST_PAIRS = 1 << 16  # of one question
 MOST_SAMPLES = 1 << 20  # of one direction
 MOST_WORK = 1 << 24  # samples of one question, some seconds of two cores
-WITH_TERMS = ("disney", "metal_rough", "principled")  # models of microfacets; see shaders/bsdf_terms.comp
+# Models of microfacets; see shaders/bsdf_terms.comp.
+WITH_TERMS = ("disney", "metal_rough", "principled", "microfacet")
 
 
 class BsdfBody(Model):

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
-from service.pack import PackCache, pack_camera, pack_materials, pack_turn, repacked, scene_delta
+from service.pack import PackCache, pack_camera, pack_materials, pack_microfacets, pack_turn, repacked, scene_delta
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.rendering.ipc.messages import Update
@@ -164,6 +164,7 @@ class EditSession:
             return replace(
                 update, base=old.generation, moved=elsewhere, camera=arrays.camera, materials=arrays.materials,
                 texture_words=None if arrays.textures is None else arrays.textures.words,
+                microfacets=arrays.microfacets if len(arrays.microfacets) else None,
                 environment=None if lit is None else (lit.rotation, lit.scale),
             )  # fmt: skip
         environment = new.scene.environment
@@ -174,5 +175,6 @@ class EditSession:
             camera=pack_camera(new.scene.camera, self._arrays.origin) if touched.camera else None,
             materials=pack_materials(new.scene) if touched.materials else None,
             texture_words=repacked(textures, new.scene) if touched.materials and textures else None,
+            microfacets=pack_microfacets(new.scene) if touched.materials and len(self._arrays.microfacets) else None,
             environment=pack_turn(environment) if touched.environment and environment is not None else None,
         )

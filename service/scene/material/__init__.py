@@ -7,6 +7,7 @@ disney          the "principled" BRDF of 2012
 principled      the production model, with glass, coat and sheen: `disney` and more
 metal_rough     the core BRDF of glTF 2.0
 blinn_phong     the highlight of early rasterisers
+microfacet      the distributions, geometry and Fresnel terms of the literature
 """
 
 from __future__ import annotations
@@ -19,11 +20,17 @@ from service.scene.material.blinn_phong import BlinnPhongMaterial
 from service.scene.material.diffuse import DiffuseMaterial
 from service.scene.material.disney import DisneyMaterial
 from service.scene.material.metal_rough import MetalRoughMaterial
+from service.scene.material.microfacet import MicrofacetMaterial
 from service.scene.material.principled import PrincipledMaterial
 from service.scene.texture import ScalarTexture
 
 Material = Annotated[
-    DiffuseMaterial | DisneyMaterial | PrincipledMaterial | MetalRoughMaterial | BlinnPhongMaterial,
+    DiffuseMaterial
+    | DisneyMaterial
+    | PrincipledMaterial
+    | MetalRoughMaterial
+    | BlinnPhongMaterial
+    | MicrofacetMaterial,
     Field(discriminator="type"),
 ]
 
@@ -40,6 +47,7 @@ __all__ = [
     "DisneyMaterial",
     "Material",
     "MetalRoughMaterial",
+    "MicrofacetMaterial",
     "PrincipledMaterial",
     "stretches",
 ]

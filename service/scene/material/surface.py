@@ -1,4 +1,4 @@
-"""What every material may carry, whatever its model: emission, opacity and a normal map."""
+"""What every material may carry, whatever its model: emission, a normal map, and nearly always opacity."""
 
 from __future__ import annotations
 
@@ -7,22 +7,38 @@ from typing import Annotated, Literal
 from service.scene.base import OMITTABLE, Model, hint
 from service.scene.texture import AnyFraction, AnyRadiometric, NormalTexture
 
+Emission = Annotated[
+    AnyRadiometric,
+    hint(
+        "Emission",
+        "Radiance that leaves the front side: above 0 the shape is an area light.",
+        unit="W/(m^2 sr)",
+        widget="color",
+        soft=20,
+    ),
+]
+EmissionSides = Annotated[
+    Literal["front", "both"],
+    hint("Emitting sides", "Whether the emission leaves the outward side only, or the inward side as well."),
+]
+NormalMap = Annotated[
+    NormalTexture | None,
+    OMITTABLE,
+    hint("Normal map", "Bends the surface's normal without moving the surface."),
+]
+
+
+class SolidSurface(Model):
+    """The base of models that have no opacity."""
+
+    emission: Emission = (0.0, 0.0, 0.0)
+    emission_sides: EmissionSides = "front"
+    normal_map: NormalMap = None
+
 
 class Surface(Model):
-    emission: Annotated[
-        AnyRadiometric,
-        hint(
-            "Emission",
-            "Radiance that leaves the front side: above 0 the shape is an area light.",
-            unit="W/(m^2 sr)",
-            widget="color",
-            soft=20,
-        ),
-    ] = (0.0, 0.0, 0.0)
-    emission_sides: Annotated[
-        Literal["front", "both"],
-        hint("Emitting sides", "Whether the emission leaves the outward side only, or the inward side as well."),
-    ] = "front"
+    emission: Emission = (0.0, 0.0, 0.0)
+    emission_sides: EmissionSides = "front"
     alpha: Annotated[
         AnyFraction,
         hint(
@@ -43,8 +59,4 @@ class Surface(Model):
             absent="off",
         ),
     ] = None
-    normal_map: Annotated[
-        NormalTexture | None,
-        OMITTABLE,
-        hint("Normal map", "Bends the surface's normal without moving the surface."),
-    ] = None
+    normal_map: NormalMap = None

@@ -115,7 +115,8 @@ def kernel_request(
         same_flags = update.camera is None or kernel_keys.camera_flags(update.camera) == kernel_keys.camera_flags(
             arrays.camera
         )
-        if update.settings is None and same_flags and not edits.keys() & {"materials", "texture_words", "moved"}:
+        compiled = {"materials", "texture_words", "microfacets", "moved"}
+        if update.settings is None and same_flags and not edits.keys() & compiled:
             return None
     elif offloaded is not None:
         arrays, editing, raised = offloaded.arrays, offloaded.editing, offloaded.flags

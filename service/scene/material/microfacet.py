@@ -1,0 +1,160 @@
+"""`microfacet`: the distributions, geometry and Fresnel terms of the literature, in any combination."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Annotated, Any, Literal
+
+from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
+
+from service.scene.base import OMITTABLE, hint, refusal
+from service.scene.color import Color
+from service.scene.material.surface import SolidSurface
+from service.scene.numbers import LARGEST, Fraction, RefractiveIndex, check_number, is_number, vector, vector_schema
+from service.scene.texture import REFERENCE_TAG, VALUE_TAG, AnyReflectance, ScalarTexture, form_of
+
+Distribution = Literal["phong", "beckmann", "ggx", "gtr", "abc", "sgd", "gaussian"]
+Geometry = Literal["implicit", "neumann", "cook_torrance", "kelemen", "schlick_ggx", "smith", "smith_correlated"]
+Fresnel = Literal["none", "schlick", "cook_torrance", "dielectric", "conductor"]
+DiffuseModel = Literal["lambert", "oren_nayar", "disney", "eon"]
+
+Range = tuple[float, float]
+WIDTHS: Range = (0.001, 10.0)
+ALPHA_RANGES: dict[Distribution, Range] = {
+    "phong": (0.0, 1e6),
+    "beckmann": WIDTHS,
+    "ggx": WIDTHS,
+    "gtr": WIDTHS,
+    "abc": (1e-3, 1e6),
+    "sgd": (0.01, 2.0),
+    "gaussian": (0.01, 2.0),
+}
+ANY_GAMMA: Range = (0.0, 1000.0)  # where the distribution has none
+GAMMA_RANGES: dict[Distribution, Range] = {"gtr": (0.1, 10.0), "abc": ANY_GAMMA, "sgd": (0.0, 2.0)}
+SCHLICK_GGX = ("ggx", "beckmann", "gtr")  # the distributions whose alpha it takes
+
+AnyAlpha = Annotated[
+    Annotated[Annotated[float, Field(ge=0, le=1e6)], Tag(VALUE_TAG)] | Annotated[ScalarTexture, Tag(REFERENCE_TAG)],
+    Discriminator(form_of),
+]
+LEAST_INDEX = 1e-30  # of a conductor: above 0 in single precision, too
+
+
+def _per_channel(low: float) -> Callable[[Any], Color]:
+    """A validator: three numbers, one a channel, or one for all."""
+
+    def validate(value: Any) -> Color:
+        if is_number(value):
+            number = check_number(value, low, LARGEST)
+            return number, number, number
+        return vector(low, LARGEST, "[0.2, 0.9, 1.1]")(value)
+
+    return validate
+
+
+def _per_channel_schema(low: float) -> WithJsonSchema:
+    return WithJsonSchema(
+        {"anyOf": [vector_schema(low, LARGEST), {"type": "number", "minimum": low, "maximum": LARGEST}]}
+    )
+
+
+ConductorIndex = Annotated[Color, PlainValidator(_per_channel(LEAST_INDEX)), _per_channel_schema(LEAST_INDEX)]
+Extinction = Annotated[Color, PlainValidator(_per_channel(0.0)), _per_channel_schema(0.0)]
+
+
+class MicrofacetMaterial(SolidSurface):
+    """Microfacets by the terms of the literature, for comparison and teaching: may lose or gain energy."""
+
+    type: Literal["microfacet"]
+    distribution: Annotated[
+        Distribution, hint("Distribution", "How the normals of the microfacets are spread: D, normalised.")
+    ] = "ggx"
+    alpha: Annotated[
+        AnyAlpha,
+        hint(
+            "Alpha",
+            "The distribution's parameter: a width; for phong an exponent, for abc an inverse width.",
+            unit="",
+            widget="slider",
+            soft=(0.01, 1.0),
+            ranges=("distribution", ALPHA_RANGES),
+        ),
+    ] = 0.25
+    gamma: Annotated[
+        Annotated[float, Field(ge=ANY_GAMMA[0], le=ANY_GAMMA[1])],
+        hint(
+            "Gamma",
+            "How soon the tail falls off, for gtr, abc and sgd; the others do not use it.",
+            unit="",
+            widget="slider",
+            soft=(0.1, 10.0),
+            ranges=("distribution", dict(GAMMA_RANGES)),
+        ),
+    ] = 2.0
+    geometry: Annotated[
+        Geometry, hint("Geometry", "The share of the microfacets that is neither masked nor shadowed: G.")
+    ] = "smith"
+    fresnel: Annotated[Fresnel, hint("Fresnel", "The reflectance of one microfacet: F.")] = "schlick"
+    f0: Annotated[
+        AnyReflectance,
+        hint("F0", "Reflectance head-on, for schlick and cook_torrance.", unit="", widget="color"),
+    ] = (0.04, 0.04, 0.04)
+    ior: Annotated[
+        RefractiveIndex,
+        hint("Index of refraction", "For dielectric: water 1.33, glass 1.5, diamond 2.42.", unit="", widget="slider"),
+    ] = 1.5
+    conductor_eta: Annotated[
+        ConductorIndex | None,
+        OMITTABLE,
+        hint("Conductor's index", "For conductor: its index of refraction, per channel.", unit="", widget="number"),
+    ] = None
+    conductor_k: Annotated[
+        Extinction | None,
+        OMITTABLE,
+        hint("Conductor's k", "For conductor: its extinction coefficient, per channel.", unit="", widget="number"),
+    ] = None
+    diffuse: Annotated[
+        AnyReflectance,
+        hint("Diffuse", "Albedo of the diffuse lobe, which is added to the facets.", unit="", widget="color"),
+    ] = (0.0, 0.0, 0.0)
+    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "The shape of the diffuse lobe.")] = "lambert"
+    diffuse_roughness: Annotated[
+        Fraction,
+        hint(
+            "Diffuse roughness",
+            "Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it.",
+            unit="",
+            widget="slider",
+        ),
+    ] = 0.0
+
+    @model_validator(mode="before")
+    @classmethod
+    def _no_opacity(cls, value: Any) -> Any:
+        if isinstance(value, dict) and "alpha_cutoff" in value:
+            detail = "alpha_cutoff belongs to opacity, which microfacet has none of: its alpha is the distribution's"
+            raise refusal(detail, "/alpha_cutoff")
+        return value
+
+    @model_validator(mode="after")
+    def _terms_fit(self) -> MicrofacetMaterial:
+        self._check("alpha", self.alpha_range)
+        self._check("gamma", GAMMA_RANGES.get(self.distribution, ANY_GAMMA))
+        if self.geometry == "schlick_ggx" and self.distribution not in SCHLICK_GGX:
+            allowed = ", ".join(SCHLICK_GGX)
+            raise refusal(f"schlick_ggx goes with {allowed} only, not with {self.distribution}", "/geometry")
+        for name in ("conductor_eta", "conductor_k"):
+            if self.fresnel == "conductor" and getattr(self, name) is None:
+                raise refusal(f"{name} is required where fresnel is conductor", f"/{name}")
+        return self
+
+    def _check(self, name: str, bounds: Range) -> None:
+        value, (low, high) = getattr(self, name), bounds
+        if isinstance(value, float) and not low <= value <= high:
+            detail = f"must be between {low:g} and {high:g} where distribution is {self.distribution}, not {value!r}"
+            raise refusal(detail, f"/{name}")
+
+    @property
+    def alpha_range(self) -> Range:
+        """What alpha may be; a texture's values are clamped to it."""
+        return ALPHA_RANGES[self.distribution]
