@@ -11,12 +11,14 @@ from importlib import metadata, util
 
 import numpy as np
 
+from gpu.layout import LUMINANCE
+
 GUIDE_SAMPLES = 16  # of the first hit's albedo and normal; 256 give the same error to three digits
 SMALLEST = 16  # pixels a side; smaller pictures are mostly the network's own padding: 1 x 1 came out 6 x too dark
 # Times the picture's typical radiance: what is brighter stays as it was rendered. The network's curve ends at 65504,
 # and beyond that it invents (1e20 came out as 3.5e20).
 BRIGHTEST = 1e4
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE)
 
 
 def version() -> str | None:

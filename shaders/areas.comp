@@ -9,13 +9,14 @@ layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 seen
 uniform uvec2 size; // of the bound rows
 
 void main() {
-    uvec2 a = gl_GlobalInvocationID.xy, areas = (size + 7u) / 8u;
+    uvec2 a = gl_GlobalInvocationID.xy, areas = (size + PLAN_AREA - 1u) / PLAN_AREA;
     if (a.x >= areas.x || a.y >= areas.y) return;
     vec4 sum = vec4(0.0), counts = vec4(0.0);
-    uint y = 8u * a.y, right = min(8u * a.x + 8u, size.x), low = min(y + 8u, size.y);
+    uint y = PLAN_AREA * a.y;
+    uint right = min(PLAN_AREA * (a.x + 1u), size.x), low = min(y + PLAN_AREA, size.y);
     do {
-        uint x = 8u * a.x;
-        vec4 own = vec4(equal(uvec4(y & 3u), uvec4(0u, 1u, 2u, 3u)));
+        uint x = PLAN_AREA * a.x;
+        vec4 own = vec4(equal(uvec4(y % PLAN_CLASSES), uvec4(0u, 1u, 2u, 3u)));
         do {
             vec4 moment = moments[y * size.x + x];
             if (moment.w > 1.0) sum += own * luminance_variance(moment.rgb) / (moment.w - 1.0);

@@ -16,7 +16,7 @@ Lone lone_make(vec3 wo) {
     Lone lone;
     bool behind = wo.z < 0.0;
     lone.side = behind ? -1.0 : 1.0;
-    lone.visible = wo.z > 0.0 || (behind && surface_transmits(m));
+    lone.visible = wo.z > 0.0 || (behind && material_transmits(m));
 #if HAS_ANISOTROPIC
     m.anisotropic_rotation *= lone.side; // it turns from u towards v on both sides, as in interaction_tangent
 #endif

@@ -10,6 +10,6 @@ const float ULP = 5.9604645e-8;  // 2^-24, the largest relative rounding error o
 // n ulps, bounding n successive roundings [Higham 2002, lemma 3.1].
 float gamma_error(float n) { return n * ULP / (1.0 - n * ULP); }
 
-float luminance(vec3 c) { return dot(c, vec3(0.2126, 0.7152, 0.0722)); }
+float luminance(vec3 c) { return dot(c, LUMINANCE); }
 float max_component(vec3 c) { return max(c.x, max(c.y, c.z)); }
 float sqr(float x) { return x * x; }

@@ -2,16 +2,6 @@
 // runs both sides of every `if`, a loop of their own saves such paths the work that only other surfaces need.
 
 #if HAS_MIRRORS
-// Whether a surface only mirrors or refracts.
-bool delta_chain_takes(Material m, bool mapped) {
-    bool whole = m.metallic >= 1.0;
-#if HAS_TRANSMISSION
-    whole = whole || m.transmission >= 1.0;
-#endif
-    return whole && !mapped && m.model == MODEL_PRINCIPLED && m.roughness < SURFACE_LEAST_ROUGHNESS
-        && m.clearcoat <= 0.0 && m.sheen <= 0.0;
-}
-
 // Scatters as principled_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {
     Surface s = surface_make(m, here.tangent);
@@ -41,7 +31,7 @@ bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Materia
     do {
         path.radiance_before = path.radiance;
         here = interaction_make(path, m);
-        taken = delta_chain_takes(m, here.mapped);
+        taken = material_is_delta(m) && !here.mapped;
         if (taken) {
             delta_chain_step(here, m, rng, path);
             taken = path.alive && path.bounce < frame.max_bounces;

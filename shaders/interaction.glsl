@@ -67,7 +67,7 @@ Interaction interaction_make(inout Path path, out Material m) {
     here.basis = frame_basis(facing_normal(path.at, wo_w));
     here.wo = frame_to_local(here.basis, wo_w);
     here.facing = here.mapped ? here.front : here.basis.z; // a lobe that folds reaches all that is in front
-    here.transmits = surface_transmits(m);
+    here.transmits = material_transmits(m);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);
     return here;

@@ -53,7 +53,7 @@ Medium medium_at_camera() {
 #else
         Material m = material_pick(at.material);
 #endif
-        bool counts = more && surface_transmits(m);
+        bool counts = more && material_transmits(m);
 #if HAS_HIDDEN_SHAPES
         counts = counts && (at.shape & HIDDEN) == 0u;
 #endif

@@ -38,7 +38,7 @@ uniform uint width; // of the picture
 uniform uint lines; // of METER_LINE invocations
 
 float meter_luminance(uint slot) {
-    return dot(sums[slot].rgb, vec3(0.2126, 0.7152, 0.0722)) / max(moments[slot].w, 1.0);
+    return dot(sums[slot].rgb, LUMINANCE) / max(moments[slot].w, 1.0);
 }
 
 void main() {

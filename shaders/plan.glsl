@@ -7,15 +7,16 @@ layout(std430, binding = SLOT_OUTPUT) readonly buffer work_buffer { uint plan_wo
 // Finds the pixel of this invocation; false where there is none. tile_size.x is the number of areas.
 bool plan_pixel(out uvec2 pixel, out uint slot) {
     uint area = gl_WorkGroupID.x < frame.tile_size.x ? plan_work[gl_WorkGroupID.x] : 0xffffffffu;
-    pixel = 8u * uvec2(area & 0xffffu, area >> 16u) + gl_LocalInvocationID.xy;
+    pixel = PLAN_AREA * uvec2(area & 0xffffu, area >> 16u) + gl_LocalInvocationID.xy;
     slot = pixel.y * frame.slot_width + pixel.x - frame.slot_first;
     return all(lessThan(pixel, frame.resolution));
 }
 
 // How many samples this dispatch adds to a pixel that has had `had`.
 uint plan_due(uvec2 pixel, uint had) {
-    uvec2 area = pixel >> 3u;
-    uint wanted = plan_counts[area.y * ((frame.resolution.x + 7u) >> 3u) + area.x][pixel.y & 3u];
+    uvec2 area = pixel / PLAN_AREA;
+    uint columns = (frame.resolution.x + PLAN_AREA - 1u) / PLAN_AREA;
+    uint wanted = plan_counts[area.y * columns + area.x][pixel.y % PLAN_CLASSES];
     return min(wanted - min(had, wanted), frame.sample_count);
 }
 #endif

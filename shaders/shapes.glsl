@@ -23,6 +23,7 @@ struct SurfacePoint {
 };
 
 #include "frame.glsl"
+#include "material.glsl"
 #include "shapes/sphere.glsl"
 #include "shapes/quad.glsl"
 #include "shapes/solid.glsl"

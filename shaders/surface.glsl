@@ -1,4 +1,6 @@
 // A material at a point of a surface, ready for the lobes. Here, and only here, roughness becomes alpha.
+#include "material.glsl"
+
 struct Surface {
     uint model;
     vec3 base_color;
@@ -45,9 +47,6 @@ struct Surface {
 #endif
 };
 
-// A roughness below this is a mirror.
-const float SURFACE_LEAST_ROUGHNESS = 0.01;
-
 #if HAS_PRINCIPLED
 // Sets what `principled` has whatever the direction; principled_face adds the rest.
 void surface_principled(Material m, vec2 tangent, inout Surface s) {
@@ -64,7 +63,7 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
 #if HAS_TRANSMISSION
     s.transmission = m.transmission;
 #endif
-    s.is_delta = m.roughness < SURFACE_LEAST_ROUGHNESS;
+    s.is_delta = m.roughness < LEAST_ROUGHNESS;
     s.aspect = 1.0;
 #if HAS_ANISOTROPIC
     s.aspect = sqrt(1.0 - 0.9 * m.anisotropic);
@@ -73,7 +72,7 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
     s.tangent = m.anisotropic > 0.0 ? vec2(cs.x * tangent.x - cs.y * tangent.y, cs.y * tangent.x + cs.x * tangent.y)
                                     : vec2(1.0, 0.0);
 #endif
-    float a = sqr(max(m.roughness, SURFACE_LEAST_ROUGHNESS));
+    float a = sqr(max(m.roughness, LEAST_ROUGHNESS));
     s.alpha = vec2(a / s.aspect, a * s.aspect);
 #if HAS_SHEEN
     s.sheen = m.sheen * (m.sheen_color.x >= 0.0 ? m.sheen_color : mix(vec3(1.0), tint, m.sheen_tint));
@@ -83,8 +82,8 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
 #endif
     s.coat_is_delta = false;
 #if HAS_CLEARCOAT
-    s.coat_is_delta = m.clearcoat_roughness >= 0.0 && m.clearcoat_roughness < SURFACE_LEAST_ROUGHNESS;
-    float rough = max(m.clearcoat_roughness, SURFACE_LEAST_ROUGHNESS);
+    s.coat_is_delta = m.clearcoat_roughness >= 0.0 && m.clearcoat_roughness < LEAST_ROUGHNESS;
+    float rough = max(m.clearcoat_roughness, LEAST_ROUGHNESS);
     s.alpha_coat = m.clearcoat_roughness >= 0.0 ? rough * rough : mix(0.1, 0.001, m.clearcoat_gloss);
     s.coat_roughness = s.coat_is_delta ? 0.0 : sqrt(s.alpha_coat);
 #endif
@@ -123,15 +122,6 @@ vec3 surface_attenuation(Material m) {
     if (m.attenuation_distance > 0.0) return min(-log(m.attenuation_color) / m.attenuation_distance, vec3(1e30));
 #endif
     return vec3(0.0);
-}
-
-// Whether light passes through the surface.
-bool surface_transmits(Material m) {
-#if HAS_TRANSMISSION
-    return m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0;
-#else
-    return false;
-#endif
 }
 
 Surface surface_make(Material m, vec2 tangent) {

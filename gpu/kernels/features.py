@@ -17,7 +17,6 @@ from gpu.layout import LightKind, MaterialModel, ShapeKind, microfacet_records, 
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
-LEAST_ROUGHNESS = 0.01  # as in surface.glsl
 OPEN = 0.4  # of the picture shows nothing: then a loop of its own for that spares more than it takes
 
 
@@ -80,7 +79,9 @@ def _mirrors(materials: np.ndarray) -> np.ndarray:
     m = materials
     whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
     bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
-    out: np.ndarray = (m["model"] == MaterialModel.PRINCIPLED) & (m["roughness"] < LEAST_ROUGHNESS) & whole & bare
+    out: np.ndarray = (
+        (m["model"] == MaterialModel.PRINCIPLED) & (m["roughness"] < layout.LEAST_ROUGHNESS) & whole & bare
+    )
     return out
 
 

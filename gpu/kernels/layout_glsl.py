@@ -119,8 +119,12 @@ def _constants() -> str:
         "CLUSTER_BIT",
         "LIGHT_CODES",
         "METER_REPLICATES",
+        "PLAN_AREA",
+        "PLAN_CLASSES",
     ):
         out.append(f"const uint {name} = {getattr(layout, name)}u;")
+    out.append(f"const float LEAST_ROUGHNESS = {layout.LEAST_ROUGHNESS!r};")
+    out.append(f"const vec3 LUMINANCE = vec3({', '.join(map(repr, layout.LUMINANCE))});")
     out.append(f"#define LIGHT_TREE_TEXTURE {bindings.LIGHT_TREE_TEXTURE}")
     out.append(f"const uint LIGHT_TREE_ROW = {bindings.TEXELS_A_ROW}u;")
     out += [f"#define ENERGY_{name.upper()}_TEXTURE {unit}" for name, unit in bindings.ENERGY_TEXTURES.items()]

@@ -16,6 +16,8 @@ from gpu.layout.record import Record, f32, u32, uvec2, vec2, vec3, vec4
 NONE = 0xFFFFFFFF  # "no light", "no shape": an index that no array reaches
 NOT_VAST = 3.4e38
 ABSENT = -1.0  # a material's number that was not given
+LEAST_ROUGHNESS = 0.01  # a `principled` surface or coat with less is a mirror
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear Rec.709
 TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises what it may need
 SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
@@ -298,6 +300,8 @@ class Frame(Record):
     instance_shift: u32  # of an instance's number in an id, above its triangle's
 
 
+PLAN_AREA = 8  # pixels a side of the areas that a sample plan knows: a work group of the path tracer
+PLAN_CLASSES = 4  # of an area's rows, each planned by itself: llvmpipe works on a row of eight pixels at once
 METER_REPLICATES = 8  # more than the noise meter takes of a pixel; which one it is, in so many parts of its place's x
 
 BUFFERS: dict[str, tuple[type[Record], Slot]] = {

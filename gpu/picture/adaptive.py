@@ -9,8 +9,10 @@ import numpy as np
 from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
+from gpu.layout import PLAN_AREA as AREA
+from gpu.layout import PLAN_CLASSES as CLASSES
 from gpu.layout.bindings import Slot
-from gpu.picture.sample_plan import AREA, CLASSES, DECISIONS, WORDS, SamplePlan, pixels_of, weights_of
+from gpu.picture.sample_plan import DECISIONS, WORDS, SamplePlan, pixels_of, weights_of
 from gpu.picture.schedule import Dispatch, Tile
 from gpu.picture.tiles import GUESS_S, SLICE_S, USUAL_BOUNCES, usual_pass
 

@@ -21,7 +21,7 @@ import numpy as np
 from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
-from gpu.layout import METER_REPLICATES
+from gpu.layout import LUMINANCE, METER_REPLICATES
 from gpu.layout.bindings import Slot
 
 FROM = 8  # samples of each pixel, from which on the meter runs; before, the samples' own variance must do
@@ -30,7 +30,7 @@ _PIXELS, _FEWEST = 2048, 256  # that are looked at; in small pictures a quarter 
 _EVEN = 0.5  # share of them drawn evenly
 MOST = 4  # estimates of a pixel
 _BLOCKS = 1 << 20  # of pixels that are weighed at most, each as one
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
+_LUMINANCE = np.array(LUMINANCE)
 
 
 def defines(weigh: int) -> dict[str, object]:

@@ -15,8 +15,9 @@ from __future__ import annotations
 
 import numpy as np
 
-AREA = 8  # pixels a side: a work group
-CLASSES = 4  # of rows: a row of eight pixels is what llvmpipe works on at once
+from gpu.layout import PLAN_AREA as AREA
+from gpu.layout import PLAN_CLASSES as CLASSES
+
 DECISIONS = (8, 32, 128)  # mean samples of a pixel at which it is decided anew; no more than CLASSES - 1
 LEAST, MOST = 1 / 8, 32.0  # of the mean: the least finds light that few paths find, the most bounds a pass
 _EXPONENT = (

@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from gpu import layout
 from gpu.tables.environment_cells import draw_cells
 
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722], np.float32)  # Rec.709
+LUMINANCE = np.array(layout.LUMINANCE, np.float32)
 UNIFORM_SPHERE = 1.0 / (4.0 * np.pi)
 
 

@@ -38,8 +38,8 @@ float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
 #if HAS_SINGLE_SIDED
     bool single = (tri.shape & SINGLE_SIDED) != 0u;
 #if HAS_TRANSMISSION
-    Material m = material_load(tri.material); // a ray can only leave a body that has a back
-    if (m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0) single = false;
+    bool clear = material_transmits(material_load(tri.material)); // a ray can only leave a body that has a back
+    single = single && !clear;
 #endif
     if (single) {
         hit = hit && dot(cross(tri.v1 - tri.v0, tri.v2 - tri.v0), d) < 0.0;

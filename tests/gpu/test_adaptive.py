@@ -10,10 +10,12 @@ import numpy as np
 import pytest
 
 from gpu import Picture, Renderer, RenderSettings
+from gpu.layout import PLAN_AREA as AREA
+from gpu.layout import PLAN_CLASSES as CLASSES
 from gpu.layout.bindings import Slot
 from gpu.picture import adaptive
 from gpu.picture.noise_meter import FROM
-from gpu.picture.sample_plan import AREA, CLASSES, DECISIONS, LEAST, MOST, SamplePlan, pixels_of, weights_of
+from gpu.picture.sample_plan import DECISIONS, LEAST, MOST, SamplePlan, pixels_of, weights_of
 from service.cli import main
 from tests.gpu.test_noise_meter import SCENES, SHAPES, luminance
 from tests.rendering import Images, document, picture

@@ -10,8 +10,7 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.analysis.kernel_cost import kernel_cost
 from gpu.arrays import SceneArrays
-from gpu.kernels.features import FLAGS, LEAST_ROUGHNESS, flags, grown
-from gpu.kernels.source import SHADERS
+from gpu.kernels.features import FLAGS, flags, grown
 from gpu.kernels.visibility import background_share
 from gpu.layout.microfacet_records import TERMS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
@@ -187,11 +186,6 @@ def test_paths_go_through_mirrors_as_they_are_scattered(
     images.append(_seen(gpu, settings, scene))
     assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)
-
-
-def test_both_sides_agree_on_what_a_mirror_is() -> None:
-    """Else glass between the two would meet a kernel without its lobes."""
-    assert f"SURFACE_LEAST_ROUGHNESS = {LEAST_ROUGHNESS};" in (SHADERS / "surface.glsl").read_text()
 
 
 def test_an_edit_waits_for_no_loop_that_it_can_do_without() -> None:

@@ -10,6 +10,7 @@ import pytest
 
 from gpu import Renderer, layout
 from gpu.kernels.features import flags
+from gpu.layout.bindings import Slot
 from service.assets import AssetStore, MeshData
 from service.pack import pack
 from service.pack.geometry.tangents import codes
@@ -18,6 +19,7 @@ from service.rendering.streams.scene_diff import scene_diff
 from service.scene import parse_scene
 from tests.documents import Shelf, matrix_of
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
+from tests.probing import prober_of
 from tests.rendering import Images, document, picture, render
 from tests.shaders.test_normal_maps import MAPS, TEXTURES
 
@@ -70,7 +72,8 @@ def off(found: np.ndarray, expected: np.ndarray) -> float:
     return float(np.degrees(np.arccos(np.clip((found * unit).sum(-1), -1, 1))).max())
 
 
-def test_codes_come_back() -> None:
+def coded() -> tuple[np.ndarray, np.ndarray]:
+    """Records of normals all over the sphere with the codes of tangents, and these tangents (n, 3)."""
     rng = np.random.default_rng(5)
     bits = rng.integers(0, 2**32, 5000, dtype=np.uint32)
     bits[(bits & 0xFFFF == 0x8000) | (bits >> 16 == 0x8000)] = 0  # -32768, which no normal becomes
@@ -82,7 +85,21 @@ def test_codes_come_back() -> None:
     for k, name in enumerate(("n0", "n1", "n2")):
         made[name] = bits
         made["bits"] |= code << np.uint32(layout.TANGENT_SHIFT + layout.TANGENT_BITS * k)
-    assert off(unpacked(made)[0][:, 0], t) < 180 / layout.TANGENT_STEPS + 1e-6
+    return made, t
+
+
+def test_codes_come_back() -> None:
+    records, tangents = coded()
+    assert off(unpacked(records)[0][:, 0], tangents) < 180 / layout.TANGENT_STEPS + 1e-6
+
+
+def test_shaders_read_the_same_tangents(gpu: Renderer) -> None:
+    records, tangents = coded()
+    flags = frozenset({"HAS_TRIANGLES", "HAS_SMOOTH_NORMALS", "HAS_TANGENTS"})
+    inputs = {Slot.TRIANGLE_NORMALS: records}
+    found = prober_of(gpu).run("tangents.comp", len(records), inputs, raised=flags)[0][:, :3]
+    assert off(found, unpacked(records)[0][:, 0]) < 0.05, "rounding of float32, far below a step"
+    assert off(found, tangents) < 180 / layout.TANGENT_STEPS + 0.05
 
 
 @pytest.mark.parametrize("uvs", [True, False])

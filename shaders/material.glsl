@@ -1,0 +1,20 @@
+// What the numbers of a material say of it before it is a surface. features.py asks the same of all of a scene's.
+
+// Whether light passes through its surfaces.
+bool material_transmits(Material m) {
+#if HAS_TRANSMISSION
+    return m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0;
+#else
+    return false;
+#endif
+}
+
+// Whether it only mirrors or refracts.
+bool material_is_delta(Material m) {
+    bool whole = m.metallic >= 1.0;
+#if HAS_TRANSMISSION
+    whole = whole || m.transmission >= 1.0;
+#endif
+    return whole && m.model == MODEL_PRINCIPLED && m.roughness < LEAST_ROUGHNESS && m.clearcoat <= 0.0
+        && m.sheen <= 0.0;
+}

@@ -1,0 +1,18 @@
+// What kernels make of the numbers of material i: whether it transmits, whether it only mirrors or refracts, its index
+// of refraction and its coat's roughness.
+layout(local_size_x = 64) in;
+#include "layout.glsl"
+#include "constants.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "surface.glsl"
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
+uniform uint count;
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    Material m = material_load(i);
+    Surface s = surface_make(m, vec2(1.0, 0.0));
+    answers[i] = vec4(material_transmits(m), material_is_delta(m), s.eta_outside, s.coat_roughness);
+}

@@ -1,0 +1,16 @@
+// The tangent at the first corner of triangle i, as its normals' record has it.
+layout(local_size_x = 64) in;
+#include "layout.glsl"
+#include "constants.glsl"
+#include "sobol.glsl"
+#include "sampling.glsl"
+#include "shapes.glsl"
+layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
+uniform uint count;
+
+void main() {
+    uint i = gl_GlobalInvocationID.x;
+    if (i >= count) return;
+    TriangleNormals n = triangle_normals_load(i);
+    answers[i] = vec4(triangle_tangent(n.n0, n.bits, 0u), 0.0);
+}
