@@ -57,6 +57,9 @@ export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
 export const renderPicture = async (scene, settings, signal) =>
   (await ask("POST", "render?format=png", { ...json({ scene, settings }), signal })).blob();
 
+// What the shader functions say of a material: `question` is "" for values, "/albedo" or "/terms".
+export const askBsdf = async (question, body) => (await ask("POST", `bsdf${question}`, json(body))).json();
+
 // A render as a job of the server's: {id, ...}; how far it is, asked for until it ends or `wait` seconds passed; its
 // picture so far.
 export const submitRender = async (scene, settings) => (await ask("POST", "renders", json({ scene, settings }))).json();

@@ -49,6 +49,7 @@ export function makeCommands({
       push();
     },
     toggleTheme: () => ui.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
+    toggleLobe: () => { if (!find("show-lobe").hidden) ui.set({ lobe: !ui.state.lobe }); },
     pickTool: (tool) => ui.set({ tool }),
     nextLayer: () => ui.set({ layer: page.layers[(page.layers.indexOf(ui.state.layer) + 1) % page.layers.length] }),
     undo: () => travel(() => editor.undo()),
@@ -95,6 +96,7 @@ const BUTTONS = {
   pause: "togglePause", download: "download", compare: "toggleCompare", help: "showKeys", undo: "undo", redo: "redo",
   frame: "frame", "reset-view": "resetView", "open-file": "openFiles", "add-file": "addFiles", theme: "toggleTheme",
   "copy-material": "copyMaterial", "paste-material": "pasteMaterial", "reset-material": "resetMaterial",
+  "show-lobe": "toggleLobe",
 };
 
 export function watchButtons(find, does) {
@@ -124,6 +126,7 @@ export function keyTable(does) {
     { keys: ["home"], does: does.resetView, says: "back to the first view", group: "View" },
     { keys: ["escape"], does: () => pickTool("orbit"), says: "put the tool away", group: "Tools" },
     { keys: ["c"], does: does.toggleCompare, says: "compare two variants", group: "View" },
+    { keys: ["b"], does: does.toggleLobe, says: "how the material scatters light", group: "View" },
     { keys: ["l"], does: does.nextLayer, says: "next layer", group: "View" },
     { keys: ["h"], does: () => toggle("histogram"), says: "histogram", group: "View" },
     { keys: ["x"], does: () => toggle("clipping"), says: "clipped pixels", group: "View" },

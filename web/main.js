@@ -11,6 +11,7 @@ import { sentence } from "./format-text.js";
 import { Importer, watchDrops } from "./importer.js";
 import { askForKey } from "./key.js";
 import { fillSheet, watchKeys } from "./keys.js";
+import { LobePanel } from "./lobe/panel.js";
 import { Announcer, Messages } from "./messages.js";
 import { Output, forecastSize } from "./output.js";
 import { PageState, namesOf } from "./page-state.js";
@@ -179,6 +180,11 @@ const savePage = new SavePage(find("page-save"), {
   },
 });
 
+const lobe = new LobePanel(find("lobe"), {
+  acts: editor, schema, calls, titles, mean: (texture, isColor) => textureThumbnails.mean(texture, isColor), close: () => ui.set({ lobe: false }),
+});
+find("show-lobe").hidden = !lobe.isPossible;
+
 const output = new Output(find("output"), {
   schema, acts: editor, order: () => ({ scene: editor.state.scene, settings: editor.state.settings }), view: () => page.view, complain, say,
 });
@@ -236,12 +242,16 @@ function refresh() {
   push();
   messages.review();
   controller.mark();
+  lobe.refresh();
   clearTimeout(saving);
   if (editor.canUndo || left) saving = setTimeout(() => keepWork(essence(editor.state)), SAVE_REST_MS);
 }
 
 function showUi() {
   display.show();
+  find("lobe").hidden = !ui.state.lobe || !lobe.isPossible;
+  find("show-lobe").setAttribute("aria-pressed", String(ui.state.lobe));
+  lobe.refresh();
   controller.showUi(ui.state);
   push();
 }

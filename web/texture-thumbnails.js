@@ -2,7 +2,7 @@
 // the service. One after the other, and each once.
 
 import { fetchAsset, renderPicture } from "./api.js";
-import { hex, linear } from "./color.js";
+import { hex, linear, toLinear } from "./color.js";
 
 const SIDE = 64;
 const SQUARES = 4; // of a checker, along each side
@@ -56,6 +56,28 @@ export class TextureThumbnails {
       this.#bitmaps.set(asset, made);
     }
     return this.#bitmaps.get(asset);
+  }
+
+  // Resolves to the texture's mean, linear [r, g, b, a]; of an image without a picture 1. `isColor`: images of 8 bits
+  // are sRGB where a colour is read, unless they say otherwise.
+  async mean(texture, isColor) {
+    if (texture.type === "checker") {
+      const [a, b] = [linear(texture.a), linear(texture.b)];
+      return [...a.map((x, i) => (x + b[i]) / 2), 1];
+    }
+    const bitmap = await this.#bitmap(texture.asset);
+    if (!bitmap) return [1, 1, 1, 1];
+    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
+    context.drawImage(bitmap, 0, 0);
+    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
+    const isEncoded = (texture.color_space ?? (isColor ? "srgb" : "linear")) === "srgb";
+    const decode = (byte) => (isEncoded ? toLinear(byte / 255) : byte / 255);
+    const sums = [0, 0, 0, 0];
+    for (let i = 0; i < data.length; i += 4) {
+      for (let k = 0; k < 3; k += 1) sums[k] += decode(data[i + k]);
+      sums[3] += data[i + 3] / 255;
+    }
+    return sums.map((sum) => (4 * sum) / data.length);
   }
 
   // A canvas that shows the texture, now or as soon as there is a picture of it.

@@ -1,13 +1,13 @@
 // The state of the interface, as opposed to the document: the active tool, the overlays of the picture, the open tab.
-// It is neither undone nor shared; the tab and the theme outlive the page.
+// It is neither undone nor shared; the tab, the theme and whether the lobe is shown outlive the page.
 
 const STORED = "sunbox.ui";
-const LASTING = ["tab", "theme"];
+const LASTING = ["tab", "theme", "lobe"];
 
 export class UiState {
   #listeners = [];
   state = {
-    tool: "orbit", layer: "color", histogram: false, clipping: false, checker: null, guides: false, tab: "material", theme: null,
+    tool: "orbit", layer: "color", histogram: false, clipping: false, checker: null, guides: false, tab: "material", theme: null, lobe: false,
   };
 
   constructor() {

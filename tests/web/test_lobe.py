@@ -1,0 +1,269 @@
+"""The panel of the lobe on the real server: what it draws, says and hands out."""
+
+from __future__ import annotations
+
+import csv
+import io
+import json
+import math
+import re
+from collections.abc import Iterator
+from typing import Any
+from xml.etree import ElementTree
+
+import pytest
+from playwright.sync_api import Browser, BrowserContext, Route
+
+from tests.serving import Server
+from tests.web.conftest import Editor
+from tests.web.test_textures import halves
+
+PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
+IS_DONE = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'"
+
+
+def paste(editor: Editor, material: dict[str, Any]) -> None:
+    editor.page.evaluate(PASTE, json.dumps(material))
+    editor.page.click("#paste-material")
+    editor.wait("the model", lambda: editor.page.input_value("#model") == material["type"])
+
+
+def view(editor: Editor, name: str) -> None:
+    """Chooses a view, and waits for its first curve."""
+    editor.page.click(f"#lobe [data-value={name}]")
+    plotted(editor)
+
+
+def plotted(editor: Editor) -> None:
+    editor.page.wait_for_timeout(50)
+    editor.wait("the plot", lambda: editor.page.evaluate(IS_DONE))
+
+
+def table(editor: Editor) -> list[dict[str, float]]:
+    rows = csv.DictReader(io.StringIO(editor.shot("#lobe >> text=Save CSV").decode()))
+    return [{name: float(value) for name, value in row.items()} for row in rows]
+
+
+@pytest.fixture
+def lobe(editor: Editor) -> Editor:
+    """The editor with a pause in its picture and the panel open."""
+    editor.page.click("#pause")
+    editor.page.click("#show-lobe")
+    plotted(editor)
+    return editor
+
+
+def test_a_diffuse_lobe_is_a_half_circle_of_albedo_over_pi(lobe: Editor) -> None:
+    paste(lobe, {"type": "diffuse", "albedo": [0.8, 0.4, 0.2]})
+    plotted(lobe)
+    rows = table(lobe)
+    assert len(rows) > 90 and all(abs(row["theta_deg"]) < 90 for row in rows), "nothing goes through"
+    for row in rows:
+        assert [row[f"f_{c}"] for c in "rgb"] == pytest.approx([x / math.pi for x in (0.8, 0.4, 0.2)], rel=1e-5)
+    assert "largest value 0.15 per steradian" in lobe.page.get_attribute("#lobe svg", "aria-label")  # type: ignore[operator]
+    assert lobe.complaints == []
+
+
+def test_the_curve_follows_the_slider(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "principled", "roughness": 0.2})
+    plotted(lobe)
+    before = page.get_attribute("#lobe .curve", "d")
+    page.fill(lobe.field("roughness", "number"), "0.6")
+    page.press(lobe.field("roughness", "number"), "Enter")
+    plotted(lobe)
+    after = page.get_attribute("#lobe .curve", "d")
+    assert after != before
+    page.keyboard.press("Control+z")
+    plotted(lobe)
+    lobe.wait("the first curve again", lambda: page.get_attribute("#lobe .curve", "d") == before)
+
+
+def test_a_narrow_lobe_is_refined(lobe: Editor) -> None:
+    paste(lobe, {"type": "metal_rough", "base_color": 0.8, "metallic": 1, "roughness": 0.08})
+    plotted(lobe)
+    first = len(table(lobe))
+    lobe.wait("more of it", lambda: len(table(lobe)) > first + 10)
+
+
+def test_hand_and_keys_turn_the_light(lobe: Editor) -> None:
+    page = lobe.page
+    box = page.locator(".lobe-plot").bounding_box()
+    assert box is not None
+    angle = "#lobe input[type=range]"
+    assert page.input_value(angle) == "45"
+    page.mouse.move(box["x"] + box["width"] / 2 + 2, box["y"] + 8)
+    page.mouse.down()
+    assert float(page.input_value(angle)) < 5, "the light comes from where the hand is"
+    page.mouse.move(box["x"] + 20, box["y"] + 0.8 * box["height"], steps=3)
+    page.mouse.up()
+    assert float(page.input_value(angle)) > 60
+    at = float(page.input_value(angle))
+    page.focus(".lobe-plot")
+    page.keyboard.press("ArrowLeft")
+    assert float(page.input_value(angle)) == at - 1
+    page.fill(angle, "30")
+    plotted(lobe)
+    assert "for light from 30 degrees" in (page.get_attribute("#lobe svg", "aria-label") or "")
+    view(lobe, "solid")
+    before = page.get_attribute("#lobe .mesh path", "d")
+    page.focus(".lobe-plot")
+    page.keyboard.press("ArrowUp")
+    assert page.get_attribute("#lobe .mesh path", "d") != before, "the solid turns"
+
+
+def test_glass_is_seen_on_both_sides(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "principled", "transmission": 1, "roughness": 0, "ior": 1.5, "base_color": 1})
+    plotted(lobe)
+    said = page.locator("#lobe text.delta").all_text_contents()
+    shares = sorted(float(re.sub(r"[^\d.]", "", each)) for each in said)
+    cosine = math.sqrt(1 - (math.sin(math.pi / 4) / 1.5) ** 2)
+    s = (math.cos(math.pi / 4) - 1.5 * cosine) / (math.cos(math.pi / 4) + 1.5 * cosine)
+    p = (1.5 * math.cos(math.pi / 4) - cosine) / (1.5 * math.cos(math.pi / 4) + cosine)
+    reflected = 100 * (s * s + p * p) / 2
+    assert shares == pytest.approx([reflected, 100 - reflected], rel=0.06), "Fresnel's, in two digits"
+    assert page.get_attribute("#lobe input[type=range]", "max") == "180", "the light may come from inside"
+    paste(lobe, {"type": "principled", "transmission": 1, "roughness": 0.3})
+    plotted(lobe)
+    assert any(abs(row["theta_deg"]) > 90 and row["f_g"] > 0 for row in table(lobe))
+
+
+def test_both_variants_are_drawn_over_each_other(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "principled", "roughness": 0.3})
+    page.click("#compare")
+    page.select_option("#comparison select[aria-label^=Turn]", "disney")
+    plotted(lobe)
+    lobe.wait("both", lambda: page.locator("#lobe .curve").count() == 2)
+    assert page.inner_text("#lobe .lobe-legend").split("\n") == ["A, Principled", "B, Disney"]
+    assert {"A_f_r", "B_f_b"} <= table(lobe)[0].keys()
+    for name in ("solid", "terms", "albedo", "slice"):
+        view(lobe, name)
+        assert page.locator("#lobe :is(.curve.b, .mesh.b, .pixels:nth-of-type(1))").count() >= 1, name
+    assert lobe.complaints == []
+
+
+def test_the_albedo_says_its_furnace(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "diffuse", "albedo": 0.6})
+    view(lobe, "albedo")
+    assert "White furnace 0.600 ± 0.001" in page.inner_text("#lobe")
+    rows = table(lobe)
+    assert all(row["albedo_g"] == pytest.approx(0.6, abs=1e-4) for row in rows)
+    paste(lobe, {"type": "principled", "base_color": 1, "metallic": 1, "roughness": 0.7})
+    plotted(lobe)
+    lobe.wait("the number", lambda: re.search(r"White furnace (0\.99\d|1\.00[0-3])", page.inner_text("#lobe")))
+
+
+def test_terms_are_of_models_that_have_them(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "metal_rough", "base_color": 0.5, "roughness": 0.5, "metallic": 0})
+    view(lobe, "terms")
+    assert page.locator("#lobe .curve").count() == 3
+    rows = table(lobe)
+    assert rows[0]["D"] == pytest.approx(1 / (math.pi * 0.25**2), rel=1e-4), "GGX at its normal, alpha .25"
+    assert rows[0]["F_g"] == pytest.approx(0.04, rel=1e-4)
+    paste(lobe, {"type": "diffuse", "albedo": 0.6})
+    lobe.wait("words", lambda: page.is_visible("#lobe .note[role=status]"))
+    assert page.locator("#lobe .curve").count() == 0
+    paste(lobe, {"type": "metal_rough", "base_color": 0.5, "metallic": 1, "roughness": 0.5})
+    lobe.wait("curves again", lambda: page.locator("#lobe .curve").count() == 3)
+
+
+def test_the_slice_is_an_image(lobe: Editor) -> None:
+    paste(lobe, {"type": "diffuse", "albedo": 0.5})
+    view(lobe, "slice")
+    lobe.page.uncheck("#lobe >> label:has-text('Logarithmic') >> input")
+    grey = lobe.page.evaluate("""() => {
+        const { data } = document.querySelector("#lobe canvas").getContext("2d").getImageData(0, 0, 96, 96);
+        return [Math.min(...data), Math.max(...data.filter((_, i) => i % 4 < 3))];
+    }""")
+    linear = 0.5 / math.pi
+    assert grey == [pytest.approx(255 * (1.055 * linear ** (1 / 2.4) - 0.055), abs=1)] * 2
+
+
+def test_a_plot_leaves_as_a_file_of_its_own(lobe: Editor) -> None:
+    for name in ("polar", "solid", "terms", "albedo", "slice"):
+        view(lobe, name)
+        text = lobe.shot("#lobe >> text=Save SVG").decode()
+        root = ElementTree.fromstring(text)
+        assert "var(" not in text and "class=" not in text and "light-dark" not in text, "it needs no style sheet"
+        kinds = {each.tag.rsplit("}", 1)[1] for each in root.iter()}
+        assert ("image" if name == "slice" else "path") in kinds and "foreignObject" not in kinds
+    rows = lobe.page.locator("#lobe table tbody tr")
+    lobe.page.evaluate("document.querySelector('#lobe details').open = true")
+    view(lobe, "albedo")
+    assert rows.count() == 21 and lobe.page.locator("#lobe tbody th[scope=row]").count() == 21
+    assert lobe.complaints == []
+
+
+def test_images_are_replaced_and_that_is_said(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "diffuse", "albedo": 1})
+    lobe.drop("#material-form [data-field=albedo]", {"halves.png": halves()})
+    lobe.wait("the words", lambda: "the mean stands for that of albedo" in page.inner_text("#lobe"))
+    lobe.page.wait_for_timeout(500)  # until the image is there
+    plotted(lobe)
+    half = ((220 / 255 + 0.055) / 1.055) ** 2.4 / 2
+    assert table(lobe)[0]["f_g"] * math.pi == pytest.approx(half, rel=0.05), "green on one side, none on the other"
+
+
+def test_a_moving_hand_gets_a_curve_for_each_answer(server: Server, context: BrowserContext) -> None:
+    """Slow answers are not given up for newer questions, and no two are under way at once."""
+    editor = Editor(context.new_page())
+    page = editor.page
+    editor.open(server.url)
+    page.click("#pause")
+    page.click("#show-lobe")
+    plotted(editor)
+    page.wait_for_timeout(1000)  # until the curve is fine
+    under_way = 0
+
+    def slow(route: Route) -> None:
+        nonlocal under_way
+        under_way += 1
+        assert under_way == 1
+        page.wait_for_timeout(60)
+        under_way -= 1
+        route.continue_()
+
+    page.route("**/v1/bsdf", slow)
+    seen = page.evaluate("""async () => {
+        const slider = document.querySelector("[data-field=roughness] input[type=range]");
+        const seen = new Set();
+        for (let i = 0; i <= 60; i++) {
+            slider.value = i / 60;
+            slider.dispatchEvent(new Event("input"));
+            await new Promise((resolve) => setTimeout(resolve, 20));
+            seen.add(document.querySelector("#lobe .curve").getAttribute("d"));
+        }
+        return seen.size;
+    }""")
+    page.unroute("**/v1/bsdf")
+    assert seen >= 4
+    editor.wait("the last one", lambda: page.evaluate(IS_DONE))
+
+
+@pytest.fixture
+def phone(browser: Browser, server: Server) -> Iterator[Editor]:
+    opened = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)
+    editor = Editor(opened.new_page())
+    editor.open(server.url)
+    yield editor
+    opened.close()
+
+
+def test_a_phone_shows_the_lobe_in_the_pictures_place(phone: Editor) -> None:
+    page = phone.page
+    page.tap("#show-lobe")
+    plotted(phone)
+    plot, panel = (page.locator(each).bounding_box() for each in (".lobe-plot", "#panel"))
+    assert plot and panel
+    assert plot["width"] > 350 and plot["height"] > 220 and plot["y"] + plot["height"] < panel["y"]
+    assert page.evaluate("document.documentElement.scrollWidth") == 390
+    assert page.evaluate("(p => p.scrollWidth - p.clientWidth)(document.getElementById('lobe'))") == 0
+    assert page.evaluate("getComputedStyle(document.getElementById('picture')).visibility") == "hidden"
+    page.tap("#lobe [aria-label='Close the lobe']")
+    assert page.is_hidden("#lobe")
+    assert page.evaluate("getComputedStyle(document.getElementById('picture')).visibility") == "visible"
