@@ -16,14 +16,6 @@
 
 bool path_was_cut; // the driver has ended the last path before its time
 
-// A camera ray along d that meets nothing: rgb is the radiance, a is 1 where the background is shown.
-vec4 path_sky(vec3 d, Medium medium) {
-    vec4 sky = vec4(0.0);
-    vec3 arriving = medium_share(medium, INFINITY_T) * arriving_outside(d, PDF_DELTA, false);
-    if (arriving_background()) sky = vec4(path_clamp(arriving, false), 1.0);
-    return sky;
-}
-
 // Begins a path that leaves the camera along d and meets `hit` first. Returns its alpha: 1 where it meets a surface or
 // a background that is shown.
 float path_begin(vec3 d, Hit hit, SurfacePoint at, Medium medium, out Path path) {

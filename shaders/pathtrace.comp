@@ -60,27 +60,11 @@ void main() {
     Medium medium = medium_at_camera();
     uint i = 0u;
     do {
-        Sampler rng;
         vec3 o, d;
-        Hit hit;
         SurfacePoint at;
-#if HAS_OPEN_VIEW
-        // Samples of the sky are skipped in a loop of their own: a machine that runs both sides of every `if` would run
-        // all that follows for them, too.
-        bool missed;
-        do {
-#endif
-            rng = sobol_begin(pixel, first + i, replicate);
-            camera_ray(pixel, rng, o, d);
-            hit = transparency_nearest(o, d, NONE, 0u, rng, at);
-#if HAS_OPEN_VIEW
-            missed = hit.id == NONE;
-            if (missed) add(path_sky(d, medium));
-            if (missed) i++;
-            missed = missed && i < count;
-        } while (missed);
-        if (hit.id == NONE) break; // out of samples, or the driver has ended the loop
-#endif
+        Sampler rng = sobol_begin(pixel, first + i, replicate);
+        camera_ray(pixel, rng, o, d);
+        Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
         Path path;
         float alpha = path_begin(d, hit, at, medium, path);
         add(vec4(path_radiance(rng, path), alpha));

@@ -1,7 +1,6 @@
 """From a scene to compiled kernels: which code it needs, the shader text with that code, the compiled result.
 
 features        the table of flags: which code a scene needs
-visibility      the share of a picture that shows nothing, by which a kernel is chosen
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
 textures_glsl   how materials read textures, as GLSL
 instances_glsl  records of instances as GLSL

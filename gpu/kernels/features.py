@@ -12,12 +12,10 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
-from gpu.kernels.visibility import background_share
 from gpu.layout import LightKind, MaterialModel, ShapeKind, microfacet_records, texture_records
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
-OPEN = 0.4  # of the picture shows nothing: then a loop of its own for that spares more than it takes
 
 
 def _looped(scene: SceneArrays, kind: ShapeKind, records: str) -> int:
@@ -200,7 +198,6 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     ),
     "HAS_ENVIRONMENT_CUBE": lambda s: s.environment is not None and s.environment.cube,
     "HAS_SUN": lambda s: s.environment is not None and s.environment.sun is not None,
-    "HAS_OPEN_VIEW": lambda s: background_share(s) >= OPEN,
     **{name: _camera(asks) for name, asks in CAMERA_FLAGS.items()},
     "HAS_DISNEY": _model(MaterialModel.DISNEY),
     "HAS_SUBSURFACE": _disney("subsurface"),
@@ -245,7 +242,7 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
 
 
 # What spares work and changes no picture: an edit that could do with it is not worth waiting for a compiler.
-_SPARING = frozenset({"HAS_MIRRORS", "HAS_OPEN_VIEW"})
+_SPARING = frozenset({"HAS_MIRRORS"})
 
 
 def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:
@@ -254,7 +251,7 @@ def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
-# varying index. 0: too many to be worth it, or met through the tree.
+# varying index. 0: too many to be worth it, or met through the tree. docs/house.md says what each gains.
 COUNTS: dict[str, str] = {
     "SPHERE_COUNT": "spheres",
     "QUAD_COUNT": "quads",

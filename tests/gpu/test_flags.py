@@ -11,7 +11,6 @@ from gpu import Renderer, RenderSettings
 from gpu.analysis.kernel_cost import kernel_cost
 from gpu.arrays import SceneArrays
 from gpu.kernels.features import FLAGS, flags, grown
-from gpu.kernels.visibility import background_share
 from gpu.layout.microfacet_records import TERMS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
 from service.pack import Packed, pack
@@ -87,7 +86,6 @@ SCENES: dict[str, Doc] = {
     "ENVIRONMENT_IMAGE": document([FLOOR], environment={"type": "image", "asset": "floats"}),
     "ENVIRONMENT_CUBE": document([FLOOR], environment={"type": "cubemap", "assets": {
         f"{sign}{axis}": "face" for axis in "xyz" for sign in "pn"}}),
-    "OPEN_VIEW": lit(ball("m", (0.3, 0.2, 0), 0.5)),
     "APERTURE": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "aperture_radius": 0.1}),
     "DISNEY": made_of({"type": "disney"}), "SUBSURFACE": made_of({"type": "disney", "subsurface": 1}),
     "SHEEN": made_of({"type": "disney", "sheen": 1}), "ANISOTROPIC": made_of({"type": "disney", "anisotropic": 1}),
@@ -131,17 +129,6 @@ def _seen(gpu: Renderer, settings: RenderSettings, arrays: SceneArrays, **how: A
     made.release()
     loaded.release()
     return image
-
-
-@pytest.mark.parametrize("radius", [5.0, 1.5, 1.0, 0.4])
-def test_how_much_of_the_view_is_open(gpu: Renderer, radius: float) -> None:
-    camera = {"position": [1, 2, 4], "target": [0.2, 0, 0], "vfov": 40}
-    arrays = pack(parse_scene(document([ball("m", radius=radius)], camera=camera)), IMAGES).arrays
-    seen = _seen(gpu, RenderSettings(64, 64, 1, filter="box"), arrays)
-    share = background_share(arrays)
-    assert share == pytest.approx(1 - seen[..., 3].mean(), abs=0.02)
-    assert ("HAS_OPEN_VIEW" in flags(arrays)) == (share >= 0.4)
-    assert background_share(pack(parse_scene(lit(ball("m", radius=radius), FLOOR)), IMAGES).arrays) == 0
 
 
 @pytest.mark.parametrize("name", SCENES if LONG else ["CLEARCOAT", "MIRRORS"])
