@@ -106,6 +106,11 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
         (1280, 800), "dark",
         [("key", "c", ""), ("select", "#comparison [aria-label^=Turn]", "blinn_phong")],
     ),
+    "editor-lobe": (
+        (1280, 800), "dark",
+        [("click", "#material-presets [data-name=copper]", ""), ("key", "b", ""), ("key", "c", ""),
+         ("select", "#comparison [aria-label^=Turn]", "disney"), ("click", "#lobe [data-value=polar]", "")],
+    ),
     "editor-scene": ((1280, 800), "light", [("click", "#tab-scene", ""), ("key", "h", ""), ("key", "4", "")]),
     "editor-render": (
         (1280, 800), "light",

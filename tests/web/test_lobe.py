@@ -245,6 +245,22 @@ def test_a_moving_hand_gets_a_curve_for_each_answer(server: Server, context: Bro
     editor.wait("the last one", lambda: page.evaluate(IS_DONE))
 
 
+def test_an_old_plot_is_dimmed_until_the_new_one_is_there(lobe: Editor) -> None:
+    page = lobe.page
+    held: list[Route] = []
+    page.route("**/v1/bsdf", lambda route: held.append(route))
+    page.fill(lobe.field("roughness", "number"), "0.9")
+    page.press(lobe.field("roughness", "number"), "Enter")
+    lobe.wait(
+        "a dim plot", lambda: page.evaluate("getComputedStyle(document.querySelector('#lobe svg')).opacity") == "0.35"
+    )
+    for route in held:
+        route.continue_()
+    page.unroute("**/v1/bsdf")
+    plotted(lobe)
+    assert page.evaluate("getComputedStyle(document.querySelector('#lobe svg')).opacity") == "1"
+
+
 @pytest.fixture
 def phone(browser: Browser, server: Server) -> Iterator[Editor]:
     opened = browser.new_context(viewport={"width": 390, "height": 844}, has_touch=True, is_mobile=True)

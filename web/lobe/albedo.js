@@ -62,9 +62,9 @@ function note(data) {
   return numbers(data).map(({ side, most, ...own }) => {
     const whose = Object.keys(data).length > 1 ? `${side.toUpperCase()}: ` : "";
     const gain = most > 1.003 ? ` It sends back more light than it gets, up to ${most.toFixed(3)}.` : "";
-    const grey = isGrey(data[side].albedo) ? "" : " (luminance)";
-    return `${whose}White furnace ${said(own)}${grey}: the share of uniform light that comes back.${gain}`;
-  }).join(" ");
+    const grey = isGrey(data[side].albedo) ? "" : " in luminance";
+    return `${whose}White furnace ${said(own)}${grey}.${gain}`;
+  }).join(" ").concat(" That is the share of uniform light that comes back.");
 }
 
 const RGB = ["r", "g", "b"];

@@ -25,6 +25,7 @@ const TURN = Math.PI / 200; // of the solid view, for a CSS pixel
 const KEY_TURN = Math.PI / 24;
 const LOWEST = -1.5; // radians of the solid view's camera
 const ROOMY = 640; // CSS pixels of height that have room for the table, too
+const STALE_MS = 400; // without an answer, after which the old plot is dimmed
 const REFINE_REST_MS = 150; // without a change, before more is asked of the server
 
 export class LobePanel {
@@ -33,6 +34,7 @@ export class LobePanel {
   #shown = null; // {view, data} that the plot shows
   #wanted = null; // the key of what was asked for last
   #latest = new Latest();
+  #waiting = null; // the timer of an answer that does not come
   #means = new Map(); // of textures, as far as they are known
 
   // `root` is the panel's element; `acts` the editor; `calls` the server's paths; `mean(texture, isColor)` resolves to
@@ -196,6 +198,7 @@ export class LobePanel {
     if (key === this.#wanted) return this.#draw();
     this.#wanted = key;
     this.root.setAttribute("aria-busy", "true");
+    this.#await();
     const options = { ...this.#options };
     this.#latest.want((isStale) => this.#load(VIEWS[view], materials, options, isStale));
     return undefined;
@@ -205,6 +208,8 @@ export class LobePanel {
     try {
       const each = async (load) => Object.fromEntries(await Promise.all(Object.entries(materials).map(async ([side, material]) => [side, await load(side, material)])));
       let data = await each((_, material) => view.first(askBsdf, material, options));
+      this.#answered();
+      if (isStale()) this.#await();
       this.#show(view, data);
       if (!isStale()) this.root.setAttribute("aria-busy", "false"); // the newest that was wanted; finer curves may follow
       await new Promise((resolve) => { setTimeout(resolve, view.finer ? REFINE_REST_MS : 0); });
@@ -219,6 +224,7 @@ export class LobePanel {
         if (isBetter && !isStale()) this.#show(view, data);
       }
     } catch (problem) {
+      this.#answered();
       this.root.setAttribute("aria-busy", "false");
       if (problem.status !== 422) this.#wanted = null; // asked for again with the next change of anything
       this.#data = null;
@@ -226,6 +232,14 @@ export class LobePanel {
       this.trouble.textContent = problemText(problem, this.titles);
       this.plot.replaceChildren();
     }
+  }
+
+  #await() { this.#waiting ??= setTimeout(() => this.plot.classList.add("stale"), STALE_MS); }
+
+  #answered() {
+    clearTimeout(this.#waiting);
+    this.#waiting = null;
+    this.plot.classList.remove("stale");
   }
 
   #show(view, data) {
