@@ -112,6 +112,18 @@ def test_hand_and_keys_turn_the_light(lobe: Editor) -> None:
     assert page.get_attribute("#lobe .mesh path", "d") != before, "the solid turns"
 
 
+def test_the_mouse_reads_the_curve(lobe: Editor) -> None:
+    page = lobe.page
+    paste(lobe, {"type": "diffuse", "albedo": 0.5})
+    plotted(lobe)
+    box = page.locator(".lobe-plot").bounding_box()
+    assert box is not None
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] + 20)
+    lobe.wait("the reading", lambda: lobe.text(".lobe-reading") == "0°: 0.159 1/sr")
+    page.mouse.move(box["x"] + box["width"] / 2, box["y"] - 40)
+    lobe.wait("its end", lambda: page.is_hidden(".lobe-reading"))
+
+
 def test_glass_is_seen_on_both_sides(lobe: Editor) -> None:
     page = lobe.page
     paste(lobe, {"type": "principled", "transmission": 1, "roughness": 0, "ior": 1.5, "base_color": 1})

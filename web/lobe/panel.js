@@ -5,7 +5,7 @@ import { albedo } from "./albedo.js";
 import { csv, standalone } from "./files.js";
 import { Latest } from "./latest.js";
 import { plain, texturesOf } from "./material.js";
-import { incidenceAt, isBelow, polar } from "./polar.js";
+import { angleAt, isBelow, polar, readingAt } from "./polar.js";
 import { slice } from "./slice.js";
 import { solid } from "./solid.js";
 import { Table } from "./table.js";
@@ -59,6 +59,8 @@ export class LobePanel {
       "button", { type: "button", role: "radio", class: "button small", "data-value": name }, VIEWS[name].title)));
     this.markView = watchChoice(views, "button", ({ dataset }) => this.#set({ view: dataset.value }));
     this.plot = element("div", { class: "lobe-plot" });
+    this.reading = element("p", { class: "lobe-reading", "aria-hidden": "true" });
+    this.plot.addEventListener("pointerleave", () => { this.reading.textContent = ""; });
     this.angle = element("input", {
       type: "range", id, min: "0", max: "89.5", step: "0.5", oninput: () => this.#set({ incidence: this.angle.valueAsNumber }),
     });
@@ -82,7 +84,7 @@ export class LobePanel {
       save("Save CSV", () => this.#save("csv", "text/csv", () => csv(this.#shown.view.table(this.#shown.data)))));
     this.root.append(
       element("header", { class: "lobe-head" }, this.title, views, element("button", { type: "button", class: "button icon", "aria-label": "Close the lobe", onclick: close }, "×")),
-      this.plot, this.trouble, this.angleRow,
+      this.plot, this.reading, this.trouble, this.angleRow,
       element("div", { class: "checks" }, this.log.row, this.colors.row), this.legend, this.note, this.replaced, this.table.element, this.files);
     this.#watchHand();
   }
@@ -97,6 +99,7 @@ export class LobePanel {
       this.#drag(event, last);
     });
     this.plot.addEventListener("pointermove", (event) => {
+      this.#read(event);
       if (!last) return;
       this.#drag(event, last);
       last = { x: event.clientX, y: event.clientY };
@@ -116,7 +119,14 @@ export class LobePanel {
     if (this.#view.turns) this.#turn(-(clientX - last.x) * TURN, (clientY - last.y) * TURN);
     if (this.#view !== polar || this.#shown.view !== polar) return;
     const { left, top } = this.plot.getBoundingClientRect();
-    this.#set({ incidence: this.#inRange(incidenceAt(this.#shown.data, { ...this.#options, size: this.#size() }, clientX - left, clientY - top)) });
+    this.#set({ incidence: this.#inRange(Math.abs(angleAt(this.#shown.data, this.#drawn(), clientX - left, clientY - top))) });
+  }
+
+  // What the curves say at the mouse.
+  #read({ clientX, clientY, pointerType }) {
+    const isRead = pointerType === "mouse" && this.#view === polar && this.#shown?.view === polar;
+    const { left, top } = this.plot.getBoundingClientRect();
+    this.reading.textContent = isRead ? readingAt(this.#shown.data, this.#drawn(), clientX - left, clientY - top) : "";
   }
 
   // Not along the surface, where there is no side.
@@ -136,7 +146,8 @@ export class LobePanel {
     this.refresh();
   }
 
-  #size() { return { width: this.plot.clientWidth, height: this.plot.clientHeight }; }
+  // The options of a drawing, with its size.
+  #drawn() { return { ...this.#options, size: { width: this.plot.clientWidth, height: this.plot.clientHeight } }; }
 
   #save(ending, mime, make) {
     if (this.#shown) saveAs(new Blob([make()], { type: mime }), `sunbox-${this.#options.view}-${this.acts.state.chosen.material}.${ending}`);
@@ -254,7 +265,7 @@ export class LobePanel {
   #draw() {
     if (this.root.hidden || !this.#shown || !this.plot.clientWidth) return;
     const { view, data } = this.#shown;
-    const options = { ...this.#options, size: this.#size() };
+    const options = this.#drawn();
     const drawn = view.draw(data, options);
     // The plot takes the focus for its arrows, where they do something.
     this.plot.tabIndex = view.turns || view === polar ? 0 : -1;

@@ -88,12 +88,21 @@ function draw(data, { incidence, isLog, channels, size }) {
   return figure(size.width, size.height, label, grid, words, surface, mirror, lobes, deltas, light);
 }
 
-// The angle of incidence under a place of the plot, in degrees; below the surface where the material transmits.
-export function incidenceAt(data, { size, incidence }, px, py) {
-  const isWhole = Object.values(data).some(isBelow) || incidence > 90;
-  const { x, y } = layout(size, isWhole);
-  const angle = Math.abs((Math.atan2(px - x, y - py) * 180) / Math.PI);
-  return Math.min(Math.round(2 * angle) / 2, isWhole ? 180 : 89.5);
+// The outgoing angle at a place of the plot, in whole degrees.
+export function angleAt(data, { size, incidence }, px, py) {
+  const { x, y } = layout(size, Object.values(data).some(isBelow) || incidence > 90);
+  return Math.round((Math.atan2(px - x, y - py) * 180) / Math.PI);
+}
+
+// The values that way, in words: "62°: 0.31 1/sr"; nothing where the plot has no direction.
+export function readingAt(data, options, px, py) {
+  const angle = angleAt(data, options, px, py);
+  if (angle < -178 || Math.abs(angle) === 90 || (Math.abs(angle) > 90 && !Object.values(data).some(isBelow))) return "";
+  const sides = Object.entries(data).map(([side, { angles, f }]) => {
+    const value = luminance(between(angles, f, angle));
+    return `${Object.keys(data).length > 1 ? `${side.toUpperCase()} ` : ""}${tickText(Number(value.toPrecision(3)))}`;
+  });
+  return `${angle}°: ${sides.join(", ")} 1/sr`;
 }
 
 function table(data) {
