@@ -60,7 +60,7 @@ vec3 arriving_emission(SurfacePoint at, vec3 d) {
     return vec3(0.0);
 }
 
-// Ambient radiance, which blinn_phong adds without a cause: both sides send it, and it is never sampled as a light.
+// Ambient radiance, which phong and blinn_phong add without a cause: both sides send it, and it is never sampled as a light.
 vec3 arriving_ambient(SurfacePoint at) {
 #if HAS_AMBIENT && HAS_TEXTURES
     return texture_ambient(at);

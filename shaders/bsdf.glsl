@@ -8,6 +8,7 @@
 #include "lobes/disney/clearcoat.glsl"
 #include "lobes/metal_rough.glsl"
 #include "lobes/blinn_phong.glsl"
+#include "lobes/phong.glsl"
 #include "lobes/microfacet/precise.glsl"
 #include "lobes/microfacet/distribution.glsl"
 #include "lobes/microfacet/geometry.glsl"
@@ -119,6 +120,9 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
         r = Scatter(blinn_phong_eval(s, wi, wm), blinn_phong_pdf(s, wi, wm, dot(wi, wm)));
     }
 #endif
+#if HAS_PHONG
+    if (s.model == MODEL_PHONG) r = Scatter(phong_eval(s, wo, wi), phong_pdf(s, wo, wi));
+#endif
 #if HAS_MICROFACET
     if (s.model == MODEL_MICROFACET) {
         vec3 sum = wo + wi;
@@ -163,6 +167,9 @@ LobeSample bsdf_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
 #endif
 #if HAS_BLINN_PHONG
     if (s.model == MODEL_BLINN_PHONG) wi = blinn_phong_sample(s, wo, u_lobe, u);
+#endif
+#if HAS_PHONG
+    if (s.model == MODEL_PHONG) wi = phong_sample(s, wo, u_lobe, u);
 #endif
 #if HAS_MICROFACET
     if (s.model == MODEL_MICROFACET) wi = microfacet_model_sample(s, wo, u_lobe, u);

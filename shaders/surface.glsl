@@ -13,7 +13,7 @@ struct Surface {
     vec3 sheen;       // colour times amount
     float clearcoat;
     float alpha_coat;
-    vec3 phong;       // colour of blinn_phong's highlight
+    vec3 phong;       // colour of the highlight of phong and blinn_phong
     float shininess;
     vec2 tangent;     // direction in the shading frame that anisotropy stretches along
 #if HAS_PRINCIPLED

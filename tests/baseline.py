@@ -1,4 +1,4 @@
-"""The contract's formulas of `metal_rough` and `blinn_phong` in float64, written from the page."""
+"""The contract's formulas of `metal_rough`, `blinn_phong` and `phong` in float64, written from the page."""
 
 from __future__ import annotations
 
@@ -29,5 +29,14 @@ def blinn_phong(material: np.void, wo: np.ndarray, wi: np.ndarray) -> np.ndarray
     h = h / np.linalg.norm(h, axis=1, keepdims=True)
     sin2 = h[:, 0] ** 2 + h[:, 1] ** 2
     power = np.exp(0.5 * float(material["shininess"]) * np.log1p(-sin2))
+    diffuse, specular = (np.asarray(material[name], float) for name in ("base_color", "phong_specular"))
+    return np.asarray((diffuse + specular * (power / wi[:, 2])[:, None]) / np.pi)
+
+
+def phong(material: np.void, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
+    """As `metal_rough`."""
+    apart = wi * [-1, -1, 1] - wo
+    cos = np.maximum(1 - 0.5 * (apart**2).sum(1), 0)  # r.v of unit vectors
+    power = cos ** float(material["shininess"])
     diffuse, specular = (np.asarray(material[name], float) for name in ("base_color", "phong_specular"))
     return np.asarray((diffuse + specular * (power / wi[:, 2])[:, None]) / np.pi)

@@ -206,6 +206,7 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_CLEARCOAT": _disney("clearcoat"),
     "HAS_METAL_ROUGH": _model(MaterialModel.METAL_ROUGH),
     "HAS_BLINN_PHONG": _model(MaterialModel.BLINN_PHONG),
+    "HAS_PHONG": _model(MaterialModel.PHONG),
     "HAS_AMBIENT": lambda s: bool((s.materials["ambient"] > 0).any()),
     "HAS_MICROFACET": _model(MaterialModel.MICROFACET),
     **_terms(),
@@ -225,6 +226,7 @@ EDITED = {
     "HAS_DISNEY": _OPAQUE,
     "HAS_PRINCIPLED": ("HAS_PRINCIPLED_LOBES", "HAS_SUBSURFACE", "HAS_SHEEN", "HAS_CLEARCOAT"),
     "HAS_BLINN_PHONG": ("HAS_AMBIENT",),
+    "HAS_PHONG": ("HAS_AMBIENT",),
 }
 
 

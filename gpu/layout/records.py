@@ -58,6 +58,7 @@ class MaterialModel(IntEnum):
     METAL_ROUGH = 3
     BLINN_PHONG = 4
     MICROFACET = 5
+    PHONG = 6
 
 
 class Material(Record):
@@ -78,7 +79,7 @@ class Material(Record):
     opacity: f32  # the chance that a ray meets the surface
     emission_sides: u32  # 1: the outward side emits; 2: both do
     sheen_roughness: f32
-    phong_specular: vec3  # blinn_phong; its diffuse is base_color
+    phong_specular: vec3  # of phong and blinn_phong; their diffuse is base_color
     shininess: f32  # exponent, >= 0
     ambient: vec3  # radiance added wherever a path meets the surface
     transmission: f32

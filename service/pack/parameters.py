@@ -20,6 +20,7 @@ RENAMED |= {"normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
 # Where a name means another thing in one model.
 RENAMED_IN = {
     "blinn_phong": {"specular": "phong_specular"},
+    "phong": {"specular": "phong_specular"},
     "microfacet": {"alpha": "alpha", "f0": "specular_color"},
 }
 SIDES = {"front": 1, "both": 2}

@@ -28,12 +28,17 @@ float blinn_phong_pdf(Surface s, vec3 wi, vec3 wm, float cos_d) {
     return mix(half_pdf / (4.0 * max(cos_d, 1e-6)), lambert_pdf(wi), blinn_phong_diffuse_chance(s));
 }
 
-vec3 blinn_phong_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
-    float y = 2.0 / (s.shininess + 1.0) * log(1.0 - u.y); // of z^2
+// A direction about z with the density (n + 1) / (2 pi) z^n.
+vec3 blinn_phong_lobe(float n, vec2 u) {
+    float y = 2.0 / (n + 1.0) * log(1.0 - u.y); // of z^2
     float tail = -y * (1.0 + y * (0.5 + y * (1.0 / 6.0 + y * (1.0 / 24.0 + y * (1.0 / 120.0)))));
     float sin2 = clamp(y > -0.1 ? tail : 1.0 - exp(y), 0.0, 1.0);
     float r = sqrt(sin2), phi = TWO_PI * u.x;
-    vec3 wm = vec3(r * cos(phi), r * sin(phi), sqrt(1.0 - sin2));
+    return vec3(r * cos(phi), r * sin(phi), sqrt(1.0 - sin2));
+}
+
+vec3 blinn_phong_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
+    vec3 wm = blinn_phong_lobe(s.shininess, u);
     vec3 mirrored = 2.0 * dot(wo, wm) * wm - wo;
     return u_lobe < blinn_phong_diffuse_chance(s) ? lambert_sample(u) : mirrored;
 }

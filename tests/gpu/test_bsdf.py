@@ -28,7 +28,15 @@ SPECULAR = {
 }
 ALL = ROWS | PRINCIPLED | SPECULAR
 # Lobes that the cells of the quadrature are too wide for.
-NARROW = {"mirror", "smooth metal", "clear coat", "glTF mirror", "glTF dielectric", "blinn-phong mirror"}
+NARROW = {
+    "mirror",
+    "smooth metal",
+    "clear coat",
+    "glTF mirror",
+    "glTF dielectric",
+    "blinn-phong mirror",
+    "phong mirror",
+}
 ANGLES = (10.0, 50.0, 80.0)
 
 
@@ -85,6 +93,7 @@ def test_values_are_the_formulas(gpu: Renderer, row: str) -> None:
     wi = sphere(np.random.default_rng(1), 2000).astype(np.float32).astype(float)
     above = wi[:, 2] > 0
     formulas = {MaterialModel.METAL_ROUGH: baseline.metal_rough, MaterialModel.BLINN_PHONG: baseline.blinn_phong}
+    formulas[MaterialModel.PHONG] = baseline.phong
     for angle in ANGLES:
         wo = direction(angle).astype(np.float32).astype(float)
         found = values(gpu, material, wo, wi)

@@ -91,7 +91,8 @@ SCENES: dict[str, Doc] = {
     "SHEEN": made_of({"type": "disney", "sheen": 1}), "ANISOTROPIC": made_of({"type": "disney", "anisotropic": 1}),
     "TANGENTS": made_of({"type": "disney", "anisotropic": 1}, icosphere("m", 1)),
     "CLEARCOAT": made_of({"type": "disney", "clearcoat": 1}), "METAL_ROUGH": made_of(GLTF),
-    "BLINN_PHONG": made_of(PHONG), "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
+    "BLINN_PHONG": made_of(PHONG), "PHONG": made_of({**PHONG, "type": "phong"}),
+    "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
     "MICROFACET": made_of(MICROFACET), "MICROFACET_TABLES": made_of({**MICROFACET, "distribution": "abc"}),
     **{f"MICROFACET_{kind}_{e.name}".upper(): made_of({**MICROFACET, kind: e.name.lower()})
        for kind, terms in TERMS.items() for e in terms},

@@ -15,6 +15,7 @@ from tests import baseline, disney, stats
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 
 D, METAL_ROUGH, BLINN_PHONG = MaterialModel.DISNEY, MaterialModel.METAL_ROUGH, MaterialModel.BLINN_PHONG
+PHONG = MaterialModel.PHONG
 ROWS = {
     "diffuse": materials(model=MaterialModel.DIFFUSE, base_color=(0.8, 0.5, 0.1)),
     "disney default": materials(model=D),
@@ -40,8 +41,12 @@ ROWS = {
     "blinn-phong flat": materials(model=BLINN_PHONG, base_color=0, phong_specular=(1, 0.5, 0.2), shininess=0),
     "blinn-phong dull": materials(model=BLINN_PHONG, base_color=0.2, phong_specular=1, shininess=2.5),
     "blinn-phong mirror": materials(model=BLINN_PHONG, base_color=0, phong_specular=1, shininess=1e6),
+    "phong": materials(model=PHONG, base_color=(0.4, 0.1, 0.1), phong_specular=0.5, shininess=40),
+    "phong flat": materials(model=PHONG, base_color=0.3, phong_specular=(1, 0.5, 0.2), shininess=0),
+    "phong dull": materials(model=PHONG, base_color=0.2, phong_specular=1, shininess=2.5),
+    "phong mirror": materials(model=PHONG, base_color=0, phong_specular=1, shininess=1e6),
 }  # fmt: skip
-RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] != BLINN_PHONG]
+RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] not in (BLINN_PHONG, PHONG)]
 P = MaterialModel.PRINCIPLED
 GLASS = {"model": P, "transmission": 1, "base_color": (1, 0.8, 0.6)}
 PRINCIPLED = {
@@ -64,7 +69,7 @@ PRINCIPLED = {
     ),
 }  # fmt: skip
 ANGLES = (0.0, 35.0, 70.0, 87.0)
-FLAGS = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG"})
+FLAGS = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG", "HAS_PHONG"})
 TANGENT = np.array([0.8, 0.6])
 CASES = [(name, angle) for name in ROWS for angle in ANGLES]
 
@@ -111,7 +116,7 @@ def _hemisphere(rng: np.random.Generator, n: int) -> np.ndarray:
 
 
 def _formula(material: np.void, wo: np.ndarray, wi: np.ndarray) -> np.ndarray:
-    formulas = {METAL_ROUGH: baseline.metal_rough, BLINN_PHONG: baseline.blinn_phong}
+    formulas = {METAL_ROUGH: baseline.metal_rough, BLINN_PHONG: baseline.blinn_phong, PHONG: baseline.phong}
     if material["model"] in formulas:
         return formulas[material["model"]](material, wo, wi)
     return disney.bsdf(material, wo, wi, TANGENT)

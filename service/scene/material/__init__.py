@@ -7,6 +7,7 @@ disney          the "principled" BRDF of 2012
 principled      the production model, with glass, coat and sheen: `disney` and more
 metal_rough     the core BRDF of glTF 2.0
 blinn_phong     the highlight of early rasterisers
+phong           the first of these highlights
 microfacet      the distributions, geometry and Fresnel terms of the literature
 """
 
@@ -21,6 +22,7 @@ from service.scene.material.diffuse import DiffuseMaterial
 from service.scene.material.disney import DisneyMaterial
 from service.scene.material.metal_rough import MetalRoughMaterial
 from service.scene.material.microfacet import MicrofacetMaterial
+from service.scene.material.phong import PhongMaterial
 from service.scene.material.principled import PrincipledMaterial
 from service.scene.texture import ScalarTexture
 
@@ -30,6 +32,7 @@ Material = Annotated[
     | PrincipledMaterial
     | MetalRoughMaterial
     | BlinnPhongMaterial
+    | PhongMaterial
     | MicrofacetMaterial,
     Field(discriminator="type"),
 ]
@@ -48,6 +51,7 @@ __all__ = [
     "Material",
     "MetalRoughMaterial",
     "MicrofacetMaterial",
+    "PhongMaterial",
     "PrincipledMaterial",
     "stretches",
 ]

@@ -53,11 +53,14 @@ REQUIRED = {
     MaterialModel.DIFFUSE: {"albedo": 0.25},
     MaterialModel.METAL_ROUGH: {"base_color": 0.25, "metallic": 0.5, "roughness": 0.75},
     MaterialModel.BLINN_PHONG: {"diffuse": 0.25, "specular": 0.5, "shininess": 7},
+    MaterialModel.PHONG: {"diffuse": 0.25, "specular": 0.5, "shininess": 7},
 }
 MEMBERS = {
     (MaterialModel.DIFFUSE, "albedo"): "base_color",
     (MaterialModel.BLINN_PHONG, "diffuse"): "base_color",
     (MaterialModel.BLINN_PHONG, "specular"): "phong_specular",
+    (MaterialModel.PHONG, "diffuse"): "base_color",
+    (MaterialModel.PHONG, "specular"): "phong_specular",
     (MaterialModel.MICROFACET, "diffuse"): "base_color",
     (MaterialModel.MICROFACET, "f0"): "specular_color",
 }
