@@ -6,8 +6,8 @@ import numpy as np
 
 from gpu.settings import RenderSettings
 
-# A pixel's bytes: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more, and a uvec2.
-PIXEL_BYTES, GUIDED_PIXEL_BYTES = 48, 88
+# A pixel's bytes: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more, and a uvec4.
+PIXEL_BYTES, GUIDED_PIXEL_BYTES = 48, 96
 PICTURE_BYTES = 1 << 20  # the noise meter's buffers and what is small
 
 

@@ -9,8 +9,14 @@ SAMPLERS = ("sobol", "independent")
 FILTERS = ("box", "tent", "gaussian", "blackman_harris")
 TONE_MAPS = ("linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral")
 ID_AOVS = ("shape_id", "material_id")
-FIRST_HIT_AOVS = ("albedo", "normal", "depth", *ID_AOVS)  # traced apart from the picture, when first asked for
-AOVS = ("color", "albedo", "normal", "depth", "variance", *ID_AOVS)
+FIRST_HIT_AOVS = (
+    "albedo",
+    "normal",
+    "depth",
+    *ID_AOVS,
+    "incidence",
+)  # traced apart from the picture, when first asked for
+AOVS = ("color", "albedo", "normal", "depth", "variance", *ID_AOVS, "incidence")
 
 
 @dataclass(frozen=True)

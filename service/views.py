@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from typing import Final, Literal, get_args
 
-Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id"]
+Aov = Literal["color", "albedo", "normal", "depth", "variance", "shape_id", "material_id", "incidence"]
 AovOrAll = Literal[Aov, "all"]  # "all" is every AOV as a layer of one file
 ToneMap = Literal["linear", "exponential", "reinhard", "aces", "agx", "pbr_neutral"]
 Bits = Literal[8, 16]  # of a PNG's channels

@@ -1,10 +1,11 @@
-// Entry: albedo, normal and depth of the first hit, over the same camera rays as the picture's first samples, and the
+// Entry: albedo, normal, depth and incidence of the first hit, over the same camera rays as the picture's first samples, and the
 // shape and the material that the first of these rays met.
 layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
 layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit
 layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
-layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec2 met[]; }; // index + 1 of shape and material; 0: none
+layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec4 met[]; }; // index + 1 of shape and material, 0: none; the sum of
+                                                                      // angles of incidence in degrees, as a float
 #include "constants.glsl"
 #include "sobol.glsl"
 #include "sampling.glsl"
@@ -18,6 +19,7 @@ void main() {
     uint slot;
     if (!camera_pixel(pixel, slot)) return;
     vec4 albedo = albedos[slot], normal = normals[slot];
+    float incidence = uintBitsToFloat(met[slot].z);
     uint i = 0u;
     do {
         Sampler rng = sobol_begin(pixel, frame.sample_first + i, 0u);
@@ -27,7 +29,7 @@ void main() {
         Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
         if (frame.sample_first + i == 0u) {
             uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
-            met[slot] = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
+            met[slot].xy = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
         }
         if (hit.id != NONE) {
 #if HAS_TEXTURES
@@ -45,9 +47,12 @@ void main() {
             if (m.model == MODEL_PRINCIPLED) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));
 #endif
             albedo += vec4(seen, 1.0);
-            normal += vec4(dot(at.ng, d) > 0.0 ? -at.ns : at.ns, hit.t);
+            vec3 n = dot(at.ng, d) > 0.0 ? -at.ns : at.ns;
+            normal += vec4(n, hit.t);
+            incidence += degrees(atan(length(cross(d, n)), -dot(d, n)));
         }
     } while (++i < frame.sample_count);
     albedos[slot] = albedo;
     normals[slot] = normal;
+    met[slot].z = floatBitsToUint(incidence);
 }

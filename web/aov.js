@@ -90,6 +90,13 @@ export function paintLayer(aov, floats, width, height, names) {
 
 // Of the layers that need no numbers.
 export const LEGENDS = {
+  incidence: {
+    swatches: [
+      { color: "rgb(64 153 89)", text: "0–45°" }, { color: "rgb(242 204 76)", text: "45–75°" },
+      { color: "rgb(204 64 51)", text: "75–90°" },
+    ],
+    note: "The angle between the view and the surface's normal",
+  },
   albedo: { note: "The share of light that comes back from the first surface" },
   normal: {
     swatches: [

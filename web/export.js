@@ -8,6 +8,7 @@ import { KEY, pngWith, recipeText } from "./recipe.js";
 const CHANNELS = {
   color: ["R", "G", "B", "A"], albedo: ["albedo.R", "albedo.G", "albedo.B"], normal: ["normal.X", "normal.Y", "normal.Z"],
   depth: ["depth.Z"], variance: ["variance.R", "variance.G", "variance.B"], shape_id: ["shape_id.I"], material_id: ["material_id.I"],
+  incidence: ["incidence.I"],
 };
 
 // `madeFrom(scene, samples, {aov, bits})` gives the metadata of a picture.

@@ -16,7 +16,8 @@ from gpu.picture import filters
 from gpu.picture.schedule import Tile
 from gpu.settings import RenderSettings
 
-_ALIGNED = 32  # pixels: a binding may begin at a multiple of so many, at 8 bytes or 16, on any driver
+_PIXEL_BYTES = 16  # of every accumulator
+_ALIGNED = 32  # pixels: a binding may begin at a multiple of so many on any driver
 
 
 class Dispatcher:
@@ -50,8 +51,7 @@ class Dispatcher:
         first = (y * width + x) // _ALIGNED * _ALIGNED
         count = (y + rows - 1) * width + x + columns - first
         for slot, buffer in buffers.items():
-            pixel_bytes = 8 if slot == Slot.OUTPUT else 16
-            buffer.bind_to_storage_buffer(int(slot), offset=first * pixel_bytes, size=count * pixel_bytes)
+            buffer.bind_to_storage_buffer(int(slot), offset=first * _PIXEL_BYTES, size=count * _PIXEL_BYTES)
         return first
 
     def frame(self, origin: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:

@@ -6,6 +6,10 @@ import numpy as np
 
 from gpu.settings import ID_AOVS
 
+# Degrees from which an angle of incidence has the colour, display-encoded. Reflectances stay near that of normal
+# incidence up to 45 degrees and rise steeply from 75 [Lagarde 2013, "Memo on Fresnel equations"].
+ZONES = ((0.0, (0.25, 0.6, 0.35)), (45.0, (0.95, 0.8, 0.3)), (75.0, (0.8, 0.25, 0.2)))
+
 
 def srgb(linear: np.ndarray) -> np.ndarray:
     """sRGB encoding of 0..1 [IEC 61966-2-1]; clips."""
@@ -16,9 +20,11 @@ def srgb(linear: np.ndarray) -> np.ndarray:
 
 def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
     """(h, w, c) of an AOV as (h, w, 4) display values, opaque: albedo sRGB, normal .5 + .5 n, depth and variance
-    divided by their maximum, ids in colours that tell neighbours apart."""
+    divided by their maximum, ids in colours that tell neighbours apart, incidence in a colour for each of ZONES."""
     if aov in ID_AOVS:
         shown = _coloured(values)
+    elif aov == "incidence":
+        shown = _zones(values)
     elif aov == "albedo":
         shown = srgb(values)
     elif aov == "normal":
@@ -38,3 +44,11 @@ def _coloured(ids: np.ndarray) -> np.ndarray:
     hue = 2 * np.pi * ((ids.astype(np.float64) * 0.6180339887498949) % 1)
     phase = np.array([0, 2, 4]) * np.pi / 3
     return np.where(ids > 0, 0.55 + 0.4 * np.cos(hue - phase), 0.0)
+
+
+def _zones(degrees: np.ndarray) -> np.ndarray:
+    """(h, w, 1) angles as (h, w, 3) in the colours of ZONES; black where nothing was met, which is 0."""
+    shown = np.zeros((*degrees.shape[:2], 3))
+    for least, color in ZONES:
+        shown[(degrees[..., 0] > 0) & (degrees[..., 0] >= least)] = color
+    return shown

@@ -36,8 +36,8 @@ class FirstHit:
 
     def allocate(self) -> None:
         width, height = self._size
-        for slot, pixel_bytes in ((Slot.ALBEDO, 16), (Slot.NORMAL, 16), (Slot.OUTPUT, 8)):
-            self.buffers[slot] = contexts.allocate(self._context, pixel_bytes * width * height)
+        for slot in (Slot.ALBEDO, Slot.NORMAL, Slot.OUTPUT):
+            self.buffers[slot] = contexts.allocate(self._context, 16 * width * height)
             self.buffers[slot].clear()
 
     def limit(self, samples: int) -> None:
@@ -57,18 +57,18 @@ class FirstHit:
                 self.samples, self._row = self.samples + 1, 0
 
     def read(self, aov: str) -> np.ndarray:
-        """(height, width, channels) float32 of albedo, normal, depth, or one of ID_AOVS."""
+        """(height, width, channels) float32 of albedo, normal, depth, incidence (degrees), or one of ID_AOVS."""
         if aov in ID_AOVS:
             met = np.frombuffer(self.buffers[Slot.OUTPUT].read(), np.uint32)
-            ids: np.ndarray = met.reshape(self._size[1], self._size[0], 2)[..., ID_AOVS.index(aov), None]
+            ids: np.ndarray = met.reshape(self._size[1], self._size[0], 4)[..., ID_AOVS.index(aov), None]
             return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
-        if aov != "depth":
+        if aov not in ("depth", "incidence"):
             values = self._vectors(Slot.ALBEDO if aov == "albedo" else Slot.NORMAL)
             mean: np.ndarray = values[..., :3] / np.float32(self.samples)
             return mean
         hits = self._vectors(Slot.ALBEDO)[..., 3:]
-        distances = self._vectors(Slot.NORMAL)[..., 3:]
-        return np.where(hits > 0, distances / np.maximum(hits, 1), 0).astype(np.float32)
+        sums = self._vectors(Slot.NORMAL)[..., 3:] if aov == "depth" else self._vectors(Slot.OUTPUT)[..., 2:3]
+        return np.where(hits > 0, sums / np.maximum(hits, 1), 0).astype(np.float32)
 
     def _vectors(self, slot: Slot) -> np.ndarray:
         flat = np.frombuffer(self.buffers[slot].read(), np.float32)

@@ -75,6 +75,7 @@ LAYERS: dict[Aov, tuple[str, ...]] = {
     "variance": ("variance.R", "variance.G", "variance.B"),
     "shape_id": ("shape_id.I",),
     "material_id": ("material_id.I",),
+    "incidence": ("incidence.I",),
 }
 
 

@@ -69,7 +69,7 @@ def test_a_picture_of_many_parts_is_the_same(gpu: Renderer, monkeypatch: pytest.
     whole = picture(gpu, everything(), 3, width=150, height=90)
     monkeypatch.setattr(contexts, "storage_block_bytes", lambda _: limit)
     parts = picture(gpu, everything(), 3, width=150, height=90)
-    for aov in ("color", "variance", "albedo", "normal", "depth", "shape_id", "material_id"):
+    for aov in ("color", "variance", "albedo", "normal", "depth", "shape_id", "material_id", "incidence"):
         assert np.array_equal(parts.read(aov), whole.read(aov)), aov
     assert np.array_equal(parts.display(), whole.display())
     assert np.array_equal(parts.display(dtype="f4"), whole.display(dtype="f4"))

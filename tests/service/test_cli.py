@@ -158,6 +158,7 @@ def test_all_aovs_become_layers(gpu: Any, scene: Path, tmp_path: Path) -> None:
     out = tmp_path / "out.exr"
     assert main(["render", str(scene), "-o", str(out), "--aov", "all", *SMALL]) == 0
     layers = {"albedo": "RGB", "normal": "XYZ", "depth": "Z", "variance": "RGB", "shape_id": "I", "material_id": "I"}
+    layers["incidence"] = "I"
     names = {f"{layer}.{channel}" for layer, channels in layers.items() for channel in channels}
     assert set(OpenImageIO.ImageBuf(str(out)).spec().channelnames) == {*"RGBA", *names}
 

@@ -124,7 +124,7 @@ def test_every_format_of_every_aov(http: httpx.Client, running: str, format: str
 def test_image_shapes_and_depths(http: httpx.Client) -> None:
     id = start(http)["id"]
     status(http, id, 20)
-    for aov, channels in {"color": 4, "albedo": 3, "normal": 3, "depth": 1, "variance": 3, "material_id": 1}.items():
+    for aov, channels in {"color": 4, "albedo": 3, "normal": 3, "depth": 1, "variance": 3, "incidence": 1}.items():
         array = pixels(http, id, aov)
         assert array.shape == (24, 32, channels) and array.dtype == np.float32
     png = http.get(f"/v1/renders/{id}/image").content

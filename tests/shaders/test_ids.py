@@ -1,4 +1,4 @@
-"""AOVs that name what was met: indices of the document, of the very first camera ray of a pixel."""
+"""AOVs of the first hit that say what was met, of the very first camera ray of a pixel, and at which angle."""
 
 from __future__ import annotations
 
@@ -54,3 +54,20 @@ def test_more_samples_change_no_id(gpu: Renderer, aov: str) -> None:
     met = {"shape_id": 2, "material_id": 4}[aov]
     assert 0.4 < (once == met).mean() < 0.6
     assert set(np.unique(once)) == {0, met, {"shape_id": 1, "material_id": 2}[aov]}
+
+
+def test_incidence_is_the_angle_between_view_and_normal(gpu: Renderer) -> None:
+    """On a ball seen from afar the sine of the angle is the distance from its middle; 0 beside it."""
+    ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "left"}
+    camera = {"position": [0, 0, 1000], "target": [0, 0, 0], "vfov": 0.16}
+    made = picture(gpu, document([ball], MATERIALS, camera=camera), 64, filter="box")
+    angles, shown = made.read("incidence")[..., 0], made.display("incidence")
+    made.release()
+    made.scene.release()
+    y, x = (np.mgrid[:32, :32] + 0.5 - 16) / 16 * 1000 * np.tan(np.radians(0.08))
+    r = np.hypot(x, y)
+    assert (angles[r > 1.1] == 0).all() and (shown[r > 1.1][:, :3] == 0).all()
+    inside = r < 0.9
+    assert angles[inside] == pytest.approx(np.degrees(np.arcsin(r[inside])), abs=1.5)
+    zones = [set(map(tuple, shown[(angles > low) & (angles < high)])) for low, high in ((1, 45), (45, 75), (75, 90))]
+    assert all(len(zone) == 1 for zone in zones) and len(set.union(*zones)) == 3
