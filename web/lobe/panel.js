@@ -62,9 +62,9 @@ export class LobePanel {
     this.reading = element("p", { class: "lobe-reading", "aria-hidden": "true" });
     this.plot.addEventListener("pointerleave", () => { this.reading.textContent = ""; });
     this.angle = element("input", {
-      type: "range", id, min: "0", max: "89.5", step: "0.5", oninput: () => this.#set({ incidence: this.angle.valueAsNumber }),
+      type: "range", id, min: "0", max: "89.5", step: "0.5", oninput: () => this.#set({ incidence: this.#inRange(this.angle.valueAsNumber) }),
     });
-    slideByTouch(this.angle, { input: (incidence) => this.#set({ incidence }), commit() {} });
+    slideByTouch(this.angle, { input: (incidence) => this.#set({ incidence: this.#inRange(incidence) }), commit() {} });
     this.degrees = element("output", { for: id });
     this.angleRow = element("div", { class: "field lobe-angle" }, element("label", { for: id }, "Incidence"), this.angle, this.degrees);
     const check = (title, change) => {
