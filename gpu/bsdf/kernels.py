@@ -14,11 +14,14 @@ from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import features
 from gpu.layout import MaterialModel
+from gpu.layout.microfacet_records import Microfacet
 
 VALUES, ALBEDO, TERMS = "bsdf_values.comp", "bsdf_albedo.comp", "bsdf_terms.comp"
 ENTRIES = (VALUES, ALBEDO, TERMS)
 
 NOWHERE: np.void = np.zeros(1, layout.Camera.dtype)[0]  # a camera where there is no scene to look at
+# Every term of `microfacet`. They would cost a picture time, but not a curve, and one kernel serves them all.
+_MENUS = frozenset(name for name in features.FLAGS if name.startswith("HAS_MICROFACET"))
 # What a material has besides its BSDF.
 _REST = {"emission": 0.0, "ambient": 0.0, "opacity": 1.0, "attenuation_distance": layout.ABSENT}
 
@@ -32,8 +35,9 @@ def bare(arrays: SceneArrays) -> SceneArrays:
 
 
 def flags(arrays: SceneArrays) -> frozenset[str]:
-    """The flags that a bare material raises, with those that its sliders could raise."""
-    return features.grown(frozenset(), arrays)
+    """The flags that a bare material raises, with those that its sliders and menus could raise."""
+    raised = features.grown(frozenset(), arrays)
+    return raised | _MENUS if "HAS_MICROFACET" in raised else raised
 
 
 def defines(arrays: SceneArrays, entry: str) -> dict[str, object]:
@@ -46,12 +50,12 @@ def defines(arrays: SceneArrays, entry: str) -> dict[str, object]:
 
 
 def samples() -> Iterator[SceneArrays]:
-    """A bare material of each model, and of those that can transmit or stretch one for each combination; none of
-    `microfacet`, whose kernels differ by their terms."""
-    for model in (model for model in MaterialModel if model != MaterialModel.MICROFACET):
+    """A bare material of each model, and of those that can transmit or stretch one for each combination."""
+    for model in MaterialModel:
         for transmission in (0.0, 1.0):
             for anisotropic in (0.0, 1.0):
                 material = np.zeros(1, layout.Material.dtype)
                 material["model"] = model
                 material["transmission"], material["anisotropic"] = transmission, anisotropic
-                yield bare(SceneArrays(NOWHERE, material))
+                terms = Microfacet.words // 4 if model == MaterialModel.MICROFACET else 0
+                yield bare(SceneArrays(NOWHERE, material, microfacets=np.zeros((terms, 4), np.uint32)))

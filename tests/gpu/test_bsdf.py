@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -12,7 +13,9 @@ from gpu import BsdfAlbedo, BsdfTerms, BsdfValues, Renderer, SceneArrays, Steps
 from gpu.bsdf import kernels
 from gpu.layout import MaterialModel
 from gpu.precompile import kernel_keys
-from tests import baseline, disney
+from service.pack import pack_material
+from service.scene.material.microfacet import MicrofacetMaterial
+from tests import baseline, disney, microfacets
 from tests.probing import materials
 from tests.shaders.test_lobes import PRINCIPLED, ROWS
 
@@ -205,6 +208,42 @@ def test_values_are_reciprocal_across_the_surface(gpu: Renderer, glass: dict[str
     assert (there[across] > 0).any() and (there[~across] > 0).any()
 
 
+LAB: list[dict[str, Any]] = [
+    {"distribution": "phong", "alpha": 1e6, "geometry": "kelemen", "fresnel": "cook_torrance", "f0": 0.5},
+    {"distribution": "beckmann", "geometry": "smith", "fresnel": "none"},
+    {"distribution": "gtr", "alpha": 0.001, "gamma": 10.0, "geometry": "schlick_ggx"},
+    {"distribution": "gtr", "gamma": 1.0, "geometry": "cook_torrance", "fresnel": "dielectric", "ior": 1.8},
+    {"distribution": "abc", "alpha": 1e6, "gamma": 1000.0, "geometry": "implicit"},
+    {"distribution": "sgd", "alpha": 0.3, "geometry": "smith_correlated", "diffuse": 0.5, "diffuse_model": "eon"},
+    {"distribution": "gaussian", "geometry": "neumann", "fresnel": "conductor", "conductor_eta": [0.2, 0.9, 1.1],
+     "conductor_k": [3.9, 2.4, 2.2]},
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("given", LAB, ids=lambda given: given["distribution"])
+def test_microfacet_and_its_terms(gpu: Renderer, given: dict[str, Any]) -> None:
+    """Against the formulas in double precision; all of its terms are in one kernel."""
+    material = MicrofacetMaterial(type="microfacet", **given)
+    packed, m = pack_material(material), material.model_dump()
+    degrees = np.array([1e-3, 0.03, 0.3, 3.0, 20.0, 60.0, 85.0])
+    w, view = np.array([direction(angle) for angle in degrees]), direction(45)
+    found = Steps(gpu.bsdf.terms(packed, view[None], w)).finish()
+    expected = microfacets.d(m["distribution"], m["alpha"], m["gamma"], np.tan(np.radians(degrees)))
+    np.testing.assert_allclose(found.distribution, expected, rtol=1e-3, atol=1e-30)
+    np.testing.assert_allclose(found.fresnel, microfacets.fresnel(m, w[:, 2]), rtol=1e-3)
+    wi = w * [-1, 1, 1]
+    half = wi + view
+    half /= np.linalg.norm(half, axis=1, keepdims=True)
+    geometry = microfacets.geometry(m, np.broadcast_to(view, wi.shape), wi, half)
+    np.testing.assert_allclose(found.geometry, geometry, rtol=1e-2, atol=1e-3)
+    # Seen head-on, where the half vector is as exact as the directions are.
+    head_on = np.array([0.0, 0.0, 1.0])
+    f = Steps(gpu.bsdf.values(packed, head_on[None], w)).finish().f[0]
+    np.testing.assert_allclose(f, microfacets.bsdf(m, head_on, w), rtol=1.2e-2, atol=1e-6)
+    keys = list(kernel_keys.bsdf_keys())
+    assert all(kernel_keys.bsdf_key(packed, question) in keys for question in kernel_keys.QUESTIONS)
+
+
 def test_pairs_are_those_of_the_grid(gpu: Renderer) -> None:
     rng = np.random.default_rng(7)
     wo, wi = sphere(rng, 50)[:40], sphere(rng, 50)[:40]
@@ -273,11 +312,12 @@ def test_terms_of_principled(gpu: Renderer) -> None:
 def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
     foreseen = list(kernel_keys.bsdf_keys())
     used = set()
-    for material in ALL.values():
-        glowing = material.copy()
+    lab = pack_material(MicrofacetMaterial(type="microfacet"))
+    for material in [*map(lone, ALL.values()), lab]:
+        glowing = material.materials.copy()
         glowing["emission"], glowing["opacity"], glowing["attenuation_distance"] = 3.0, 0.5, 1.0
         for question in kernel_keys.QUESTIONS:
-            key = kernel_keys.bsdf_key(lone(material), question)
-            assert kernel_keys.bsdf_key(lone(glowing), question) == key
+            key = kernel_keys.bsdf_key(material, question)
+            assert kernel_keys.bsdf_key(replace(material, materials=glowing), question) == key
             used.add(foreseen.index(key))
     assert used == set(range(len(foreseen)))
