@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from gpu.arrays import SceneArrays
 from gpu.settings import RenderSettings
 
 # A pixel's bytes: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more, and a uvec4.
@@ -11,9 +12,9 @@ PIXEL_BYTES, GUIDED_PIXEL_BYTES = 48, 96
 PICTURE_BYTES = 1 << 20  # the noise meter's buffers and what is small
 
 
-def scene_bytes(scene: object) -> int:
-    """About what a SceneArrays takes on the device."""
-    parts = [scene, *(getattr(scene, name, None) for name in ("environment", "textures"))]
+def scene_bytes(scene: SceneArrays) -> int:
+    """About what a scene takes on the device."""
+    parts = [scene, scene.environment, scene.textures]
     arrays = [array for part in parts if part is not None for array in vars(part).values()]
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
