@@ -34,28 +34,28 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
     from prometheus_client.core import CounterMetricFamily, GaugeMetricFamily, HistogramMetricFamily, Metric
     from prometheus_client.registry import Collector
 
-    def counter(name: str, told: str, value: float) -> Metric:
-        return CounterMetricFamily(f"sunbox_{name}", told, value=value)
+    def counter(name: str, help: str, value: float) -> Metric:
+        return CounterMetricFamily(f"sunbox_{name}", help, value=value)
 
-    def counters(name: str, told: str, labels: tuple[str, ...], values: Mapping[Any, float]) -> Metric:
-        family = CounterMetricFamily(f"sunbox_{name}", told, labels=labels)
+    def counters(name: str, help: str, labels: tuple[str, ...], values: Mapping[Any, float]) -> Metric:
+        family = CounterMetricFamily(f"sunbox_{name}", help, labels=labels)
         for key, value in values.items():
             family.add_metric(key, value)
         return family
 
-    def gauge(name: str, told: str, value: float) -> Metric:
-        return GaugeMetricFamily(f"sunbox_{name}", told, value=value)
+    def gauge(name: str, help: str, value: float) -> Metric:
+        return GaugeMetricFamily(f"sunbox_{name}", help, value=value)
 
-    def gauges(name: str, told: str, label: str, values: Mapping[str, float]) -> Metric:
-        family = GaugeMetricFamily(f"sunbox_{name}", told, labels=(label,))
+    def gauges(name: str, help: str, label: str, values: Mapping[str, float]) -> Metric:
+        family = GaugeMetricFamily(f"sunbox_{name}", help, labels=(label,))
         for key, value in values.items():
             family.add_metric((key,), value)
         return family
 
-    def histogram(name: str, told: str, values: Distribution) -> Metric:
+    def histogram(name: str, help: str, values: Distribution) -> Metric:
         buckets = [(f"{bound:g}", float(count)) for bound, count in values.cumulative()]
         return HistogramMetricFamily(
-            f"sunbox_{name}", told, buckets=[*buckets, ("+Inf", values.count)], sum_value=values.total
+            f"sunbox_{name}", help, buckets=[*buckets, ("+Inf", values.count)], sum_value=values.total
         )
 
     class Sunbox(Collector):
