@@ -15,9 +15,11 @@ from gpu.tables.sky import SunDisk
 
 Vec3 = tuple[float, float, float]
 
-# Triangles of meshes: from the first number on one may be an instance; a smaller one costs less in the scene's tree.
-# From the second on one that a stream moves is worth a kernel that takes a quarter longer: to pack it takes .05 s.
-SHAREABLE, HEAVY = 1 << 10, 1 << 15
+# Triangles from which on a mesh may be an instance; a smaller one costs less in the scene's own tree.
+SHAREABLE = 1 << 10
+# Triangles from which on a mesh that a stream moves is worth a kernel that takes a quarter longer: to pack such a
+# mesh again takes 0.05 s.
+HEAVY = 1 << 15
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from gpu.settings import RenderSettings
 
 # A pixel's bytes: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more, and a uvec4.
 PIXEL_BYTES, GUIDED_PIXEL_BYTES = 48, 96
-PICTURE_BYTES = 1 << 20  # the noise meter's buffers and what is small
+PICTURE_BYTES = 1 << 20  # of every picture, whatever its size: the noise meter's buffers and small ones
 
 
 def scene_bytes(scene: SceneArrays) -> int:

@@ -278,8 +278,8 @@ def looped(scene: SceneArrays) -> dict[str, int]:
     return {f"looped_{records}": _looped(scene, kind, records) for records, kind in kinds}
 
 
-def told_loops() -> dict[str, object]:
-    """For a kernel that learns those numbers from the frame."""
+def loops_from_frame() -> dict[str, object]:
+    """The defines of a kernel that reads from the frame how often its loops run."""
     return {_loop(name): f"frame.looped_{records}" for name, records in COUNTS.items()}
 
 

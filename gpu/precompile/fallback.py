@@ -31,7 +31,7 @@ def flags() -> frozenset[str]:
 
 def defines() -> dict[str, object]:
     """What it is compiled with, whatever the scene and its settings."""
-    return features.defines(flags(), RenderSettings(1, 1, clamp=1.0)) | features.told_loops()
+    return features.defines(flags(), RenderSettings(1, 1, clamp=1.0)) | features.loops_from_frame()
 
 
 def settings_for(settings: RenderSettings) -> RenderSettings | None:
