@@ -45,7 +45,7 @@ class Config(BaseSettings):
     )
     allowed_hosts: Words = Field(
         default_factory=list,
-        description="Names besides 127.0.0.1 and localhost, separated by commas, by which this server may be asked "
+        description="Names besides 127.0.0.1 and localhost, separated by commas, by which this server may be reached "
         "(default: none on a loopback address, any on another).",
     )
     allowed_origins: Words = Field(

@@ -52,7 +52,7 @@ class Kernel(BaseModel):
     saving_unknown: str | None = Field(description="Why `saving` is null; null where it is not.")
     sample_s: float | None = Field(description="Of this kernel, seconds a sample and pixel; null until measured.")
     full_sample_s: float | None = Field(description="The same of the kernel with everything on.")
-    full_compile_ms: float | None = Field(description="What that one took to compile, or to load where it was kept.")
+    full_compile_ms: float | None = Field(description="How long that kernel took to compile or to load.")
 
 
 class Forecast(BaseModel):
@@ -139,7 +139,7 @@ class BsdfTerms(BaseModel):
         description="The share of facets that is neither masked nor shadowed, between a direction of this cosine and "
         "one of `wo_cosine` on the other side of the normal; null for a perfect mirror."
     )
-    fresnel: list[list[float]] = Field(description="The reflectance of a facet that is met at this cosine.")
+    fresnel: list[list[float]] = Field(description="The reflectance of a facet at this cosine.")
 
 
 class BsdfAlbedo(BaseModel):

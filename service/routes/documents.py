@@ -29,7 +29,9 @@ Name = Annotated[
         examples=["my-scene"],
     ),
 ]
-Title = Annotated[str | None, Query(min_length=1, max_length=200, description="For menus; else the name.")]
+Title = Annotated[
+    str | None, Query(min_length=1, max_length=200, description="The title in menus; by default the name.")
+]
 
 
 @router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
@@ -50,7 +52,7 @@ async def document(request: Request, kind: answers.DocumentKind, name: Name) -> 
 @router.put(
     "/{kind}/{name}",
     summary="Save a document",
-    description="The body is the bare document, and must be valid; what had the name is replaced.",
+    description="The body is the bare document, and must be valid; a document of the same name is replaced.",
     openapi_extra=answers.DOCUMENT_BODY,
     responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 413, 415, 422),
 )

@@ -117,8 +117,8 @@ async def renders(request: Request) -> list[dict[str, Any]]:
 @router.get(
     "/renders/{id}",
     summary="How far it is",
-    description="With `wait`, answers at the render's end, or after so many seconds; with `saving` too, when that is "
-    "measured.",
+    description="With `wait`, answers at the render's end, or after that many seconds; with `saving`, once that is "
+    "measured as well.",
     response_model=None,
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422),
 )

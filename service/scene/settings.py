@@ -62,7 +62,7 @@ class Settings(Model):
         OMITTABLE,
         hint(
             "Time limit",
-            "Stops after so long; with it and no samples given, nothing else stops it.",
+            "Stops after this time; where no samples are given, nothing else stops it.",
             unit="s",
             widget="number",
             soft=60,

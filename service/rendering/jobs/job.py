@@ -34,7 +34,7 @@ from service.rendering.requests.request_reader import stop_rule, weight
 
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 
-UNASKED = KernelMeasured(0, "Nobody asked: GET this render with ?saving=true, and wait=60 to wait for it.")
+UNASKED = KernelMeasured(0, "Not measured yet: GET this render with ?saving=true, and wait=60 to wait for it.")
 ASKED = KernelMeasured(
     0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60."
 )

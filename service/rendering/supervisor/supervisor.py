@@ -188,7 +188,7 @@ class Supervisor:
         lifeline = None if self._lifeline is None else self._lifeline[0]
         self._process = process = Process(self._options, self._received, lambda: self._lose(process), lifeline)
         for task, held in self._tasks.items():
-            self._not_measured(held, "The renderer was lost meanwhile: ask again.")
+            self._not_measured(held, "The renderer was lost before it could answer: ask again.")
             held.resident = held.record.kept is None
             if held.resident:
                 self._tell_all(held.record)
@@ -227,7 +227,7 @@ class Supervisor:
 
     def _hear(self, message: FromRenderer, held: _Task) -> None:
         if isinstance(message, Evicted):
-            self._not_measured(held, "It made room for others meanwhile: ask again.")
+            self._not_measured(held, "The render made room for others before it was measured: ask again.")
             held.resident = held.record.saved is None
             if held.resident:  # it ended before it had a sample
                 for read in list(held.record.reads.values()):

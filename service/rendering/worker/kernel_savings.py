@@ -19,10 +19,10 @@ if TYPE_CHECKING:
 
 SLICE_S = 0.015  # how long a task that comes meanwhile may have to wait
 NO_KERNEL = (
-    "Not measured: the kernel with everything on is not in the driver's disk cache, and nobody shall wait for it; "
-    "`sunbox info` compiles it and measures."
+    "Not measured: the kernel with every feature is not in the driver's disk cache, and to compile it would delay "
+    "others; `sunbox info` compiles it and measures."
 )
-NO_PICTURE = "Not measured: there is no picture of it any more, or none yet."
+NO_PICTURE = "Not measured: the renderer has no picture of this scene, or no longer has it."
 
 log = logging.getLogger(__name__)
 

@@ -26,7 +26,7 @@ class Phase(Enum):
     UPDATING = "an update is to be applied"
     TRACING = "samples are added"
     SAVING = "the picture is read for the server, which keeps it"
-    ENDED = "the render has had enough"
+    ENDED = "the render has reached its end"
 
 
 class Task:

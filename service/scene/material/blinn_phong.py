@@ -40,7 +40,7 @@ class BlinnPhongMaterial(Surface):
         AnyRadiometric,
         hint(
             "Ambient",
-            "Radiance added wherever the surface is met; it lights nothing by being picked as a light.",
+            "Radiance added wherever a path meets the surface; it is never sampled as a light.",
             unit="W/(m^2 sr)",
             widget="color",
             soft=1,

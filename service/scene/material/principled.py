@@ -46,7 +46,7 @@ class PrincipledMaterial(DisneyMaterial):
         OMITTABLE,
         hint(
             "Index of refraction",
-            "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which else sets it.",
+            "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which sets it otherwise.",
             unit="",
             widget="slider",
             follows=("specular", index_of_specular),
