@@ -5,7 +5,7 @@ serve          the editor and the API
 bsdf           curves of a material's BSDF, into a table or a figure
 bsdf_curves    what those curves are, by kind
 bsdf_figure    the figures, drawn by matplotlib
-import         a glTF model as a document with files beside it
+import         a model as a document with files beside it
 info           what would render here
 bench          measurements
 health         the container's health check
@@ -13,7 +13,7 @@ assets         the assets of a scene, and their ids
 configuration  the configuration; what is wrong in it ends the command
 documents      documents and settings, from files and from `--set`
 files          files, never half-written
-models         glTF models with the files that they refer to
+models         glTF and OBJ models with the files that they refer to
 progress       how far a render is, on stderr
 tracing        one render in this process
 """

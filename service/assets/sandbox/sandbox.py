@@ -47,7 +47,7 @@ class Sandbox:
         self.children = Children("service.assets.sandbox.child", ENVIRONMENT, is_quiet=True)
 
     def start(self) -> None:
-        """Starts a child for the first file, without waiting."""
+        """Start a child for the first file, without waiting."""
         with self.children.one():
             pass
 
