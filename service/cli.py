@@ -114,18 +114,20 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "compare", "peers", "hemisphere", "hand", "tradeoff"],
+        choices=["speed", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds"],
         default="speed",
         help="speed (default): paths per second, compile times, growth with triangles, latencies; "
         "compare: this checkout beside an earlier revision; "
         "peers: error at equal time beside Mitsuba and Cycles; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
         "hand: from a slider to other pixels, in a browser; "
-        "tradeoff: the price list, what every knob that buys speed costs in error",
+        "tradeoff: the price list, what every knob that buys speed costs in error; "
+        "seeds: the experiments of the programs that Sunbox grew out of, repeated",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
-    add("--publish", action="store_true", help="tradeoff: write docs/tradeoff.* and the price list that is served")
-    add("--quick", action="store_true", help="tradeoff: try it out on one scene; its figures mean nothing")
+    text = "tradeoff: write docs/tradeoff.* and the price list that is served; seeds: write docs/experiments*"
+    add("--publish", action="store_true", help=text)
+    add("--quick", action="store_true", help="tradeoff, seeds: try it out on little; its figures mean nothing")
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
     add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
     add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")

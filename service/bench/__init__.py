@@ -25,6 +25,7 @@ soak_clients       what they do
 soak_page          a hand on the editor meanwhile
 soak_server        the server that is soaked
 soak_tally         what they went through
+seeds              the experiments of the programs that Sunbox grew out of
 gallery            the README's pictures
 thumbnails         the editor's pictures of the material presets
 """

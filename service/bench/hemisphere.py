@@ -7,8 +7,6 @@ directions with independent numbers, as a beginner writes it, beside what Sunbox
 from __future__ import annotations
 
 import math
-import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -17,7 +15,7 @@ import numpy as np
 
 from gpu import Renderer, RenderSettings
 from service import presets
-from service.bench import machine
+from service.bench import machine, timing
 from service.bench.scenes import BenchAssets
 from service.pack import pack
 from service.scene import parse_scene
@@ -60,8 +58,7 @@ def slope(samples: list[int], error: list[float]) -> float:
 def _render(
     renderer: Renderer, material: dict[str, Any], way: str, counts: list[int], seed: int
 ) -> list[tuple[float, np.ndarray]]:
-    """(seconds of tracing, picture) at each count of one render. Where the processor renders, its own seconds, over
-    the cores: others may be at work."""
+    """(seconds of tracing, picture) at each count of one render."""
     lamps = presets.get("environments", "studio")
     ball = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
     camera = {"position": [0, 0.6, 3.2], "target": [0, 0, 0], "vfov": 40}
@@ -73,17 +70,13 @@ def _render(
     out, seconds = [], 0.0
     software = bool(renderer.info["software"])
     for count in counts:
-        start = _clock(software)
+        start = timing.clock(software)
         picture.trace(math.inf, count)
-        seconds += _clock(software) - start
+        seconds += timing.clock(software) - start
         out.append((seconds, picture.read()[..., :3].astype(np.float64)))
     picture.release()
     loaded.release()
     return out
-
-
-def _clock(software: bool) -> float:
-    return time.process_time() / (os.cpu_count() or 1) if software else time.perf_counter()
 
 
 def table(document: dict[str, Any]) -> str:

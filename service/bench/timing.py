@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import time
 from typing import TYPE_CHECKING
 
@@ -25,3 +26,8 @@ def _trace(picture: Picture, samples: int) -> float:
     while picture.samples < samples:
         picture.trace(1.0, samples)
     return time.perf_counter() - began
+
+
+def clock(software: bool) -> float:
+    """Seconds. Where the processor renders, this process' own over the cores: others may be at work."""
+    return time.process_time() / (os.cpu_count() or 1) if software else time.perf_counter()

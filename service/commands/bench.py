@@ -1,4 +1,4 @@
-"""`sunbox bench speed | compare | peers | hemisphere | hand | tradeoff`: a table; `-o` keeps the figures as JSON."""
+"""`sunbox bench speed | compare | peers | hemisphere | hand | tradeoff | seeds`: a table; `-o` keeps the figures."""
 
 from __future__ import annotations
 
@@ -22,6 +22,7 @@ def run(arguments: argparse.Namespace) -> int:
         "hemisphere": _hemisphere,
         "hand": _hand,
         "tradeoff": _tradeoff,
+        "seeds": _seeds,
     }
     return measures[arguments.what](arguments)
 
@@ -134,6 +135,27 @@ def _tradeoff(arguments: argparse.Namespace) -> int:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     if arguments.publish:
         tradeoff_report.publish(document)
+    return 0
+
+
+def _seeds(arguments: argparse.Namespace) -> int:
+    if arguments.publish and arguments.quick:
+        raise BadInput("--publish --quick: figures that mean nothing are not for publishing")
+    if arguments.publish and find_spec("matplotlib") is None:
+        raise BadInput("--publish: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+    output = _output(arguments.output)
+    from gpu import GpuError
+    from service.bench.seeds import page, report, run
+
+    try:
+        document, pictures = run.measure(arguments.quick, lambda what: print(what, file=sys.stderr))
+    except GpuError as error:
+        raise Failed(str(error)) from None
+    print(page.markdown(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    if arguments.publish:
+        report.publish(document, pictures)
     return 0
 
 

@@ -1,0 +1,34 @@
+"""All the experiments, in one go."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from gpu import Renderer
+from service.bench import machine
+from service.bench.seeds import blur, bounces, reflection, samples, spheres
+from service.bench.seeds.stage import Stage
+
+
+def measure(quick: bool, told: Callable[[str], None]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
+    """(the figures, as JSON; pictures (h, w, 3) of sRGB bytes by name). `quick`: small, and the figures mean nothing.
+
+    Raises GpuError.
+    """
+    with Renderer() as renderer:
+        stage = Stage(renderer, quick, told)
+        began = stage.clock()
+        document = {
+            "machine": machine.describe(renderer.info),
+            "quick": quick,
+            "spheres": spheres.measure(stage),
+            "rooms": bounces.rooms(stage),
+            "model": bounces.model(stage),
+            "samples": samples.measure(stage),
+            "blur": blur.measure(stage),
+            "reflection": reflection.measure(stage),
+        }
+        return document | {"took_s": stage.clock() - began}, stage.pictures

@@ -1,0 +1,112 @@
+"""One sphere: in the light of a point, and of a cubemap with 1 to 4 096 samples of the hemisphere."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+
+from service import presets
+from service.assets import ImageData, MeshData
+from service.bench.scenes import BenchAssets
+from service.bench.seeds.stage import Document, Stage, rmse, sheet, shown
+from service.pack import pack
+from service.scene import parse_scene
+
+SIZE, ERROR_SIZE = 800, 128
+COUNTS = tuple(4**k for k in range(7))  # 1, 4, ... 4 096
+WAYS: dict[str, dict[str, str]] = {"uniform": {"estimator": "uniform", "sampler": "independent"}, "Sunbox": {}}
+FACE = 128  # texels of a side
+# Directions at the middle of a face, to its right and down.
+AXES = {
+    "px": ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
+    "nx": ((-1, 0, 0), (0, 0, 1), (0, -1, 0)),
+    "py": ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
+    "ny": ((0, -1, 0), (1, 0, 0), (0, 0, -1)),
+    "pz": ((0, 0, 1), (1, 0, 0), (0, -1, 0)),
+    "nz": ((0, 0, -1), (-1, 0, 0), (0, -1, 0)),
+}
+MATERIALS: dict[str, Document] = {
+    "diffuse": {"type": "diffuse", "albedo": 0.8},
+    "metal": {"type": "disney", "base_color": [1, 0.8, 0.4], "metallic": 1, "roughness": 0.3},
+}
+
+
+class CubeAssets:
+    """The clear sky of the presets as six faces, by the name of each."""
+
+    def __init__(self) -> None:
+        self._pixels = BenchAssets().image(presets.get("environments", "clear-sky")["asset"]).pixels
+
+    def mesh(self, ref: str) -> MeshData:
+        raise KeyError(ref)  # the scene has none
+
+    def image(self, ref: str) -> ImageData:
+        ahead, right, down = AXES[ref]
+        s = (2 * np.arange(FACE) + 1) / FACE - 1
+        d = np.array(ahead) + np.multiply.outer(s, down)[:, None] + np.multiply.outer(s, right)
+        d /= np.linalg.norm(d, axis=2, keepdims=True)
+        height, width = self._pixels.shape[:2]
+        column = (0.5 + np.arctan2(d[..., 0], -d[..., 2]) / (2 * math.pi)) * width
+        row = np.arccos(np.clip(d[..., 1], -1, 1)) / math.pi * height
+        nearest = np.minimum(row.astype(int), height - 1), np.minimum(column.astype(int), width - 1)
+        return ImageData(np.asarray(self._pixels[nearest][..., :3], np.float32))
+
+
+def sphere(material: Document, **light: Any) -> Document:
+    return {
+        "version": 1,
+        "camera": {"position": [0, 0, 3.4], "target": [0, 0, 0], "vfov": 40},
+        "materials": {"ball": material},
+        "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "ball"}],
+        **light,
+    }
+
+
+CUBE = {"environment": {"type": "cubemap", "assets": {name: name for name in AXES}, "rotation": 150}}
+POINT = {"lights": [{"type": "point", "position": [2.5, 3, 3], "intensity": 60}]}
+
+
+def measure(stage: Stage) -> dict[str, Any]:
+    """`ms`: for a sample of every pixel at 800 x 800, by light and way. `errors`: of each material and way, the root
+    mean square error over the mean, by the number of samples."""
+    assets, side = CubeAssets(), stage.either(SIZE, 32)
+    timed = {}
+    stage.told("a point light, a cubemap")
+    point = stage.packed(sphere(MATERIALS["metal"], **POINT))
+    timed["point light", "Sunbox"] = stage.picture(point, side, side, max_bounces=1)
+    for way, settings in WAYS.items():
+        cube = pack(parse_scene(sphere(MATERIALS["metal"], **CUBE)), assets).arrays
+        timed["cubemap", way] = stage.picture(cube, side, side, max_bounces=1, **settings)
+    taken = stage.rates(timed)
+    seen = [[shown(stage.image(point, 200, 200, 1, max_bounces=1)) for _ in range(1)]]
+    errors = []
+    counts = stage.either(COUNTS, COUNTS[:3])
+    small = stage.either(ERROR_SIZE, 24)
+    rows = []
+    for name, material in MATERIALS.items():
+        cube = pack(parse_scene(sphere(material, **CUBE)), assets).arrays
+        stage.told(f"{name}: what errors are taken from")
+        truth = stage.image(cube, small, small, counts[-1], max_bounces=1, filter="box", seed=1000)
+        for way, settings in WAYS.items():
+            stage.told(f"{name}, {way}")
+            most = counts[-1] if way == "uniform" else counts[-2]
+            picture = stage.picture(cube, small, small, max_bounces=1, filter="box", **settings)
+            row, found = [], []
+            for count in counts:
+                if count <= most:
+                    picture.trace(math.inf, count)
+                    pixels = picture.read()[..., :3].astype(np.float64)
+                    found.append(rmse(pixels, truth) / float(truth.mean()))
+                    row.append(shown(pixels))
+            picture.release()
+            errors.append({"material": name, "way": way, "samples": list(counts[: len(found)]), "error": found})
+            rows.append(row)
+    stage.pictures["point"] = seen[0][0]
+    stage.pictures["samples"] = sheet(rows)
+    return {
+        "size": side,
+        "ms": [{"light": light, "way": way, "ms": 1e3 * s} for (light, way), s in taken.items()],
+        "errors": errors,
+    }
