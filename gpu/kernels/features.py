@@ -61,9 +61,11 @@ def _term(kind: str, value: int) -> Callable[[SceneArrays], bool]:
 
 
 def _terms() -> dict[str, Callable[[SceneArrays], bool]]:
-    """A flag for each term of `microfacet`: HAS_MICROFACET_DISTRIBUTION_GTR."""
-    kinds = microfacet_records.TERMS.items()
-    return {f"HAS_MICROFACET_{kind.upper()}_{e.name}": _term(kind, e) for kind, terms in kinds for e in terms}
+    """A flag for each term of `microfacet` that has code of its own: HAS_MICROFACET_DISTRIBUTION_GTR."""
+    plain = microfacet_records.PLAIN
+    every = [(kind, term) for kind, terms in microfacet_records.TERMS.items() for term in terms]
+    own = [(kind, term) for kind, term in every if plain.get(kind) != term]
+    return {f"HAS_MICROFACET_{kind.upper()}_{term.name}": _term(kind, term) for kind, term in own}
 
 
 def _transmits(materials: np.ndarray) -> np.ndarray:

@@ -54,6 +54,8 @@ TERMS: dict[str, type[IntEnum]] = {
     "fresnel": Fresnel,
     "diffuse_model": DiffuseModel,
 }
+# What is computed where no flag of its kind is raised.
+PLAIN: dict[str, IntEnum] = {"fresnel": Fresnel.NONE, "diffuse_model": DiffuseModel.LAMBERT}
 
 
 class Microfacet(Record):

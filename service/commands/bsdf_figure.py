@@ -27,7 +27,8 @@ PEAKED = 20.0  # times the median of a lobe: then its radius is logarithmic, or 
 def draw(materials: Mapping[str, Curves], format: str) -> bytes:
     """The figure as "svg" or "png". The same curves give the same bytes."""
     kind = next(iter(materials.values())).kind
-    sheet = Figure(figsize=(6.4 * (len(materials) if kind == "slice" else 1), 5.2), layout="constrained")
+    wide = 6.4 * (len(materials) if kind == "slice" else 1)
+    sheet = Figure(figsize=(wide, 4.6 if kind == "polar" and _opaque(materials) else 5.2), layout="constrained")
     FigureCanvasAgg(sheet)
     if kind == "slice":
         _slices(sheet, materials)
@@ -45,11 +46,19 @@ def _curves(materials: Mapping[str, Curves]) -> list[tuple[Curves, np.ndarray, d
     """(its material's curves, values, how to draw it) of each curve."""
     out = []
     for (name, curves), style in zip(materials.items(), STYLES, strict=False):
+        groups = list(dict.fromkeys(column.rpartition("_")[0] for column in curves.columns))  # one for each angle
         for column, values in curves.columns.items():
             label = f"{name}: {column}" if len(materials) > 1 else column
-            color = COLORS.get(column.rpartition("_")[2]) if len(curves.columns) <= len(COLORS) else None
-            out.append((curves, values, {"label": label, "linestyle": style, "color": color}))
+            group, _, channel = column.rpartition("_")
+            shade = 1 - 0.65 * groups.index(group) / len(groups)
+            look = {"label": label, "linestyle": style, "color": COLORS.get(channel), "alpha": shade}
+            out.append((curves, values, look))
     return out
+
+
+def _opaque(materials: Mapping[str, Curves]) -> bool:
+    """Whether no polar diagram of them has a lower half."""
+    return all(abs(curves.theta).max() <= 90 for curves in materials.values())
 
 
 def _plain(plot: Any, kind: str, materials: Mapping[str, Curves]) -> None:
@@ -70,8 +79,7 @@ def _plain(plot: Any, kind: str, materials: Mapping[str, Curves]) -> None:
 def _polar(plot: Any, materials: Mapping[str, Curves]) -> None:
     plot.set_theta_zero_location("N")
     plot.set_theta_direction(-1)
-    half = all(abs(curves.theta).max() <= 90 for curves in materials.values())
-    if half:
+    if _opaque(materials):
         plot.set_thetamin(-90)
         plot.set_thetamax(90)
     drawn = _curves(materials)
@@ -79,7 +87,9 @@ def _polar(plot: Any, materials: Mapping[str, Curves]) -> None:
         plot.plot(np.radians(curves.theta), values, **how)
     lit = np.concatenate([values[values > 0] for _, values, _ in drawn])
     if len(lit) and lit.max() > PEAKED * np.median(lit):
-        plot.set_rscale("symlog", linthresh=float(np.median(lit)))
+        least = float(np.median(lit))
+        plot.set_rscale("symlog", linthresh=least)
+        plot.set_rticks(10.0 ** np.arange(np.ceil(np.log10(2 * least)), np.log10(lit.max())))
     top = float(lit.max()) if len(lit) else 1.0
     plot.set_rlim(0, 1.05 * top)
     for curves in materials.values():
@@ -88,7 +98,7 @@ def _polar(plot: Any, materials: Mapping[str, Curves]) -> None:
             plot.plot([angle, angle], [0, top], color="black", linewidth=1)
             plot.annotate(f"{max(lobe.weight):.3g}", (angle, top), fontsize=8)
     plot.set_xlabel("f (1/sr) in the plane of incidence; lines: perfectly specular lobes and their weights")
-    plot.legend(loc="upper left", bbox_to_anchor=(-0.15, 1.1))
+    plot.figure.legend(loc="outside upper center", ncols=3 * len(materials), frameon=False)
 
 
 def _slices(sheet: Any, materials: Mapping[str, Curves]) -> None:

@@ -11,7 +11,7 @@ from gpu import Renderer, RenderSettings
 from gpu.analysis.kernel_cost import kernel_cost
 from gpu.arrays import SceneArrays
 from gpu.kernels.features import FLAGS, flags, grown
-from gpu.layout.microfacet_records import TERMS
+from gpu.layout.microfacet_records import PLAIN, TERMS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
 from service.pack import Packed, pack
 from service.scene import parse_scene
@@ -95,7 +95,7 @@ SCENES: dict[str, Doc] = {
     "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
     "MICROFACET": made_of(MICROFACET), "MICROFACET_TABLES": made_of({**MICROFACET, "distribution": "abc"}),
     **{f"MICROFACET_{kind}_{e.name}".upper(): made_of({**MICROFACET, kind: e.name.lower()})
-       for kind, terms in TERMS.items() for e in terms},
+       for kind, terms in TERMS.items() for e in terms if PLAIN.get(kind) != e},
     "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
     "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
     "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),

@@ -117,7 +117,7 @@ def test_a_software_renderer_is_not_ready_where_a_gpu_is_required() -> None:
 def test_warming_up_leaves_no_task_and_raises_nothing(
     answer: Callable[[Listener, int], None], logged: str, caplog: pytest.LogCaptureFixture
 ) -> None:
-    caplog.set_level(logging.INFO)
+    caplog.set_level(logging.INFO, logger=warm_up.__module__)
     renderers = StandIn(answer)
     asyncio.run(warm_up(renderers, READER, readiness.SCENE))
     assert renderers.frames == 1 and not renderers.open_tasks
