@@ -12,7 +12,7 @@ from scipy import integrate
 from gpu import Renderer
 from gpu.kernels.features import FLAGS
 from gpu.layout.bindings import Slot
-from gpu.layout.microfacet_records import Distribution
+from gpu.layout.microfacet_records import PLAIN, Distribution
 from gpu.tables import microfacet as tables
 from service.pack import pack_materials, pack_microfacets
 from service.scene import parse_scene
@@ -36,6 +36,7 @@ SHAPES = [
     *[("sgd", a, g) for a in (0.01, 0.3, 1.0, 2.0) for g in (0.0, 0.5, 1.0, 1.5, 2.0)],
     *[("gaussian", a, 2.0) for a in (0.01, 0.1, 0.5, 2.0)],
 ]
+PLAIN_FLAGS = {f"HAS_MICROFACET_{kind.upper()}_{term.name}" for kind, term in PLAIN.items()}
 ANGLES = (0.0, 45.0, 75.0, 89.9)
 LOWEST = math.cos(math.radians(89.9))
 
@@ -60,7 +61,7 @@ def ask(prober: Prober, m: Doc, wo: np.ndarray, asks: np.ndarray, sample: int = 
         {"version": 1, "camera": camera, "materials": {"m": {"type": "microfacet", **m}}, "shapes": []}
     )
     kinds = ("distribution", "geometry", "fresnel", "diffuse_model")
-    raised = {"HAS_MICROFACET", *(f"HAS_MICROFACET_{kind}_{m[kind]}".upper() for kind in kinds)}
+    raised = {"HAS_MICROFACET", *(f"HAS_MICROFACET_{kind}_{m[kind]}".upper() for kind in kinds)} - PLAIN_FLAGS
     words = pack_microfacets(scene)
     if len(words) > 5:
         raised.add("HAS_MICROFACET_TABLES")
