@@ -14,8 +14,8 @@ export function inWords(name) {
   return NAMES[name] ?? spaced.charAt(0).toUpperCase() + spaced.slice(1);
 }
 
-// Four digits that count, without trailing zeros.
-export const compact = (value) => String(Number(value.toPrecision(4)));
+// Four digits that count, without trailing zeros; of a number for each channel, all three.
+export const compact = (value) => [value].flat().map((each) => String(Number(each.toPrecision(4)))).join(", ");
 
 export function duration(seconds) {
   if (seconds < 9.95) return `${seconds.toFixed(1)} s`;

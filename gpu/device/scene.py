@@ -189,7 +189,8 @@ class Scene:
             self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
         self.arrays = arrays
         if tables is not None:
-            self._details[bindings.MICROFACETS_TEXTURE].release()
+            if bindings.MICROFACETS_TEXTURE in self._details:  # else this edit brings the first one
+                self._details[bindings.MICROFACETS_TEXTURE].release()
             self._details[bindings.MICROFACETS_TEXTURE] = tables
         if len(arrays.materials) and (materials is not None or texture_words is not None):
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
