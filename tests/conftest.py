@@ -10,6 +10,7 @@ from pathlib import Path
 import pytest
 
 from gpu import ContextError, Renderer
+from gpu import context as contexts
 from tests.privileges import shed
 from tests.rendering import release_pictures
 from tests.serving import Server
@@ -39,6 +40,13 @@ def gpu() -> Iterator[Renderer]:
         pytest.skip(str(error))
     yield renderer
     renderer.close()
+
+
+@pytest.fixture(autouse=True)
+def _current_context(request: pytest.FixtureRequest) -> None:
+    """Make the session's context current: the last test may have made another, and a probe calls GL by itself."""
+    if "gpu" in request.fixturenames:
+        contexts.use(request.getfixturevalue("gpu")._context)
 
 
 @pytest.fixture(scope="session")

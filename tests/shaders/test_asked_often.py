@@ -57,7 +57,8 @@ def pictures(gpu: Renderer, scene: dict[str, Any], samples: int, **settings: Any
 
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr(source, "_read", changed)
-        once = picture(Renderer(), scene, samples, SKY, **settings).read()[..., :3]
+        with Renderer() as renderer:
+            once = picture(renderer, scene, samples, SKY, **settings).read()[..., :3]
     return picture(gpu, scene, samples, SKY, **settings).read()[..., :3], once
 
 

@@ -93,8 +93,6 @@ def _places(seed: int, count: int, spread: float = 1.0) -> Iterator[tuple[np.nda
         yield rng.normal(size=3) * spread * 10 ** rng.uniform(-1, 1), n / np.linalg.norm(n), i % 3 == 0
 
 
-# Not explained yet: in one process with some thousand others its first answer is wrong; with fewer it never was.
-@pytest.mark.calm
 def test_lights_are_drawn_as_often_as_they_say(pickers: Any) -> None:
     scene = _room(1)
     arrays = _packed({**scene, **SUNS, "lights": scene["lights"] + SUNS["lights"]})
