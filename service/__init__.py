@@ -25,6 +25,9 @@ connections        connections below HTTP
 connection_limits  how many connections there are, and how long one may stand still
 downloads          large answers, in pieces
 documents          what users saved, in SQLite
+database           the SQLite file: its version, its connections
+migrations         its tables, as the ordered steps that made them
+data_lock          one server at a time on a data folder
 quota              room on the disk
 garbage            the garbage collector, out of the way of large imports
 storage            what is kept in the data folder

@@ -27,7 +27,8 @@ from service import presets
 from service.config import Config, unknown_variables
 from service.connection_limits import Watch
 from service.connections import connection_class, listen
-from service.documents import DamagedFile
+from service.data_lock import FolderInUse, locked
+from service.database import DamagedFile
 from service.downloads import Pieces
 from service.guard import Guard, turning_away
 from service.logs import Requests
@@ -101,7 +102,7 @@ def create_app(config: Config) -> FastAPI:
 
 
 def run(config: Config) -> int:
-    """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 where the address cannot be used."""
+    """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 where it could not start."""
     _give_memory_back()
     sys.setswitchinterval(SWITCH_S)
     if unknown := unknown_variables():
@@ -112,16 +113,23 @@ def run(config: Config) -> int:
     except OSError as error:
         log.error("could not listen host=%s port=%d error=%s", config.host, config.port, error.strerror or error)
         return 1
-    host, port = listener.getsockname()[:2]
+    host = listener.getsockname()[0]
     if not config.api_key and not ipaddress.ip_address(host).is_loopback:
         log.warning(OPEN_TO_ALL, host)
-    app = create_app(config)
-    own: AppState = app.state.sunbox
     try:
-        own.documents.prepare()
-    except DamagedFile as error:
+        with listener, locked(config.data_dir):
+            return _serve(config, listener, most)
+    except (DamagedFile, FolderInUse) as error:
         log.error("did not start reason=%s", error)
         return 1
+
+
+def _serve(config: Config, listener: socket.socket, most: int) -> int:
+    """With at most that many connections. Raises DamagedFile."""
+    host, port = listener.getsockname()[:2]
+    app = create_app(config)
+    own: AppState = app.state.sunbox
+    own.documents.prepare()
     own.quota.clear()
     full = Requests(turning_away(FULL, respond), refuse=respond, heard=own.traffic.heard)
     settings = uvicorn.Config(

@@ -20,10 +20,11 @@ import pytest
 import uvicorn
 from starlette.requests import Request
 
-from service import app, documents
+from service import app, database
 from service.assets import AssetStore
 from service.config import Config
-from service.documents import DamagedFile, Documents, checked
+from service.database import DamagedFile
+from service.documents import Documents, checked
 from service.downloads import Downloads, FileAnswer
 from service.problems import Unavailable
 from service.routes.documents import document
@@ -139,7 +140,7 @@ def test_documents_give_their_room_back(saved: Documents, tmp_path: Path) -> Non
 
 def test_the_log_does_not_stay_large(saved: Documents, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """Somebody who reads all the time keeps SQLite from deleting it."""
-    monkeypatch.setattr(documents, "LOG_BYTES", 50_000)
+    monkeypatch.setattr(database, "LOG_BYTES", 50_000)
     saved.put("scenes", "0", checked("scenes", SCENE))
     with closing(sqlite3.connect(tmp_path / "documents.sqlite3")) as other:
         other.execute("SELECT count(*) FROM documents").fetchone()
