@@ -29,8 +29,10 @@ database           the SQLite file: its version, its connections
 migrations         its tables, as the ordered steps that made them
 data_lock          one server at a time on a data folder
 quota              room on the disk
+disk_usage         what files take on a disk: blocks and inodes
 garbage            the garbage collector, out of the way of large imports
 storage            what is kept in the data folder
+data_check         whether that is sound
 logs               a line or a JSON object for each event
 log_output         where log records go
 child_processes    children that parse strangers' files, as the service starts and ends them

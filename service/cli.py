@@ -1,4 +1,4 @@
-"""The command line: `sunbox serve | render | bsdf | import | info | bench`.
+"""The command line: `sunbox serve | render | bsdf | import | info | check-data | bench`.
 
 Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
 Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
@@ -21,7 +21,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parsed = parser().parse_args(arguments)
     # Nothing here multiplies large matrices, and a pool of threads for that costs 60 ms at every start.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
-    run = import_module(f"service.commands.{parsed.command}").run
+    run = import_module(f"service.commands.{parsed.command.replace('-', '_')}").run
     try:
         return int(run(parsed))
     except CommandError as error:
@@ -46,6 +46,7 @@ def parser() -> argparse.ArgumentParser:
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a glTF or OBJ model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
+    _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
     _bench(commands.add_parser("bench", help="measure"))
     return top
 
@@ -91,6 +92,11 @@ def _any_of(names: Sequence[str]) -> str:
 def _info(command: argparse.ArgumentParser) -> None:
     command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF or OBJ model")
     _asset_root(command)
+
+
+def _check_data(command: argparse.ArgumentParser) -> None:
+    text = "the folder, which a server may be using (default: SUNBOX_DATA_DIR)"
+    command.add_argument("folder", nargs="?", metavar="FOLDER", help=text)
 
 
 def _asset_root(command: argparse.ArgumentParser) -> None:

@@ -13,7 +13,7 @@ from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 1 GiB
 MIB, GIB = 2**20, 2**30
 
-LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota")  # how the names of limits begin
+LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota", "data_files")  # how the names of limits begin
 
 HOST = re.compile(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")  # a name, an IPv4 or an IPv6 address
 
@@ -58,8 +58,10 @@ class Config(BaseSettings):
     data_quota: int = Field(
         10 * GIB,
         ge=1,
-        description="Most bytes of assets and documents; assets unused longest make room, unless documents use them.",
+        description="Most bytes of assets and documents, in whole blocks; assets unused longest make room, unless "
+        "documents use them.",
     )
+    data_files: int = Field(1_000_000, ge=1, description="Most files that they take, two for an asset.")
     device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
     require_gpu: bool = Field(False, description="Refuse to start on a software renderer.")
     log_format: Literal["console", "json"] = Field(

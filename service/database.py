@@ -8,6 +8,7 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from pathlib import Path
 
+from service.disk_usage import Usage
 from service.migrations import MIGRATIONS, VERSION
 from service.problems import Unavailable
 
@@ -76,16 +77,16 @@ class Database:
                 raise Unavailable("Others are writing to the database just now.", 1) from None
             raise Unavailable("The database cannot be reached: the server's disk has a problem.", 30) from None
 
-    def bytes(self) -> int:
+    def usage(self) -> Usage:
         """Of the file's used pages, without the log beside it, which is deleted when the file is closed."""
         if not self.exists():
-            return 0
+            return Usage()
         with self.open() as database:
             pages, free, size = (
                 database.execute(f"PRAGMA {name}").fetchone()[0]
                 for name in ("page_count", "freelist_count", "page_size")
             )
-        return int((pages - free) * size)
+        return Usage(int((pages - free) * size), 1)
 
     @contextmanager
     def _connected(self) -> Iterator[sqlite3.Connection]:

@@ -15,6 +15,7 @@ from pydantic import TypeAdapter
 from service import recipe
 from service.assets import AssetStore
 from service.database import Database
+from service.disk_usage import Usage, expected
 from service.problems import FieldError, InvalidDocument, NotFound
 from service.quota import Quota
 from service.scene import Material, parse_scene
@@ -93,7 +94,7 @@ class Documents:
         # These assets stay while others make room, so that a refused document costs no asset.
         with self._quota.pinned(uses) if self._quota else nullcontext():
             self._find_assets(document, uses)
-            room = self._quota.room(len(body.encode())) if self._quota else nullcontext()
+            room = self._quota.room(expected([len(body.encode())])) if self._quota else nullcontext()
             with room, self._database.open() as database, database:
                 database.execute("BEGIN IMMEDIATE")
                 self._find_assets(document, uses)  # again: another process may have made room
@@ -125,10 +126,9 @@ class Documents:
             database.execute("BEGIN IMMEDIATE")
             yield {asset for (asset,) in database.execute("SELECT DISTINCT asset FROM uses")}
 
-    @property
-    def bytes(self) -> int:
+    def usage(self) -> Usage:
         """Of the database, whose unused pages don't count."""
-        return self._database.bytes()
+        return self._database.usage()
 
     def _find_assets(self, document: CheckedDocument, uses: list[str]) -> None:
         """Raises InvalidDocument where one of them is not here."""

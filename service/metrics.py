@@ -96,8 +96,10 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
             yield gauge("renderer_tasks", "Pictures that the renderer holds.", seen.tasks)
             yield gauge("gpu_bytes", "What they hold on the GPU.", seen.gpu_bytes)
             yield gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(state))
-            with suppress(Unavailable):  # the disk fails: all other metrics are still given
-                yield gauge("data_bytes", "Assets and documents on the disk.", state.quota.used())
+            with suppress(Unavailable, OSError):  # the disk fails: all other metrics are still given
+                stored = state.quota.used()
+                yield gauge("data_bytes", "Assets and documents on the disk, in whole blocks.", stored.bytes)
+                yield gauge("data_files", "Files of assets and documents.", stored.files)
             yield gauge("data_quota_bytes", "What they may take.", state.config.data_quota)
 
     return Sunbox()

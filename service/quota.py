@@ -10,7 +10,8 @@ from collections.abc import Callable, Collection, Iterator
 from contextlib import AbstractContextManager, contextmanager
 from pathlib import Path
 
-from service.assets.folder import AssetFolder
+from service.assets.folder import AssetFolder, total
+from service.disk_usage import Usage
 from service.problems import TooLarge, Unavailable
 
 log = logging.getLogger(__name__)
@@ -19,7 +20,7 @@ RETRY_S = 60
 
 
 class Quota:
-    """Bounds the assets in `folder` together with `others` bytes beside them.
+    """Bounds the assets in `folder` together with what `others` beside them take.
 
     `in_use` gives the ids of the assets that must stay; while its context lasts no other asset becomes one of them.
     """
@@ -27,26 +28,30 @@ class Quota:
     def __init__(
         self,
         folder: Path,
-        limit: int,
+        limit: Usage,
         in_use: Callable[[], AbstractContextManager[set[str]]],
-        others: Callable[[], int] = lambda: 0,
+        others: Callable[[], Usage] = Usage,
     ) -> None:
         self._files = AssetFolder(folder / "assets")
         self._limit = limit
         self._in_use = in_use
         self._others = others
         self._lock = threading.Lock()
-        self._promised = 0  # bytes that are being stored
+        self._promised = Usage()  # what is being stored
         self._pinned: Counter[str] = Counter()  # how many contexts keep each id
 
     @contextmanager
-    def room(self, size: int) -> Iterator[None]:
-        """Room for `size` more bytes, which are to be stored while the context lasts. Deletes assets for it.
+    def room(self, size: Usage) -> Iterator[None]:
+        """Room for `size` more, which is to be stored while the context lasts. Deletes assets for it.
 
         Raises TooLarge for what could never be, Unavailable where too much must stay; nothing is deleted then.
         """
-        if size > self._limit:
-            raise TooLarge(f"{size} bytes are more than all assets may take: {self._limit} (SUNBOX_DATA_QUOTA)")
+        if size.bytes > self._limit.bytes:
+            most = self._limit.bytes
+            raise TooLarge(f"{size.bytes} bytes are more than all assets may take: {most} (SUNBOX_DATA_QUOTA)")
+        if size.files > self._limit.files:
+            most = self._limit.files
+            raise TooLarge(f"{size.files} files are more than there may be: {most} (SUNBOX_DATA_FILES)")
         with self._lock:
             try:
                 self._make_room(size)
@@ -71,32 +76,36 @@ class Quota:
             with self._lock:
                 self._pinned -= Counter(ids)
 
-    def used(self) -> int:
-        """The bytes that are used."""
-        return self._others() + self._files.bytes()
+    def used(self) -> Usage:
+        return self._others() + self._files.usage()
 
     def clear(self) -> None:
-        """Delete what a crash left."""
+        """Delete what a crash left, and count what is here."""
         self._files.clear()
+        try:
+            self._files.recount()
+        except OSError as error:
+            log.warning("could not count the assets error=%s", error)
 
-    def _make_room(self, size: int) -> None:
+    def _make_room(self, size: Usage) -> None:
         most = self._limit - self._promised - size
-        if self.used() <= most:
+        if not self.used().exceeds(most):
             return
-        self.clear()
+        self._files.clear()
         with self._in_use() as in_use, self._files.alone():
-            held = self._files.held()
-            over = self._others() + sum(one.bytes for one in held.values()) - most
+            held = self._files.count()
+            left = self._others() + total(held)
             stays = {id.removeprefix("sha256:") for id in (*in_use, *self._pinned)}
             goes = []
             for hash in sorted(held.keys() - stays, key=lambda hash: held[hash].used):
-                if over <= 0:
+                if not left.exceeds(most):
                     break
-                over -= held[hash].bytes
+                left -= held[hash].usage
                 goes.append(hash)
-            if over > 0:
-                detail = "The disk quota is used up by saved documents and what they refer to (SUNBOX_DATA_QUOTA)."
+            if left.exceeds(most):
+                name = "SUNBOX_DATA_QUOTA" if left.bytes > most.bytes else "SUNBOX_DATA_FILES"
+                detail = f"The disk quota is used up by saved documents and what they refer to ({name})."
                 raise Unavailable(detail, RETRY_S)
             for hash in goes:
                 self._files.delete(hash)
-                log.info("asset evicted id=sha256:%s bytes=%d", hash, held[hash].bytes)
+                log.info("asset evicted id=sha256:%s bytes=%d", hash, held[hash].usage.bytes)

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 from service.assets import AssetStore
 from service.config import Config
+from service.disk_usage import Usage
 from service.documents import Documents
 from service.quota import Quota
 
@@ -19,7 +20,8 @@ class Storage:
 
 def storage(config: Config) -> Storage:
     # They depend on each other: assets need room, the quota the documents' references, documents the assets.
-    quota = Quota(config.data_dir, config.data_quota, lambda: documents.assets_in_use(), lambda: documents.bytes)
+    limit = Usage(config.data_quota, config.data_files)
+    quota = Quota(config.data_dir, limit, lambda: documents.assets_in_use(), lambda: documents.usage())
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota)
     return Storage(assets, documents, quota)

@@ -16,29 +16,27 @@ import logging
 import os
 import re
 import tempfile
-import time
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import BinaryIO
 
+from service.assets.folder_totals import FolderTotals
 from service.assets.source import Source, write
+from service.disk_usage import Usage, usage
 
 log = logging.getLogger(__name__)
 
 HASH = re.compile(r"[0-9a-f]{64}")
 RECORD, SCENE, DAMAGED, PART = ".json", ".scene.json", ".damaged", ".tmp"
-# The folder's time of change tells whether its files are still those that were counted; file systems write it with
-# steps of up to 2 s (FAT), so a younger one may belong to an earlier state.
-SETTLED_NS = 3_000_000_000
 
 
 @dataclass
 class Held:
     """What one asset takes on the disk. `used` is when it was last read, in ns since 1970; 0 of damaged bytes."""
 
-    bytes: int = 0
+    usage: Usage = field(default_factory=Usage)
     used: int = 0
 
 
@@ -47,7 +45,7 @@ class AssetFolder:
 
     def __init__(self, path: Path) -> None:
         self.path = path
-        self._counted: tuple[int, int] | None = None  # the folder's time of change, and bytes then
+        self._totals = FolderTotals(path.with_name(path.name + ".totals"))
 
     def file(self, id: str, suffix: str = "") -> Path:
         return self.path / (id.removeprefix("sha256:") + suffix)
@@ -64,10 +62,12 @@ class AssetFolder:
         """
         with ExitStack() as stack:
             written = {suffix: stack.enter_context(self._written(data, lasting)) for suffix, data in files.items()}
-            with self.alone():
+            with self.alone(), self._totals.change() as change:
                 for suffix, path in written.items():
+                    change.replaces(self.file(id, suffix))
                     os.replace(path, self.file(id, suffix))
-                self.file(id, DAMAGED).unlink(missing_ok=True)
+                    change.added(self.file(id, suffix))
+                change.remove(self.file(id, DAMAGED))
                 changed = self.file(id, next(iter(files))).stat().st_mtime_ns
         if lasting:
             self._sync()
@@ -77,26 +77,38 @@ class AssetFolder:
         """Takes an asset out of use whose bytes, open in `file`, don't have its hash. Raises OSError."""
         with self.alone(), suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file.fileno()), self.file(id).stat()):  # else it was replaced just now
-                self.file(id, RECORD).unlink(missing_ok=True)
-                os.replace(self.file(id), self.file(id, DAMAGED))
+                with self._totals.change() as change:
+                    change.remove(self.file(id, RECORD))
+                    change.replaces(self.file(id, DAMAGED))
+                    os.replace(self.file(id), self.file(id, DAMAGED))
 
     def delete(self, id: str) -> None:
         """Within `alone`. The record goes first: there is never one without its bytes."""
-        for suffix in (RECORD, SCENE, DAMAGED, ""):
-            self.file(id, suffix).unlink(missing_ok=True)
+        with self._totals.change() as change:
+            for suffix in (RECORD, SCENE, DAMAGED, ""):
+                change.remove(self.file(id, suffix))
 
-    def bytes(self) -> int:
-        """Of all assets; leftovers of a crash don't count."""
-        try:
-            changed = self.path.stat().st_mtime_ns
-        except FileNotFoundError:
-            return 0
-        if self._counted is None or self._counted[0] != changed:
-            total = sum(held.bytes for held in self.held().values())
-            if time.time_ns() - changed < SETTLED_NS:
-                return total
-            self._counted = changed, total
-        return self._counted[1]
+    def usage(self) -> Usage:
+        """Of all assets; leftovers of a crash don't count. Raises OSError."""
+        known = self._totals.read()
+        if known is None:
+            if not self.path.exists():
+                return Usage()
+            with self.alone():
+                known = self._totals.read()
+                if known is None:
+                    known = total(self.count())
+        return known
+
+    def known_totals(self) -> Usage | None:
+        """What `usage` says without counting; None where nobody knows."""
+        return self._totals.read()
+
+    def count(self) -> dict[str, Held]:
+        """What `held` says, of which the totals are made anew. Within `alone`."""
+        held = self.held()
+        self._totals.write(total(held))
+        return held
 
     def held(self) -> dict[str, Held]:
         """What is here of each asset, by hash; leftovers of a crash are not."""
@@ -104,12 +116,12 @@ class AssetFolder:
         names = set()
         for entry in self._entries():
             with suppress(FileNotFoundError):
-                hash, suffix = _split(entry.name)
+                hash, suffix = split(entry.name)
                 if hash:
                     found = entry.stat(follow_symlinks=False)
                     names.add(entry.name)
                     one = held.setdefault(hash, Held())
-                    one.bytes += found.st_size
+                    one.usage += usage(found)
                     if not suffix:
                         one.used = found.st_mtime_ns
         return {hash: one for hash, one in held.items() if {hash, hash + RECORD} <= names or hash + DAMAGED in names}
@@ -121,7 +133,7 @@ class AssetFolder:
             with self.alone() if self.path.exists() else nullcontext():
                 names = {entry.name for entry in self._entries()}
                 for name in names:
-                    hash, suffix = _split(name)
+                    hash, suffix = split(name)
                     if hash and suffix != DAMAGED and not {hash, hash + RECORD} <= names:
                         (self.path / name).unlink(missing_ok=True)
                         deleted += 1
@@ -131,6 +143,12 @@ class AssetFolder:
             log.warning("could not clear away what a crash left folder=%s error=%s", self.path, error)
         if deleted:
             log.info("cleared away what a crash left files=%d", deleted)
+
+    def recount(self) -> None:
+        """Make the totals anew, as somebody may have copied or deleted files by hand. Raises OSError."""
+        if self.path.exists():
+            with self.alone():
+                self.count()
 
     @contextmanager
     def alone(self) -> Iterator[None]:
@@ -176,7 +194,11 @@ class AssetFolder:
             os.close(fd)
 
 
-def _split(name: str) -> tuple[str, str]:
+def total(held: dict[str, Held]) -> Usage:
+    return sum((one.usage for one in held.values()), Usage())
+
+
+def split(name: str) -> tuple[str, str]:
     """The hash that a file's name begins with, "" where it is none of an asset's, and the rest."""
     hash, dot, rest = name.partition(".")
     known = HASH.fullmatch(hash) and dot + rest in ("", RECORD, SCENE, DAMAGED)

@@ -20,6 +20,7 @@ from service.assets.integrity import Integrity, damaged
 from service.assets.scene_import import Imported, take_apart
 from service.assets.source import Source, digest, format_of, handed, length
 from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
+from service.disk_usage import Usage, expected
 from service.garbage import collector_paused
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
 
@@ -32,7 +33,7 @@ FORMATS = (
 )
 RECORD_BYTES = 512  # about what the record of an asset takes
 
-Room = Callable[[int], AbstractContextManager[None]]
+Room = Callable[[Usage], AbstractContextManager[None]]
 
 
 class HasLimits(Protocol):
@@ -58,7 +59,7 @@ class AssetStore:
     """For any number of threads, and for several processes on one folder.
 
     `builtin` gives assets that are there without having been uploaded, by id; it is called when one is first missed.
-    `room` is entered with a number of bytes before they are stored, left afterwards, and raises where they have none.
+    `room` is entered with what files will take first, left at the end, and raises where that is too much.
     """
 
     def __init__(
@@ -102,7 +103,7 @@ class AssetStore:
         if KINDS[format] == "scene":
             return self._import(id, format, data, new=True)[0]
         info = self._described(id, format, data)
-        with self._room(size + RECORD_BYTES):
+        with self._room(expected((size, RECORD_BYTES))):
             self._store(info, data)
         return info
 
@@ -182,8 +183,10 @@ class AssetStore:
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
         size = length(data)
-        text = len(json.dumps(file.document)) + RECORD_BYTES * (len(file.parts) + len(file.document["shapes"]))
-        with self._room(text + sum(len(part.data) for part in file.parts) + (size if new else 0)):
+        # References to the parts, which are about as long as a record, are added to the document.
+        text = len(json.dumps(file.document)) + RECORD_BYTES * len(file.document["shapes"])
+        parts = [stored for part in file.parts for stored in (len(part.data), RECORD_BYTES)]
+        with self._room(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
             imported = take_apart(file, self._keep)
             info = AssetInfo(
                 id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,

@@ -7,6 +7,7 @@ bsdf_curves    what those curves are, by kind
 bsdf_figure    the figures, drawn by matplotlib
 import         a model as a document with files beside it
 info           what would render here
+check_data     whether the data folder is sound
 bench          measurements
 health         the container's health check
 assets         the assets of a scene, and their ids

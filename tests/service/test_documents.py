@@ -124,16 +124,16 @@ def test_documents_give_their_room_back(saved: Documents, tmp_path: Path) -> Non
     """Deleted or replaced by smaller ones, also while somebody else has the file open."""
     file = tmp_path / "documents.sqlite3"
     saved.put("scenes", "0", checked("scenes", SCENE))
-    little = saved.bytes
+    little = saved.usage().bytes
     with closing(sqlite3.connect(file)) as other:
         other.execute("SELECT count(*) FROM documents").fetchone()
         for name in "123":
             saved.put("scenes", name, checked("scenes", large_scene()))
-        assert saved.bytes > little + 2_500_000
+        assert saved.usage().bytes > little + 2_500_000
         saved.delete("scenes", "1")
         saved.delete("scenes", "3")
         saved.put("scenes", "2", checked("scenes", SCENE))
-        assert saved.bytes < little + 50_000
+        assert saved.usage().bytes < little + 50_000
     saved.put("scenes", "0", checked("scenes", SCENE))
     assert sum(path.stat().st_size for path in tmp_path.glob("documents*")) < little + 50_000
 
@@ -179,7 +179,7 @@ def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_pat
     assert file.stat().st_mtime_ns == before
     saved.put("scenes", "b", checked("scenes", large_scene()))
     saved.delete("scenes", "b")
-    assert saved.bytes < 100_000
+    assert saved.usage().bytes < 100_000
 
 
 def test_a_conversion_that_was_killed_goes_on(saved: Documents, tmp_path: Path) -> None:

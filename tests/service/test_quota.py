@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import signal
 import subprocess
@@ -14,14 +13,17 @@ from typing import Any
 import pytest
 
 from service.assets import AssetStore
+from service.assets.folder_totals import TOTALS
 from service.config import Config
+from service.disk_usage import BLOCK, Usage
 from service.documents import checked
 from service.problems import AssetError, InvalidDocument, NotFound, TooLarge, Unavailable, UnsupportedMedia
 from service.storage import Storage, storage
 from tests.asset_files import OBJ, glb, gltf
 from tests.serving import SCENE
 
-LIMIT = 20_000
+ASSET = 2 * BLOCK  # bytes that a small asset takes on the disk: its own and its record's block
+LIMIT = 20 * ASSET
 
 
 @pytest.fixture
@@ -51,8 +53,12 @@ def here(kept: Storage, ids: list[str]) -> list[bool]:
     return [kept.assets.holds(id) for id in ids]
 
 
+def used(kept: Storage) -> int:
+    return kept.quota.used().bytes
+
+
 def make_room(kept: Storage, size: int) -> None:
-    with kept.quota.room(size):
+    with kept.quota.room(Usage(size)):
         pass
 
 
@@ -62,10 +68,10 @@ def test_what_was_used_longest_ago_makes_way(kept: Storage, tmp_path: Path) -> N
     kept.assets.add(OBJ + b"#" * (1000 - len(OBJ) + 1))  # ids[1] again
     make_room(kept, 0)
     assert here(kept, ids) == [True] * 4
-    make_room(kept, LIMIT - kept.quota.used() + 500)
+    make_room(kept, LIMIT - used(kept) + 500)
     assert here(kept, ids) == [True, True, False, True]
     make_room(kept, LIMIT)
-    assert here(kept, ids) == [False] * 4 and kept.quota.used() == 0
+    assert here(kept, ids) == [False] * 4 and kept.quota.used() == Usage()
     with pytest.raises(NotFound):
         kept.assets.read(ids[0])
     with pytest.raises(TooLarge):
@@ -73,17 +79,17 @@ def test_what_was_used_longest_ago_makes_way(kept: Storage, tmp_path: Path) -> N
 
 
 def test_assets_of_documents_stay(tmp_path: Path) -> None:
-    kept = storage(Config(data_dir=tmp_path, data_quota=100_000))
+    kept = storage(Config(data_dir=tmp_path, data_quota=LIMIT))
     ids = uploads(kept, tmp_path, 2)
     kept.documents.put("scenes", "mine", checked("scenes", mesh_scene(ids[0])))
-    make_room(kept, 100_000 - kept.quota.used() + 500)
+    make_room(kept, LIMIT - used(kept) + 500)
     assert here(kept, ids) == [True, False]
     other = kept.assets.add(OBJ).id
     with pytest.raises(Unavailable, match="SUNBOX_DATA_QUOTA"):
-        make_room(kept, 99_900)  # the document and its asset are in the way
+        make_room(kept, LIMIT - 100)  # the document and its asset are in the way
     assert kept.assets.holds(other)  # it would not have helped
     kept.documents.delete("scenes", "mine")
-    make_room(kept, 100_000 - kept.documents.bytes)
+    make_room(kept, LIMIT - kept.documents.usage().bytes)
     assert not kept.assets.holds(ids[0])
     kept.assets.close()
 
@@ -103,12 +109,13 @@ def test_deleted_documents_do_not_count(tmp_path: Path) -> None:
 
 @pytest.fixture
 def full(tmp_path: Path) -> Iterator[tuple[Storage, list[str]]]:
-    """Storage without room for more than 2 kB, and the assets in it."""
-    kept = storage(Config(data_dir=tmp_path, data_quota=100_000))
+    """Storage without room for one more file of more than a block, and the assets in it."""
+    kept = storage(Config(data_dir=tmp_path, data_quota=LIMIT))
     kept.documents.put("scenes", "first", checked("scenes", SCENE))  # the file of the documents, with its empty pages
     ids = uploads(kept, tmp_path, 3)
-    size = 100_000 - kept.quota.used() - 2000
+    size = LIMIT - used(kept) - 2 * BLOCK
     ids += [kept.assets.add(OBJ + b"#" * (size - len(OBJ))).id]
+    assert used(kept) == LIMIT - BLOCK
     yield kept, ids
     kept.assets.close()
 
@@ -121,7 +128,7 @@ def test_what_is_refused_costs_nobody_anything(full: tuple[Storage, list[str]]) 
         with pytest.raises(InvalidDocument):
             kept.documents.put("scenes", "refused", checked("scenes", document))
     with pytest.raises(TooLarge):
-        kept.documents.put("scenes", "refused", checked("scenes", {**SCENE, "shapes": [ball] * 2000}))
+        kept.documents.put("scenes", "refused", checked("scenes", {**SCENE, "shapes": [ball] * 4000}))
     with pytest.raises(UnsupportedMedia):
         kept.assets.add(b"hello" * 2000)
     with pytest.raises(AssetError):
@@ -135,7 +142,7 @@ def test_what_is_refused_costs_nobody_anything(full: tuple[Storage, list[str]]) 
 def test_a_document_makes_room_but_not_of_its_own_assets(full: tuple[Storage, list[str]]) -> None:
     """The one used longest ago is named by the very document that needs room."""
     kept, ids = full
-    kept.documents.put("scenes", "mine", checked("scenes", {**mesh_scene(ids[0]), "lights": SCENE["lights"] * 40}))
+    kept.documents.put("scenes", "mine", checked("scenes", {**mesh_scene(ids[0]), "lights": SCENE["lights"] * 100}))
     assert here(kept, ids) == [True, False, True, True]
 
 
@@ -148,7 +155,7 @@ def test_no_asset_goes_between_the_look_and_the_saving(
     def looked(self: AssetStore, id: str) -> bool:
         monkeypatch.undo()
         found = holds(self, id)
-        make_room(kept, 100_000 - kept.documents.bytes - 2000)  # somebody else's upload
+        make_room(kept, LIMIT - kept.documents.usage().bytes - ASSET)  # somebody else's upload
         return found
 
     monkeypatch.setattr(AssetStore, "holds", looked)
@@ -158,30 +165,30 @@ def test_no_asset_goes_between_the_look_and_the_saving(
 
 def test_what_is_being_stored_has_its_room(kept: Storage, tmp_path: Path) -> None:
     ids = uploads(kept, tmp_path, 2)
-    free = LIMIT - kept.quota.used()
-    with kept.quota.room(free - 2000):
+    free = LIMIT - used(kept)
+    with kept.quota.room(Usage(free - 2000)):
         make_room(kept, 2000)
         assert all(here(kept, ids))
         make_room(kept, 2500)
         assert here(kept, ids) == [False, True]
         with pytest.raises(Unavailable):
-            make_room(kept, 6000)
+            make_room(kept, 2001 + 2 * ASSET)
         assert here(kept, ids) == [False, True]
     make_room(kept, free)
     assert here(kept, ids) == [False, True]
 
 
 def test_parts_of_scenes_need_room_too(kept: Storage, tmp_path: Path) -> None:
-    ids = uploads(kept, tmp_path, 10, 1500)
+    ids = uploads(kept, tmp_path, 19, 1500)
     info = kept.assets.add(glb(gltf()))
     kept.assets.scene(info.id)
-    assert kept.quota.used() <= LIMIT and not kept.assets.holds(ids[0]) and kept.assets.holds(ids[9])
+    assert used(kept) <= LIMIT and not kept.assets.holds(ids[0]) and kept.assets.holds(ids[18])
 
 
 def test_what_a_killed_upload_leaves_does_not_count(kept: Storage, tmp_path: Path) -> None:
     """Killed in the middle of its writing: the next start clears that away, and not what others are writing."""
     kept.assets.add(OBJ)
-    used = kept.quota.used()
+    before = kept.quota.used()
     program = f"""
 import os, sys
 from pathlib import Path
@@ -195,29 +202,29 @@ AssetFolder(Path({str(tmp_path / "assets")!r})).put("sha256:" + "a" * 64, {{"": 
     writer = subprocess.Popen([sys.executable, "-c", program], stdin=subprocess.PIPE, stdout=subprocess.PIPE)
     assert writer.stdout is not None and writer.stdout.readline()
     folder = tmp_path / "assets"
-    assert len(list(folder.iterdir())) == 3 and kept.quota.used() == used
+    assert len(list(folder.iterdir())) == 3 and kept.quota.used() == before
     kept.quota.clear()
     assert len(list(folder.iterdir())) == 3  # it is still being written
     writer.send_signal(signal.SIGKILL)
     writer.communicate()
     assert len(list(folder.iterdir())) == 3
     kept.quota.clear()
-    assert len(list(folder.iterdir())) == 2 and kept.quota.used() == used
+    assert len(list(folder.iterdir())) == 2 and kept.quota.used() == before
 
 
 def test_leftovers_are_cleared_away(kept: Storage, tmp_path: Path) -> None:
     id = kept.assets.add(OBJ).id
-    used, folder = kept.quota.used(), tmp_path / "assets"
+    before, folder = kept.quota.used(), tmp_path / "assets"
     lost = "sha256:" + "b" * 64
     file(tmp_path, lost, ".json").write_bytes(b"{}" * 9000)
     file(tmp_path, lost, ".scene.json").write_bytes(b"{}" * 9000)
     file(tmp_path, "c" * 64).write_bytes(b"bytes without a record" * 1000)
     (folder / ".abcd.tmp").write_bytes(b"half" * 9000)
     (folder / "a friend's notes").write_bytes(b"not ours")
-    assert kept.quota.used() == used
-    make_room(kept, LIMIT - used)
+    assert kept.quota.used() == before
+    make_room(kept, LIMIT - before.bytes)
     assert kept.assets.holds(id)
-    make_room(kept, LIMIT - used + 1)
+    make_room(kept, LIMIT - before.bytes + 1)
     assert [path.name for path in folder.iterdir()] == ["a friend's notes"]
 
 
@@ -239,22 +246,100 @@ def test_damaged_bytes_make_way_first(kept: Storage, tmp_path: Path) -> None:
     with pytest.raises(NotFound, match="damaged"):
         kept.assets.read(ids[1])
     assert file(tmp_path, ids[1], ".damaged").exists()
-    make_room(kept, LIMIT - kept.quota.used() + 500)
+    make_room(kept, LIMIT - used(kept) + 500)
     assert not file(tmp_path, ids[1], ".damaged").exists() and kept.assets.holds(ids[0])
 
 
-def test_the_folder_is_counted_when_it_has_changed(
+def counted(folder: Path) -> Usage:
+    """What the assets take, by walking through the folder."""
+    found = [path.stat() for path in (folder / "assets").iterdir()]
+    return Usage(sum(one.st_blocks * 512 for one in found), len(found))
+
+
+def test_blocks_count_and_not_bytes(tmp_path: Path) -> None:
+    kept = storage(Config(data_dir=tmp_path, data_quota=LIMIT))
+    kept.assets.add(OBJ)
+    kept.assets.add(OBJ + b"#" * BLOCK)
+    assert kept.quota.used() == Usage(5 * BLOCK, 4) == counted(tmp_path)
+    kept.assets.close()
+
+
+def test_files_have_a_limit_too(tmp_path: Path) -> None:
+    kept = storage(Config(data_dir=tmp_path, data_files=8))
+    ids = uploads(kept, tmp_path, 4)
+    ids.append(kept.assets.add(OBJ).id)
+    assert here(kept, ids) == [False, True, True, True, True] and kept.quota.used().files == 8
+    with pytest.raises(TooLarge, match="SUNBOX_DATA_FILES"), kept.quota.room(Usage(1, 9)):
+        pass
+    kept.documents.put("scenes", "a", checked("scenes", mesh_scene(*ids[1:4])))
+    with pytest.raises(Unavailable, match="SUNBOX_DATA_FILES"), kept.quota.room(Usage(1, 3)):
+        pass
+    kept.assets.close()
+
+
+def test_totals_are_kept_and_not_counted_again(
     kept: Storage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    """Not at every look at /metrics."""
-    kept.assets.add(OBJ)
-    counted = []
+    """By whatever comes, is replaced, is damaged or goes, and by other processes too."""
+    kept.quota.clear()
+    ids = uploads(kept, tmp_path, 3)
+    assert kept.quota.used() == counted(tmp_path)
+    walks = []
     scandir = os.scandir
-    monkeypatch.setattr("os.scandir", lambda path: counted.append(path) or scandir(path))
-    used = kept.quota.used()
-    assert kept.quota.used() == used and len(counted) == 2  # it changed a moment ago, and may again in this one
-    os.utime(tmp_path / "assets", (1000, 1000))
-    assert {kept.quota.used() for _ in range(5)} == {used} and len(counted) == 3
-    id = kept.assets.add(OBJ + b"#").id
-    assert kept.quota.used() == used + len(OBJ) + 1 + len(file(tmp_path, id, ".json").read_bytes())
-    assert json.loads(file(tmp_path, id, ".json").read_bytes())["id"] == id
+    monkeypatch.setattr("os.scandir", lambda path: walks.append(path) or scandir(path))
+    kept.assets.scene(kept.assets.add(glb(gltf())).id)
+    kept.assets.add(OBJ)
+    other = storage(Config(data_dir=tmp_path, data_quota=LIMIT))
+    ids += [other.assets.add(OBJ + b"#" * 9000).id]
+    file(tmp_path, ids[1]).write_bytes(bytes(1001))
+    with pytest.raises(NotFound, match="damaged"):
+        kept.assets.read(ids[1])
+    assert kept.quota.used() == counted(tmp_path) == other.quota.used()
+    kept.assets.add(OBJ + b"#" * (1000 - len(OBJ) + 1))  # ids[1] is healed
+    assert kept.quota.used() == counted(tmp_path) and not walks
+    make_room(kept, LIMIT - used(kept) + 1)
+    assert not kept.assets.holds(ids[0]) and kept.quota.used() == counted(tmp_path)
+    other.assets.close()
+
+
+def test_a_start_counts_what_was_copied_by_hand(kept: Storage, tmp_path: Path) -> None:
+    id = kept.assets.add(OBJ).id
+    file(tmp_path, id).unlink()
+    file(tmp_path, id, ".json").unlink()
+    kept.quota.clear()
+    assert kept.quota.used() == Usage()
+
+
+def test_a_change_that_was_killed_is_counted(kept: Storage, tmp_path: Path) -> None:
+    """Nobody believes totals that were written before it."""
+    kept.assets.add(OBJ)
+    program = f"""
+import os, signal
+from pathlib import Path
+from service.assets.folder import AssetFolder
+replace = os.replace
+def stop(*paths):
+    replace(*paths)
+    if str(paths[1]).endswith(".json"):
+        os.kill(os.getpid(), signal.SIGKILL)
+os.replace = stop
+AssetFolder(Path({str(tmp_path / "assets")!r})).put("sha256:" + "a" * 64, {{"": b"x" * 100_000, ".json": b"{{}}"}})
+"""
+    subprocess.run([sys.executable, "-c", program])
+    assert counted(tmp_path).bytes > 100_000 and kept.quota.used() == counted(tmp_path)
+
+
+def test_a_full_disk_costs_the_totals_only(kept: Storage, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Where they cannot be written the folder is counted."""
+    kept.assets.add(OBJ)
+
+    write = os.pwrite
+
+    def pwrite(fd: int, data: bytes, offset: int) -> int:
+        if len(data) == TOTALS.size:
+            raise OSError(28, "No space left on device")
+        return write(fd, data, offset)
+
+    monkeypatch.setattr("os.pwrite", pwrite)
+    kept.assets.add(OBJ + b"#" * 9000)
+    assert kept.quota.used() == counted(tmp_path)

@@ -1,0 +1,77 @@
+"""What an asset folder takes on the disk, kept up to date with each change instead of counted again.
+
+The totals stand in a file beside the folder, for all processes that use it. The file says so while a change is under
+way: after a crash in the middle of one, whoever comes next counts.
+"""
+
+from __future__ import annotations
+
+import os
+import struct
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+
+from service.disk_usage import Usage, usage
+
+TOTALS = struct.Struct("<4sIqq")  # MAGIC, whether a change is under way, bytes, files
+MAGIC = b"SBX1"
+
+
+class FolderTotals:
+    """All but `read` are to be called under the folder's lock."""
+
+    def __init__(self, path: Path) -> None:
+        self._path = path
+
+    def read(self) -> Usage | None:
+        """None where nobody knows: nothing was counted yet, or a change is under way."""
+        try:
+            magic, changing, size, files = TOTALS.unpack(self._path.read_bytes())
+        except (OSError, struct.error):
+            return None
+        return Usage(size, files) if magic == MAGIC and not changing else None
+
+    def write(self, total: Usage | None) -> None:
+        """None: nobody knows until it is counted. Where the disk fails, nobody knows either."""
+        known = total or Usage()
+        try:
+            file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o644)
+            try:
+                os.pwrite(file, TOTALS.pack(MAGIC, total is None, known.bytes, known.files), 0)
+            finally:
+                os.close(file)
+        except OSError:
+            with suppress(OSError):
+                self._path.unlink()
+
+    @contextmanager
+    def change(self) -> Iterator[Change]:
+        """Files are added and removed while it lasts; nobody knows the totals where it raises."""
+        before = self.read()
+        change = Change()
+        self.write(None)
+        yield change
+        if before is not None:
+            self.write(before + change.difference)
+
+
+class Change:
+    """What files that come and go make of the totals."""
+
+    def __init__(self) -> None:
+        self.difference = Usage()
+
+    def added(self, path: Path) -> None:
+        """Raises FileNotFoundError."""
+        self.difference += usage(path.lstat())
+
+    def replaces(self, path: Path) -> None:
+        """To be called before a file takes this place, or goes; nothing may be there."""
+        with suppress(FileNotFoundError):
+            self.difference -= usage(path.lstat())
+
+    def remove(self, path: Path) -> None:
+        """Deletes a file, where it is there."""
+        self.replaces(path)
+        path.unlink(missing_ok=True)

@@ -1,0 +1,43 @@
+"""What files take on a disk: whole blocks and inodes, and not only the bytes that are in them.
+
+A file of 70 bytes takes a block of 4 KiB: what a million of them take is not 70 MB.
+"""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Iterable
+from dataclasses import dataclass
+
+ST_BLOCK = 512  # bytes; the unit of st_blocks on Linux, whatever the file system's own blocks are
+BLOCK = 4096  # bytes; the blocks of ext4, XFS, Btrfs and tmpfs, unless they were made otherwise
+
+
+@dataclass(frozen=True)
+class Usage:
+    """Bytes of blocks, and a number of files. Differences may be negative."""
+
+    bytes: int = 0
+    files: int = 0
+
+    def __add__(self, other: Usage) -> Usage:
+        return Usage(self.bytes + other.bytes, self.files + other.files)
+
+    def __sub__(self, other: Usage) -> Usage:
+        return Usage(self.bytes - other.bytes, self.files - other.files)
+
+    def exceeds(self, limit: Usage) -> bool:
+        return self.bytes > limit.bytes or self.files > limit.files
+
+
+def usage(found: os.stat_result) -> Usage:
+    """Of a file that is there."""
+    return Usage(found.st_blocks * ST_BLOCK, 1)
+
+
+def expected(sizes: Iterable[int]) -> Usage:
+    """Of files that are to be written, by their sizes in bytes."""
+    total = Usage()
+    for size in sizes:
+        total += Usage(-(-size // BLOCK) * BLOCK, 1)
+    return total
