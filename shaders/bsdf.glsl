@@ -1,4 +1,5 @@
 // The material models: which lobes each of them has, and with what weights. Directions are in the shading frame.
+#include "lobe.glsl"
 #include "fresnel.glsl"
 #include "ggx.glsl"
 #include "lobes/lambert.glsl"
@@ -84,26 +85,26 @@ Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #else
     if (wo.z <= 0.0 || wi.z <= 0.0) return Scatter(vec3(0.0), 0.0);
 #endif
-    Scatter r = Scatter(lambert_eval(s), lambert_pdf(wi));
+    Scatter r = Scatter(LOBE(LOBE_DIFFUSE, lambert_eval(s)), lambert_pdf(wi));
 #if HAS_DISNEY
     if (s.model == MODEL_DISNEY) {
         LobeWeights w = bsdf_weights(s, wo);
         vec3 wm = normalize(wo + wi);
         float cos_d = dot(wi, wm);
-        r.f = disney_diffuse_eval(s, wo, wi, cos_d);
+        r.f = LOBE(LOBE_DIFFUSE, disney_diffuse_eval(s, wo, wi, cos_d));
         r.pdf = w.diffuse * lambert_pdf(wi);
 #if HAS_SHEEN
-        r.f += disney_sheen_eval(s, cos_d);
+        r.f += LOBE(LOBE_SHEEN, disney_sheen_eval(s, cos_d));
 #endif
         vec3 wm_t = wm, wo_t = wo;
 #if HAS_ANISOTROPIC
         wm_t = bsdf_turn(s, wm);
         wo_t = bsdf_turn(s, wo);
 #endif
-        r.f += disney_specular_eval(s, wo, wi, wm_t, cos_d);
+        r.f += LOBE(LOBE_SPECULAR, disney_specular_eval(s, wo, wi, wm_t, cos_d));
         r.pdf += w.specular * disney_specular_pdf(s, wo_t, wm_t);
 #if HAS_CLEARCOAT
-        r.f += disney_clearcoat_eval(s, wo, wi, wm, cos_d);
+        r.f += LOBE(LOBE_CLEARCOAT, disney_clearcoat_eval(s, wo, wi, wm, cos_d));
         r.pdf += w.clearcoat * disney_clearcoat_pdf(s, wm, cos_d);
 #endif
     }

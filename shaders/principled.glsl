@@ -120,13 +120,13 @@ PrincipledWeights principled_weights(Surface s, vec3 wo) {
 Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) {
     if (s.transmission <= 0.0 || s.metallic >= 1.0) return Scatter(vec3(0.0), 0.0);
     vec3 wo_t = bsdf_turn(s, wo), wi_t = bsdf_turn(s, wi);
-    vec3 f = multiscatter_transmit(s, principled_albedo(s, wi));
+    vec3 f = LOBE(LOBE_MULTISCATTER, multiscatter_transmit(s, principled_albedo(s, wi)));
     float pdf = w.diffuse_below * INV_PI * -wi.z;
     vec3 wm = microfacet_half_vector(s, wo_t, wi_t);
     if (!s.is_delta && !s.index_matched) {
         pdf += w.microfacet * microfacet_transmit_folded(s, wo_t, wi_t);
         if (wm.z > 0.0) {
-            f += microfacet_transmit(s, wo_t, wi_t, wm);
+            f += LOBE(LOBE_TRANSMISSION, microfacet_transmit(s, wo_t, wi_t, wm));
             pdf += w.microfacet * microfacet_transmit_pdf(s, wo_t, wi_t, wm);
         }
     }
@@ -149,12 +149,13 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
 #endif
     float clear = multiscatter_fresnel(fresnel_mean(s.eta_outside), s.albedo_mean.x);
     vec4 albedo_i = principled_albedo(s, wi);
-    vec3 f = principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
-                                     multiscatter_albedo(albedo_i, clear), multiscatter_albedo(s.albedo_mean, clear));
-    f += multiscatter_reflect(s, albedo_i, principled_multiscatter(s));
+    vec3 f = LOBE(LOBE_DIFFUSE, principled_diffuse_eval(s, wo.z, wi.z, multiscatter_albedo(s.albedo, clear),
+                                                        multiscatter_albedo(albedo_i, clear),
+                                                        multiscatter_albedo(s.albedo_mean, clear)));
+    f += LOBE(LOBE_MULTISCATTER, multiscatter_reflect(s, albedo_i, principled_multiscatter(s)));
     float pdf = w.diffuse * INV_PI * wi.z;
     if (!s.is_delta) {
-        f += microfacet_reflect(s, wo_t, wi_t, wm_t, cos_d);
+        f += LOBE(LOBE_SPECULAR, microfacet_reflect(s, wo_t, wi_t, wm_t, cos_d));
         pdf += w.microfacet * microfacet_reflect_pdf(s, wo_t, wm_t, cos_d);
 #if HAS_TRANSMISSION
         pdf += w.microfacet * microfacet_reflect_folded(s, wo_t, wi_t);
@@ -165,11 +166,11 @@ Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
         float sheen_i = principled_sheen_albedo(s, wi.z);
         f *= principled_layers(s, coat_i, sheen_i);
 #if HAS_SHEEN
-        f += sheen_charlie_eval(s, wo, wi) * (1.0 - max(s.coat_albedo, coat_i));
+        f += LOBE(LOBE_SHEEN, sheen_charlie_eval(s, wo, wi) * (1.0 - max(s.coat_albedo, coat_i)));
         pdf += w.sheen * sheen_charlie_pdf();
 #endif
 #if HAS_CLEARCOAT && !HAS_COAT_NORMALS
-        f += principled_clearcoat_eval(s, wo, wi, wm, cos_d);
+        f += LOBE(LOBE_CLEARCOAT, principled_clearcoat_eval(s, wo, wi, wm, cos_d));
         pdf += w.coat * principled_clearcoat_pdf(s, wo, wm);
 #endif
     }

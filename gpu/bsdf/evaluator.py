@@ -17,10 +17,11 @@ from gpu import context as contexts
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.bsdf import kernels as own
+from gpu.bsdf import lobes as single
 from gpu.device.scene import upload_tables
 from gpu.device.textures import KINDS, bound_textures, linear_texture
 from gpu.kernels.cache import KernelCache
-from gpu.layout import bindings
+from gpu.layout import MaterialModel, bindings
 from gpu.layout.bindings import Slot
 
 DELTAS = 3  # as in shaders/bsdf_deltas.glsl
@@ -35,19 +36,25 @@ _MOST = 1 << 16  # ... of any, which bounds the buffers
 class BsdfValues:
     """For n directions wo and m directions wi: `f` (n, m, 3), 1/sr, without the cosine, transmission as basic
     radiance; `pdf` (n, m), 1/sr. Perfectly specular lobes, which are in neither: `delta_wi` (n, DELTAS, 3),
-    `delta_weight` (n, DELTAS, 3), and `delta_probability` (n, DELTAS), 0 where there is none. All float32."""
+    `delta_weight` (n, DELTAS, 3), and `delta_probability` (n, DELTAS), 0 where there is none. All float32.
+
+    Where they were asked for, `lobes` (k, n, m, 3) are the parts that add up to `f`, and `lobe_names` (k,) their
+    names, such as "diffuse"; else k is 0.
+    """
 
     f: np.ndarray
     pdf: np.ndarray
     delta_wi: np.ndarray
     delta_weight: np.ndarray
     delta_probability: np.ndarray
+    lobes: np.ndarray
+    lobe_names: np.ndarray
 
 
 @dataclass(frozen=True)
 class BsdfAlbedo:
     """The mean of what `samples` samples multiply radiance by, reflected and transmitted, (n, 3) float64, and its
-    standard error (n, 3), NaN for a single sample."""
+    standard error (n, 3)."""
 
     albedo: np.ndarray
     error: np.ndarray
@@ -78,33 +85,53 @@ class BsdfEvaluator:
         wi: np.ndarray,
         slice_s: float = SLICE_S,
         paired: bool = False,
+        lobes: bool = False,
     ) -> Generator[None, None, BsdfValues]:
         """Evaluate a material for every pair of `wo` (n, 3) and `wi` (m, 3), unit length; `paired`: for each wo with
-        the wi in its place, so that m is n in what is given and 1 in what comes back.
+        the wi in its place, so that m is n in what is given and 1 in what comes back. `lobes`: each lobe alone, too.
 
         Raises CompileError, OutOfMemory.
         """
         n, m = len(wo), 1 if paired else len(wi)
+        alone = single.OF_MODEL[MaterialModel(int(material.materials["model"][0]))] if lobes else ()
+        found = []
         work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m, "wi_step": int(paired)})
         try:
             work.give(np.concatenate([wo, wi]))
             work.make(Slot.OUTPUT, 16 * n * m)
             work.make(Slot.MOMENTS, 32 * DELTAS * n)
-            for _ in work.slices(n * m, slice_s):
-                yield
-            found = work.read(Slot.OUTPUT).reshape(n, m, 4)
+            for lobe in (single.EVERY, *alone):
+                for _ in work.slices(n * m, slice_s, lobe_shown=int(lobe)):
+                    yield
+                found.append(work.read(Slot.OUTPUT).reshape(n, m, 4))
             wi_, weight = np.moveaxis(work.read(Slot.MOMENTS).reshape(n, DELTAS, 2, 4), 2, 0)
         finally:
             work.release()
-        return BsdfValues(found[..., :3], found[..., 3], wi_[..., :3], weight[..., :3], wi_[..., 3])
+        whole, *parts = found
+        names = np.array([lobe.name.lower() for lobe in alone], np.str_)
+        shown = np.stack([part[..., :3] for part in parts]) if parts else np.zeros((0, n, m, 3), np.float32)
+        return BsdfValues(
+            whole[..., :3], whole[..., 3], wi_[..., :3], weight[..., :3], wi_[..., 3], lobes=shown, lobe_names=names
+        )
 
     def albedo(
         self, material: SceneArrays, wo: np.ndarray, samples: int, slice_s: float = SLICE_S
     ) -> Generator[None, None, BsdfAlbedo]:
         """Sample a material as a path does, `samples` times from each of `wo` (n, 3), unit length.
 
+        The scatter of a batch tells the error of a single sample.
+
         Raises CompileError, OutOfMemory.
         """
+        mean, deviation = yield from self._sampled(material, wo, samples, slice_s)
+        if samples == 1:
+            _, deviation = yield from self._sampled(material, wo, BATCH, slice_s)
+        return BsdfAlbedo(mean, deviation / np.sqrt(samples))
+
+    def _sampled(
+        self, material: SceneArrays, wo: np.ndarray, samples: int, slice_s: float
+    ) -> Generator[None, None, tuple[np.ndarray, np.ndarray]]:
+        """The mean of the samples and their standard deviation, (n, 3) each; that of one sample is 0."""
         n, batches = len(wo), -(-samples // BATCH)
         sums = np.zeros((2, n, 3))
         work = self._dispatch(material, own.ALBEDO, {"batches": batches, "batch": BATCH, "samples": samples})
@@ -120,11 +147,9 @@ class BsdfEvaluator:
         finally:
             work.release()
         mean = sums[0] / samples
-        if samples == 1:
-            return BsdfAlbedo(mean, np.full_like(mean, np.nan))
         # Rounding may leave a little less than nothing of the variance of samples that are all alike.
-        variance = np.maximum(sums[1] / samples - mean**2, 0.0) * (samples / (samples - 1))
-        return BsdfAlbedo(mean, np.sqrt(variance / samples))
+        variance = np.maximum(sums[1] / samples - mean**2, 0.0) * (samples / max(samples - 1, 1))
+        return mean, np.sqrt(variance)
 
     def terms(
         self, material: SceneArrays, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
@@ -206,20 +231,20 @@ class _Dispatch:
         contexts.use(self._context)
         return np.frombuffer(self._buffers[slot].read(size), np.float32)
 
-    def slices(self, total: int, slice_s: float) -> Iterator[tuple[int, int]]:
+    def slices(self, total: int, slice_s: float, **uniforms: int) -> Iterator[tuple[int, int]]:
         """Run over `total` invocations in parts (first, count) of about `slice_s` seconds, each done when yielded."""
         first, size = 0, _FIRST
         while first < total:
             count = min(size, total - first)
             began = time.perf_counter()
-            self._run(first, count)
+            self._run(first, count, uniforms)
             seconds = time.perf_counter() - began
             yield first, count
             first += count
             growth = min(max(slice_s / max(seconds, 1e-6), 0.25), 4.0)
             size = min(max(int(size * growth) // _GROUP, 1) * _GROUP, _MOST)
 
-    def _run(self, first: int, count: int) -> None:
+    def _run(self, first: int, count: int, uniforms: dict[str, int]) -> None:
         contexts.use(self._context)
         for slot, buffer in self._buffers.items():
             buffer.bind_to_storage_buffer(int(slot))
@@ -227,7 +252,7 @@ class _Dispatch:
             buffer.bind_to_uniform_block(block)
         for unit, texture in (*self._tables.items(), *self._textures.items()):
             texture.use(unit)
-        for name, value in {**self._uniforms, "first": first, "count": count}.items():
+        for name, value in {**self._uniforms, **uniforms, "first": first, "count": count}.items():
             self._kernel[name].value = value
         self._kernel.run(-(-count // _GROUP))
         self._context.finish()

@@ -12,6 +12,7 @@ import numpy as np
 
 from gpu import layout
 from gpu.arrays import SceneArrays
+from gpu.bsdf import lobes
 from gpu.kernels import features
 from gpu.layout import MaterialModel
 from gpu.layout.microfacet_records import Microfacet
@@ -45,8 +46,8 @@ def defines(arrays: SceneArrays, entry: str) -> dict[str, object]:
 
     The numbers of `bsdf_albedo.comp` are independent: the scatter of its samples tells their error.
     """
-    out = features.defines(flags(arrays), shapes=features.counts(arrays))
-    return out | {"SAMPLER": 1} if entry == ALBEDO else out
+    own: dict[str, dict[str, object]] = {ALBEDO: {"SAMPLER": 1}, VALUES: lobes.defines(), TERMS: {}}
+    return features.defines(flags(arrays), shapes=features.counts(arrays)) | own[entry]
 
 
 def samples() -> Iterator[SceneArrays]:

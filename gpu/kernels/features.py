@@ -319,4 +319,5 @@ def defines(
     out["ADAPTIVE"] = int(settings is not None and settings.adaptive)
     out["ESTIMATOR"] = ESTIMATORS.index(settings.estimator) if settings else 0
     out["SAMPLER"] = SAMPLERS.index(settings.sampler) if settings else 0
+    out["LOBE_CHOICE"] = 0
     return out

@@ -11,7 +11,8 @@ float blinn_phong_power(vec3 wm, float n) {
 
 // Lacks the cosine, which bsdf_eval multiplies back.
 vec3 blinn_phong_eval(Surface s, vec3 wi, vec3 wm) {
-    return INV_PI * (s.base_color + s.phong * (blinn_phong_power(wm, s.shininess) / wi.z));
+    return INV_PI * (LOBE(LOBE_DIFFUSE, s.base_color)
+                   + LOBE(LOBE_SPECULAR, s.phong * (blinn_phong_power(wm, s.shininess) / wi.z)));
 }
 
 // The chance of picking the diffuse lobe. The highlight reflects at most 8 / (n + 2) times its colour, and never over

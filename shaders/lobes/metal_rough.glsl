@@ -3,7 +3,8 @@
 
 vec3 metal_rough_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
-    return (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color + disney_specular_eval(s, wo, wi, wm, cos_d);
+    return LOBE(LOBE_DIFFUSE, (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color)
+         + LOBE(LOBE_SPECULAR, disney_specular_eval(s, wo, wi, wm, cos_d));
 }
 
 // The chance of picking the diffuse lobe.

@@ -11,7 +11,8 @@ float phong_power(vec3 wo, vec3 wi, float n) {
 
 // Lacks the cosine, which bsdf_eval multiplies back.
 vec3 phong_eval(Surface s, vec3 wo, vec3 wi) {
-    return INV_PI * (s.base_color + s.phong * (phong_power(wo, wi, s.shininess) / wi.z));
+    return INV_PI * (LOBE(LOBE_DIFFUSE, s.base_color)
+                   + LOBE(LOBE_SPECULAR, s.phong * (phong_power(wo, wi, s.shininess) / wi.z)));
 }
 
 // The chance of picking the diffuse lobe. The highlight reflects at most 2 / (n + 1) times its colour.

@@ -4,7 +4,7 @@
 
 vec3 microfacet_model_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     float dg = distribution_d(s, wm) * geometry_term(s, wo, wi, wm, cos_d);
-    return diffuse_term(s, wo, wi, cos_d) + fresnel_term(s, cos_d) * dg;
+    return LOBE(LOBE_DIFFUSE, diffuse_term(s, wo, wi, cos_d)) + LOBE(LOBE_SPECULAR, fresnel_term(s, cos_d) * dg);
 }
 
 // The chance of picking the diffuse lobe. The floor of 0.05 keeps the facets sampled where they are dark head-on.
