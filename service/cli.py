@@ -83,6 +83,7 @@ def _bsdf(command: argparse.ArgumentParser) -> None:
     text = "of the direction that is seen from, for polar and geometry, 0 to 89.9; may be given again (default: 45)"
     add("--angle", action="append", metavar="DEGREES", help=text)
     add("--with", dest="other", metavar="OTHER.json", help="another material to compare with")
+    add("--lobes", action="store_true", help="of polar, also each lobe by itself: diffuse, specular, ...")
 
 
 def _any_of(names: Sequence[str]) -> str:

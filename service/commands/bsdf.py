@@ -32,6 +32,8 @@ def run(arguments: argparse.Namespace) -> int:
         raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join(FORMATS)}")
     if format != ".csv" and find_spec("matplotlib") is None:
         raise BadInput(f"-o {arguments.output!r}: needs matplotlib, which `pip install 'sunbox[plot]'` brings")
+    if arguments.lobes and arguments.kind != "polar":
+        raise BadInput(f"--lobes: goes with --kind polar, not with {arguments.kind}")
     angles = list(dict.fromkeys(map(_angle, arguments.angle or [DEFAULT_ANGLE])))
     output = files.writable(path)
     config = configuration()
@@ -45,7 +47,9 @@ def run(arguments: argparse.Namespace) -> int:
         names = [str(each) for each in given]
     try:
         with Renderer(config.device) as renderer:
-            curves = [curves_of(renderer, material, arguments.kind, angles) for material in materials]
+            curves = [
+                curves_of(renderer, material, arguments.kind, angles, arguments.lobes) for material in materials
+            ]
     except GpuError as error:
         raise Failed(str(error)) from None
     for each, found in zip(given, curves, strict=True):

@@ -20,6 +20,7 @@ ALBEDO_STEP = 1.0  # ... of the albedo, which is smooth and is sampled
 ALBEDO_SAMPLES = 1 << 16
 SLICE_STEP = 1.0  # ... of a slice, along both of its axes
 CHANNELS = ("r", "g", "b")
+LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec.709
 
 T = TypeVar("T")
 
@@ -34,7 +35,8 @@ class Specular:
 
 @dataclass(frozen=True)
 class Curves:
-    """`theta` (n,) in degrees, and a column (n,) for each curve; of a slice, `image` is (theta_d, theta_h, 3)."""
+    """`theta` (n,) in degrees, and a column (n,) for each curve; of a slice, `image` is (theta_d, theta_h, 3).
+    `lobes` (n, 3) are the parts of the curves that were asked for, where they are not 0 everywhere."""
 
     kind: str
     theta: np.ndarray
@@ -42,6 +44,14 @@ class Curves:
     specular: dict[str, list[Specular]] = field(default_factory=dict)  # by curve
     image: np.ndarray | None = None
     missing: str = ""  # why there is nothing to show
+    lobes: dict[str, np.ndarray] = field(default_factory=dict)  # "f_45_diffuse"
+
+    @property
+    def table_columns(self) -> dict[str, np.ndarray]:
+        out = dict(self.columns)
+        for name, values in self.lobes.items():
+            out |= _channels(name, values)
+        return out
 
     @property
     def notes(self) -> list[str]:
@@ -54,10 +64,10 @@ class Curves:
         ]
 
 
-def curves_of(renderer: Renderer, material: Material, kind: str, angles: list[float]) -> Curves:
-    """The curves of one kind. Raises GpuError."""
-    made: Curves = KINDS[kind](renderer.bsdf, pack_material(material), angles)
-    return made
+def curves_of(renderer: Renderer, material: Material, kind: str, angles: list[float], lobes: bool = False) -> Curves:
+    """The curves of one kind; `lobes` is for "polar". Raises GpuError."""
+    packed = pack_material(material)
+    return _polar(renderer.bsdf, packed, angles, lobes) if lobes else KINDS[kind](renderer.bsdf, packed, angles)
 
 
 def table(materials: Mapping[str, Curves]) -> str:
@@ -67,7 +77,7 @@ def table(materials: Mapping[str, Curves]) -> str:
     columns = {"theta_deg": first.theta}
     for name, curves in materials.items():
         known = np.isin(first.theta, curves.theta)
-        for curve, values in curves.columns.items():
+        for curve, values in curves.table_columns.items():
             column = np.zeros(len(first.theta))  # behind a surface that does not transmit there is no light
             column[known] = values
             columns[f"{_plain(name)}:{curve}" if several else curve] = column
@@ -99,25 +109,28 @@ def _channels(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{name}_{channel}": values[:, i] for i, channel in enumerate(CHANNELS)}
 
 
-def _polar(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+def _polar(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float], lobes: bool = False) -> Curves:
     """f in the plane of incidence; wo is at -angle, so that a mirror reflects it to +angle. Light beyond 90 degrees
     is transmitted."""
     theta = np.round(np.arange(-1800, 1801) * STEP, 1)
     wo = _directions(-np.array(angles))
-    found = _done(bsdf.values(material, wo, _directions(theta)))
+    found = _done(bsdf.values(material, wo, _directions(theta), lobes=lobes))
     above = np.abs(theta) < 90
     clear = bool(found.f[:, ~above].any()) or bool((found.delta_wi[found.delta_probability > 0][:, 2] < 0).any())
     shown = np.ones_like(above) if clear else above
     columns: dict[str, np.ndarray] = {}
     specular: dict[str, list[Specular]] = {}
+    parts: dict[str, np.ndarray] = {}
     for i, angle in enumerate(angles):
         name = f"f_{angle:g}"
         columns |= _channels(name, found.f[i, shown])
+        lit = {lobe: f[i, shown] for lobe, f in zip(found.lobe_names.tolist(), found.lobes, strict=True) if f.any()}
+        parts |= {f"{name}_{lobe}": f for lobe, f in lit.items()}
         for k in np.flatnonzero(found.delta_probability[i] > 0):
             x, _, z = found.delta_wi[i, k].tolist()
             weight = tuple(found.delta_weight[i, k].tolist())
             specular.setdefault(name, []).append(Specular(float(np.degrees(np.arctan2(x, z))), weight))
-    return Curves("polar", theta[shown], columns, specular)
+    return Curves("polar", theta[shown], columns, specular, lobes=parts)
 
 
 def _albedo(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
@@ -138,7 +151,7 @@ def _slice(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> C
     along = half * np.cos(theta_d)[:, None]
     found = _done(bsdf.values(material, along + across, along - across, paired=True))
     image = found.f[:, 0].reshape(len(grid), len(grid), 3)
-    luminance = image.astype(np.float64) @ [0.2126, 0.7152, 0.0722]
+    luminance = image.astype(np.float64) @ LUMINANCE
     columns = {f"theta_d_{angle:g}": values for angle, values in zip(grid, luminance, strict=True)}
     return Curves("slice", grid, columns, image=image)
 

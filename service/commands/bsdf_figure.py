@@ -11,7 +11,7 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from service.commands.bsdf_curves import Curves
+from service.commands.bsdf_curves import LUMINANCE, Curves
 
 AXES = {  # what is on the two axes
     "distribution": ("angle of the facet's normal (degrees)", "D (1/sr)"),
@@ -20,6 +20,14 @@ AXES = {  # what is on the two axes
     "albedo": ("angle to the normal (degrees)", "directional albedo"),
 }
 COLORS = {"r": "#c0392b", "g": "#27803b", "b": "#2b5fc0"}
+LOBES = {
+    "diffuse": "#c77700",
+    "specular": "#0b7a99",
+    "multiscatter": "#7a5195",
+    "sheen": "#b0447a",
+    "clearcoat": "#4c7a1f",
+    "transmission": "#3a55c4",
+}
 STYLES = ("-", "--")  # of the first material and of the one that it is compared with
 PEAKED = 20.0  # times the median of a lobe: then its radius is logarithmic, or nothing but the peak would be seen
 
@@ -53,6 +61,13 @@ def _curves(materials: Mapping[str, Curves]) -> list[tuple[Curves, np.ndarray, d
             shade = 1 - 0.65 * groups.index(group) / len(groups)
             look = {"label": label, "linestyle": style, "color": COLORS.get(channel), "alpha": shade}
             out.append((curves, values, look))
+        angles = list(dict.fromkeys(column.rpartition("_")[0] for column in curves.lobes))
+        for column, parts in curves.lobes.items():
+            angle, _, lobe = column.rpartition("_")
+            label = f"{name}: {column}" if len(materials) > 1 else column
+            shade = 1 - 0.65 * angles.index(angle) / len(angles)
+            look = {"label": label, "linestyle": style, "color": LOBES[lobe], "alpha": shade, "linewidth": 1}
+            out.append((curves, parts @ LUMINANCE, look))
     return out
 
 

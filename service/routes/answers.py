@@ -118,6 +118,11 @@ class SpecularLobe(BaseModel):
     probability: float = Field(description="With which the renderer picks the lobe.")
 
 
+class BsdfLobe(BaseModel):
+    name: str = Field(description="`diffuse`, `specular`, `multiscatter`, `sheen`, `clearcoat` or `transmission`.")
+    f: list[list[list[float]]] = Field(description="Its part of `f`; 0 where the material's numbers turn it off.")
+
+
 class BsdfValues(BaseModel):
     f: list[list[list[float]]] = Field(
         description="`f[i][j]` is the value for `wo[i]` and `wi[j]`, 1/sr, without the cosine: transmission where "
@@ -129,6 +134,10 @@ class BsdfValues(BaseModel):
         "samples that are lost below the horizon."
     )
     delta: list[list[SpecularLobe]] = Field(description="The perfectly specular lobes as seen from `wo[i]`.")
+    lobes: list[BsdfLobe] | None = Field(
+        None,
+        description="With `lobes` only: what the material's model adds up to `f`, which is their sum to rounding.",
+    )
 
 
 class BsdfTerms(BaseModel):
@@ -144,7 +153,9 @@ class BsdfTerms(BaseModel):
 
 class BsdfAlbedo(BaseModel):
     albedo: list[list[float]] = Field(description="Of each cosine, for each channel.")
-    error: list[list[float | None]] = Field(description="Its standard error; null for a single sample.")
+    error: list[list[float]] = Field(
+        description="Its standard error. That of a single sample is the standard deviation of 64 others."
+    )
 
 
 def problems(*statuses: int) -> Responses:
@@ -196,7 +207,12 @@ BSDF_BODY = body(
         "type": "object",
         "required": ["material", "wo", "wi"],
         "additionalProperties": False,
-        "properties": {"material": reference("Material"), "wo": _DIRECTIONS, "wi": _DIRECTIONS},
+        "properties": {
+            "material": reference("Material"),
+            "wo": _DIRECTIONS,
+            "wi": _DIRECTIONS,
+            "lobes": {"type": "boolean", "default": False, "description": "Whether to answer with each lobe, too."},
+        },
     },
     metal=BSDF,
 )

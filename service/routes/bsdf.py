@@ -34,7 +34,8 @@ Arrays = dict[str, np.ndarray]
     summary="Values of a material's BSDF",
     description="For any material without textures: `f` for every pair of directions, the density with which the "
     "renderer would sample `wi`, and the perfectly specular lobes, which are in neither. Opacity, emission, ambient "
-    f"light and absorption are left out. At most {MOST_PAIRS} pairs.",
+    "light and absorption are left out. With `lobes`, each lobe of the model by itself as well. "
+    f"At most {MOST_PAIRS} pairs.",
     openapi_extra=answers.BSDF_BODY,
     response_class=Response,
     responses=answers.shaped(answers.BsdfValues) | answers.problems(400, 413, 415, 422, 503),
@@ -76,7 +77,9 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
         await own.renderers.able(STARTING_S)
         asked: BsdfRequest = await own.bodies.parsed(kind, body)
     material = pack_material(asked.material)
-    question = EvaluateBsdf(0, asked.question, material, asked.wo, asked.wi, asked.samples, owner(request))
+    question = EvaluateBsdf(
+        0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner(request)
+    )
     answer = asyncio.ensure_future(own.bsdf.ask(question))
     gone = asyncio.ensure_future(disconnected(request.receive))
     try:
@@ -101,13 +104,16 @@ def _values(arrays: Arrays) -> bytes:
         ]
         for each in deltas
     ]
-    return _object({"f": _rows(arrays["f"]), "pdf": _rows(arrays["pdf"]), "delta": json.dumps(delta)})
+    parts = {"f": _rows(arrays["f"]), "pdf": _rows(arrays["pdf"]), "delta": json.dumps(delta)}
+    if len(arrays["lobes"]):
+        named = zip(arrays["lobe_names"].tolist(), arrays["lobes"], strict=True)
+        each = (f'{{"name":{json.dumps(name)},"f":{_rows(f)}}}' for name, f in named)
+        parts["lobes"] = "[" + ",".join(each) + "]"
+    return _object(parts)
 
 
 def _albedo(arrays: Arrays) -> bytes:
-    error = arrays["error"]
-    written = json.dumps([[None] * 3] * len(error)) if np.isnan(error).all() else _pieces(error)
-    return _object({"albedo": _pieces(arrays["albedo"]), "error": written})
+    return _object({"albedo": _pieces(arrays["albedo"]), "error": _pieces(arrays["error"])})
 
 
 def _terms(arrays: Arrays) -> bytes:

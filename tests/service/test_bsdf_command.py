@@ -60,6 +60,20 @@ def test_polar_is_the_formula(write: Any, tmp_path: Path) -> None:
     assert found["theta_deg"][[0, -1]].tolist() == [-89.9, 89.9]
 
 
+def test_polar_by_lobe(write: Any, tmp_path: Path) -> None:
+    plastic = write("plastic", {**METAL, "metallic": 0, "base_color": "#ffffff"})
+    found = table(tmp_path, plastic, "--lobes", "--angle", "30")
+    assert list(found) == ["theta_deg", "f_30", "f_30_diffuse", "f_30_specular"]
+    np.testing.assert_allclose(found["f_30_diffuse"] + found["f_30_specular"], found["f_30"], rtol=1e-5)
+    assert list(table(tmp_path, plastic, "--angle", "30")) == ["theta_deg", "f_30"]
+    both = table(tmp_path, plastic, "--lobes", "--with", write("gold", METAL))
+    assert {"plastic:f_45_diffuse", "gold:f_45_specular_g"} <= both.keys()
+    assert "gold:f_45_diffuse_g" not in both, "a metal has none"
+    out = tmp_path / "lobes.svg"
+    assert main(["bsdf", plastic, "--with", write("glass", FROSTED), "--lobes", "-o", str(out)]) == 0
+    assert b"</svg>" in out.read_bytes()
+
+
 def test_transmitted_light_is_below(write: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     found = table(tmp_path, write("frosted", FROSTED), "--angle", "30")
     below = np.abs(found["theta_deg"]) > 90
@@ -144,6 +158,7 @@ def test_two_files_of_one_name(write: Any, tmp_path: Path) -> None:
         (GREY, ["--angle", "nan"], "--angle 'nan'"),
         (GREY, ["--angle", "steep"], "--angle 'steep'"),
         (GREY, ["--kind", "lobe"], "--kind"),
+        (METAL, ["--kind", "albedo", "--lobes"], "--lobes"),
         (GREY, ["--with", "/nowhere.json"], "/nowhere.json"),
         (GREY, ["-o", "lobe.pdf"], ".csv, .svg, .png"),
     ],

@@ -168,6 +168,7 @@ class EvaluateBsdf:
     wo: np.ndarray  # (n, 3), unit length
     wi: np.ndarray  # (m, 3), unit length; for "albedo" none
     samples: int = 0  # for "albedo"
+    lobes: bool = False  # for "values": each lobe alone, too
     client: str = ""
 
 

@@ -30,6 +30,7 @@ class BsdfBody(Model):
     material: Material
     wo: Directions
     wi: Directions
+    lobes: bool = False
 
 
 class AlbedoBody(Model):
@@ -58,6 +59,7 @@ class BsdfRequest:
     wo: np.ndarray
     wi: np.ndarray = field(default_factory=lambda: np.zeros((0, 3)))
     samples: int = 0
+    lobes: bool = False
 
 
 def parse_values(body: bytes | bytearray | memoryview) -> BsdfRequest:
@@ -68,7 +70,8 @@ def parse_values(body: bytes | bytearray | memoryview) -> BsdfRequest:
         raise TooLarge(f"{n} wo and {m} wi are {n * m} pairs: at most {MOST_PAIRS} are evaluated at a time")
     parsed = validated(_BSDF, document, "")
     _without_textures(parsed.material)
-    return BsdfRequest("values", parsed.material, normalized(parsed.wo), normalized(parsed.wi))
+    wo, wi = normalized(parsed.wo), normalized(parsed.wi)
+    return BsdfRequest("values", parsed.material, wo, wi, lobes=parsed.lobes)
 
 
 def parse_albedo(body: bytes | bytearray | memoryview) -> BsdfRequest:

@@ -63,8 +63,9 @@ class BsdfTask:
         asked, evaluator = self._question, self._evaluator
         if asked.question == "albedo":
             return evaluator.albedo(asked.material, asked.wo, asked.samples)
-        evaluate = evaluator.values if asked.question == "values" else evaluator.terms
-        return evaluate(asked.material, asked.wo, asked.wi)
+        if asked.question == "terms":
+            return evaluator.terms(asked.material, asked.wo, asked.wi)
+        return evaluator.values(asked.material, asked.wo, asked.wi, lobes=asked.lobes)
 
     def fail(self) -> None:
         """The server is told by the loop."""
