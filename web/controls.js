@@ -7,6 +7,7 @@ import { element, isBeingEdited } from "./dom.js";
 import { slideByTouch } from "./sliding.js";
 import { neededIn, parseNumber, parseTriple } from "./number.js";
 import { compact, inWords, unitText } from "./format-text.js";
+import { span } from "./span.js";
 
 const UNSET = "–"; // neither document nor schema has a value
 
@@ -15,6 +16,7 @@ const UNSET = "–"; // neither document nor schema has a value
 function numberEntry(field, id, { input, commit, refuse, restore }) {
   const unit = unitText(field.unit);
   let latest = null;
+  let scale = span(field.soft, field.step, Boolean(field.ranges));
   const clean = () => { delete box.dataset.dirty; };
   const take = () => {
     clean();
@@ -30,7 +32,7 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
   };
   const step = (steps) => {
     const from = parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
-    const to = Number((from + steps * field.step).toPrecision(12));
+    const to = Number((from + steps * scale.stepAt(from)).toPrecision(12));
     const { min, max, open } = field;
     if (to < min || to > max || to <= open.min || to >= open.max) return;
     clean();
@@ -56,8 +58,9 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     onkeyup: ({ key }) => { if (key === "ArrowUp" || key === "ArrowDown") commit(); },
     onchange: take,
   });
-  const show = (value, effective) => {
+  const show = (value, effective, ends = field.soft) => {
     latest = value ?? null;
+    scale = span(ends, field.step, Boolean(field.ranges));
     box.placeholder = effective === undefined ? (field.absent ?? UNSET) : compact(effective);
     if (isBeingEdited(box)) return;
     box.value = latest === null ? "" : compact(latest);
@@ -67,24 +70,30 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
 }
 
 function track(field, id, { input, commit }) {
-  const { min, max } = field.soft;
+  let scale = null;
   // A bound that does not belong to the range: the slider stops one step before it.
-  const inside = (value) => {
+  const inside = (at) => {
+    const value = scale.isLog ? scale.fromShare(at) : at;
     if (value <= field.open.min) return field.open.min + field.step;
     return value >= field.open.max ? field.open.max - field.step : value;
   };
-  const range = element("input", {
-    type: "range", id, min: String(min), max: String(max), step: String(field.step),
-    oninput: () => input(inside(range.valueAsNumber)),
-    onchange: commit,
-  });
+  const range = element("input", { type: "range", id, oninput: () => input(inside(range.valueAsNumber)), onchange: commit });
+  const over = (ends) => {
+    if (scale && ends.min === scale.min && ends.max === scale.max) return;
+    scale = span(ends, field.step, Boolean(field.ranges));
+    const [min, max] = scale.isLog ? [0, 1] : [ends.min, ends.max];
+    Object.assign(range, { min: String(min), max: String(max), step: String(scale.step) });
+  };
+  over(field.soft);
   slideByTouch(range, { input: (value) => input(inside(value)), commit });
   // A slider without a value stands, as a ghost, where the one is that holds; without either it has no thumb.
-  const show = (value, effective) => {
+  const show = (value, effective, ends = field.soft) => {
+    over(ends);
+    const [min, max] = [Number(range.min), Number(range.max)];
     const known = value ?? effective ?? null;
     range.classList.toggle("ghost", (value ?? null) === null);
     range.classList.toggle("unset", known === null);
-    range.value = String(known ?? min);
+    range.value = String(known === null ? min : scale.isLog ? scale.toShare(known) : known);
     range.style.setProperty("--fill", String((range.valueAsNumber - min) / (max - min)));
     const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
     const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
@@ -99,9 +108,9 @@ function slider(field, id, events) {
   entry.element.setAttribute("aria-label", `${field.title}, number`);
   return {
     element: element("div", { class: "slider" }, range.element, entry.element),
-    show(value, effective) {
-      range.show(value, effective);
-      entry.show(value, effective);
+    show(value, effective, ends) {
+      range.show(value, effective, ends);
+      entry.show(value, effective, ends);
     },
   };
 }

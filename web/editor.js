@@ -3,10 +3,11 @@
 
 import { fetchPreset } from "./api.js";
 import * as moving from "./camera.js";
-import { linear } from "./color.js";
+import { converted } from "./conversion.js";
+import { redistributed } from "./distribution.js";
 import { OWN } from "./library.js";
 import { exposed } from "./lighting.js";
-import { at, isObject, pointer, put } from "./patch.js";
+import { at, pointer, put } from "./patch.js";
 import { defaults, environmentModels, fields, materialModels, model } from "./schema.js";
 import { Store } from "./store.js";
 
@@ -14,21 +15,6 @@ import { Store } from "./store.js";
 function subject({ shapes }) {
   const index = shapes.findIndex(({ type }) => type !== "quad");
   return Math.max(index, 0);
-}
-
-// Blinn and Phong's highlight for a roughness: its exponent 2 / alpha^2 - 2, alpha being roughness^2, and the
-// reflectance at normal incidence times (exponent + 8) / 8, the normalisation that this model leaves out
-// [Akenine-Moeller et al., Real-Time Rendering].
-function highlight({ roughness, base_color = 0.5, metallic = 0 }) {
-  if (isObject(roughness) || isObject(base_color) || isObject(metallic)) return {};
-  const shininess = Number(Math.max(0, 2 / Math.max(roughness, 0.05) ** 4 - 2).toPrecision(3));
-  const color = linear(base_color);
-  const tidy = (x) => Number(Math.min(1, x).toPrecision(4));
-  return {
-    shininess,
-    specular: color.map((x) => tidy((0.04 * (1 - metallic) + x * metallic) * (shininess + 8) / 8)),
-    diffuse: color.map((x) => tidy(x * (1 - metallic))),
-  };
 }
 
 const picked = (name, scene, exposure) => ({
@@ -90,6 +76,11 @@ export class Editor extends Store {
     this.change(put(this.state, place, value), gesture);
   }
 
+  // Another distribution for the material at a place; `own` are the fields of its model.
+  redistribute(place, distribution, own) {
+    this.edit(place, redistributed(at(this.state, place), distribution, own));
+  }
+
   rest() { this.seal(); }
 
   async #fetch(kind, name, use) {
@@ -142,20 +133,9 @@ export class Editor extends Store {
 
   putMaterial(material) { this.change(put(this.state, this.materialPlace, material)); }
 
-  // Another model for the material: what both know stays, and so does the colour.
   converted(old, type) {
     const models = materialModels(this.#schema);
-    const [before, after] = [old.type, type].map((each) => fields(this.#schema, models[each]));
-    const material = { type };
-    for (const { name } of after) if (old[name] !== undefined) material[name] = old[name];
-    const [from, to] = [before, after].map((all) => all.find(({ widget }) => widget === "color"));
-    if (from && to) material[to.name] = old[from.name] ?? from.initial;
-    if (type === "blinn_phong" && old.roughness !== undefined) Object.assign(material, highlight(old));
-    // What a model asks for and no other has: the middle of its slider.
-    for (const { name, required, widget, soft } of after) {
-      if (required && material[name] === undefined && widget !== "choice") material[name] = (soft.min + soft.max) / 2;
-    }
-    return material;
+    return converted(old, ...[old.type, type].map((each) => ({ type: each, fields: fields(this.#schema, models[each]) })));
   }
 
   pickModel(type) { this.putMaterial(this.converted(this.material, type)); }

@@ -80,7 +80,7 @@ export class Panel {
   #mount(id, chosen, place) {
     const textures = [];
     const form = schemaForm(chosen, {
-      change: (name, value) => this.acts.edit(`${place}/${name}`, value),
+      change: (name, value) => this.#edit(chosen, place, name, value),
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
       takeFile: (name, file) => this.acts.takeTexture(`${place}/${name}`, file),
@@ -93,6 +93,12 @@ export class Panel {
     });
     this.#find(`${id}-form`).replaceChildren(form.element);
     return { place, textures, ...form };
+  }
+
+  #edit(chosen, place, name, value) {
+    const isLeader = value !== undefined && chosen.some(({ ranges }) => ranges?.field === name);
+    if (isLeader) this.acts.redistribute(place, value, chosen);
+    else this.acts.edit(`${place}/${name}`, value);
   }
 
   // `knobs`: what the chosen quality makes of the settings that are not given.

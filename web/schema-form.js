@@ -7,6 +7,7 @@ import { element, freshId } from "./dom.js";
 import { acceptFiles } from "./files.js";
 import { equal, isObject } from "./patch.js";
 import { followed } from "./schema.js";
+import { endsOf } from "./span.js";
 import { describe } from "./tooltip.js";
 import { unitText } from "./format-text.js";
 
@@ -55,8 +56,9 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
   if (hint) describe(node, label, field.hint);
   return {
     element: node, mark,
-    // `effective`: what holds where neither the document nor the schema has a value.
-    show(value, initial = field.initial, effective = undefined) {
+    // `effective`: what holds where neither the document nor the schema has a value; `ends`: of a slider whose range
+    // depends on another field.
+    show(value, initial = field.initial, effective = undefined, ends = undefined) {
       latest = value ?? initial;
       const textured = isTexture(latest);
       if (image) {
@@ -64,7 +66,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
         image.show(latest);
         under?.show(latest);
       }
-      if (trouble.hidden && !textured) widget.show(latest, effective); // else what was refused stays in sight
+      if (trouble.hidden && !textured) widget.show(latest, effective, ends); // else what was refused stays in sight
       reset.hidden = textured || field.required || value === undefined || isSame(field, value, initial);
     },
   };
@@ -82,9 +84,9 @@ export function schemaForm(fields, acts) {
     show(values, initials = {}) {
       for (const [name, each] of rows) {
         const field = fields.find((one) => one.name === name);
-        const leader = field.follows?.field;
-        const lead = values[leader] ?? fields.find((one) => one.name === leader)?.initial;
-        each.show(values[name], initials[name], followed(field, lead));
+        const valueOf = (leader) => values[leader] ?? fields.find((one) => one.name === leader)?.initial;
+        const ends = field.ranges && endsOf(field, valueOf(field.ranges.field));
+        each.show(values[name], initials[name], followed(field, valueOf(field.follows?.field)), ends);
       }
     },
     // Says at a field what is wrong with it; false where this form has no such field.

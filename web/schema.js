@@ -89,6 +89,7 @@ function field(schema, name, raw, required) {
     initial: top.default ?? undefined,
     absent: bound(nodes, "x-absent"),
     follows: bound(nodes, "x-follows"),
+    ranges: bound(nodes, "x-ranges"),
   };
 }
 
