@@ -57,6 +57,10 @@ export const fetchAssetScene = (id) => get(`assets/${id}/scene`);
 export const renderPicture = async (scene, settings, signal) =>
   (await ask("POST", "render?format=png", { ...json({ scene, settings }), signal })).blob();
 
+// The linear values of such a picture, as the bytes of a .npy file.
+export const renderValues = async (scene, settings) =>
+  (await ask("POST", "render?format=npy", json({ scene, settings }))).arrayBuffer();
+
 // What the shader functions say of a material: `question` is "" for values, "/albedo" or "/terms".
 export const askBsdf = async (question, body) => (await ask("POST", `bsdf${question}`, json(body))).json();
 

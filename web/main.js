@@ -181,7 +181,7 @@ const savePage = new SavePage(find("page-save"), {
 });
 
 const lobe = new LobePanel(find("lobe"), {
-  acts: editor, schema, calls, titles, mean: (texture, isColor) => textureThumbnails.mean(texture, isColor), close: () => ui.set({ lobe: false }),
+  acts: editor, schema, calls, titles, mean: (texture, reads) => textureThumbnails.mean(texture, reads), close: () => ui.set({ lobe: false }),
 });
 find("show-lobe").hidden = !lobe.isPossible;
 

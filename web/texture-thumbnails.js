@@ -1,22 +1,31 @@
 // Small pictures of textures: made by the browser from the image's bytes where it can read them, else (EXR, HDR) by
-// the service. One after the other, and each once.
+// the service. One after the other, and each once. Their means are of the values that the renderer sees, however large.
 
-import { fetchAsset, renderPicture } from "./api.js";
-import { hex, linear, toLinear } from "./color.js";
+import { fetchAsset, renderPicture, renderValues } from "./api.js";
+import { hex, linear } from "./color.js";
 
 const SIDE = 64;
 const SQUARES = 4; // of a checker, along each side
+const MEAN_SAMPLES = 16; // of a pixel, which spread evenly over it
 
 // A square that shines as the image tells, and fills the picture.
-const lit = (texture) => ({
+const lit = (texture, looks = { emission: { texture: "image" } }) => ({
   version: 1, camera: { position: [0, 0, 1], target: [0, 0, 0], vfov: 90 }, textures: { image: texture },
-  materials: { image: { type: "diffuse", albedo: 0, emission: { texture: "image" } } },
+  materials: { image: { type: "diffuse", albedo: 0, ...looks } },
   shapes: [{ type: "quad", origin: [-1, -1, 0], u: [2, 0, 0], v: [0, 2, 0], material: "image" }],
 });
+// A square that shines where it is opaque.
+const OPACITY = { emission: 1, alpha: { texture: "image", channel: "a" } };
+const SETTINGS = { width: SIDE, height: SIDE, max_bounces: 0, filter: "box" };
 
-async function rendered(asset) {
-  const settings = { width: SIDE, height: SIDE, max_samples: 4, max_bounces: 0 };
-  return createImageBitmap(await renderPicture(lit({ asset }), settings));
+const rendered = async (asset) => createImageBitmap(await renderPicture(lit({ asset }), { ...SETTINGS, max_samples: 4 }));
+
+// The mean colour of a square's picture, whose pixels are single-precision numbers behind the header of a .npy file.
+async function meanOf(scene) {
+  const file = await renderValues(scene, { ...SETTINGS, max_samples: MEAN_SAMPLES });
+  const values = new Float32Array(file.slice(10 + new DataView(file).getUint16(8, true)));
+  const channels = values.length / (SIDE * SIDE);
+  return [0, 1, 2].map((k) => values.reduce((sum, x, i) => (i % channels === k ? sum + x : sum), 0) / (SIDE * SIDE));
 }
 
 function drawChecker(context, { a, b }) {
@@ -38,6 +47,7 @@ const shrink = (blob) => createImageBitmap(blob, { resizeHeight: SIDE, resizeQua
 
 export class TextureThumbnails {
   #bitmaps = new Map(); // by asset: a promise of a bitmap, or of null
+  #means = new Map(); // by texture and what is read of it: a promise of [r, g, b, a]
   #last = Promise.resolve();
 
   // An image that is on its way to the server needs not come back from there.
@@ -58,26 +68,22 @@ export class TextureThumbnails {
     return this.#bitmaps.get(asset);
   }
 
-  // Resolves to the texture's mean, linear [r, g, b, a]; of an image without a picture 1. `isColor`: images of 8 bits
-  // are sRGB where a colour is read, unless they say otherwise.
-  async mean(texture, isColor) {
+  // Resolves to the texture's mean, linear [r, g, b, a]; of an image that the service cannot read 1. `reads` is "color" or
+  // a channel: images of 8 bits are sRGB where a colour is read, unless they say otherwise. Only alpha has a mean where
+  // that is read, as an image without it cannot be asked for it.
+  async mean(texture, reads) {
     if (texture.type === "checker") {
       const [a, b] = [linear(texture.a), linear(texture.b)];
       return [...a.map((x, i) => (x + b[i]) / 2), 1];
     }
-    const bitmap = await this.#bitmap(texture.asset);
-    if (!bitmap) return [1, 1, 1, 1];
-    const context = new OffscreenCanvas(bitmap.width, bitmap.height).getContext("2d");
-    context.drawImage(bitmap, 0, 0);
-    const { data } = context.getImageData(0, 0, bitmap.width, bitmap.height);
-    const isEncoded = (texture.color_space ?? (isColor ? "srgb" : "linear")) === "srgb";
-    const decode = (byte) => (isEncoded ? toLinear(byte / 255) : byte / 255);
-    const sums = [0, 0, 0, 0];
-    for (let i = 0; i < data.length; i += 4) {
-      for (let k = 0; k < 3; k += 1) sums[k] += decode(data[i + k]);
-      sums[3] += data[i + 3] / 255;
+    const { asset, color_space = reads === "color" ? undefined : "linear" } = texture;
+    const key = JSON.stringify([asset, color_space, reads === "a"]);
+    if (!this.#means.has(key)) {
+      const image = { asset, ...(color_space ? { color_space } : {}) };
+      const made = reads === "a" ? meanOf(lit(image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity]) : meanOf(lit(image)).then((color) => [...color, 1]);
+      this.#means.set(key, made.catch(() => [1, 1, 1, 1]));
     }
-    return sums.map((sum) => (4 * sum) / data.length);
+    return this.#means.get(key);
   }
 
   // A canvas that shows the texture, now or as soon as there is a picture of it.

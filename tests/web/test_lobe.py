@@ -8,10 +8,14 @@ import json
 import math
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
+import numpy as np
 import pytest
+from OpenImageIO import ImageOutput, ImageSpec
+from PIL import Image
 from playwright.sync_api import Browser, Route
 
 from tests.serving import Server
@@ -223,10 +227,57 @@ def test_images_are_replaced_and_that_is_said(lobe: Editor) -> None:
     paste(lobe, {"type": "diffuse", "albedo": 1})
     lobe.drop("#material-form [data-field=albedo]", {"halves.png": halves()})
     lobe.wait("the words", lambda: "the mean stands for that of albedo" in page.inner_text("#lobe"))
-    lobe.page.wait_for_timeout(500)  # until the image is there
+    half = ((220 / 255 + 0.055) / 1.055) ** 2.4 / 2  # green on one side, none on the other
+    lobe.wait("its mean", lambda: table(lobe)[0]["f_g"] * math.pi == pytest.approx(half, rel=1e-3))
+
+
+def test_means_are_of_the_values_and_not_of_a_small_picture(lobe: Editor, server: Server, tmp_path: Path) -> None:
+    """Of bright values, of alpha, and of a pattern that a small picture in sRGB would make too dark."""
+    script = """async ([asset, reads]) => {
+        const { TextureThumbnails } = await import(new URL("texture-thumbnails.js", location));
+        return new TextureThumbnails().mean({ asset }, reads);
+    }"""
+    pixels = np.random.default_rng(1).random((37, 53, 4)).astype(np.float32) * [40, 4, 0.4, 1]
+    path = tmp_path / "bright.exr"
+    written = ImageOutput.create(str(path))
+    written.open(str(path), ImageSpec(53, 37, 4, "float"))
+    written.write_image(np.ascontiguousarray(pixels, np.float32))
+    written.close()
+    squares = io.BytesIO()
+    Image.fromarray((np.indices((128, 128)).sum(0) % 2 * 255).astype(np.uint8)).save(squares, "PNG")
+    expected = {"color": [*pixels.mean((0, 1))[:3], 1], "a": [1, 1, 1, pixels[..., 3].mean()]}
+    for data, reads, mean in (
+        (path.read_bytes(), "color", expected["color"]),
+        (path.read_bytes(), "a", expected["a"]),
+        (squares.getvalue(), "color", [0.5, 0.5, 0.5, 1]),
+    ):
+        headers = {"content-type": "application/octet-stream"}
+        asset = server.http.post("/v1/assets", content=data, headers=headers).json()["id"]
+        assert lobe.page.evaluate(script, [asset, reads]) == pytest.approx(mean, rel=2e-3)
+
+
+def test_lobes_are_drawn_apart(lobe: Editor) -> None:
+    page = lobe.page
+    plastic = {"type": "principled", "roughness": 0.3, "clearcoat": 1, "clearcoat_roughness": 0.2}
+    paste(lobe, plastic)
     plotted(lobe)
-    half = ((220 / 255 + 0.055) / 1.055) ** 2.4 / 2
-    assert table(lobe)[0]["f_g"] * math.pi == pytest.approx(half, rel=0.05), "green on one side, none on the other"
+    page.check("#lobe >> label:has-text('By lobe') >> input")
+    lobe.wait("the lobes", lambda: page.locator("#lobe .curve[class*=lobe-]").count() == 4)
+    legend = page.inner_text("#lobe .lobe-legend").split("\n")
+    assert legend == ["Principled", "diffuse", "specular", "multiscatter", "clearcoat"]
+    rows = table(lobe)
+    for row in rows:
+        parts = sum(row[f"f_{name}_g"] for name in legend[1:])
+        assert parts == pytest.approx(row["f_g"], rel=1e-4, abs=1e-7)
+    page.click("#compare")
+    page.select_option("#comparison select[aria-label^=Turn]", "metal_rough")
+    lobe.wait("those of both", lambda: page.locator("#lobe .curve.b[class*=lobe-]").count() == 2)
+    assert {"A_f_clearcoat_r", "B_f_specular_r"} <= table(lobe)[0].keys()
+    page.uncheck("#lobe >> label:has-text('By lobe') >> input")
+    lobe.wait("the sums alone", lambda: page.locator("#lobe .curve").count() == 2)
+    view(lobe, "solid")
+    assert page.is_hidden("#lobe >> label:has-text('By lobe')")
+    assert lobe.complaints == []
 
 
 def test_a_moving_hand_gets_a_curve_for_each_answer(lobe: Editor) -> None:

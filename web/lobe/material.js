@@ -8,10 +8,13 @@ const CHANNELS = { r: 0, g: 1, b: 2, a: 3 };
 
 export const isTextured = (value) => isObject(value) && value.texture !== undefined;
 
-// The names of the textures that a material shows, each with whether a colour is read from it: [{texture, isColor}].
+// What a field reads of its texture: "color", or a channel, "r", "g", "b" or "a".
+const readOf = ({ channel = "r" }, { widget }) => (widget === "color" ? "color" : channel);
+
+// The names of the textures whose values a material shows, each with what is read of it: [{texture, reads}].
 export const texturesOf = (material, fields) => fields
-  .filter(({ name }) => isTextured(material[name]))
-  .map(({ name, widget }) => ({ texture: material[name].texture, isColor: widget === "color" }));
+  .filter(({ name, widget }) => isTextured(material[name]) && widget !== "texture")
+  .map((field) => ({ texture: material[field.name].texture, reads: readOf(material[field.name], field) }));
 
 function constant({ channel = "r", factor = 1 }, { widget, min = -Infinity, max = Infinity }, mean) {
   const inside = (x) => Number(Math.min(Math.max(x, min), max).toPrecision(6));
@@ -20,7 +23,7 @@ function constant({ channel = "r", factor = 1 }, { widget, min = -Infinity, max 
 }
 
 // {material, replaced}: the document without textures, and the titles of the fields that had one. `fields` are those
-// of the model; `mean(texture, isColor)` is a texture's mean [r, g, b, a], linear. A normal map has no mean: it goes.
+// of the model; `mean(texture, reads)` is a texture's mean [r, g, b, a], linear. A normal map has no mean: it goes.
 export function plain(material, fields, mean) {
   const out = { ...material };
   const replaced = [];
@@ -29,7 +32,7 @@ export function plain(material, fields, mean) {
     if (!isTextured(value)) continue;
     replaced.push(field.title);
     if (field.widget === "texture") delete out[field.name];
-    else out[field.name] = constant(value, field, mean(value.texture, field.widget === "color"));
+    else out[field.name] = constant(value, field, mean(value.texture, readOf(value, field)));
   }
   return { material: out, replaced };
 }

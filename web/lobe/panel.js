@@ -5,7 +5,7 @@ import { albedo } from "./albedo.js";
 import { csv, standalone } from "./files.js";
 import { Latest } from "./latest.js";
 import { plain, texturesOf } from "./material.js";
-import { angleAt, isBelow, polar, readingAt } from "./polar.js";
+import { angleAt, isBelow, lit, polar, readingAt } from "./polar.js";
 import { slice } from "./slice.js";
 import { solid } from "./solid.js";
 import { Table } from "./table.js";
@@ -29,7 +29,7 @@ const STALE_MS = 400; // without an answer, after which the old plot is dimmed
 const REFINE_REST_MS = 150; // without a change, before more is asked of the server
 
 export class LobePanel {
-  #options = { view: "polar", incidence: 45, isLog: true, channels: "luminance", turn: -0.6, height: 0.42 };
+  #options = { view: "polar", incidence: 45, isLog: true, channels: "luminance", byLobe: false, turn: -0.6, height: 0.42 };
   #data = null; // of the last answer, by variant: {a, b?}
   #shown = null; // {view, data} that the plot shows
   #wanted = null; // the key of what was asked for last
@@ -37,8 +37,8 @@ export class LobePanel {
   #waiting = null; // the timer of an answer that does not come
   #means = new Map(); // of textures, as far as they are known
 
-  // `root` is the panel's element; `acts` the editor; `calls` the server's paths; `mean(texture, isColor)` resolves to
-  // a texture's mean colour; `close()` hides the panel.
+  // `root` is the panel's element; `acts` the editor; `calls` the server's paths; `mean(texture, reads)` resolves to
+  // a texture's mean; `close()` hides the panel.
   constructor(root, { acts, schema, calls, mean, titles, close }) {
     Object.assign(this, { root, acts, mean, titles });
     this.models = materialModels(schema.scene);
@@ -73,6 +73,7 @@ export class LobePanel {
     };
     this.log = check("Logarithmic", (isLog) => this.#set({ isLog }));
     this.colors = check("Red, green, blue", (isRgb) => this.#set({ channels: isRgb ? "rgb" : "luminance" }));
+    this.lobes = check("By lobe", (byLobe) => this.#set({ byLobe }));
     this.legend = element("p", { class: "lobe-legend" });
     this.note = element("p", { class: "note" });
     this.replaced = element("p", { class: "note" });
@@ -85,7 +86,7 @@ export class LobePanel {
     this.root.append(
       element("header", { class: "lobe-head" }, this.title, views, element("button", { type: "button", class: "button icon", "aria-label": "Close the lobe", onclick: close }, "×")),
       this.plot, this.reading, this.trouble, this.angleRow,
-      element("div", { class: "checks" }, this.log.row, this.colors.row), this.legend, this.note, this.replaced, this.table.element, this.files);
+      element("div", { class: "checks" }, this.log.row, this.lobes.row, this.colors.row), this.legend, this.note, this.replaced, this.table.element, this.files);
     this.#watchHand();
   }
 
@@ -162,7 +163,7 @@ export class LobePanel {
     const materials = Object.fromEntries(Object.entries(documents).filter(([, document]) => document).map(([side, document]) => {
       const own = fields(this.schema, this.models[document.type]);
       this.#learn(texturesOf(document, own), scene.textures ?? {});
-      const made = plain(document, own, (texture, isColor) => this.#means.get(JSON.stringify([scene.textures?.[texture], isColor])) ?? [1, 1, 1, 1]);
+      const made = plain(document, own, (texture, reads) => this.#means.get(JSON.stringify([scene.textures?.[texture], reads])) ?? [1, 1, 1, 1]);
       made.replaced.forEach((title) => replaced.add(title));
       return [side, made.material];
     }));
@@ -171,11 +172,11 @@ export class LobePanel {
 
   // Finds the means of textures that are new, and asks again with them.
   #learn(used, textures) {
-    for (const { texture, isColor } of used) {
-      const key = JSON.stringify([textures[texture], isColor]);
+    for (const { texture, reads } of used) {
+      const key = JSON.stringify([textures[texture], reads]);
       if (this.#means.has(key) || !textures[texture]) continue;
       this.#means.set(key, null);
-      this.mean(textures[texture], isColor).then((mean) => {
+      this.mean(textures[texture], reads).then((mean) => {
         this.#means.set(key, mean);
         this.refresh();
       });
@@ -185,7 +186,7 @@ export class LobePanel {
   // Shows the state of the editor; asks the server where that needs numbers that are not here.
   refresh() {
     if (this.root.hidden || !this.isPossible) return;
-    const { view, incidence, isLog, channels } = this.#options;
+    const { view, incidence, isLog, channels, byLobe } = this.#options;
     if (!this.#shown) this.table.element.open = this.root.clientHeight > ROOMY;
     const { materials, replaced } = this.#materials();
     this.title.textContent = `Lobe of ${inWords(this.acts.state.chosen.material)}`;
@@ -197,6 +198,8 @@ export class LobePanel {
     this.degrees.textContent = `${incidence}°`;
     this.log.row.hidden = !this.#view.hasLog;
     this.log.box.checked = isLog;
+    this.lobes.row.hidden = !this.#view.hasLobes;
+    this.lobes.box.checked = byLobe;
     this.colors.row.hidden = !this.#view.hasChannels;
     this.colors.box.checked = channels === "rgb";
     this.replaced.hidden = !replaced.length;
@@ -205,7 +208,7 @@ export class LobePanel {
     this.plot.classList.toggle("aims", this.#view === polar);
     this.plot.classList.toggle("tall", this.#view === terms);
     // No view reads what it does not show: another angle asks for no new albedo.
-    const key = JSON.stringify([view, materials, this.#view.hasIncidence ? incidence : null]);
+    const key = JSON.stringify([view, materials, this.#view.hasIncidence ? incidence : null, this.#view.hasLobes ? byLobe : null]);
     if (key === this.#wanted) return this.#draw();
     this.#wanted = key;
     this.root.setAttribute("aria-busy", "true");
@@ -284,8 +287,10 @@ export class LobePanel {
     const keys = view === slice ? [] : Object.keys(data).flatMap((side) => channels.map(([channel, title]) => element("span", { class: "key" },
       element("i", { class: `swatch ${side} ${channelClass(channel)}` }),
       [Object.keys(data).length > 1 ? `${side.toUpperCase()}, ${inWords(models[side] ?? "")}` : inWords(models.a ?? ""), title].filter(Boolean).join(", "))));
+    const names = view.hasLobes ? [...new Set(Object.values(data).flatMap((own) => lit(own).map(({ name }) => name)))] : [];
+    const lobes = names.map((name) => element("span", { class: "key" }, element("i", { class: `swatch lobe-${name}` }), name));
     const deltas = Object.values(data).some((own) => own.deltas?.length) ? [element("span", { class: "key" }, element("i", { class: "swatch delta" }), "perfectly specular, share of the light")] : [];
-    this.legend.replaceChildren(...keys, ...deltas);
+    this.legend.replaceChildren(...keys, ...lobes, ...deltas);
     this.colors.row.classList.toggle("dim", Object.values(data).every(({ f, albedo: all }) => isGrey(f ?? all ?? [])));
   }
 }

@@ -2,7 +2,7 @@
 
 import { angleOf, inPlane, refined, sweep } from "./directions.js";
 import { decades, figure, line, path, svg, text, ticks, tickText } from "./plot.js";
-import { colorTable, curves, luminance, scaleOf, share } from "./values.js";
+import { colorTable, column, curves, luminance, scaleOf, share } from "./values.js";
 import { percent } from "../format-text.js";
 
 const JUMP = 0.02; // of the radius, between two neighbours of a curve
@@ -10,17 +10,19 @@ const MOST_NEW = 60; // jumps that one refinement fills
 const ROUNDS = 3;
 const TABLE_STEP = 10; // degrees between the rows on the page
 
-// f for light from -incidence; the mirror images of that direction are asked for at the end, as `delta` is of wo.
-async function ofAngles(ask, material, incidence, angles) {
+// f for light from -incidence, and where `byLobe` its parts [{name, f}]; the mirror images of that direction are asked
+// for at the end, as `delta` is of wo.
+async function ofAngles(ask, material, incidence, angles, byLobe) {
   const from = inPlane(-incidence);
-  const { f, delta } = await ask("", { material, wo: [...angles.map(inPlane), from], wi: [from] });
-  return { f: f.slice(0, -1).map(([color]) => color), delta: delta.at(-1) };
+  const { f, delta, lobes = [] } = await ask("", { material, wo: [...angles.map(inPlane), from], wi: [from], ...(byLobe ? { lobes: true } : {}) });
+  const along = (values) => values.slice(0, -1).map(([color]) => color);
+  return { f: along(f), lobes: lobes.map(({ name, f: own }) => ({ name, f: along(own) })), delta: delta.at(-1) };
 }
 
-async function first(ask, material, { incidence }) {
+async function first(ask, material, { incidence, byLobe }) {
   const angles = sweep(incidence);
-  const { f, delta } = await ofAngles(ask, material, incidence, angles);
-  return { incidence, angles, f, deltas: delta.map(({ wi, weight }) => ({ angle: angleOf(wi), weight })) };
+  const { f, lobes, delta } = await ofAngles(ask, material, incidence, angles, byLobe);
+  return { incidence, angles, f, lobes, deltas: delta.map(({ wi, weight }) => ({ angle: angleOf(wi), weight })) };
 }
 
 // The same curve with directions between those where it jumps, or null where it is fine enough.
@@ -30,10 +32,18 @@ async function finer(ask, material, data, { isLog }, round) {
   const scale = scaleOf(values, isLog);
   const between = refined(data.angles, values.map((value) => share(value, scale)), JUMP, MOST_NEW);
   if (!between.length) return null;
-  const { f } = await ofAngles(ask, material, data.incidence, between);
-  const all = [...data.angles.map((angle, i) => [angle, data.f[i]]), ...between.map((angle, i) => [angle, f[i]])].sort((a, b) => a[0] - b[0]);
-  return { ...data, angles: all.map(([angle]) => angle), f: all.map(([, color]) => color) };
+  const { f, lobes } = await ofAngles(ask, material, data.incidence, between, data.lobes.length > 0);
+  const angles = [...data.angles, ...between];
+  const order = angles.map((_, i) => i).sort((i, j) => angles[i] - angles[j]);
+  const merged = (old, more) => order.map((i) => [...old, ...more][i]);
+  return {
+    ...data, angles: order.map((i) => angles[i]), f: merged(data.f, f),
+    lobes: data.lobes.map(({ name, f: old }, k) => ({ name, f: merged(old, lobes[k].f) })),
+  };
 }
+
+// The lobes that the material has: the others are 0 at every angle.
+export const lit = ({ lobes }) => lobes.filter(({ f }) => f.some((color) => Math.max(...color) > 0));
 
 export const isBelow = ({ angles, f, deltas }) =>
   angles.some((angle, i) => Math.abs(angle) > 90 && Math.max(...f[i]) > 0) || deltas.some(({ angle }) => Math.abs(angle) > 90);
@@ -75,7 +85,8 @@ function draw(data, { incidence, isLog, channels, size }) {
     text(x - radius, y + (isWhole ? -5 : 14), "f, 1/sr", { class: "axis" }));
   const surface = line(x - radius, y, x + radius, y, { class: "surface" });
   const mirror = incidence <= 90 ? line(x, y, ...at(incidence, radius), { class: "mirror" }) : null;
-  const lobes = lines.map((each) => svg("path", {
+  const parts = Object.entries(data).flatMap(([side, own]) => lit(own).map(({ name, f }) => ({ side, class: `${side} lobe-${name}`, values: f.map(luminance) })));
+  const drawn = [...parts, ...lines].map((each) => svg("path", {
     class: `curve ${each.class}`,
     d: `${path([[x, y], ...data[each.side].angles.map((angle, i) => at(angle, share(each.values[i], scale) * radius))])}Z`,
   }));
@@ -85,7 +96,7 @@ function draw(data, { incidence, isLog, channels, size }) {
   }));
   const light = arrow(...at(-incidence, radius), ...at(-incidence, 12), "light");
   const label = `Polar plot of the BSDF for light from ${incidence} degrees; largest value ${tickText(Number(greatest.toPrecision(3)))} per steradian`;
-  return figure(size.width, size.height, label, grid, words, surface, mirror, lobes, deltas, light);
+  return figure(size.width, size.height, label, grid, words, surface, mirror, drawn, deltas, light);
 }
 
 // The outgoing angle at a place of the plot, in whole degrees.
@@ -107,7 +118,14 @@ export function readingAt(data, options, px, py) {
 
 function table(data) {
   const { angles } = data.a;
-  const whole = colorTable(data, "theta_deg", angles, ({ angles: own, f }) => angles.map((angle) => f[own.indexOf(angle)] ?? between(own, f, angle)), "f");
+  const at = (own, f) => angles.map((angle) => f[own.indexOf(angle)] ?? between(own, f, angle));
+  const whole = colorTable(data, "theta_deg", angles, ({ angles: own, f }) => at(own, f), "f");
+  for (const [side, own] of Object.entries(data)) {
+    for (const { name, f } of lit(own)) {
+      whole.columns.push(...["r", "g", "b"].map((channel) => column(data, side, `f_${name}_${channel}`)));
+      at(own.angles, f).forEach((color, i) => whole.rows[i].push(...color));
+    }
+  }
   const isWhole = Object.values(data).some(isBelow);
   return { ...whole, rows: whole.rows.filter(([angle]) => isWhole || Math.abs(angle) < 90), isShown: ([angle]) => angle % TABLE_STEP === 0 };
 }
@@ -119,4 +137,4 @@ function between(angles, f, angle) {
   return f[to].map((value, i) => f[to - 1][i] + t * (value - f[to - 1][i]));
 }
 
-export const polar = { title: "Polar", needs: "/v1/bsdf", hasIncidence: true, hasLog: true, hasChannels: true, first, finer, draw, table };
+export const polar = { title: "Polar", needs: "/v1/bsdf", hasIncidence: true, hasLog: true, hasChannels: true, hasLobes: true, first, finer, draw, table };
