@@ -18,12 +18,12 @@ from gpu.accel.sah import Split
 from gpu.errors import SceneTooLarge
 from gpu.layout import LEAF_FIRST_MASK, LEAF_MAX_COUNT, TREELET_MAX_NODES, Node, ShapeKind
 
-LEAF_SIZE = 4  # at most so many primitives in a leaf; the surface area heuristic splits most of them further
-LEAF_SIZE_LARGE = 8  # exactly that many wherever counts allow, for scenes whose eight orders would pass 2 GiB
+LEAF_SIZE = 4  # the most primitives in a leaf; the surface area heuristic splits most of them further
+LEAF_SIZE_LARGE = 8  # the size of leaves, wherever counts allow, in scenes whose eight orders would pass 2 GiB
 LARGE = 6_000_000
 MAX_PRIMITIVES = LEAF_FIRST_MASK + 1
 OCTANTS = 8
-WHOLE = 4096  # nodes; a smaller tree is all top: half a megabyte in eight orders
+WHOLE = 4096  # nodes; a smaller tree has no treelets and takes half a megabyte in eight orders
 WORTH_THREADS = 32_768  # boxes; below it starting threads costs more than they save
 
 Vec3 = tuple[float, float, float]
@@ -66,8 +66,8 @@ def build(
 ) -> Tree:  # fmt: skip
     """The tree over n boxes: `lower`, `upper` (n, 3) float32, finite; `kinds` (n,) `layout.ShapeKind`.
 
-    A leaf holds one kind only. `firsts`: where, not at 0, the boxes of a kind begin in its array. `staying`: where
-    those of a kind begin among the boxes whose array is not brought into the leaves' order. The tree does not
+    A leaf holds one kind only. `firsts` says where the boxes of a kind begin in its array, if not at 0; `staying`
+    where those of a kind begin among the boxes, if its array is not brought into the leaves' order. The tree does not
     depend on the number of threads. Raises SceneTooLarge.
     """
     n = len(kinds)
@@ -134,7 +134,7 @@ def thread(tree: Tree, treelet: int | None = None) -> tuple[np.ndarray, int]:
     Bit i of the octant is set where the ray's direction is negative on axis i. An order is depth first, the
     child nearer along the split axis first. An inner node's link is the place in the whole array to go on at
     when its box is missed, the octant's end being (o + 1) * count. After a hit or a leaf, it is i + 1. A treelet
-    whose box is met is walked from its first node to its last, then on at i + 1. `treelet`: the most nodes in one.
+    whose box is hit is walked from its first node to its last, then on at i + 1. `treelet`: the most nodes in one.
     """
     most = 0 if tree.count <= WHOLE else TREELET_MAX_NODES
     most = 1 + (most if treelet is None else treelet)

@@ -49,10 +49,10 @@ def grow(
 ) -> tuple[int, int]:  # fmt: skip
     """Grows the subtree over boxes [first, last), its root into `slot`, the others from slot `free` on.
 
-    Reorders `boxes` and `index`. Splits ranges of more than `leaf_max` boxes, of several `kinds` or of instances
-    always, others of `leaf_min` or fewer never, by `split`, a `Split`. A range of at most `whole` boxes, unless it is
-    the root's, is left to another call: its slot, first and last go into `tasks`. Returns (first slot left free,
-    number of tasks).
+    Reorders `boxes` and `index`. By `split`, a `Split`, it always splits ranges of more than `leaf_max` boxes, of
+    several `kinds` or of instances, and never other ranges of `leaf_min` boxes or fewer. A range of at most `whole`
+    boxes, unless it is the root's, is left to another call: its slot, first and last go into `tasks`. Returns (first
+    free slot, number of tasks).
     """
     # The smaller child is always done first, so the stack holds at most log2(boxes) ranges.
     stack = np.empty((64, 3), np.int64)
@@ -115,7 +115,7 @@ def grow(
 
 @jit
 def measure(rows: np.ndarray, first: int, last: int, root: int) -> None:
-    """Fills in the sizes of the inner nodes of slots [first, last), then of `root`; those below are known."""
+    """Fill in the sizes of the inner nodes of slots [first, last), then of `root`; the sizes below them are known."""
     for k in range(last - first + 1):
         at = last - 1 - k if k < last - first else root
         if not rows[at, LINK] & np.uint32(LEAF_BIT):

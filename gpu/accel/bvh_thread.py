@@ -1,8 +1,8 @@
-"""A tree in the orders in which rays of the octants meet it, with skip links instead of a stack.
+"""A tree in a depth-first order for each octant of ray directions, with skip links instead of a stack.
 
-Only the top of the tree is kept once for each octant. Its leaves are treelets: subtrees of a few dozen nodes, kept
-once, left child first, for all octants. What order they are walked in matters little, and eight orders of all took
-six times the memory and as long (the caches hold more of one).
+Only the top of the tree is stored once for each octant. Its leaves are treelets: subtrees of a few dozen nodes,
+stored once for all octants, left child first. The order inside them matters little: eight orders of everything took
+six times the memory and no less time, as less of it fits into the caches.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from gpu.layout import LEAF_BIT, LEAF_COUNT_SHIFT, LEAF_FIRST_MASK, TREELET_BIT
 
 @jit
 def top_sizes(rows: np.ndarray, regions: np.ndarray, most: int, sizes: np.ndarray) -> None:
-    """Fills in the nodes of each row's subtree; treelets, of at most `most` nodes with their root, count as one."""
+    """Fill in the number of nodes of each row's subtree; treelets, of at most `most` nodes with their root, count as
+    one."""
     for q in range(len(regions)):
         r = len(regions) - 1 - q
         for k in range(regions[r, 1] - regions[r, 0]):
@@ -33,9 +34,9 @@ def lay_treelets(
     rows: np.ndarray, regions: np.ndarray, ranks: np.ndarray, most: int, base: int,
     place: np.ndarray, top: np.ndarray, nodes: np.ndarray,
 ) -> int:  # fmt: skip
-    """Fills `nodes` (k, 4) with the treelets, their roots left out, `place` of each root with its first node, `top`
-    with the slots that are in none, parents first. `base`: the place of nodes[0] in the array that links count in.
-    Returns how many nodes there are.
+    """Fill `nodes` (k, 4) with the treelets without their roots, `place` of each root with its first node, and `top`
+    with the slots outside treelets, parents first. `base` is the place of nodes[0] in the array that links count in.
+    Returns the number of nodes.
     """
     inside = np.zeros(len(rows), np.uint8)
     used = 0
@@ -79,9 +80,9 @@ def thread_octant(
     rows: np.ndarray, top: np.ndarray, ranks: np.ndarray, sizes: np.ndarray, most: int, treelets: np.ndarray,
     octant: int, base: int, nodes: np.ndarray,
 ) -> None:  # fmt: skip
-    """Fills `nodes` (count, 4) with the rows `top`. `base` is the place of nodes[0] in the array that links count in.
+    """Fill `nodes` (count, 4) with the rows `top`. `base` is the place of nodes[0] in the array that links count in.
 
-    `sizes` as by top_sizes, `treelets` as lay_treelets' `place`.
+    `sizes` are those of `top_sizes`, `treelets` is the `place` of `lay_treelets`.
     """
     place = np.empty(len(rows), np.uint32)  # of each slot in this order; only the rows in use are touched
     place[0] = 0

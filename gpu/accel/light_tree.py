@@ -17,12 +17,12 @@ from gpu.accel import light_tree_build, light_tree_clusters
 from gpu.accel.light_tree_build import AXIS, BEYOND, INTENSITY, NORMALS, RADIUS, WIDTH
 from gpu.layout import LightNode, LightTreeHead
 
-# Share of the picks that goes to the tree's lights alike, or half of it: what the tree knows nothing of, walls, must
-# not keep a light from being picked at all.
+# Of the picks this share, or down to half of it, is spread evenly over the tree's lights: the tree does not know
+# about walls, and a light that it takes for unimportant must still be picked.
 EVEN = 0.05
 STEPS = 65535  # of the grid that nodes' places are on
-PIECE = 1 << 14  # pairs packed at once, within the processor's cache
-WIDEST = 2.0**27  # steps that a node's radius is told to
+PIECE = 1 << 14  # pairs packed at once, which fit into the processor's cache
+WIDEST = 2.0**27  # the largest radius of a node that its 8 bits can say, in steps
 FARTHEST = 2.0**38  # steps from one end of the scene to the other: squares times intensities stay inside float32
 
 
@@ -34,10 +34,10 @@ def build(
     trails (n,) uint32; the even part of each light's probability; intensities (n,) float32, 1 for the brightest).
 
     For n >= 2 lights: boxes `low`, `high` (n, 3) and the `radius` (n,) of a ball around each one's middle; its
-    normals lie about the unit `axis` (n, 3) within the angle whose cosine is `normals` (n,), and light leaves at up
-    to the one whose cosine is `beyond` (n,), >= 0, from a normal; `intensity` (n,) >= 0, of any unit. The tree's
-    lights are the first n, picked with probability `share` all together. `reach`: how far the scene's points are
-    apart at most.
+    normals lie about the unit `axis` (n, 3) within the angle whose cosine is `normals` (n,), and light leaves within
+    the angle whose cosine is `beyond` (n,), >= 0, of a normal; `intensity` (n,) >= 0 has any unit. The tree's lights
+    are the first n, picked with probability `share` all together. `reach` is the largest distance between two points
+    of the scene.
     """
     n = len(low)
     if n < 2:
@@ -69,10 +69,11 @@ def build(
 
 
 def _grid(lights: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """Origin (3,) and step, exact in float32, of a grid that holds all middles."""
+    """Origin (3,) and step, exact in float32, of a grid that covers the middles of all lights."""
     middle = 0.5 * (lights[:, 0:3] + lights[:, 3:6])
     low, high = middle.min(axis=0), middle.max(axis=0)
-    # Not finer than float32 knows the places, nor so fine that a scene's other end is beyond what float32 squares.
+    # The step is at least the rounding of places in float32, and large enough that float32 can square the distance to
+    # the other end of the scene in steps.
     finest = max(float(np.abs(middle).max()) * 2.0**-22, reach / FARTHEST, float(lights[:, RADIUS].max()) / WIDEST)
     step = float(np.float32(max(float((high - low).max()) / (STEPS - 4), finest)))
     return (low - 2 * step).astype(np.float32).astype(np.float64), step
@@ -81,12 +82,12 @@ def _grid(lights: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
 def _packed(
     bounds: np.ndarray, children: np.ndarray, clustered: np.ndarray, origin: np.ndarray, step: float
 ) -> np.ndarray:
-    """(2 (n - 1), 4) uint32: `layout.LightNode` records, rounded so that they still hold what they held."""
+    """(2 (n - 1), 4) uint32: `layout.LightNode` records, whose bounds are rounded outwards."""
     nodes = np.zeros(children.shape, LightNode.dtype)
     place = (0.5 * (bounds[..., 0:3] + bounds[..., 3:6]) - origin) / step
     grid = np.clip(np.rint(place), 0, STEPS)
     away = np.linalg.norm(place - grid, axis=-1)
-    # A tenth of a step, and some: float32 in the shader.
+    # A tenth of a step and a share of the radius cover the rounding in the shader's float32.
     radius = _upwards(bounds[..., RADIUS] / step * (1 + 1e-5) + away + 0.1)
     axis, turned = _octahedral(bounds[..., AXIS : AXIS + 3])
     half = 0.5 * (np.arccos(np.clip(bounds[..., NORMALS], -1, 1)) + turned)
@@ -102,19 +103,19 @@ def _packed(
 
 
 def _upwards(radius: np.ndarray) -> np.ndarray:
-    """8 bits: 5 of an exponent from 2^-4, 3 of a mantissa; the next number that is not less."""
+    """8 bits, rounded up: 5 of an exponent from 2^-4 and 3 of a mantissa."""
     bits = np.asarray(radius, np.float32).view(np.uint32).astype(np.int64) - (123 << 23)
     return np.asarray(np.clip(-(-bits >> 20), 0, 255), np.uint32)
 
 
 def _brightness(intensity: np.ndarray) -> np.ndarray:
-    """11 bits: 7 of an exponent from 2^-87, 4 of a mantissa, rounded; what is fainter counts as 2^-87."""
+    """11 bits, rounded: 7 of an exponent from 2^-87 and 4 of a mantissa; fainter lights count as 2^-87."""
     bits = np.asarray(intensity, np.float32).view(np.uint32).astype(np.int64) - (40 << 23)
     return np.asarray(np.clip((bits + (1 << 18)) >> 19, 0, 2047), np.uint32)
 
 
 def _octahedral(axis: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """(2 x 8 bits, the angle from the axis to what they stand for), as octahedral coordinates."""
+    """(2 x 8 bits of octahedral coordinates, the angle between the axis and the direction that they decode to)."""
     e = axis / np.abs(axis).sum(axis=-1, keepdims=True)
     folded = (1 - np.abs(e[..., 1::-1])) * np.where(e[..., :2] >= 0, 1, -1)
     uv = np.where(e[..., 2:] < 0, folded, e[..., :2])

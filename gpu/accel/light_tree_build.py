@@ -10,7 +10,7 @@ import numpy as np
 from gpu.jit import jit
 
 BINS = 12
-DEPTH = 32  # levels of pairs: a light's way is the bits of a word
+DEPTH = 32  # levels of pairs at most, as the bits of one word say how to reach a light
 # Columns of a node's bounds: box, axis, cosine of the half angle of the normals' cone, of how far beyond it light
 # leaves, intensity, radius of a ball around all of it
 BOX, AXIS, NORMALS, BEYOND, INTENSITY, RADIUS, WIDTH = 0, 6, 9, 10, 11, 12, 13
@@ -18,11 +18,11 @@ BOX, AXIS, NORMALS, BEYOND, INTENSITY, RADIUS, WIDTH = 0, 6, 9, 10, 11, 12, 13
 
 @jit
 def _include(row: np.ndarray, light: np.ndarray) -> None:
-    """Adds a light to a bin's box, axes, intensity and count (its last column)."""
+    """Add a light to a bin's box, axes, intensity and count (its last column)."""
     for k in range(3):
         row[k] = min(row[k], light[k])
         row[k + 3] = max(row[k + 3], light[k + 3])
-        # A light of all directions has no axis: it widens what its neighbours' have in common.
+        # A light that shines in all directions has no axis; it shortens the mean of its neighbours' axes.
         row[AXIS + k] += light[AXIS + k] * (0.5 + 0.5 * light[NORMALS])
     row[INTENSITY] += light[INTENSITY]
     row[RADIUS] += 1.0
@@ -49,9 +49,9 @@ def _merge(row: np.ndarray, other: np.ndarray) -> None:
 
 @jit
 def _cost(row: np.ndarray) -> float:
-    """What a node costs in variance: its intensity times the square of its size, as importance takes it, times how
-    many directions it sends light to. That is told from the length of the mean of its lights' axes, a sum, within
-    10 % of the measure of the paper's cone.
+    """The cost of a node in variance: its intensity times the square of its size, as in the importance, times a
+    measure of the directions into which it shines. That is computed from the length of the mean of its lights' axes,
+    a sum, and within 10 % of the measure of the paper's cone.
     """
     size, mean = 0.0, 0.0
     for k in range(3):
@@ -66,7 +66,8 @@ def _cost(row: np.ndarray) -> float:
 def _split(
     lights: np.ndarray, order: np.ndarray, first: int, last: int, bins: np.ndarray, side: np.ndarray
 ) -> tuple[int, float, float, int]:
-    """(axis; twice where bin 0 begins; bins a unit of that; the right side's first); axis -1: all are in one place"""
+    """(axis, twice the place where bin 0 begins, bins per unit of that, first bin of the right side). The axis is -1
+    where all lights are in one place."""
     low, high = np.empty(3, np.float64), np.empty(3, np.float64)
     for k in range(3):
         low[k], high[k] = np.inf, -np.inf
@@ -112,8 +113,9 @@ def _push(row: np.ndarray, first: int, last: int, depth: int, trail: int, place:
 
 @jit
 def grow(lights: np.ndarray, order: np.ndarray, children: np.ndarray, trails: np.ndarray) -> None:
-    """Fills `children` (n - 1, 2) int64: the pair that a child is, or ~light where it is one; and `trails` (n,)
-    uint32: bit k of a light's says which child is taken at depth k. `lights` (n, WIDTH), n >= 2; reorders `order`.
+    """Fill `children` (n - 1, 2) int64 with the pair of each child, or ~light where it is a light, and `trails` (n,)
+    uint32, of which bit k says which child leads to the light at depth k. `lights` (n, WIDTH), n >= 2. Reorders
+    `order`.
     """
     bins, side = np.empty((BINS, WIDTH), np.float64), np.empty(WIDTH, np.float64)
     stack = np.empty((DEPTH + 2, 5), np.int64)  # first, last, depth, trail, place among all children
@@ -150,7 +152,7 @@ def grow(lights: np.ndarray, order: np.ndarray, children: np.ndarray, trails: np
 
 @jit
 def _cone(node: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
-    """The cone of normals around two others, into `node` [Conty Estevez & Kulla 2018, algorithm 1]."""
+    """Write the cone of normals around two others into `node` [Conty Estevez & Kulla 2018, algorithm 1]."""
     if b[NORMALS] < a[NORMALS]:
         a, b = b, a  # the wider first
     node[NORMALS] = a[NORMALS]
@@ -181,7 +183,7 @@ def _cone(node: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
 
 @jit
 def _around(node: np.ndarray, child: np.ndarray) -> float:
-    """Radius of a ball around the node's middle that holds the child's ball."""
+    """The radius of a ball around the node's middle that contains the child's ball."""
     d2 = 0.0
     for k in range(3):
         d2 += (0.5 * (node[k] + node[k + 3]) - 0.5 * (child[k] + child[k + 3])) ** 2
@@ -191,7 +193,7 @@ def _around(node: np.ndarray, child: np.ndarray) -> float:
 
 @jit
 def bound(lights: np.ndarray, children: np.ndarray, bounds: np.ndarray) -> None:
-    """Fills `bounds` (n - 1, 2, WIDTH): of each pair's children."""
+    """Fill `bounds` (n - 1, 2, WIDTH) with those of each pair's children."""
     node = np.empty(WIDTH, np.float64)
     for i in range(len(children) - 1, -1, -1):
         for side in range(2):

@@ -11,7 +11,7 @@ from gpu.accel.light_tree_build import BEYOND, INTENSITY, NORMALS
 from gpu.jit import jit
 from gpu.layout import LightCluster, LightClusterEntry
 
-# Lights of a cluster at most, and of those that nest in it. Seven sizes down to 4 gain 2 % more of a sample's time.
+# The most lights of a cluster, and of those that nest in it. Seven sizes down to 4 gain 2 % more of a sample's time.
 SIZES = (256, 64, 16)
 # Cosine of the half angle of the normals of flat lights in one cluster. With 0.9 a shining ball errs by 7 % more.
 CONE = 0.97
@@ -23,7 +23,7 @@ def _choose(
     lights: np.ndarray, children: np.ndarray, bounds: np.ndarray, first: np.ndarray, count: np.ndarray,
     chosen: np.ndarray,
 ) -> None:  # fmt: skip
-    """Fills, for each pair, the place of its first light in the tree's order, its lights' count, and whether its
+    """Fill in for each pair the place of its first light in the tree's order, its number of lights, and whether its
     parent is a cluster.
     """
     pairs = len(children)
@@ -68,7 +68,7 @@ def _next(share: np.ndarray, i: int, heavy: bool) -> int:
 
 @jit
 def _tabulate(share: np.ndarray, threshold: np.ndarray, alias: np.ndarray) -> None:
-    """Alias table of shares whose mean is 1, as in `gpu.tables.alias_table` but for few of them."""
+    """Make the alias table of shares whose mean is 1, as `gpu.tables.alias_table` does, but fast for few of them."""
     n = len(share)
     for i in range(n):
         threshold[i], alias[i] = 1.0, i
@@ -95,7 +95,8 @@ def _fill(
     order: np.ndarray, intensity: np.ndarray, first: np.ndarray, count: np.ndarray, starts: np.ndarray,
     totals: np.ndarray, own: np.ndarray, other: np.ndarray, threshold: np.ndarray,
 ) -> None:  # fmt: skip
-    """Fills the tables: of the pair i, whose entries begin at starts[i], -1: it has none; and its intensity."""
+    """Fill the tables and `totals`, the intensity of each pair. Entries of the pair i begin at starts[i]; -1: it has
+    no table."""
     for i in range(len(starts)):
         if starts[i] < 0:
             continue

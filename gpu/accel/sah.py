@@ -14,7 +14,7 @@ from gpu.layout import ShapeKind
 
 
 class Split(IntEnum):
-    """How a range of boxes is divided. All but the first are there to be compared with it: `sunbox bench seeds`."""
+    """How a range of boxes is divided. All but the first exist for comparison, in `sunbox bench seeds`."""
 
     SAH = 0  # the surface area heuristic, over BINS bins or, where the boxes are few, half as many
     SPATIAL_MEDIAN = 1  # in the middle of the centroids' bounds, across their longest axis
@@ -27,7 +27,7 @@ class Split(IntEnum):
 INSTANCE = int(ShapeKind.INSTANCE)
 OBJECT_MEDIAN = int(Split.OBJECT_MEDIAN)
 BINS = 16
-FEW = 24  # below this many boxes half the bins do: most nodes are small, and their time went into empty bins
+FEW = 24  # boxes below which half the bins suffice: most nodes are small, and their time went into empty bins
 
 
 @jit
@@ -83,7 +83,7 @@ def best_split(
 ) -> tuple[float, int, int, int]:  # fmt: skip
     """(area times count, summed over the two sides; axis; the right side's first bin; number of bins).
 
-    Axis -1: all centroids are one point. `count`, `bins` and `sums` are room to work in. `split`: one of the
+    Axis -1: all centroids are one point. `count`, `bins` and `sums` are scratch arrays. `split`: one of the
     heuristics among `Split`.
     """
     used = split
@@ -125,7 +125,7 @@ def best_split(
             _include(side, bins[k, b])
             cost = sums[b - 1] + half_area(side) * above
             skew = abs(last - first - 2 * above)
-            # Boxes without area cost nothing wherever they are split: then in the middle.
+            # Boxes without area cost nothing wherever they are split, so they are split in the middle.
             if cost < best or (cost == best and skew < best_skew):
                 best, best_axis, best_bin, best_skew = cost, k, b, skew
     return best, best_axis, best_bin, used
@@ -133,7 +133,7 @@ def best_split(
 
 @jit
 def longest_axis(middle: np.ndarray) -> int:
-    """Of the centroids' bounds; -1: they are one point."""
+    """The longest axis of the centroids' bounds; -1 where they are one point."""
     axis, longest = -1, 0.0
     for k in range(3):
         if middle[k + 3] - middle[k] > longest:
@@ -143,9 +143,9 @@ def longest_axis(middle: np.ndarray) -> int:
 
 @jit
 def halve(boxes: np.ndarray, index: np.ndarray, first: int, last: int, axis: int) -> int:
-    """Brings the boxes of the lower half along `axis` to the front [Hoare 1961]; returns the first place behind them.
+    """Bring the boxes of the lower half along `axis` to the front [Hoare 1961]; returns the first place behind them.
 
-    Written out, as numba takes five seconds to compile a sort.
+    It is written out because numba takes five seconds to compile a sort.
     """
     middle = first + (last - first) // 2
     low, high = first, last - 1
@@ -175,7 +175,7 @@ def partition(
     boxes: np.ndarray, index: np.ndarray, first: int, last: int,
     axis: int, low: float, rate: float, bin_: int,
 ) -> int:  # fmt: skip
-    """Moves the boxes of bins below `bin_` to the front; returns the first place behind them."""
+    """Move the boxes of bins below `bin_` to the front; returns the first place behind them."""
     i, j = first, last - 1
     while i <= j:
         if int((np.float64(boxes[i, axis]) + np.float64(boxes[i, axis + 3]) - low) * rate) < bin_:
@@ -188,7 +188,7 @@ def partition(
 
 @jit
 def partition_kind(boxes: np.ndarray, index: np.ndarray, kinds: np.ndarray, first: int, last: int) -> int:
-    """Moves the boxes of the first one's kind to the front; returns the first place behind them."""
+    """Move the boxes of the first one's kind to the front; returns the first place behind them."""
     kind = kinds[index[first]]
     i = first
     for j in range(first, last):
@@ -200,7 +200,7 @@ def partition_kind(boxes: np.ndarray, index: np.ndarray, kinds: np.ndarray, firs
 
 @jit
 def is_mixed(index: np.ndarray, kinds: np.ndarray, first: int, last: int) -> bool:
-    """Whether these can't be one leaf: they are of several kinds, or instances, of which each is one."""
+    """Whether these boxes cannot be one leaf: they are of several kinds, or instances, each of which is a leaf."""
     kind = kinds[index[first]]
     found = last > first + 1 and kind == INSTANCE
     for i in range(first + 1, last):

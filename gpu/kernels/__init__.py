@@ -1,4 +1,4 @@
-"""From a scene to compiled kernels: which code it needs, the shader text with that code, the compiled result.
+"""From a scene to compiled kernels: the flags of the code that it needs, the shader text, the compiled result.
 
 features        the table of flags: which code a scene needs
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants

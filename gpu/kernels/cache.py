@@ -1,6 +1,7 @@
-"""Compiled kernels, kept while pictures hold them, and for a while longer: the driver's disk cache is some ms away.
+"""Compiled kernels, which stay in memory while pictures use them and for a while after that.
 
-On llvmpipe a kernel takes 7 MB. Whoever may send documents may ask for thousands of them.
+Loading one from the driver's disk cache takes some milliseconds. On llvmpipe a kernel takes 7 MB, and clients that
+may send documents can cause thousands of them, so the number of unused ones is bounded.
 """
 
 from __future__ import annotations
@@ -20,8 +21,8 @@ from gpu.kernels.source import SHADERS, KernelSource
 
 log = logging.getLogger(__name__)
 
-MOST = 16  # kept though nobody holds them: some show pictures, the others trace them
-LONGEST_S = 600.0  # ... and not used for so long
+MOST = 16  # kernels that stay though no picture holds them: some resolve pictures, the others trace them
+LONGEST_S = 600.0  # seconds without use after which a kernel that no picture holds is evicted
 
 _Key = tuple[str, tuple[tuple[str, object], ...]]
 
@@ -34,7 +35,8 @@ class _Kept:
 
 
 class KernelCache:
-    """By entry and defines; `compile_ms` of the last one is in `last_compile_ms`."""
+    """Kernels by entry and defines. `last_compile_ms` is what the last call of `get` spent on compiling, 0 for
+    none."""
 
     def __init__(
         self, context: Any, folders: Sequence[Path] = (SHADERS,), most: int = MOST, longest_s: float = LONGEST_S
@@ -50,8 +52,8 @@ class KernelCache:
         return len(self._cache)
 
     def get(self, entry: str, defines: Mapping[str, object]) -> Any:
-        """The kernel `entry` (a file of shaders/) with these defines, good until the next call; held, until it
-        is let go. Raises CompileError naming file and line."""
+        """The kernel `entry` (a file of shaders/) with these defines. It is valid until the next call; after `hold`,
+        until `let_go`. Raises CompileError naming file and line."""
         key = (entry, tuple(sorted(defines.items())))
         self.last_compile_ms = 0.0
         if key not in self._cache:
@@ -63,7 +65,7 @@ class KernelCache:
         return kept.kernel
 
     def hold(self, kernel: Any) -> None:
-        """Keeps it from being evicted."""
+        """Protect the kernel from eviction, until as many calls of `let_go`."""
         self._of(kernel).holders += 1
 
     def let_go(self, kernel: Any) -> None:
@@ -73,7 +75,7 @@ class KernelCache:
         self._evict(len(self._free) - self._most)
 
     def tidy(self) -> float | None:
-        """Evicts those that nobody has used for long; in how many seconds the next one is due."""
+        """Evict kernels that have not been used for long. Returns the seconds until the next one is due, or None."""
         now = time.monotonic()
         old = sum(now - self._cache[key].used_at >= self._longest_s for key in self._free)
         if old:
@@ -84,7 +86,7 @@ class KernelCache:
 
     @property
     def _free(self) -> list[_Key]:
-        """Those that nobody holds, the longest unused first."""
+        """The kernels that no picture holds, the longest unused first."""
         free = [key for key, kept in self._cache.items() if not kept.holders]
         return sorted(free, key=lambda key: self._cache[key].used_at)
 
@@ -116,6 +118,6 @@ class KernelCache:
 
 
 def _trim() -> None:
-    """What was freed goes back to the system: glibc keeps the many small pieces of 40 kernels, 300 MB, for itself."""
+    """Return freed memory to the system: glibc would keep the many small pieces of 40 kernels, 300 MB, for itself."""
     with suppress(AttributeError, OSError):  # another C library
         ctypes.CDLL(None).malloc_trim(0)

@@ -1,4 +1,4 @@
-"""Which code a scene needs: a table, flag -> question about the arrays.
+"""The flags, which say what code a scene needs: a table, flag -> predicate over the arrays.
 
 A flag only removes code that the scene cannot reach; choices that change pixels are settings (`defines`).
 """
@@ -19,7 +19,7 @@ FILTER_TABLE_SIZE = 512
 
 
 def _looped(scene: SceneArrays, kind: ShapeKind, records: str) -> int:
-    """How many shapes of a kind stand in the kernel's loop: they come first among their records."""
+    """The number of shapes of a kind that stand in the kernel's loop; they come first among their records."""
     return scene.large.get(kind, 0) if kind in scene.bvh_kinds else len(getattr(scene, records))
 
 
@@ -75,7 +75,7 @@ def _transmits(materials: np.ndarray) -> np.ndarray:
 
 
 def _mirrors(materials: np.ndarray) -> np.ndarray:
-    """Those that only mirror or refract, by their own numbers: textures may make more of others, or less."""
+    """Materials that only mirror or refract, by their own numbers; textures may add others, or take some away."""
     m = materials
     whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
     bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
@@ -86,7 +86,8 @@ def _mirrors(materials: np.ndarray) -> np.ndarray:
 
 
 def _spreads(s: SceneArrays) -> bool:
-    """Whether some `principled` does more than mirror and refract, or no glass is there for which that is spared."""
+    """Whether kernels need the lobes of `principled`: not where all such materials only mirror or refract, and among
+    them is clear glass, whose paths then take the short loop of delta_chain.glsl."""
     m = s.materials
     given = m["model"] == MaterialModel.PRINCIPLED
     sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
@@ -113,7 +114,7 @@ def _mapped(s: SceneArrays, *names: str) -> bool:
 
 
 def _coat_apart(s: SceneArrays) -> bool:
-    """Whether some coat's normal is not that of what is under it."""
+    """Whether the normal of some coat differs from that of the layer below."""
     if s.textures is None or not _mapped(s, "normal", "coat_normal"):
         return False
     names = list(s.textures.slots)
@@ -133,7 +134,7 @@ def _thin(s: SceneArrays) -> bool:
 
 
 def _veiled(s: SceneArrays) -> bool:
-    """Whether what shines, or its opacity, changes over a shape."""
+    """Whether the emission or the opacity of an emitting shape varies over its surface."""
     shines = (s.materials["emission"] > 0).any(axis=1)
     given = s.materials[shines]
     textured = (given[name] == np.float32(layout.TEXTURED) for name in ("emission", "opacity"))
@@ -144,7 +145,7 @@ def _camera(asks: Callable[[np.void], bool]) -> Callable[[SceneArrays], bool]:
     return lambda s: asks(s.camera)
 
 
-# Flags that the camera alone decides, a `layout.Camera`: where one differs, another camera needs another kernel.
+# Flags that the camera alone decides (a `layout.Camera`): a camera that raises others needs another kernel.
 CAMERA_FLAGS: dict[str, Callable[[np.void], bool]] = {
     "HAS_APERTURE": lambda camera: bool(camera["aperture_radius"] > 0),
 }
@@ -220,9 +221,9 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_ATTENUATION": lambda s: bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any()),
 }
 
-# What a slider of a model can raise. While a scene is edited they are all raised with the model, so that no slider
-# ever waits for a compiler. `principled` leaves out what costs more than it saves: stretched highlights double its
-# time and clear bodies add a fifth; the first touch of such a slider compiles once.
+# Flags that a slider of a model can raise. While a scene is edited they are all raised with the model, so that no
+# slider ever waits for the compiler. For `principled` two are left out because they are expensive: anisotropic
+# highlights double its time and clear bodies add a fifth; the first use of such a slider compiles once.
 _OPAQUE = ("HAS_SUBSURFACE", "HAS_SHEEN", "HAS_ANISOTROPIC", "HAS_CLEARCOAT")
 EDITED = {
     "HAS_DISNEY": _OPAQUE,
@@ -233,7 +234,7 @@ EDITED = {
 
 
 def everything() -> frozenset[str]:
-    """Every flag there is."""
+    """All flags."""
     return frozenset(FLAGS)
 
 
@@ -245,17 +246,17 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
     return frozenset(raised)
 
 
-# What spares work and changes no picture: an edit that could do with it is not worth waiting for a compiler.
+# Flags that only save work and change no picture: an edit that could raise one does not wait for the compiler.
 _SPARING = frozenset({"HAS_MIRRORS"})
 
 
 def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:
-    """The flags of a scene under edit, after one: those that it had, and what it needs now."""
+    """The flags of a scene after an edit: those that were raised before, and those that it needs now."""
     return raised | (flags(scene, True) - _SPARING)
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
-# varying index. 0: too many to be worth it, or met through the tree. docs/house.md says what each gains.
+# varying index. 0: they are too many for that to gain time, or in the tree. docs/house.md says what each gains.
 COUNTS: dict[str, str] = {
     "SPHERE_COUNT": "spheres",
     "QUAD_COUNT": "quads",
@@ -265,29 +266,29 @@ COUNTS: dict[str, str] = {
 }
 FEW = {"MATERIAL_COUNT": "materials", "LIGHT_COUNT": "lights"}
 _FEW_MAX = 64
-_BLOCK_BYTES = 16384  # what every driver gives a uniform block
+_BLOCK_BYTES = 16384  # bytes that a uniform block may have with every driver
 PICK_MAX = 2
 
 
 def _loop(name: str) -> str:
-    """The define of how often a loop over shapes runs, beside that of how many of them stand in it."""
+    """The name of the define for the turns of a loop over shapes; another one counts the shapes that stand in it."""
     return name.replace("_COUNT", "_LOOP")
 
 
 def looped(scene: SceneArrays) -> dict[str, int]:
-    """How many shapes of each kind stand in the kernel's loops, by the members of `layout.Frame` that tell so."""
+    """The number of shapes of each kind that stand in the kernel's loops, by their member of `layout.Frame`."""
     kinds = zip(COUNTS.values(), ShapeKind, strict=False)
     return {f"looped_{records}": _looped(scene, kind, records) for records, kind in kinds}
 
 
 def loops_from_frame() -> dict[str, object]:
-    """The defines of a kernel that reads from the frame how often its loops run."""
+    """The defines of a kernel that reads from the frame how many turns its loops make."""
     return {_loop(name): f"frame.looped_{records}" for name, records in COUNTS.items()}
 
 
 def counts(scene: SceneArrays) -> dict[str, object]:
-    """How many shapes of each kind stand in the kernel's loops, how many materials and lights, where few; and where
-    textures belong."""
+    """The defines for the numbers of shapes in the kernel's loops, for the numbers of materials and lights where
+    those are few, and for the places of textures."""
     kinds = zip(COUNTS.items(), ShapeKind, strict=False)  # instances are never looped over
     out: dict[str, object] = {name: _looped(scene, kind, records) for (name, records), kind in kinds}
     out |= {_loop(name): n for name, n in out.items()}
@@ -308,7 +309,7 @@ def _quad_lamp(scene: SceneArrays) -> int:
 def defines(
     raised: frozenset[str], settings: RenderSettings | None = None, shapes: Mapping[str, object] | None = None
 ) -> dict[str, object]:
-    """Every flag as 0 or 1, the numbers of shapes that loops run over, and the settings that are compiled in."""
+    """The defines of a kernel: every flag as 0 or 1, numbers of records, and the settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
     out |= {"QUAD_LAMP": -1} | textures_glsl.defines({}) | dict(shapes or {})

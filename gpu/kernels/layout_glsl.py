@@ -18,9 +18,10 @@ def _struct(record: type[Record]) -> str:
 def _loader(name: str, record: type[Record], slot: Slot) -> str:
     """The buffer of a record and its `NAME_load(i)`.
 
-    A buffer of which kernels know the count is a uniform block: llvmpipe loads those once for all lanes where the
-    index is constant, as in unrolled loops, and storage buffers lane by lane wherever control flow has diverged.
-    A kind of which the first stand in a loop and the others in the tree has both, and `NAME_tree_load(i)` for any.
+    Where a kernel knows the number of records, they are in a uniform block: llvmpipe loads from a block once for all
+    lanes where the index is constant, as in unrolled loops, but from a storage buffer lane by lane wherever control
+    flow has diverged. Where the first shapes of a kind stand in a loop and the others in the tree, there are both,
+    and `NAME_tree_load(i)` reads any of them.
     """
     storage = _storage(name, record, slot, "words")
     if name not in bindings.COUNTED:
@@ -51,7 +52,7 @@ _SHAPES = frozenset(kind.name.lower() for kind in ShapeKind if kind != ShapeKind
 
 
 def _split(name: str) -> str:
-    """Whether a kernel's loop holds some shapes of a kind and its tree the others."""
+    """The condition under which a kernel's loop has some shapes of a kind and its tree the others."""
     return f"{name.upper()}_COUNT > 0 && HAS_BVH_{layout.BUFFERS[name][1].name}"
 
 
@@ -77,7 +78,7 @@ def _load(name: str, record: type[Record], function: str, words: str) -> str:
 
 
 def _picker(name: str, record: type[Record]) -> str:
-    """`NAME_pick(i)`: as `_load`, but where there are very few, chosen among loads at constant places."""
+    """`NAME_pick(i)`, which is `NAME_load(i)`, but chooses among loads at constant places where records are few."""
     count = f"{name.upper()}_COUNT"
     tree = f"#if {_split(name)}\n    return {name}_tree_load(i);\n#elif" if name in _SHAPES else "#if"
     return f"""

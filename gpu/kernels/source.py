@@ -1,4 +1,4 @@
-"""Shader text: includes, flags, errors by file and line."""
+"""Shader text with its includes and flags, and the driver's errors by file and line."""
 
 from __future__ import annotations
 
@@ -57,13 +57,13 @@ class KernelSource:
         return out
 
     def _check(self, condition: str, name: str, at: int) -> None:
-        # Mesa reads an unknown name in #if as 0 and says nothing.
+        # Mesa takes an unknown name in #if for 0 without a warning.
         for word in _WORD.findall(condition.split("//")[0]):
             if word not in self._defines:
                 raise CompileError(f"{name}:{at}: #if asks for {word}, which nothing defines")
 
     def explain(self, message: str) -> str:
-        """The driver's message with file names for its source numbers."""
+        """The driver's message with file names in place of its source numbers."""
 
         def named(match: re.Match[str]) -> str:
             number = int(match.group(1))

@@ -31,7 +31,7 @@ def unpacked(record: type[Record], group: int) -> str:
 
 
 def defines(slots: dict[str, int]) -> dict[str, object]:
-    """Of a scene whose textured members get their texels from these slots; see `arrays.TextureArrays`."""
+    """The defines of a scene whose textured members get their texels from these slots; see `arrays.TextureArrays`."""
     count = max(slots.values(), default=-1) + 1
     out: dict[str, object] = {f"TEXTURE_{name.upper()}": slots.get(name, -1) for name in ALL}
     out |= {f"TEXTURE_{name.upper()}_USE": f"{i}u" for i, name in enumerate(slots)}
@@ -43,12 +43,13 @@ def defines(slots: dict[str, int]) -> dict[str, object]:
 
 
 def groups(slots: dict[str, int]) -> int:
-    """Groups of four words that follow each material."""
+    """The number of groups of four words that follow each material."""
     return (max(slots.values(), default=-1) + 1) * SLOT_GROUPS + len(slots) * USE_GROUPS
 
 
 def _reader(record: type[Record], name: str, first: str, size: int) -> str:
-    """`NAME_load(i, k)`: the k-th of material i; `NAME_pick(i, k)`: without a varying index where there are few."""
+    """`NAME_load(i, k)`, the k-th record of material i, and `NAME_pick(i, k)`, which needs no varying index where
+    there are few materials."""
     words = "\n".join(
         f"    uvec4 w{j} = material_words[i * MATERIAL_GROUPS + {first} + {size}u * k + {j}u];" for j in range(size)
     )

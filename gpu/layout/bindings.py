@@ -26,16 +26,16 @@ class Slot(IntEnum):
     OUTPUT = 15
 
 
-FRAME_BLOCK = 0  # uniform blocks
+FRAME_BLOCK = 0  # binding points of uniform blocks
 FILTER_BLOCK = 1
-# Buffers with a NAME_COUNT that kernels are compiled for: uniform blocks where it is above 0. Binding points
+# Binding points, as uniform blocks, of the buffers whose NAME_COUNT kernels are compiled for, where it is above 0.
 COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}
-ENVIRONMENT_TEXTURE = 0  # texture units
+ENVIRONMENT_TEXTURE = 0  # this and the following ones are texture units
 BYTES_TEXTURE, FLOATS_TEXTURE = 8, 9  # texels of images
-UVS_TEXTURES = (10, 11)  # of triangles' corners, by uv set
+UVS_TEXTURES = (10, 11)  # texture coordinates of triangles' corners, by uv set
 COLORS_TEXTURE = 12
 LIGHT_TREE_TEXTURE = 13
-INSTANCES_TEXTURE = 14  # records: all storage buffers are taken
+INSTANCES_TEXTURE = 14  # records in a texture, as all storage buffers are taken
 MICROFACETS_TEXTURE = 5  # records of the model `microfacet` and their tables
 ENERGY_TEXTURES = {"albedo": 1, "stretched": 2, "mean": 3, "sheen": 4}  # tables of gpu.tables.energy
-TEXELS_A_ROW = 8192  # of the textures that hold texels and coordinates, one after the other
+TEXELS_A_ROW = 8192  # width of the textures that hold one long row of values, cut into rows

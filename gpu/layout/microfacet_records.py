@@ -54,7 +54,7 @@ TERMS: dict[str, type[IntEnum]] = {
     "fresnel": Fresnel,
     "diffuse_model": DiffuseModel,
 }
-# What is computed where no flag of its kind is raised.
+# The term of each kind that kernels compute where no flag of that kind is raised.
 PLAIN: dict[str, IntEnum] = {"fresnel": Fresnel.NONE, "diffuse_model": DiffuseModel.LAMBERT}
 
 
@@ -66,7 +66,7 @@ class Microfacet(Record):
     gamma: f32  # the distribution's second parameter, where it has one
     diffuse_roughness: f32  # [0, 1]; radians for oren_nayar
     table: u32  # the first texel of its table
-    rows: u32  # 0: it needs none; 1: of its one alpha; else of a range of them, by which a texture may give alpha
+    rows: u32  # 0: it needs no table; 1: one alpha; else a range of alphas, for a texture that gives alpha
     conductor_eta: vec3  # index of refraction, per channel
     row_scale: f32  # rows over a unit of log(alpha + row_offset)
     conductor_k: vec3  # extinction coefficient, per channel

@@ -18,13 +18,13 @@ NOT_VAST = 3.4e38
 ABSENT = -1.0  # a material's number that was not given
 LEAST_ROUGHNESS = 0.01  # a `principled` surface or coat with less is a mirror
 LUMINANCE = (0.2126, 0.7152, 0.0722)  # weights of linear Rec.709
-TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises what it may need
-SINGLE_SIDED = 0x80000000  # in Triangle.shape: the triangle is not there for rays that meet its back
+TEXTURED = 1e-30  # a material's number that a texture gives: above 0, so that it raises the flags it may need
+SINGLE_SIDED = 0x80000000  # in Triangle.shape: rays that come from behind pass the triangle
 HIDDEN = 0x40000000  # in every record's shape: the camera looks through it
-# In TriangleNormals.bits: the corners' normals are interpolated; v grows to the right of u, seen from outside; and
-# from TANGENT_SHIFT on three codes of TANGENT_BITS each, 0 of none: 1 + the tangent's angle in the plane of its
-# corner's normal, in steps. A step is .35 degrees, less than a normal map of 8 bits tells apart; right angles are
-# whole numbers of them.
+# In TriangleNormals.bits: NORMALS_SMOOTH: the corners' normals are interpolated; NORMALS_LEFT: v grows to the right
+# of u, seen from outside. From TANGENT_SHIFT on follow three codes of TANGENT_BITS each: 0 for no tangent, else 1 +
+# its angle in the plane of the corner's normal, in steps. A step is 0.35 degrees, less than a normal map of 8 bits
+# resolves; a right angle is a whole number of steps.
 NORMALS_SMOOTH, NORMALS_LEFT = 1, 2
 TANGENT_SHIFT, TANGENT_BITS, TANGENT_STEPS = 2, 10, 1020
 
@@ -39,7 +39,7 @@ class ShapeKind(IntEnum):
 
 
 class LightKind(IntEnum):
-    """Those from SPHERE on are shapes, which emit by their material."""
+    """Kinds of lights. Those from SPHERE on are shapes, which emit by their material."""
 
     POINT = 0
     ENVIRONMENT = 1
@@ -303,7 +303,7 @@ class Frame(Record):
 
 PLAN_AREA = 8  # pixels a side of the areas that a sample plan knows: a work group of the path tracer
 PLAN_CLASSES = 4  # of an area's rows, each planned by itself: llvmpipe works on a row of eight pixels at once
-METER_REPLICATES = 8  # more than the noise meter takes of a pixel; which one it is, in so many parts of its place's x
+METER_REPLICATES = 8  # more than the noise meter takes of a pixel; the replicate's number over this is x's fraction
 
 BUFFERS: dict[str, tuple[type[Record], Slot]] = {
     "material": (Material, Slot.MATERIALS),

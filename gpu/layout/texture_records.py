@@ -10,8 +10,8 @@ from gpu.layout.record import Record, f32, u32, vec3, vec4
 SLOT_CLAMP, SLOT_MIRROR, SLOT_SRGB, SLOT_FLOATS, SLOT_CHECKER, SLOT_UV_1 = (1 << i for i in range(6))
 CHANNEL_NONE, CHANNEL_COLOR, CHANNEL_R = 0, 1, 2  # then g, b and a
 
-# The numbers of a material that a texture may give, with their ranges: those a surface is made from, with which the
-# normals are asked for, and those that a path asks for elsewhere.
+# The numbers of a material that a texture may give, with their ranges: those that a surface is made from, which are
+# read together with the normals, and those that are read elsewhere along a path.
 UNIT, LARGE = (0.0, 1.0), (0.0, 1e20)
 SURFACE_RANGES: dict[str, tuple[float, float]] = {
     name: UNIT

@@ -1,7 +1,7 @@
-"""One kernel for many scenes: several times slower than a scene's own, but there at once while that is compiled.
+"""One kernel for many scenes. It is several times slower than a scene's own, but serves while that is compiled.
 
-It has every flag on but those of what it knows nothing of, and learns from the frame how many shapes there are, so
-that its machine code depends on no scene: only on whether the sides of the environment's map are powers of two.
+It has every flag on but those of features that it does not support, and reads the numbers of shapes from the frame.
+So its machine code depends on no scene, only on whether the sides of the environment's map are powers of two.
 """
 
 from __future__ import annotations
@@ -16,7 +16,8 @@ from gpu.kernels import features
 from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
 
-# Textures are laid out anew for each scene; instances and the lab's terms are rare, and would cost all others time.
+# Features that it does not support: textures are laid out anew for each scene; instances and the terms of
+# `microfacet` are rare and would cost all other scenes time.
 UNKNOWN = frozenset({
     "HAS_TEXTURES", "HAS_BYTE_TEXELS", "HAS_FLOAT_TEXELS", "HAS_SRGB_TEXELS", "HAS_CHECKERS", "HAS_UVS", "HAS_UVS_1",
     "HAS_VERTEX_COLORS", "HAS_NORMAL_MAPS", "HAS_COAT_NORMALS", "HAS_TEXTURED_LIGHTS", "HAS_INSTANCES",
@@ -30,25 +31,25 @@ def flags() -> frozenset[str]:
 
 
 def defines() -> dict[str, object]:
-    """What it is compiled with, whatever the scene and its settings."""
+    """The defines that it is compiled with, whatever the scene and its settings."""
     return features.defines(flags(), RenderSettings(1, 1, clamp=1.0)) | features.loops_from_frame()
 
 
 def settings_for(settings: RenderSettings) -> RenderSettings | None:
-    """Settings that it can render with; None where a picture with them would be another one."""
+    """The settings with which it renders the same picture; None where it cannot."""
     known = settings.estimator == "mis" and settings.sampler == "sobol"
     return replace(settings, adaptive=False) if known else None
 
 
 def kernel_key(arrays: SceneArrays, settings: RenderSettings) -> kernel_keys.KernelKey | None:
-    """To have it compiled; None where it cannot show such a scene."""
+    """The key by which it is compiled; None where it cannot show such a scene."""
     if settings_for(settings) is None or features.flags(arrays) & UNKNOWN:
         return None
     return kernel_keys.KernelKey(tuple(defines().items()), kernel_keys.kernel_key(arrays, settings, flags()).textures)
 
 
 def edits(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
-    """What `Scene.edit` has to be told to come from one to the other; None: another scene."""
+    """The arguments of `Scene.edit` that lead from one scene to the other; None where no edit does."""
     same = all(getattr(old, f.name) is getattr(new, f.name) for f in fields(SceneArrays) if f.name not in _EDITED)
     was, is_ = old.environment, new.environment
     if was is not None and is_ is not None:

@@ -26,7 +26,7 @@ ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scen
 
 @dataclass(frozen=True)
 class KernelKey:
-    """All that the machine code of a picture's kernel depends on, but the driver.
+    """Everything that the machine code of a picture's kernel depends on, except the driver.
 
     `textures` are (unit, channels, dtype, width, height): code for sides that are powers of two differs, their
     length does not matter, so that they are given as 1 or 3.
@@ -47,7 +47,7 @@ class KernelKey:
 def kernel_key(
     arrays: SceneArrays, settings: RenderSettings, raised: frozenset[str], entry: str = ENTRY
 ) -> KernelKey:
-    """What a picture of `arrays` needs compiled where these flags are raised: its kernel, or that of its GUIDES."""
+    """The key of the kernel `entry` for a picture of `arrays` where these flags are raised."""
     defines = features.defines(raised, settings, features.counts(arrays))
     return KernelKey(tuple(defines.items()), _textures(arrays, raised), entry)
 
@@ -68,8 +68,8 @@ def flags_after_edit(raised: frozenset[str], arrays: SceneArrays, editing: bool)
 
 
 def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey | None:
-    """What a stream will need when it first moves a large mesh of this scene; None where it has none, or instances.
-    A guess where there are small meshes beside it, some of which may stand in the kernel's loop.
+    """The key that a stream will need when it first moves a large mesh of this scene; None where the scene has none,
+    or has instances already. It is a guess where there are small meshes too, some of which may stand in the loop.
     """
     if len(arrays.instances):
         return None
@@ -86,8 +86,8 @@ def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey |
 
 
 def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[KernelKey]:
-    """What a stream will need when it first touches a slider of `principled` that is not compiled in with the others.
-    A guess for meshes, of which only those of the material that is stretched get tangents.
+    """The keys that a stream will need when it first moves a slider of `principled` that is not compiled in with the
+    others. They are a guess for meshes, of which only those with the anisotropic material get tangents.
     """
     has = features.flags(arrays, True)
     if "HAS_PRINCIPLED" not in has:
@@ -99,7 +99,7 @@ def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[Kerne
 
 
 def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:
-    """The same with every flag raised, for a `scene.Everything`, which has something bound to every texture unit."""
+    """The key with every flag raised, for a `scene.Everything`, which has a texture bound to every unit."""
     own = kernel_key(arrays, settings, features.everything())
     bound = {unit for unit, *_ in own.textures}
     bare = ((unit, channels, dtype, 1, 1) for unit, (channels, dtype) in KINDS.items() if unit not in bound)
@@ -107,7 +107,8 @@ def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:
 
 
 def common_keys() -> list[KernelKey]:
-    """The kernels of any scene: what a picture is shown with, and what the noise meter and `adaptive` ask of it."""
+    """The keys of the kernels of any scene: those that show a picture, and those of the noise meter and
+    `adaptive`."""
     shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
     metered = [("meter.comp", noise_meter.defines(weigh)) for weigh in (0, 1)]
     entries = [*shown, *metered, ("areas.comp", features.defines(frozenset()))]
@@ -115,13 +116,13 @@ def common_keys() -> list[KernelKey]:
 
 
 def bsdf_key(material: SceneArrays, question: BsdfQuestion) -> KernelKey:
-    """What a `BsdfEvaluator` needs for a scene of one material."""
+    """The key of the kernel by which a `BsdfEvaluator` answers the question for a scene of one material."""
     bare, entry = bsdf.bare(material), bsdf.ENTRIES[QUESTIONS.index(question)]
     return KernelKey(tuple(bsdf.defines(bare, entry).items()), _textures(bare, bsdf.flags(bare)), entry)
 
 
 def bsdf_keys() -> Iterator[KernelKey]:
-    """What a `BsdfEvaluator` needs for any material."""
+    """The keys of all kernels that a `BsdfEvaluator` needs for any material."""
     found = set[KernelKey]()
     for question in QUESTIONS:
         for material in bsdf.samples():

@@ -14,13 +14,13 @@ from gpu.errors import CompileError
 from gpu.layout import bindings
 from gpu.precompile.kernel_keys import KernelKey
 
-_BUFFER = 1 << 16  # bytes; zeros for whatever is bound, and no pixel looks at it
-_QUICK_S = 0.04  # of processor time: no compiler was at work
-_LOOKS = 8  # for a kernel in the disk cache, which drivers write behind our back
+_BUFFER = 1 << 16  # bytes of zeros that are bound to every slot; no invocation reads them
+_QUICK_S = 0.04  # seconds of processor time below which the kernel came from the disk cache
+_LOOKS = 8  # times that a kernel is looked up in the disk cache, which drivers write in a thread of their own
 
 
 class Precompiler:
-    """A context in a process of its own that only compiles. Raises ContextError where there is none to be had."""
+    """A context in a process of its own that only compiles. Raises ContextError where none can be created."""
 
     def __init__(self, device: int | None = None) -> None:
         self._context = contexts.create(device)
@@ -28,7 +28,9 @@ class Precompiler:
         self._tables: dict[int, Any] = {}
 
     def compile(self, wanted: KernelKey) -> tuple[float, bool]:
-        """Milliseconds, and whether the next one finds it in the driver's disk cache. Raises CompileError."""
+        """Compile a kernel: the milliseconds that it took, and whether the driver's disk cache has it now.
+
+        Raises CompileError."""
         began = time.perf_counter()
         first_s = self._once(wanted)
         milliseconds = (time.perf_counter() - began) * 1e3
@@ -41,7 +43,7 @@ class Precompiler:
         return milliseconds, False
 
     def _once(self, wanted: KernelKey) -> float:
-        """Compiles to machine code by running over no pixel; the processor time that it took (s)."""
+        """Compile to machine code by running over no pixel. Returns the processor time that it took (s)."""
         text = wanted.text
         textures = [self._texture(*kind) for kind in wanted.textures]
         if dict(wanted.defines).get("HAS_PRINCIPLED_LOBES"):

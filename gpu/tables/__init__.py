@@ -3,7 +3,7 @@
 alias_table        weights -> which light, and which texels of an environment, in constant time
 environment_cells  a map of weights -> cells of equal probability, along Morton's curve
 sky                the analytic clear sky and its sun, from the numbers in `hosek_wilkie.txt`
-microfacet         factors of distributions of facets, and how much of the facets a direction sees
+microfacet         factors of distributions of facets, and the area of facets that a direction sees
 energy             the energy that microfacet lobes lose, from `energy.npz`, which the folder `build` makes
 build              the offline programs behind `energy.npz`; no other module imports them
 """

@@ -34,7 +34,7 @@ def alias_table(weights: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray
         giver = np.searchsorted(spare, np.concatenate([[0.0], need[:-1]]), side="right")
         threshold[light] = share[light]
         alias[light] = heavy[np.minimum(giver, len(heavy) - 1)]
-        # A heavy item that gave more than it could spare is topped up by the next one.
+        # Where a heavy item gave more than it could spare, the next one fills it up.
         taker = np.minimum(np.searchsorted(need, spare[:-1]), len(need) - 1)
         threshold[heavy[:-1]] = np.clip(1.0 + spare[:-1] - need[taker], 0.0, 1.0)
         alias[heavy[:-1]] = heavy[1:]

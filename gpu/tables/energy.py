@@ -1,4 +1,4 @@
-"""Tables of how much light the lobes of `principled` send back, for the terms that put back what they lose.
+"""Tables of the albedos of `principled`'s lobes, for the terms that put back the energy that they lose.
 
 `gpu.tables.build.energy_tables` computes them into `energy.npz`. Runs without GL. The kernels' side is
 `shaders/energy.glsl`.
@@ -23,7 +23,7 @@ AZIMUTH_POWER = 0.8  # azimuths from the short axis, as this power of equal step
 SHEEN_SHAPE = (16, MU_COUNT)  # sheen roughness, cosine
 LEAST_ASPECT = float(np.sqrt(0.1))  # at anisotropic = 1; aspects in the tables are equal ratios apart
 LARGEST_ETA = 4.0
-LEAST_SHEEN_ROUGHNESS = 0.27  # below, the sheen's masking lets it send back more than it receives
+LEAST_SHEEN_ROUGHNESS = 0.27  # with less, the sheen's masking would let it reflect more than it receives
 _X_END = (LARGEST_ETA - 1) / (LARGEST_ETA + 1)
 
 
@@ -34,8 +34,9 @@ class Tables:
     `albedo` (eta, roughness, mu, 4): reflected with Fresnel 1; with eta's, never too low; lost where glass is
     entered; lost where it is left. `stretched` (eta, aspect, roughness, azimuth, mu, 4): the same of stretched lobes,
     though seldom a little too low.
-    `mean` (eta, round lobes and each aspect of stretched, roughness, 4): their cosine-weighted means; of what is
-    lost divided by how much more is lost in truth, as `energy_tables` says. `sheen` (roughness, mu): the same.
+    `mean` (eta, round lobes and each aspect of stretched, roughness, 4): their cosine-weighted means; those of the
+    loss are divided by the factor by which the true loss is greater, see `energy_tables`. `sheen` (roughness, mu):
+    the albedo of sheen.
     """
 
     albedo: np.ndarray
@@ -49,7 +50,7 @@ def mu_nodes(count: int = MU_COUNT) -> np.ndarray:
 
 
 def roughness_nodes(count: int = ALBEDO_SHAPE[1]) -> np.ndarray:
-    """Denser where lobes are narrow."""
+    """Roughnesses of the nodes, denser where lobes are narrow."""
     return np.linspace(0, 1, count) ** 1.5
 
 
@@ -89,7 +90,7 @@ def tables() -> Tables:
     with np.load(FILE) as kept:
         found = {n: _summed(v) if n == "stretched" else v for n, v in kept.items()}
     found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in found.items()}
-    # What is reflected with Fresnel 1 is the same for every index: kept once.
+    # The albedo with Fresnel 1 is the same for every index and is stored once.
     one = np.broadcast_to(found.pop("stretched_one"), STRETCHED_SHAPE)
     found["stretched"] = np.concatenate([one[..., None], found["stretched"]], -1)
     return Tables(**found)

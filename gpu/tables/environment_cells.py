@@ -1,8 +1,8 @@
 """A map of weights -> cells that are drawn with equal chances: how directions are drawn from an environment.
 
-An alias table draws texels exactly by weight but scatters neighbouring numbers over the whole map, and with them all
-that a stratified sampler had gained. Here the cells follow Morton's curve, so that near numbers draw near places:
-16 samples of a softly lit matte sphere are a third as noisy in variance, more samples more so. Runs without GL.
+An alias table draws texels exactly by weight but scatters neighbouring numbers over the whole map, which loses the
+gain of a stratified sampler. Here the cells follow Morton's curve, so that near numbers draw near places: 16 samples
+of a softly lit matte sphere have a third of the variance, and more samples gain more. Runs without GL.
 """
 
 from __future__ import annotations
@@ -11,11 +11,11 @@ import numpy as np
 
 from gpu.layout import EnvironmentCell
 
-CELLS_A_TEXEL = 4  # a block's chance is a whole number of cells: with 4 its error is some percent
-FEWEST_CELLS, MOST_CELLS = 1 << 14, 1 << 20  # aimed at; large maps have more texels than a pixel gets samples
-FINEST = 1 << 22  # blocks looked at; a larger map is not halved down to its texels
-CONTRAST = 4.0  # a block holds no texel so much above its mean ...
-FAINT = 1 / 64  # ... unless all of it is so much less than a cell's share
+CELLS_A_TEXEL = 4  # a block's probability is a whole number of cells: with 4 its error is some percent
+FEWEST_CELLS, MOST_CELLS = 1 << 14, 1 << 20  # bounds; large maps have more texels than a pixel gets samples
+FINEST = 1 << 22  # blocks at most; a larger map is not halved down to its texels
+CONTRAST = 4.0  # a block with a texel this many times its mean is halved ...
+FAINT = 1 / 64  # ... unless its whole weight is less than this share of a cell's
 
 
 def draw_cells(
@@ -32,7 +32,7 @@ def draw_cells(
     total = sum(float(m.max()) for m in maps)
     scaled = [np.asarray(m, np.float64) / total for m in maps]  # first, or the sum of tiny weights would be denormal
     wanted = min(max(CELLS_A_TEXEL * sum(m.size for m in maps), FEWEST_CELLS), MOST_CELLS)
-    cell = sum(float(m.sum()) for m in scaled) / wanted  # what a cell is worth
+    cell = sum(float(m.sum()) for m in scaled) / wanted  # the weight of a cell
     blocks = [_blocks(m, cell) for m in scaled]
     counts = [np.maximum(1, np.rint(b["weight"] / cell)).astype(np.int64) for b in blocks]
     number = sum(int(c.sum()) for c in counts)
@@ -86,7 +86,8 @@ def _levels(weights: np.ndarray) -> list[tuple[np.ndarray, np.ndarray, tuple[int
     rows, columns = 1, 1
     while levels[-1][0].size > 1:
         sums, peaks, _ = levels[-1]
-        # Columns before rows, in turns, as the bits of Morton's curve; a side that is one already waits.
+        # Columns and rows take turns, columns first, as the bits of Morton's curve do; a side of one texel is left
+        # out.
         axis = 1 if (columns <= rows and sums.shape[1] > 1) or sums.shape[0] == 1 else 0
         rows, columns = (rows * 2, columns) if axis == 0 else (rows, columns * 2)
         at = np.arange(0, sums.shape[axis], 2)

@@ -1,4 +1,4 @@
-"""What has no closed form in the model `microfacet`: factors of distributions, and how much of the facets is seen.
+"""Numbers without a closed form of the model `microfacet`: factors of distributions, and visible areas of facets.
 
 D is written as exp(log_factor + log_shape), with the integral of D cos over the hemisphere equal to 1. Integrals run
 over x = log(tan theta_m), in which every distribution is smooth, whatever its width: dtheta = sin cos dx.
@@ -14,8 +14,8 @@ import numpy as np
 from gpu.layout.microfacet_records import Distribution
 
 INTERVALS = 32  # of the axis of directions, each with a cubic
-# Of a table for all alphas, at equal steps of log(alpha + ROW_OFFSETS). A gamma of 10 turns gtr about within a small
-# change of alpha at 1.
+# Rows of a table for all alphas, at equal steps of log(alpha + ROW_OFFSETS). They are many because with a gamma of 10
+# gtr turns about within a small change of alpha at 1.
 ROWS, ROWS_GTR = 192, 400
 ROW_OFFSETS = {Distribution.PHONG: 2.0}  # 0 for the others
 CLOSED_FACTOR = (Distribution.PHONG, Distribution.BECKMANN, Distribution.GGX, Distribution.GTR)
@@ -63,7 +63,7 @@ def log_shape(distribution: Distribution, x: np.ndarray, alpha: float, gamma: fl
 
 @lru_cache(maxsize=1024)
 def log_factor(distribution: Distribution, alpha: float, gamma: float) -> float:
-    """The logarithm of what D is, divided by exp(log_shape)."""
+    """The logarithm of D / exp(log_shape)."""
     return _bulk(distribution, alpha, gamma)[0]
 
 
@@ -79,9 +79,9 @@ def _bulk(distribution: Distribution, alpha: float, gamma: float) -> tuple[float
 def seen_area(distribution: Distribution, alpha: float, gamma: float, sin: np.ndarray, cos: np.ndarray) -> np.ndarray:
     """The projected area of the facets that face a direction w: the integral of D(m) max(0, w.m) over the hemisphere.
 
-    G1 is cos over this. Facets that all face it would give cos; to that, those beyond theta_m = 90 degrees - theta
-    add what they would have taken away: 2 q (sqrt(1 - r^2) - r acos r) each, integrated over their azimuth, with
-    q = sin sin_m and r = cot / tan_m.
+    G1 is cos over this. If no facet faced away, the area would be cos. Facets beyond theta_m = 90 degrees - theta do
+    at some azimuths, and leaving those out adds 2 q (sqrt(1 - r^2) - r acos r), integrated over the azimuth, with q =
+    sin sin_m and r = cot / tan_m.
     """
     factor, median = _bulk(distribution, alpha, gamma)
     cot = np.maximum(cos / np.maximum(sin, 1e-300), np.exp(median - 12))  # less changes nothing

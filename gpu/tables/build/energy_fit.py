@@ -1,8 +1,8 @@
 """Values on a grid whose linear interpolation follows a function closely, and stays above it nearly everywhere.
 
-Runs without GL. A fit by asymmetric least squares [Newey & Powell 1987, "Asymmetric least squares estimation and
-testing"]: what is interpolated too low by more than a margin counts a hundredfold. Values taken from the function
-itself interpolate to one side of it wherever it is curved; the fit lets them err to both.
+They are fitted by asymmetric least squares [Newey & Powell 1987, "Asymmetric least squares estimation and testing"]:
+an error below the function by more than a margin counts a hundredfold. Values of the function itself interpolate to
+one side of it wherever it is curved; the fit lets them err to both. Runs without GL.
 """
 
 from __future__ import annotations
@@ -15,8 +15,8 @@ import numpy as np
 # of its axis.
 Samples = Sequence[tuple[np.ndarray, np.ndarray]]
 
-_WEIGHT = 100.0  # of what is below the margin
-_STEPS = 40  # twice as many change the error's root mean square by .1 %
+_WEIGHT = 100.0  # weight of errors below the margin
+_STEPS = 40  # twice as many change the error's root mean square by 0.1 %
 
 
 def _sides(rank: int, axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
@@ -34,7 +34,7 @@ def between(nodes: np.ndarray, f: np.ndarray) -> np.ndarray:
 
 
 def _spread(values: np.ndarray, f: np.ndarray, largest: bool = False) -> np.ndarray:
-    """To each node the sum of `values` with the weights that `between` gives it; or the largest that it touches."""
+    """For each node the sum of `values` with the weights that `between` gives it, or the largest value around it."""
     for axis, x in enumerate(f):
         if x > 0:
             low, high = _sides(values.ndim, axis)

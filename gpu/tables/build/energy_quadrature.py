@@ -1,4 +1,4 @@
-"""What microfacets reflect and lose and sheens reflect, by quadrature: the numbers behind `energy_tables`."""
+"""Albedos of microfacet and sheen lobes, and the energy that they lose, by quadrature, for `energy_tables`."""
 
 from __future__ import annotations
 
@@ -26,7 +26,8 @@ def _lambda(x: float, y: float, z: float) -> float:
 
 @jit_loose
 def albedos(mu: float, cos_phi: float, ax: float, ay: float, eta: float, n: int) -> tuple[float, float, float, float]:
-    """Of single scattering from direction (mu, phi): all reflected, reflected by eta, and lost by eta and by 1 / eta.
+    """Albedos of single scattering from direction (mu, phi): with Fresnel 1, with the Fresnel of eta, and the shares
+    that are lost with eta and with 1 / eta.
 
     Visible normals by spherical caps [Dupuy & Benyoub 2023]; masking of two directions on one side by heights
     correlated, across the surface by the product of both [Walter et al. 2007].
@@ -38,7 +39,7 @@ def albedos(mu: float, cos_phi: float, ax: float, ay: float, eta: float, n: int)
     length = math.sqrt((ax * x) ** 2 + (ay * y) ** 2 + z * z)
     vx, vy, vz = ax * x / length, ay * y / length, z / length
     one = reflected = kept_a = kept_b = 0.0
-    # Many rows, each turned against the last: seen head-on a whole row is lost or kept.
+    # Many rows, each turned against the last one: head-on, a whole row is masked or not.
     rows, columns = 3 * n, n // 3
     step_x, step_y = math.cos(2.0 * math.pi / columns), math.sin(2.0 * math.pi / columns)
     for i in range(rows):
@@ -83,7 +84,7 @@ def _sheen_lambda(c: float, a: float, b: float, k: float, d: float, e: float) ->
 
 
 def sheen_fit(alpha: float) -> list[float]:
-    """The five numbers of the sheen's masking, between a rough and a smooth set [Estevez & Kulla 2017, eq. 3]."""
+    """The five parameters of the sheen's masking, between a rough and a smooth set [Estevez & Kulla 2017, eq. 3]."""
     t = (1.0 - alpha) ** 2
     rough, smooth = (21.5473, 3.82987, 0.19823, -1.97760, -4.32054), (25.3245, 3.32435, 0.16801, -1.27393, -4.85967)
     return [t * s + (1.0 - t) * r for s, r in zip(smooth, rough, strict=True)]

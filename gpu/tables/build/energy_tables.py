@@ -2,11 +2,11 @@
 
 Quadrature over visible normals takes nine minutes of two cores; `energy.npz` holds the result, in steps of 1/65535.
 
-Against quadrature at 6 000 random places (stretched: 4 096) from 0 to 87 degrees, index 1 to 4: round lobes put back
-at most .002 more than is lost, and at most .005 less (index above 1.2: .011; near 1 .024). Stretched ones put back no
-less on average, .003 in one direction of a hundred, .013 at worst; at most .002 more, but where glass is left .003 in
-one of a thousand, .005 in one. What is less on average is made good by the means: of round lobes all of it, of
-stretched ones what no direction gains by.
+The tables were compared with quadrature at 6 000 random places (stretched lobes: 4 096) from 0 to 87 degrees and
+index 1 to 4. Round lobes put back at most 0.002 more than is lost, and at most 0.005 less (index above 1.2: 0.011;
+near 1: 0.024). Stretched ones put back no less on average, 0.003 less in one direction of a hundred, 0.013 at worst;
+and at most 0.002 more, except where light leaves glass: 0.003 in one of a thousand, 0.005 in one. The shortfall on
+average is corrected by the means: for round lobes all of it, for stretched ones as far as no direction gains energy.
 """
 
 from __future__ import annotations
@@ -24,18 +24,18 @@ from gpu.tables.build.energy_fit import Samples, between, fitted, raised
 from gpu.tables.build.energy_quadrature import albedos, sheen_albedo, sheen_fit
 from gpu.tables.energy import ALBEDO_SHAPE, ETA_COUNT, MEAN_SHAPE, STRETCHED_SHAPE
 
-_FINE = 120  # points a side of the quadrature over visible normals: an error of .0005
-_CHECKED = 40  # of that between the nodes: .001, at some places .003
-_STRETCHED = 42  # and of stretched lobes
-SLACK = 0.001  # how far between nodes what is put back may pass what is lost: a third of what a furnace allows
-SLACK_RESTORED = 0.002  # how far it may pass where the mean is made good
-_MEDIUM = 60  # of the quadrature's points for that
-_HELD_BACK = 5e-5  # of the mean: the quadrature's error
-_GRAZING = 0.05  # cosine, of stretched lobes: beyond 87 degrees their mean is not bounded
-_LEAST_LOST = 0.003  # below, on average, there is nothing to make good
-_MARGIN_STRETCHED = 0.0015  # of stretched lobes: how far below the truth a fit costs nothing more
-_SLACK_STRETCHED = 0.002  # and how far below it is raised
-_PLACES = 8  # in each cell of the stretched tables, spread over its five axes [Roberts 2018]
+_FINE = 120  # points a side of the quadrature over visible normals at the nodes: an error of 0.0005
+_CHECKED = 40  # points a side between the nodes: an error of 0.001, at some places 0.003
+_STRETCHED = 42  # points a side for stretched lobes
+SLACK = 0.001  # by how much the energy put back may exceed the loss between nodes: a third of what a furnace allows
+SLACK_RESTORED = 0.002  # the same where the mean is corrected
+_MEDIUM = 60  # points a side of the quadrature for that
+_HELD_BACK = 5e-5  # share of the mean that is not put back: the quadrature's error
+_GRAZING = 0.05  # least cosine for stretched lobes: beyond 87 degrees their mean is not bounded
+_LEAST_LOST = 0.003  # mean loss below which nothing is corrected
+_MARGIN_STRETCHED = 0.0015  # how far below the truth the fit of stretched lobes costs nothing more
+_SLACK_STRETCHED = 0.002  # how far below it they are raised
+_PLACES = 8  # places in each cell of the stretched tables, spread over its five axes [Roberts 2018]
 _SPREAD = 1.1347241384015194  # the root of x^6 = x + 1
 
 
@@ -49,7 +49,7 @@ def _fill(out: Any, eta: float, aspect: float, roughness: Any, cos_phi: Any, mu:
 
 
 def _grid(axes: Sequence[np.ndarray], n: int) -> np.ndarray:
-    """(eta, aspect, roughness, azimuth, mu, 4): what `albedos` says of the lobes on the grid of these."""
+    """(eta, aspect, roughness, azimuth, mu, 4): the `albedos` of the lobes on the grid of these axes."""
     eta, aspect, roughness, cos_phi, mu = axes
     out = np.empty((*map(len, axes), 4))
 
@@ -105,7 +105,8 @@ def _above(nodes: np.ndarray, fine: np.ndarray) -> np.ndarray:
 
 
 def _round_table() -> np.ndarray:
-    """`Tables.albedo`: halfway between nodes no more is put back than is lost, and E by eta is never too low."""
+    """`Tables.albedo`: halfway between nodes the energy put back is at most the loss, and E by eta is never too
+    low."""
     mu, roughness = energy.mu_nodes(), energy.roughness_nodes()
     out = _round(energy.eta_nodes(), roughness, mu, _FINE)
     steps = [2 * n - 1 for n in ALBEDO_SHAPE]
@@ -117,7 +118,7 @@ def _round_table() -> np.ndarray:
     return out
 
 
-# What places 0..1 along the axes of Tables.stretched stand for.
+# The quantities for which places 0..1 along the axes of Tables.stretched stand.
 AXES: tuple[Callable[[np.ndarray], np.ndarray], ...] = (
     energy.eta_at,
     lambda x: energy.LEAST_ASPECT**x,
@@ -128,9 +129,9 @@ AXES: tuple[Callable[[np.ndarray], np.ndarray], ...] = (
 
 
 def _fractions() -> list[np.ndarray]:
-    """Of each axis' step: where the stretched tables are compared with what they stand for.
+    """Fractions of each axis' step at which the stretched tables are compared with quadrature.
 
-    The nodes, places in the cells, and such of whole planes of nodes: people set 1, not .97.
+    They are the nodes, places in the cells, and places in whole planes of nodes, as people set 1, not 0.97.
     """
     inner = [(0.5 + k * _SPREAD ** -np.arange(1.0, 6.0)) % 1.0 for k in range(_PLACES)]
     planes = [np.where(np.arange(5) < 3, 0.0, f) for f in inner[:4]]
@@ -140,7 +141,7 @@ def _fractions() -> list[np.ndarray]:
 
 
 def _kept(f: np.ndarray) -> np.ndarray:
-    """What stretched lobes send back, float32, at those places of all cells."""
+    """The albedos of stretched lobes, float32, at those places of all cells."""
     counts = zip(STRETCHED_SHAPE, f, strict=True)
     places = [(np.arange(n - 1) + x) / (n - 1) if x > 0 else np.linspace(0, 1, n) for n, x in counts]
     found = _grid([at(x) for at, x in zip(AXES, places, strict=True)], _STRETCHED)
@@ -149,7 +150,8 @@ def _kept(f: np.ndarray) -> np.ndarray:
 
 
 def _stretched_table(samples: Samples) -> np.ndarray:
-    """`Tables.stretched`: between nodes hardly more is put back than is lost, and E by eta is hardly too low."""
+    """`Tables.stretched`: between nodes hardly more energy is put back than is lost, and E by eta is hardly too
+    low."""
     out = fitted(samples[0][1], samples, _MARGIN_STRETCHED)
     out = raised(out, samples, _SLACK_STRETCHED).astype(float)
     out[..., 0] = out[..., 0].max(axis=0)
@@ -158,14 +160,14 @@ def _stretched_table(samples: Samples) -> np.ndarray:
 
 
 def _shares(at: np.ndarray, weight: np.ndarray, count: int) -> np.ndarray:
-    """What each of `count` nodes adds to the sum of `weight` times a table interpolated at the indices `at`."""
+    """The share of each of `count` nodes in the sum of `weight` times a table interpolated at the indices `at`."""
     k = np.clip(at.astype(int), 0, count - 2)
     f = at - k
     return np.bincount(k, weight * (1 - f), count) + np.bincount(k + 1, weight * f, count)
 
 
 def _means(albedo: np.ndarray, stretched: np.ndarray) -> np.ndarray:
-    """Cosine-weighted means over the hemisphere of what the kernels interpolate of the other tables."""
+    """Cosine-weighted means over the hemisphere of the other tables, interpolated as the kernels do it."""
     u = (np.arange(320) + 0.5) / 320  # roots of cosines
     weight = u**3 / (u**3).sum()  # 2 mu dmu with mu = u^2
     turn = (np.arange(32) + 0.5) / 32
@@ -186,8 +188,8 @@ def _means(albedo: np.ndarray, stretched: np.ndarray) -> np.ndarray:
 def _restored(true: np.ndarray, kept: np.ndarray, weight: np.ndarray) -> np.ndarray:
     """How much more is lost on average than the tables say, (..., D, 2) to (..., 2); `weight` (D,) of directions.
 
-    In a dense body light is scattered index^2 times: there even .001 a time would show. Nowhere is more put back for
-    it than `SLACK_RESTORED` above what is lost.
+    In a dense body light is scattered index^2 times, so that even 0.001 each time would show. Nowhere does this put
+    back more than `SLACK_RESTORED` above the loss.
     """
     lost, found = (np.einsum("...dc,d->...c", x, weight / weight.sum()) for x in (true, kept))
     ratio = (lost - _HELD_BACK) / np.maximum(found, 1e-9)
@@ -241,7 +243,7 @@ def compute() -> dict[str, np.ndarray]:
     samples = [(f, _kept(f)) for f in _fractions()]
     albedo, stretched = _round_table(), _stretched_table(samples)
     mean = _means(albedo, stretched)
-    # Both factors of what is put back are too small by that much, and are divided by their mean.
+    # Both factors of the energy that is put back are too small by that much, and are divided by their mean.
     mean[..., 2:] /= _restoring(albedo, stretched, samples)
     return {"albedo": albedo, "stretched": stretched, "mean": mean, "sheen": _sheen_table()}
 
