@@ -1,9 +1,10 @@
-"""Arrays in, images out. Knows no HTTP, no JSON, no scene document; who may import what is in docs/house.md.
+"""Arrays in, images out. This package knows no HTTP, no JSON and no scene document; docs/house.md has the import
+rules.
 
 renderer    the one way in: load a scene, take a picture of it
 arrays      a scene as finished arrays, which the service makes
 settings    the choices that change pixels
-steps       work that is done in steps
+steps       long work in steps, between which the caller may do something else
 errors      what can go wrong on the GPU
 context     a headless OpenGL context
 denoise     Open Image Denoise over pixels that were read back; public, without GL

@@ -1,4 +1,4 @@
-"""A scene as finished arrays: what the renderer takes in. Made by the service, uploaded as it is."""
+"""A scene as finished arrays, which `service.pack` makes and the renderer uploads as they are."""
 
 from __future__ import annotations
 
@@ -15,10 +15,10 @@ from gpu.tables.sky import SunDisk
 
 Vec3 = tuple[float, float, float]
 
-# Triangles from which on a mesh may be an instance; a smaller one costs less in the scene's own tree.
+# The least number of triangles of a mesh that may be an instance; a smaller one costs less in the scene's own tree.
 SHAREABLE = 1 << 10
-# Triangles from which on a mesh that a stream moves is worth a kernel that takes a quarter longer: to pack such a
-# mesh again takes 0.05 s.
+# The least number of triangles of a mesh that becomes an instance because a stream moves it: to pack such a mesh
+# again takes 0.05 s, and the kernel with instances takes a quarter more time for a sample.
 HEAVY = 1 << 15
 
 
@@ -65,12 +65,12 @@ def _empty(record: type[Record]) -> np.ndarray:
 
 @dataclass
 class SceneArrays:
-    """Everything the renderer needs. Shapes of a kind in `bvh_kinds` are met through `nodes`, all others in a loop.
+    """Everything the renderer needs. Rays find shapes of kinds in `bvh_kinds` through `nodes`, all others in a loop.
 
     The first `large` of a kind in `bvh_kinds` stand in the loop, too, instead of among the leaves.
 
-    Triangles from the first that an instance has on are those of instances, in the order of their trees' leaves, in
-    whose `instance_nodes` links and leaves count from the first node and the first triangle of the instance.
+    The triangles of instances follow all others, in the order of their trees' leaves. Links and leaves in
+    `instance_nodes` count from the first node and the first triangle of their instance.
 
     Positions are relative to `origin` (float64, world): what was subtracted before rounding to float32.
     """
@@ -110,13 +110,13 @@ class SceneArrays:
 
     @property
     def corner_colors(self) -> np.ndarray:
-        """The triangles' colours; white where none has any, for kernels that ask."""
+        """The triangles' colours; white where no triangle has any, for kernels that read them anyway."""
         missing = len(self.triangles) and not len(self.triangle_colors)
         return np.ones((len(self.triangles), 3, 4), np.float16) if missing else self.triangle_colors
 
     @property
     def light_words(self) -> np.ndarray:
-        """The lights' tree; where there is none, for kernels that ask: a head by which no number goes down a tree."""
+        """The lights' tree. Where there is none, kernels that read it anyway get a head by which no walk begins."""
         return self.light_tree if len(self.light_tree) else np.zeros((2, 4), np.uint32)
 
 
@@ -129,10 +129,12 @@ def apply_edit(
     environment: tuple[float, float] | None = None,
     moved: Mapping[str, Any] | None = None,
 ) -> SceneArrays:
-    """The arrays after an edit: the camera, the materials' bytes (as many as before), what they have of textures
-    (`TextureArrays.words`), the words of the model `microfacet`, the environment's (rotation, scale); `moved` are
-    members of the arrays that tell where shapes stand, with the scene's tree and the lights, as many as before. The
-    tree may change where there are instances. Raises ValueError for another number of materials.
+    """The arrays after an edit. None leaves a part as it is.
+
+    `materials` are as many records as before, `texture_words` their `TextureArrays.words`, `microfacets` the words of
+    the model `microfacet`, `environment` is (rotation, scale). `moved` maps names of members to their new arrays, of
+    the same length: those that say where shapes stand, the scene's tree and the lights. The length of the tree may
+    change where there are instances. Raises ValueError for another number of materials.
     """
     changes: dict[str, Any] = dict(moved or {})
     if camera is not None:

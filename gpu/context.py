@@ -63,7 +63,7 @@ def release(context: Any) -> None:
 
 
 def allocate(context: Any, contents: np.ndarray | int) -> Any:
-    """A buffer with these bytes, or of so many. Raises OutOfMemory, which moderngl leaves to be asked for."""
+    """A buffer with these bytes, or of that many. Raises OutOfMemory, for which moderngl itself does not check."""
     size = contents if isinstance(contents, int) else contents.nbytes
     context.error  # noqa: B018  # an older one is not this buffer's
     try:
@@ -77,7 +77,7 @@ def allocate(context: Any, contents: np.ndarray | int) -> Any:
 
 
 def storage_block_bytes(context: Any) -> int:
-    """The most of a buffer that a kernel may see at once."""
+    """The most bytes of a buffer that a kernel may be given at once."""
     return int(context.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"])
 
 

@@ -14,15 +14,15 @@ import numpy as np
 from gpu.layout import LUMINANCE
 
 GUIDE_SAMPLES = 16  # of the first hit's albedo and normal; 256 give the same error to three digits
-SMALLEST = 16  # pixels a side; smaller pictures are mostly the network's own padding: 1 x 1 came out 6 x too dark
-# Times the picture's typical radiance: what is brighter stays as it was rendered. The network's curve ends at 65504,
-# and beyond that it invents (1e20 came out as 3.5e20).
+SMALLEST = 16  # pixels a side; smaller pictures are mostly the network's padding: 1 x 1 came out 6 times too dark
+# In units of the picture's typical radiance: brighter pixels stay as they were rendered. The network's curve ends at
+# 65504, and beyond that it invents values (1e20 came out as 3.5e20).
 BRIGHTEST = 1e4
 _LUMINANCE = np.array(LUMINANCE)
 
 
 def version() -> str | None:
-    """Of the library, as far as can be told without loading it; None where it is not installed."""
+    """The library's version, read without loading it; None where it is not installed."""
     if util.find_spec("pyoidn") is None:
         return None
     return f"Open Image Denoise (pyoidn {metadata.version('pyoidn')})"
@@ -55,7 +55,7 @@ def denoise(color: np.ndarray, albedo: np.ndarray, normal: np.ndarray, fine: boo
         return color
     import pyoidn
 
-    with np.errstate(over="ignore"):  # what becomes infinite is kept as it was
+    with np.errstate(over="ignore"):  # pixels that become infinite are left as they were rendered
         relative = (seen / np.float64(typical)).astype(np.float32)  # the library's own exposure fails below 1e-10
     smooth = pyoidn.denoise(
         np.minimum(relative, np.float32(BRIGHTEST)),

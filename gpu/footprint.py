@@ -7,19 +7,19 @@ import numpy as np
 from gpu.arrays import SceneArrays
 from gpu.settings import RenderSettings
 
-# A pixel's bytes: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more, and a uvec4.
+# Bytes of a pixel: three vec4 (gpu.picture.picture); with the AOVs of the first hit two more and a uvec4.
 PIXEL_BYTES, GUIDED_PIXEL_BYTES = 48, 96
-PICTURE_BYTES = 1 << 20  # of every picture, whatever its size: the noise meter's buffers and small ones
+PICTURE_BYTES = 1 << 20  # bytes of every picture, whatever its size: the noise meter's buffers and small ones
 
 
 def scene_bytes(scene: SceneArrays) -> int:
-    """About what a scene takes on the device."""
+    """About how many bytes a scene takes on the device."""
     parts = [scene, scene.environment, scene.textures]
     arrays = [array for part in parts if part is not None for array in vars(part).values()]
     return sum(array.nbytes for array in arrays if isinstance(array, np.ndarray))
 
 
 def picture_bytes(settings: RenderSettings, guided: bool = False) -> int:
-    """About what a picture takes on the device, with the AOVs of the first hit or without."""
+    """About how many bytes a picture takes on the device, with the AOVs of the first hit (`guided`) or without."""
     pixel_bytes = (GUIDED_PIXEL_BYTES if guided else PIXEL_BYTES) + (1 if settings.adaptive else 0)  # the plan
     return settings.width * settings.height * pixel_bytes + PICTURE_BYTES

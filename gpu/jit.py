@@ -1,4 +1,4 @@
-"""Machine code for the few loops that numpy cannot express, kept in the user's cache between runs."""
+"""Machine code for the few loops that numpy cannot express, cached in the user's folder between runs."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any, TypeVar, cast
 
 
 def _cache() -> Path:
-    """A folder of the user's (the package's own may be read-only), another one whenever the code changes.
+    """A folder in the user's cache, as the package's own may be read-only; its name changes whenever the code does.
 
-    numba alone would miss a change in a function or constant that came from another file.
+    numba alone would miss a change in a function or constant that comes from another file.
     """
     folder = Path(__file__).parent
     names = ("accel/*.py", "layout/*.py", "tables/build/*.py")
@@ -29,7 +29,7 @@ os.environ.setdefault("NUMBA_CACHE_DIR", str(_cache()))
 
 import numba  # noqa: E402
 
-# numba asks whether scipy has BLAS for it: 0.15 s of the first loop's start, and no loop here multiplies matrices.
+# numba looks for BLAS in scipy, which takes 0.15 s when the first loop starts; no loop here multiplies matrices.
 _BLAS = "scipy.linalg.cython_blas"
 if _BLAS not in sys.modules:
     sys.modules[_BLAS] = cast(Any, None)  # importing it fails at once

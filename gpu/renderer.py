@@ -19,7 +19,7 @@ from gpu.settings import RenderSettings
 
 
 class Renderer:
-    """A device with its context and compiled kernels. Raises ContextError where there is none to be had."""
+    """A device with its context and compiled kernels. Raises ContextError where no context can be created."""
 
     def __init__(self, device: int | None = None) -> None:
         self._thread = threading.get_ident()
@@ -42,8 +42,8 @@ class Renderer:
         everything: bool = False,
         raised: frozenset[str] = frozenset(),
     ) -> Scene:
-        """Upload a scene. `editing` keeps compiled what its materials' sliders could raise, and what was `raised`
-        before; `everything` raises every flag, whatever the scene needs.
+        """Upload a scene. `editing` also raises the flags that sliders of its materials could raise, and those that
+        were `raised` before; `everything` raises every flag, whatever the scene needs.
 
         Raises SceneTooLarge, OutOfMemory.
         """
@@ -52,8 +52,8 @@ class Renderer:
         return Scene(self._context, arrays, editing, self._texels, everything, raised)
 
     def load_fallback(self, arrays: SceneArrays) -> Scene:
-        """Upload a scene to be shown with the kernel of `fallback`, where that can show it. What it shares with other
-        scenes is uploaded once.
+        """Upload a scene for the kernel of `fallback`, which must be able to show it. Images that it shares with
+        other scenes are uploaded once.
 
         Raises SceneTooLarge, OutOfMemory.
         """
@@ -71,23 +71,23 @@ class Renderer:
 
     @property
     def bsdf(self) -> BsdfEvaluator:
-        """What the BSDF of one material is, as numbers."""
+        """The evaluator of single materials' BSDFs."""
         self._own()
         return self._bsdf
 
     def tidy(self) -> float | None:
-        """Lets go of kernels that nobody has used for long; in how many seconds to call again, None: no need."""
+        """Evict kernels that have not been used for long. Returns the seconds until the next call is due, or None."""
         self._own()
         return self._kernels.tidy()
 
     @property
     def kernels(self) -> int:
-        """How many are compiled and in memory."""
+        """The number of compiled kernels in memory."""
         return len(self._kernels)
 
     @property
     def kernels_evicted(self) -> int:
-        """How many had to go, since the renderer was made."""
+        """The number of kernels that were evicted since the renderer was made."""
         return self._kernels.evicted
 
     def close(self) -> None:

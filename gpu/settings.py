@@ -1,4 +1,4 @@
-"""How to render: the choices that change pixels, in the renderer's own words."""
+"""Render settings: the choices that change pixels."""
 
 from __future__ import annotations
 
@@ -15,14 +15,14 @@ FIRST_HIT_AOVS = (
     "depth",
     *ID_AOVS,
     "incidence",
-)  # traced apart from the picture, when first asked for
+)  # traced apart from the picture, when they are first read
 AOVS = ("color", "albedo", "normal", "depth", "variance", *ID_AOVS, "incidence")
 
 
 @dataclass(frozen=True)
 class RenderSettings:
-    """Size in pixels; `clamp` bounds the radiance of indirect light (None: unbiased); `adaptive`: a pixel's samples
-    follow its noise (gpu/picture/sample_plan.py), and a picture's are their mean."""
+    """The size is in pixels. `clamp` bounds the radiance of indirect light (None: unbiased). With `adaptive` a
+    pixel's samples follow its noise (gpu/picture/sample_plan.py), and a picture's number of samples is their mean."""
 
     width: int
     height: int

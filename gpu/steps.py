@@ -1,4 +1,4 @@
-"""Work that is done in steps, between which others have their turn."""
+"""Long work in steps, between which the caller may do something else."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ T = TypeVar("T")
 
 
 class Steps(Generic[T]):
-    """Drives a generator, a step for each of its yields, to the value that it returns."""
+    """Drives a generator to the value that it returns, one yield at a step."""
 
     def __init__(self, generator: Generator[None, None, T]) -> None:
         self._generator = generator
 
     def step(self) -> T | None:
-        """Do one step: the value with the last one, None before. Raises what the work raises."""
+        """Do one step. The last one returns the value, all before it None. Raises what the work raises."""
         try:
             next(self._generator)
         except StopIteration as end:
@@ -24,11 +24,11 @@ class Steps(Generic[T]):
         return None
 
     def finish(self) -> T:
-        """Do all steps that are left. For work whose value is not None."""
+        """Do all steps that are left, for work whose value is not None."""
         while (value := self.step()) is None:
             pass
         return value
 
     def close(self) -> None:
-        """Give up; the generator's `finally` clauses run."""
+        """Abandon the work; the generator's `finally` clauses run."""
         self._generator.close()

@@ -20,12 +20,13 @@ if TYPE_CHECKING:
 
 SIZE = 128  # pixels a side at most: enough work for a dispatch, little enough for a large mesh
 _TURNS = 5
-_ENOUGH_S = 4.0  # of tracing: then it is not begun again
+_ENOUGH_S = 4.0  # seconds of tracing after which no further turn begins
 
 
 @dataclass(frozen=True)
 class KernelCost:
-    """Seconds per sample and pixel, the best of some turns, and milliseconds of compiling; `full`: every flag on."""
+    """Seconds per sample and pixel (the best of several turns) and milliseconds of compiling, for the scene's own
+    kernel and for the `full` one, which has every flag on."""
 
     raised: tuple[str, ...]
     spared: tuple[str, ...]
@@ -57,8 +58,8 @@ def kernel_cost(renderer: Renderer, arrays: SceneArrays, settings: RenderSetting
 def kernel_cost_steps(
     renderer: Renderer, scene: Scene, settings: RenderSettings, slice_s: float = math.inf
 ) -> Generator[None, None, KernelCost]:
-    """Renders small pictures with both kernels in turns, so that both meet the same machine; between steps, of about
-    `slice_s` seconds but for loading a kernel, others may have theirs."""
+    """Render small pictures with both kernels in turns, so that both run under the same load. A step takes about
+    `slice_s` seconds, except those that load a kernel."""
     full, pictures = Everything(scene), list[Picture]()
     try:
         for each in (scene, full):

@@ -2,5 +2,5 @@
 
 lobes      the lobes of each model, of which a kernel can show one alone
 kernels    which kernels answer for a material
-evaluator  values, densities and albedos, in slices between which others have their turn
+evaluator  values, densities and albedos, in slices of bounded time
 """

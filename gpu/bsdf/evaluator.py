@@ -1,4 +1,4 @@
-"""Values, densities and albedos of one material, in slices between which others have their turn.
+"""Values, densities and albedos of one material, in slices of bounded time between which the caller renders pictures.
 
 A material comes as a scene that holds it and nothing else.
 Directions are in the frame of `shaders/bsdf_lone.glsl`: z is the outward normal, x the tangent.
@@ -26,10 +26,10 @@ from gpu.layout.bindings import Slot
 
 DELTAS = 3  # as in shaders/bsdf_deltas.glsl
 BATCH = 64  # samples of one invocation: their sums in single precision are right to 4e-6
-SLICE_S = 0.01  # between two looks at who else waits
+SLICE_S = 0.01  # seconds of a slice
 _GROUP = 64  # invocations
-_FIRST = 1024  # invocations of the first slice; the time that each slice takes tells the next one's size
-_MOST = 1 << 16  # ... of any, which bounds the buffers
+_FIRST = 1024  # invocations of the first slice; the time that a slice takes decides the size of the next one
+_MOST = 1 << 16  # invocations of any slice, which bounds the buffers
 
 
 @dataclass(frozen=True)
@@ -53,8 +53,8 @@ class BsdfValues:
 
 @dataclass(frozen=True)
 class BsdfAlbedo:
-    """The mean of what `samples` samples multiply radiance by, reflected and transmitted, (n, 3) float64, and its
-    standard error (n, 3)."""
+    """The mean factor by which `samples` samples multiply radiance, reflected and transmitted, (n, 3) float64, and
+    its standard error (n, 3)."""
 
     albedo: np.ndarray
     error: np.ndarray
@@ -87,8 +87,9 @@ class BsdfEvaluator:
         paired: bool = False,
         lobes: bool = False,
     ) -> Generator[None, None, BsdfValues]:
-        """Evaluate a material for every pair of `wo` (n, 3) and `wi` (m, 3), unit length; `paired`: for each wo with
-        the wi in its place, so that m is n in what is given and 1 in what comes back. `lobes`: each lobe alone, too.
+        """Evaluate a material for every pair of `wo` (n, 3) and `wi` (m, 3), unit length. With `paired` each wo is
+        taken with the wi of the same index: m must be n, and is 1 in the result. With `lobes` each lobe is evaluated
+        alone, too.
 
         Raises CompileError, OutOfMemory.
         """
@@ -147,15 +148,15 @@ class BsdfEvaluator:
         finally:
             work.release()
         mean = sums[0] / samples
-        # Rounding may leave a little less than nothing of the variance of samples that are all alike.
+        # Rounding may leave a variance slightly below 0 where all samples are alike.
         variance = np.maximum(sums[1] / samples - mean**2, 0.0) * (samples / max(samples - 1, 1))
         return mean, np.sqrt(variance)
 
     def terms(
         self, material: SceneArrays, wo: np.ndarray, wi: np.ndarray, slice_s: float = SLICE_S
     ) -> Generator[None, None, BsdfTerms]:
-        """The terms of a material of microfacets: D at the normals `wi` (n, 3), F at their cosines, and G between
-        each of them as a direction, mirrored at the normal, and the one direction `wo` (1, 3).
+        """The terms of a material of microfacets: D at the normals `wi` (n, 3), F at their cosines, and G between the
+        direction `wo` (1, 3) and each of `wi`, taken as a direction and mirrored at the surface's normal.
 
         Raises CompileError, OutOfMemory.
         """
@@ -191,8 +192,8 @@ class BsdfEvaluator:
 
 
 class _Dispatch:
-    """A kernel with its buffers, for one question. Others use the context and the kernel between slices, so that
-    each slice binds and sets everything again."""
+    """A kernel with its buffers, for one evaluation. Between slices the context and the kernel serve other work, so
+    each slice binds its buffers and sets its uniforms again."""
 
     def __init__(
         self, context: Any, kernels: KernelCache, kernel: Any, tables: dict[int, Any], uniforms: dict[str, int]
@@ -223,7 +224,7 @@ class _Dispatch:
         self._buffers[Slot.SUM] = contexts.allocate(self._context, padded)
 
     def make(self, slot: Slot, size: int) -> None:
-        """Allocate a buffer of so many bytes, which the kernel writes."""
+        """Allocate a buffer of `size` bytes, which the kernel writes."""
         self._buffers[slot] = contexts.allocate(self._context, size)
 
     def read(self, slot: Slot, size: int = -1) -> np.ndarray:

@@ -1,4 +1,4 @@
-"""Which kernels answer for a material: as few as there can be, so that a slider seldom waits for a compiler.
+"""Which kernels evaluate a material: as few as possible, so that a slider seldom waits for the compiler.
 
 A material comes as a scene that holds it and nothing else.
 """
@@ -44,14 +44,14 @@ def flags(arrays: SceneArrays) -> frozenset[str]:
 def defines(arrays: SceneArrays, entry: str) -> dict[str, object]:
     """What the kernel `entry` is compiled with for a bare material; many materials have it in common.
 
-    The numbers of `bsdf_albedo.comp` are independent: the scatter of its samples tells their error.
+    `bsdf_albedo.comp` takes the independent sampler, so that the scatter of its samples gives their error.
     """
     own: dict[str, dict[str, object]] = {ALBEDO: {"SAMPLER": 1}, VALUES: lobes.defines(), TERMS: {}}
     return features.defines(flags(arrays), shapes=features.counts(arrays)) | own[entry]
 
 
 def samples() -> Iterator[SceneArrays]:
-    """A bare material of each model, and of those that can transmit or stretch one for each combination."""
+    """A bare material of each model; of a model that can transmit or be anisotropic, one for each combination."""
     for model in MaterialModel:
         for transmission in (0.0, 1.0):
             for anisotropic in (0.0, 1.0):

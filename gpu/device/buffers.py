@@ -24,18 +24,18 @@ BUFFERS = {
     Slot.NODES: "nodes",
     Slot.LIGHTS: "lights",
 }
-SPARE = 2  # times the nodes of a scene's tree that there is room for behind those of instances
+SPARE = 2  # the room for a scene's tree behind those of instances, in units of its present size
 
 
 def upload(context: Any, array: np.ndarray) -> Any:
     """A buffer. Raises OutOfMemory."""
-    # An empty binding still needs a buffer: llvmpipe reads it, masked, on the way past.
+    # An empty binding still needs a buffer: llvmpipe reads it even in branches that no lane takes.
     data = np.ascontiguousarray(array).view(np.uint8).reshape(-1) if array.size else np.zeros(96, np.uint8)
     return contexts.allocate(context, data)
 
 
 def shared(context: Any, slot: Slot, arrays: SceneArrays) -> Any:
-    """The buffer of a slot of BUFFERS, the array itself where that can be had. Raises OutOfMemory."""
+    """The buffer of a slot of BUFFERS; the array itself where the driver can use it in place. Raises OutOfMemory."""
     array = getattr(arrays, BUFFERS[slot])
     if slot == Slot.NODES and len(arrays.instances):
         buffer = contexts.allocate(context, arrays.instance_nodes.nbytes + SPARE * array.nbytes)
@@ -46,7 +46,7 @@ def shared(context: Any, slot: Slot, arrays: SceneArrays) -> Any:
 
 
 def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, Any], textures: dict[int, Any]) -> int:
-    """Uploads what differs of BUFFERS but triangles, of instances and of the lights' tree; how many bytes that were.
+    """Upload what differs: of BUFFERS all but triangles, instances, the lights' tree. Returns the number of bytes.
 
     Raises OutOfMemory, and nothing has changed then.
     """

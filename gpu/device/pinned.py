@@ -1,6 +1,6 @@
-"""Buffers that are the caller's own memory: on a software renderer, which has none but the machine's.
+"""Buffers that are the caller's own memory, on a software renderer, whose memory is the machine's anyway.
 
-GL_AMD_pinned_memory: a million triangles are then there once, and not a second time as the driver's copy.
+With GL_AMD_pinned_memory a million triangles are in memory once, and not a second time as the driver's copy.
 """
 
 from __future__ import annotations
@@ -18,7 +18,7 @@ _SOFTWARE = "llvmpipe"
 
 
 class Pinned:
-    """Used as a moderngl buffer is that only kernels read. Keeps the array; the context must be current."""
+    """A buffer that only kernels read, with moderngl's methods. It keeps the array; the context must be current."""
 
     def __init__(self, context: Any, array: np.ndarray) -> None:
         self._array = array
@@ -44,9 +44,9 @@ class Pinned:
 
 
 def pin(context: Any, array: np.ndarray) -> Pinned | None:
-    """The array as a buffer, without a copy; None where that cannot be, or would not pay.
+    """The array as a buffer, without a copy; None where the driver cannot do that or a copy is cheap.
 
-    Only of arrays that nobody may write to: the device would see it.
+    The array must be read-only: the device would see a write.
     """
     if array.nbytes < LEAST or array.flags.writeable or not array.flags.c_contiguous:
         return None

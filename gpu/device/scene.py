@@ -76,9 +76,9 @@ class Scene:
         self._raise_flags()
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
-        self._images: dict[int, Any] = {}  # those of images, perhaps shared
-        self._key = ""  # under which they are
-        self.uploaded = 0  # bytes, since shapes first moved
+        self._images: dict[int, Any] = {}  # textures of images, which scenes may share, by unit
+        self._key = ""  # the images' key in the cache of textures
+        self.uploaded = 0  # bytes that edits which move shapes have uploaded
         try:
             self._upload_all()
         except OutOfMemory:
@@ -106,7 +106,7 @@ class Scene:
         return words
 
     def _upload_details(self) -> None:
-        """Textures of the images' texels and of what triangles have at their corners, each only where it is asked."""
+        """Make the textures of the images' texels and of the triangles' corners that the scene's kernels read."""
         bound = bound_textures(self.arrays, self._raised)
         for unit, values in bound.items():
             if unit not in IMAGE_UNITS:
@@ -117,7 +117,7 @@ class Scene:
             self._images, self._key = self._shared.take(key, lambda: self._upload_images(images)), key
         else:
             self._images = self._upload_images(images)
-        if self._everything:  # its kernels look everywhere: at what was bound for another scene, if at nothing else
+        if self._everything:  # its kernels read every unit, where another scene's texture may still be bound
             missing = KINDS.keys() - self._details.keys() - self._images.keys()
             self._details |= {unit: placeholder(self._context, unit) for unit in missing}
 
@@ -149,7 +149,7 @@ class Scene:
         return texture, cells
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
-        """What its kernels are compiled with."""
+        """The defines that its kernels are compiled with."""
         return features.defines(self._raised, settings, features.counts(self.arrays))
 
     @property
@@ -158,7 +158,7 @@ class Scene:
 
     @property
     def features(self) -> tuple[str, ...]:
-        """What its kernels are compiled for, in words: "bvh", "sun_disks"."""
+        """The features that its kernels are compiled for, in words: "bvh", "sun_disks"."""
         return _words(self._raised)
 
     @property
@@ -175,7 +175,7 @@ class Scene:
         environment: tuple[float, float] | None = None,
         moved: Mapping[str, Any] | None = None,
     ) -> None:
-        """Change what `gpu.arrays.apply_edit` describes, and upload nothing else.
+        """Change the parts that `gpu.arrays.apply_edit` describes, and upload nothing else.
 
         The caller resets its pictures. Raises OutOfMemory or ValueError, and changes nothing then.
         """
@@ -189,7 +189,7 @@ class Scene:
             self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
         self.arrays = arrays
         if tables is not None:
-            if bindings.MICROFACETS_TEXTURE in self._details:  # else this edit brings the first one
+            if bindings.MICROFACETS_TEXTURE in self._details:  # else this edit brings the first such material
                 self._details[bindings.MICROFACETS_TEXTURE].release()
             self._details[bindings.MICROFACETS_TEXTURE] = tables
         if len(arrays.materials) and (materials is not None or texture_words is not None):
@@ -251,7 +251,7 @@ class Scene:
 
 
 class Everything(Scene):
-    """A scene that is on the device, with every flag raised: to compare kernels with. Released before that one."""
+    """A scene that is on the device, with every flag raised, to compare kernels. Release it before the other one."""
 
     def __init__(self, scene: Scene) -> None:
         self.__dict__.update(scene.__dict__)

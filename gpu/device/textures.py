@@ -27,9 +27,8 @@ IMAGE_UNITS = {bindings.BYTES_TEXTURE, bindings.FLOATS_TEXTURE}
 
 
 def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.ndarray]:
-    """The values behind each texture unit that kernels with these flags read of a scene, where it has any: what
-    triangles have at their corners, instances, parameters and tables of `microfacet`, the lights' tree, images. See
-    KINDS for their format."""
+    """The values behind each texture unit that kernels with these flags read, where the scene has any: the triangles'
+    corners, instances, parameters and tables of `microfacet`, the lights' tree, images. KINDS has their formats."""
     colors = arrays.corner_colors if "HAS_VERTEX_COLORS" in flags else arrays.triangle_colors
     values = {
         bindings.UVS_TEXTURES[0]: arrays.triangle_uvs,
@@ -86,7 +85,7 @@ def update_range(texture: Any, values: np.ndarray, part: slice) -> int:
 
 
 def placeholder(context: Any, unit: int) -> Any:
-    """A texture of one texel, as something has to be bound there."""
+    """A texture of one texel, for a unit that needs some texture to be bound."""
     channels, dtype = KINDS[unit]
     texture = context.texture((1, 1), channels, bytes(channels * BYTES[dtype]), alignment=1, dtype=dtype)
     texture.filter = (context.NEAREST, context.NEAREST)
@@ -100,15 +99,15 @@ class _Shared:
 
 
 class TextureCache:
-    """Images on the device by `TextureArrays.key`. The last that a scene gave back stays, for the scene's next
-    version: an edit that packs a scene anew does not upload its images again.
+    """Images on the device, by `TextureArrays.key`. The images that a scene gave back last stay, so that an edit that
+    packs the scene anew does not upload them again.
     """
 
     def __init__(self) -> None:
         self._held: dict[str, _Shared] = {}
 
     def take(self, key: str, make: Callable[[], dict[int, Any]]) -> dict[int, Any]:
-        """Textures by unit; to be given back."""
+        """The textures by unit, for a caller that must give them back."""
         held = self._held.get(key)
         if held is None:
             held = self._held[key] = _Shared(make(), 0)

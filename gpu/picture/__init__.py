@@ -2,12 +2,12 @@
 
 picture      its life: accumulators on the device, settings, saving and restoring
 passes       which samples are traced next, slice by slice
-schedule     what a pass asks of `tiles` or `adaptive`
+schedule     the protocol of `tiles` and `adaptive`, which cut a pass into dispatches
 tiles        how a pass is cut, by the measured cost of each band of rows
 adaptive     passes over the areas of a sample plan
 sample_plan  how many samples each part of a picture gets
 noise_meter  a picture's error, from a second, independent estimate of a share of its pixels
-readout      what is read of a picture
+readout      a picture's mean, variance, noise and first hits, read from the accumulators
 dispatcher   kernels run over parts of a picture
 first_hit    AOVs of the first hit
 resolve      accumulators to what a display takes, on the device

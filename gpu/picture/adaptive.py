@@ -20,8 +20,8 @@ _MOST_AREAS = 1 << 14  # of a dispatch
 
 
 class Adaptive:
-    """Takes the place of `Tiles`: its rows are areas, listed for the pass under way; an area that gets more samples
-    than an invocation may take is listed several times, in rounds."""
+    """The schedule of a picture with a sample plan. Its rows are areas, listed for the pass under way; an area that
+    gets more samples than an invocation may take is listed several times, in rounds."""
 
     def __init__(
         self, context: Any, kernels: KernelCache, size: tuple[int, int], most: int, max_bounces: int
@@ -51,7 +51,7 @@ class Adaptive:
         return (self._words,)
 
     def resume(self, row: int, column: int) -> tuple[int, int]:
-        """The pass begins again: pixels that have their samples get no more."""
+        """Begin the pass again: pixels that have their samples already get no more."""
         return 0, 0
 
     def forget(self) -> None:
@@ -67,7 +67,7 @@ class Adaptive:
         return self._plan
 
     def decide(self, samples: int, main: dict[Slot, Any]) -> None:
-        """At a stop, plan anew by the picture's second moments."""
+        """At a stop, make a new plan from the picture's second moments."""
         if samples not in self.stops:
             return
         variances, counts = self._seen(main[Slot.MOMENTS])
@@ -96,7 +96,7 @@ class Adaptive:
         return seen[:, :, 0].astype(float), seen[:, :, 1].astype(np.uint32)
 
     def begin(self, before: int, after: int, most: int) -> None:
-        """Lists the areas of a pass from `before` mean samples to `after`; an invocation takes at most `most`."""
+        """List the areas of a pass from `before` mean samples to `after`; an invocation takes at most `most`."""
         plan = self._kept()
         wanted = plan.at(after)
         self._counts.write(wanted.tobytes())
@@ -128,7 +128,7 @@ class Adaptive:
         return 0, row, 1, max(1, int(min(fitting, bound)))
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
-        """As for `Tiles`: a dearer area counts at once, a cheaper one bit by bit."""
+        """Record what a tile has cost: a rise counts at once, a fall little by little, as in `Tiles`."""
         listed = slice(tile[1], tile[1] + tile[3])
         rate = seconds / (AREA * AREA * self._amounts[listed].sum())
         self.cost_s = rate if self.cost_s == 0 else 0.7 * self.cost_s + 0.3 * rate
@@ -137,7 +137,7 @@ class Adaptive:
         self._rates[lines] = np.where(old == 0, rate, np.maximum(rate, 0.7 * old + 0.3 * rate))
 
     def pass_samples(self, samples: int) -> int:
-        """How many samples a pixel gets in the next pass, in the mean."""
+        """The mean number of samples that a pixel gets in the next pass."""
         if samples == 0 or self.cost_s == 0:
             return 1
         return max(1, usual_pass(self._picture, self.cost_s, samples))
@@ -147,7 +147,8 @@ class Adaptive:
         self._work.bind_to_storage_buffer(int(Slot.OUTPUT))
 
     def dispatch(self, tile: Tile) -> Dispatch:
-        """A group for each area listed in the tile; each pixel goes on from the samples that it has."""
+        """A dispatch of one group for each area listed in the tile; each pixel goes on from the samples that it
+        has."""
         self.bind()
         y, x = np.divmod(self._areas[tile[1] : tile[1] + tile[3]], self._pixels.shape[1])
         self._work.write((x | y << 16).astype(np.uint32).tobytes())

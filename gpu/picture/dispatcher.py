@@ -17,7 +17,7 @@ from gpu.picture.schedule import Tile
 from gpu.settings import RenderSettings
 
 _PIXEL_BYTES = 16  # of every accumulator
-_ALIGNED = 32  # pixels: a binding may begin at a multiple of so many on any driver
+_ALIGNED = 32  # pixels; with any driver a binding may begin at a multiple of this
 
 
 class Dispatcher:
@@ -32,14 +32,14 @@ class Dispatcher:
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
 
     def configure(self, settings: RenderSettings) -> None:
-        """Take these settings from now on."""
+        """Use these settings from now on."""
         self.settings = settings
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
         table[:, 0] = filters.inverse(settings.filter, features.FILTER_TABLE_SIZE)
         self._filter.write(table)
 
     def bind(self) -> None:
-        """Bind what every kernel reads; `bind_part` binds what it writes."""
+        """Bind the buffers that every kernel reads; `bind_part` binds those that it writes."""
         self.scene.bind()
         self.counters.bind_to_storage_buffer(int(Slot.ALBEDO))
         self._frame_buffer.bind_to_uniform_block(bindings.FRAME_BLOCK)
@@ -74,7 +74,7 @@ class Dispatcher:
 
     @property
     def warnings(self) -> list[str]:
-        """What became of paths that the kernel could not follow to their end."""
+        """Warnings about paths that the kernel could not follow to their end."""
         ended, cut = np.frombuffer(self.counters.read(8), np.uint32).tolist()
         out = [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
         if cut:

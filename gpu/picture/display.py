@@ -1,4 +1,4 @@
-"""Pictures for the eye of what is not colour. Runs without GL."""
+"""AOVs that are not colour as pictures for the eye. Runs without GL."""
 
 from __future__ import annotations
 
@@ -19,8 +19,9 @@ def srgb(linear: np.ndarray) -> np.ndarray:
 
 
 def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
-    """(h, w, c) of an AOV as (h, w, 4) display values, opaque: albedo sRGB, normal .5 + .5 n, depth and variance
-    divided by their maximum, ids in colours that tell neighbours apart, incidence in a colour for each of ZONES."""
+    """(h, w, c) of an AOV as (h, w, 4) display values, opaque: albedo sRGB, normal 0.5 + 0.5 n, depth and variance
+    divided by their maximum, ids in colours that differ between neighbours, incidence in a colour for each of
+    ZONES."""
     if aov in ID_AOVS:
         shown = _coloured(values)
     elif aov == "incidence":
@@ -47,7 +48,7 @@ def _coloured(ids: np.ndarray) -> np.ndarray:
 
 
 def _zones(degrees: np.ndarray) -> np.ndarray:
-    """(h, w, 1) angles as (h, w, 3) in the colours of ZONES; black where nothing was met, which is 0."""
+    """(h, w, 1) angles as (h, w, 3) in the colours of ZONES; an angle of 0, where no surface is, is black."""
     shown = np.zeros((*degrees.shape[:2], 3))
     for least, color in ZONES:
         shown[(degrees[..., 0] > 0) & (degrees[..., 0] >= least)] = color

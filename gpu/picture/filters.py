@@ -26,7 +26,8 @@ def profile(name: str, x: np.ndarray) -> np.ndarray:
 
 @cache
 def inverse(name: str, size: int) -> np.ndarray:
-    """Distances (pixels) where the half profile has 1 - (1 - k / size)^4 of its weight, k = 0 .. size: float32."""
+    """The distances (pixels, float32) within which the half profile has 1 - (1 - k / size)^4 of its weight, for
+    k = 0 .. size."""
     x = np.linspace(0, RADIUS[name], 1 << 17)
     w = profile(name, x)
     cdf = np.concatenate([[0.0], np.cumsum(0.5 * (w[1:] + w[:-1]))])

@@ -1,4 +1,4 @@
-"""AOVs of the first hit: traced when first asked for, apart from the picture, over the same camera rays."""
+"""AOVs of the first hit. They are traced when first read, apart from the picture, over the same camera rays."""
 
 from __future__ import annotations
 
@@ -13,8 +13,8 @@ from gpu.layout.bindings import Slot
 from gpu.picture.schedule import Tile
 from gpu.settings import ID_AOVS
 
-SAMPLES = 256  # they average at most so many
-_PIXELS = 1 << 16  # traced at once: 25 ms on llvmpipe in a large mesh
+SAMPLES = 256  # samples that they average at most
+_PIXELS = 1 << 16  # pixels of a dispatch, which takes 25 ms on llvmpipe in a large mesh
 
 
 class FirstHit:
@@ -41,12 +41,13 @@ class FirstHit:
             self.buffers[slot].clear()
 
     def limit(self, samples: int) -> None:
-        """Begins again where more than these were traced."""
+        """Begin again if more samples than these were traced."""
         if (self.samples, self._row) > (samples, 0):
             self.clear()
 
     def trace(self, dispatch: Callable[[Tile, int], None], want: int, until: float) -> None:
-        """Up to `want` samples, while the clock (perf_counter) is before `until`; `dispatch` traces a tile's n-th."""
+        """Trace up to `want` samples while the clock (perf_counter) is before `until`; `dispatch` traces the n-th
+        sample of a tile."""
         width, height = self._size
         rows = max(1 if width > _PIXELS else 8, _PIXELS // width // 8 * 8)
         while self.samples < want and time.perf_counter() < until:

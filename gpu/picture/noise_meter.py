@@ -1,15 +1,16 @@
 """The noise meter: a picture's error from a second, independent scramble of the sampler on a share of its pixels.
 
 Half the mean squared difference of two independent estimates of a pixel is its variance, whatever the sampler gains
-(the variance of a pixel's samples knows nothing of that: 3.6 times too much at 256 samples of Sobol'). Which pixels
-are looked at decides how far the estimate can be trusted: in a Cornell box the edges of the lamp carry most of the
-error, and of 4096 pixels chosen blindly it missed by up to 60 %. So the pixels are drawn when FROM samples are there,
-half by what these say of each pixel's error, half evenly, and weighed by the reciprocal of their chances
-[Horvitz & Thompson 1952].
+(the variance of a pixel's samples misses that gain: with 256 samples of Sobol's sequence it is 3.6 times too large).
+How good the estimate is depends on the choice of pixels: in a Cornell box the edges of the lamp have most of the
+error, and with 4096 pixels drawn evenly the estimate was off by up to 60 %. So the pixels are drawn once there are
+FROM samples, half of them by the variance that these show, half evenly, and are weighed by the reciprocals of their
+probabilities [Horvitz & Thompson 1952].
 
-Where few pixels carry the error, this picture's own is chance too (it scatters by 10 % at 64 x 64 of a Cornell box),
-and a single difference tells as much of the other estimate as of this one. So those get up to MOST estimates: of
-100 pictures of that box 4 to 7 were told an error that was off by more than 20 %, and now 0 or 1.
+Where few pixels have most of the error, the picture's own error scatters as well (by 10 % for a Cornell box at 64 x
+64), and a single difference is due to the other estimate as much as to the picture's own. So such pixels get up to
+MOST estimates: with one each, the error of 4 to 7 pictures of that box in 100 was estimated more than 20 % wrong;
+with MOST it is 0 or 1.
 """
 
 from __future__ import annotations
@@ -24,17 +25,17 @@ from gpu.kernels.cache import KernelCache
 from gpu.layout import LUMINANCE, METER_REPLICATES
 from gpu.layout.bindings import Slot
 
-FROM = 8  # samples of each pixel, from which on the meter runs; before, the samples' own variance must do
+FROM = 8  # samples of each pixel at which the meter starts; before, the variance of the samples must do
 LINE = 64  # metered pixels in a row of their buffers
-_PIXELS, _FEWEST = 2048, 256  # that are looked at; in small pictures a quarter of all, but not fewer than ...
-_EVEN = 0.5  # share of them drawn evenly
-MOST = 4  # estimates of a pixel
-_BLOCKS = 1 << 20  # of pixels that are weighed at most, each as one
+_PIXELS, _FEWEST = 2048, 256  # metered pixels; in small pictures a quarter of all, but at least the second number
+_EVEN = 0.5  # share of the metered pixels that is drawn evenly
+MOST = 4  # estimates of a pixel at most
+_BLOCKS = 1 << 20  # blocks of pixels at most for which weights are computed
 _LUMINANCE = np.array(LUMINANCE)
 
 
 def defines(weigh: int) -> dict[str, object]:
-    """What meter.comp is compiled with."""
+    """The defines that meter.comp is compiled with."""
     return features.defines(frozenset()) | {"METER_WEIGH": weigh, "METER_LINE": LINE}
 
 
@@ -49,13 +50,13 @@ class NoiseMeter:
         self.buffers: dict[Slot, Any] = {}
 
     def allocate(self) -> None:
-        """Accumulators as the picture's; in the second moments' place: x with the estimate's number in its fraction,
-        y, and 1 / chance of the pixel."""
+        """Make accumulators like the picture's. In place of second moments they begin with x, whose fraction is the
+        estimate's number, y, and 1 / probability of the pixel."""
         for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
             self.buffers[slot] = contexts.allocate(self._context, 16 * LINE * self.lines)
 
     def place(self, main: dict[Slot, Any], seed: int) -> None:
-        """Draws the pixels from the picture's second moments so far."""
+        """Draw the pixels by the picture's second moments so far."""
         side = max(1, int(np.ceil(np.sqrt(self._size[0] * self._size[1] / _BLOCKS))))
         weights = self._weigh(main[Slot.MOMENTS], side)
         places = np.zeros((LINE * self.lines, 4), np.float32)
@@ -127,8 +128,9 @@ class NoiseMeter:
 
 
 def squared_error(places: np.ndarray, seen: np.ndarray, other: np.ndarray) -> float:
-    """Estimated sum over the pixels: at `places` (as `draw` gives them; none of weight 0) the picture has `seen`, and
-    `other` is an independent estimate. The square of the difference to the mean of k such is 1 + 1/k variances."""
+    """The estimated sum over the pixels: at `places` (as `draw` gives them; none of weight 0) the picture has `seen`,
+    and `other` is an independent estimate. The square of the difference to the mean of k such is 1 + 1/k
+    variances."""
     used = places[:, 2] > 0
     places, seen, other = places[used], seen[used], other[used]
     first = np.flatnonzero(places[:, 0] % 1 == 0)  # of each pixel's estimates, which stand side by side
@@ -140,10 +142,10 @@ def squared_error(places: np.ndarray, seen: np.ndarray, other: np.ndarray) -> fl
 
 
 def draw(weights: np.ndarray, size: tuple[int, int], side: int, count: int, seed: int) -> np.ndarray:
-    """(n, 3) of about `count` estimates, in order: x, y, 1 / chance of the pixel. Blocks of `side` pixels are looked
-    at as often as `weights` and an even share say, up to MOST times where they are one pixel. The second estimate of
-    a pixel and those after it follow the first, their number, in parts of METER_REPLICATES, in the fraction of x.
-    Systematic: spread over the picture, none twice that is to be looked at once."""
+    """About `count` estimates, (n, 3), in order: x, y, 1 / probability of the pixel. Blocks of `side` x `side` pixels
+    are drawn half by `weights` and half evenly, up to MOST times where they are one pixel. The second estimate of a
+    pixel and those after it follow the first, with their number over METER_REPLICATES as the fraction of x. The
+    sample is systematic: it is spread over the picture, and a block that is due once is not drawn twice."""
     width, height = size
     across = np.minimum(side, width - side * np.arange(weights.shape[1]))
     down = np.minimum(side, height - side * np.arange(weights.shape[0]))
@@ -171,7 +173,7 @@ def draw(weights: np.ndarray, size: tuple[int, int], side: int, count: int, seed
 
 
 def around(values: np.ndarray) -> np.ndarray:
-    """Mean of each place of a (rows, columns) and its up to eight neighbours."""
+    """The mean of each element of a (rows, columns) array and its up to eight neighbours."""
     down, counts = values.copy(), [np.full(n, 3, values.dtype) for n in values.shape]
     down[1:] += values[:-1]
     down[:-1] += values[1:]
@@ -187,7 +189,7 @@ def around(values: np.ndarray) -> np.ndarray:
 
 
 def inclusion(shares: np.ndarray, count: int, most: int = 1) -> np.ndarray:
-    """Numbers, at most `most`, in proportion to `shares` where below that, that sum to `count`."""
+    """Numbers that sum to `count`, each at most `most`, and in proportion to `shares` where they are below that."""
     factor, full = count / float(shares.sum(dtype=float)), 0
     for _ in range(8):  # each round fills some more to `most`; what is left after these is a rounding error
         free = shares < most / factor

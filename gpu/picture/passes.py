@@ -1,6 +1,6 @@
-"""Tracing a picture: passes of some samples for every pixel, cut into slices that leave others their turn.
+"""Tracing a picture: passes of some samples for every pixel, cut into slices of bounded time.
 
-The cut follows measured cost and never shows: every pixel adds its samples one by one, in order.
+The cut follows the measured cost and never changes the picture: every pixel adds its samples one by one, in order.
 """
 
 from __future__ import annotations
@@ -21,7 +21,7 @@ from gpu.picture.tiles import MAX_SAMPLES_A_PASS, Tiles, samples_at_once
 
 
 class Passes:
-    """How far a picture is. `main` are its accumulators; the meter's pixels are traced after each pass of its own."""
+    """The progress of a picture. `main` are its accumulators; after each pass the meter's pixels are traced."""
 
     def __init__(
         self, dispatcher: Dispatcher, kernels: KernelCache, main: dict[Slot, Any], meter: NoiseMeter
@@ -58,17 +58,17 @@ class Passes:
 
     @property
     def schedule(self) -> Schedule:
-        """Made by the first `reset`."""
+        """The schedule, which the first `reset` makes."""
         assert self._schedule is not None
         return self._schedule
 
     @property
     def under_way(self) -> tuple[int, int, int]:
-        """Of the pass under way: its samples (0: there is none), row and column of the next tile."""
+        """The pass under way: its samples (0: there is none), row and column of the next tile."""
         return self._pass_samples, self._row, self._column
 
     def restore(self, samples: int, under_way: tuple[int, int, int]) -> None:
-        """Go on there; the buffers have been written."""
+        """Go on from there; the caller has written the buffers."""
         self.samples = samples
         self._pass_samples, row, column = under_way
         self.schedule.forget()
@@ -77,7 +77,8 @@ class Passes:
             self._begin_schedule()
 
     def trace(self, budget_s: float, max_samples: int) -> float:
-        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
+        """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
+        took."""
         start = time.perf_counter()
         self._dispatcher.bind()
         while self.samples < max_samples:
@@ -118,7 +119,8 @@ class Passes:
         self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples)
 
     def _compile_fully(self) -> None:
-        """Drivers write machine code when a kernel first runs: here, over no pixel, and not in a timed slice."""
+        """Run the kernel over no pixel: drivers make machine code in a kernel's first run, which must not be
+        timed."""
         start = time.perf_counter()
         d = self._dispatcher
         d.bind()

@@ -22,7 +22,7 @@ from gpu.picture.readout import Readout
 from gpu.picture.saved import Saved
 from gpu.settings import FIRST_HIT_AOVS, RenderSettings
 
-PIECE_BYTES = 16 << 20  # of a saved buffer, read at once: some milliseconds, between which others have their turn
+PIECE_BYTES = 16 << 20  # bytes of a saved buffer that one step reads, in some milliseconds
 
 
 def _bytes(size: int) -> np.ndarray:
@@ -30,8 +30,8 @@ def _bytes(size: int) -> np.ndarray:
 
 
 class Picture:
-    """A picture of one scene at one size. Made by `Renderer.picture`. Samples are added slice by slice, and it may be
-    read whenever somebody looks."""
+    """A picture of one scene at one size, made by `Renderer.picture`. Samples are added slice by slice, and between
+    two slices it can be read."""
 
     def __init__(
         self, context: Any, kernels: KernelCache, frame: Any, scene: Scene, settings: RenderSettings
@@ -54,7 +54,7 @@ class Picture:
             raise
 
     def configure(self, settings: RenderSettings) -> None:
-        """Take other settings of the same size, and start again."""
+        """Start again with other settings of the same size."""
         if (settings.width, settings.height) != (self.settings.width, self.settings.height):
             raise ValueError("a picture keeps its size: make another")
         self.settings = settings
@@ -77,17 +77,17 @@ class Picture:
 
     @property
     def samples(self) -> int:
-        """Of each pixel, in whole passes; with `adaptive` in the mean."""
+        """The samples of each pixel in whole passes; with `adaptive` their mean over the pixels."""
         return self._passes.samples
 
     @property
     def under_way(self) -> tuple[int, int, int]:
-        """Of the pass under way: its samples (0: there is none), row and column of the next tile."""
+        """The pass under way: its samples (0: there is none), row and column of the next tile."""
         return self._passes.under_way
 
     @property
     def compile_ms(self) -> float:
-        """What its kernels have taken to compile."""
+        """Milliseconds that its kernels took to compile."""
         return self._passes.compile_ms
 
     @property
@@ -102,12 +102,12 @@ class Picture:
 
     @property
     def guided_yet(self) -> bool:
-        """Whether some of those were traced: then their kernel is compiled."""
+        """Whether any first hit was traced: then their kernel is compiled."""
         return self._readout.first_hit.begun
 
     @property
     def warnings(self) -> list[str]:
-        """What became of paths that were not followed to their end."""
+        """Warnings about paths that were not followed to their end."""
         contexts.use(self.context)
         return self._dispatcher.warnings
 
@@ -135,7 +135,8 @@ class Picture:
         self._passes.restore(saved.samples, saved.under_way)
 
     def trace(self, budget_s: float, max_samples: int) -> float:
-        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; the seconds it took."""
+        """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
+        took."""
         contexts.use(self.context)
         return self._passes.trace(budget_s, max_samples)
 
@@ -147,7 +148,7 @@ class Picture:
     def read(self, aov: str = "color") -> np.ndarray:
         """Linear (height, width, channels) float32, row 0 at the top: color 4 (premultiplied), albedo 3, normal 3,
         depth 1 (0 where nothing is hit), variance 3 (of the pixel's mean), shape_id and material_id 1 (index + 1 of
-        what the first sample's camera ray met; 0 where it met nothing).
+        the shape that the first sample's camera ray hits; 0 where it hits nothing).
 
         Waits for the GPU. Raises NothingRendered before a sample is complete.
         """
@@ -165,8 +166,8 @@ class Picture:
     def trace_guides(self, budget_s: float = math.inf, most: int | None = None) -> bool:
         """Trace the AOVs of the first hit for about `budget_s` seconds; whether they are all there.
 
-        They are traced when first asked for, over the camera rays of the picture's first 256 samples at most, or over
-        the first `most` and no others. `read` traces what is still missing.
+        They cover the camera rays of the picture's first 256 samples at most, or with `most` exactly the first
+        `most`. `read` traces those that are still missing.
         """
         self._need_samples()
         until = time.perf_counter() + budget_s

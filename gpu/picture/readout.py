@@ -1,4 +1,4 @@
-"""What is read of a picture: its mean, variance and noise, the first hits, and the mean as a display shows it."""
+"""Reading a picture: its mean, variance and noise, the first hits, and the mean as a display shows it."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from gpu.picture.schedule import Tile
 
 
 class Readout:
-    """Reads the accumulators `main` and the meter's; traces first hits when they are first asked for."""
+    """Reads the accumulators `main` and the meter's, and traces first hits when they are first read."""
 
     def __init__(
         self, dispatcher: Dispatcher, kernels: KernelCache, main: dict[Slot, Any], meter: NoiseMeter

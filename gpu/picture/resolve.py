@@ -1,4 +1,4 @@
-"""Accumulators to what a display takes, on the device."""
+"""Accumulators to display values, on the device."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
 
-_LINE = 1024  # pixels that resolve.comp takes for a row
+_LINE = 1024  # pixels in a row of resolve.comp's invocations
 
 
 def defines(tone_map: str, dtype: str) -> dict[str, object]:
-    """What resolve.comp is compiled with."""
+    """The defines that resolve.comp is compiled with."""
     out = features.defines(frozenset()) | {"TONE_MAP": f"{tone_map}_curve"}
     return out | {"OUTPUT_FLOAT": int(dtype == "f4"), "LINE": _LINE}
 

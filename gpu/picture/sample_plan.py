@@ -1,12 +1,13 @@
-"""How many samples each part of a picture gets: more where there is more noise, and none of the mean is bent by it.
+"""How many samples each part of a picture gets: more where there is more noise, without biasing the mean.
 
 The squared error of a picture, the sum of variance / samples over its pixels, is least for a given number of samples
 when each pixel's is in proportion to its standard deviation [Neyman 1934]; of points that are spread evenly, whose
-variance falls faster than that, to a lesser power. A picture is planned in areas of 8 x 8 pixels, which err alike,
-and in each by four classes of rows, y mod 4. Whoever decides a pixel's samples by what those samples say stops too
-early where they missed the light, and comes out too dark. So a class is planned by what the next one saw, and never
-by itself; what that one saw was planned by the one after it. With three decisions the circle of four does not close:
-no sample has a say in how many its own pixel gets, and the mean is unbiased.
+variance falls faster than that, to a lesser power. A picture is planned in areas of 8 x 8 pixels, whose errors are
+alike, and in each by four classes of rows, y mod 4. A rule that decided a pixel's number of samples by those samples
+would stop too early where they missed the light, and the picture would be too dark. So a class is planned by the
+samples of the next one, and never by its own; those of the next one were planned by the one after it. With three
+decisions the circle of four does not close: no sample influences how many its own pixel gets, and the mean is
+unbiased.
 
 Runs without GL.
 """
@@ -18,13 +19,13 @@ import numpy as np
 from gpu.layout import PLAN_AREA as AREA
 from gpu.layout import PLAN_CLASSES as CLASSES
 
-DECISIONS = (8, 32, 128)  # mean samples of a pixel at which it is decided anew; no more than CLASSES - 1
-LEAST, MOST = 1 / 8, 32.0  # of the mean: the least finds light that few paths find, the most bounds a pass
+DECISIONS = (8, 32, 128)  # mean samples of a pixel at which a new plan is made; at most CLASSES - 1 of them
+LEAST, MOST = 1 / 8, 32.0  # in units of the mean: the least finds light that few paths find, the most bounds a pass
 _EXPONENT = (
     0.4  # of the variance: 1 / (1 + p) is least where a pixel's squared error falls with samples^-p; Sobol's 1.5
 )
-_NEAR = 0.7  # weight of an area itself; its neighbours share the rest, for few samples tell little of one area
-_COUNTED = 1 << 24  # samples of a pixel, the most that float32 counts
+_NEAR = 0.7  # weight of an area itself; its neighbours share the rest, as few samples say little about one area
+_COUNTED = 1 << 24  # samples of a pixel: the greatest number that float32 counts to
 
 WORDS = np.dtype(
     [("counts", np.uint32, CLASSES), ("weights", np.float32, CLASSES)]
@@ -32,7 +33,7 @@ WORDS = np.dtype(
 
 
 def pixels_of(width: int, height: int) -> np.ndarray:
-    """(rows, columns, CLASSES) of areas: how many of the picture's pixels are of that area and class."""
+    """(rows, columns, CLASSES) of areas: the number of the picture's pixels in that area and class."""
     across = np.minimum(AREA, width - AREA * np.arange(-(-width // AREA)))
     y = np.arange(height)
     down = np.zeros((-(-height // AREA), CLASSES), np.int64)
@@ -41,10 +42,11 @@ def pixels_of(width: int, height: int) -> np.ndarray:
 
 
 def weights_of(variances: np.ndarray, pixels: np.ndarray) -> np.ndarray:
-    """What each class's samples shall be in proportion to, float32, (rows, columns, CLASSES) as all: `variances` of a
-    sample, summed over the pixels of an area and class, and how many `pixels` those are."""
+    """The weights to which each class's samples shall be proportional, float32. All arrays are (rows, columns,
+    CLASSES): `variances` of a sample, summed over the pixels of an area and class, and the number of those
+    `pixels`."""
     out = np.ones(pixels.shape)
-    if not np.isfinite(variances).all():  # beyond float32: nothing is known of what errs more
+    if not np.isfinite(variances).all():  # beyond float32: it is unknown which areas err more
         return out.astype(np.float32)
     for own in range(CLASSES):
         seen = (own + 1) % CLASSES
@@ -58,7 +60,7 @@ def weights_of(variances: np.ndarray, pixels: np.ndarray) -> np.ndarray:
 
 
 def _spread(values: np.ndarray) -> np.ndarray:
-    """Each area's own value and its eight neighbours', weighed."""
+    """The weighted mean of each area's value and its eight neighbours'."""
     padded = np.pad(values.astype(float), 1)
     rows, columns = values.shape
     around = sum(padded[dy : dy + rows, dx : dx + columns] for dy in range(3) for dx in range(3))
@@ -66,7 +68,7 @@ def _spread(values: np.ndarray) -> np.ndarray:
 
 
 class SamplePlan:
-    """From `counts` samples on, in proportion to `weights` as far as no pixel gives back what it has."""
+    """Samples in proportion to `weights`, as far as no pixel gets fewer than its `counts`, which it has already."""
 
     def __init__(
         self, pixels: np.ndarray, counts: np.ndarray | None = None, weights: np.ndarray | None = None
@@ -77,8 +79,8 @@ class SamplePlan:
         self._classes = [self._cumulated(k) for k in range(CLASSES)]
 
     def _cumulated(self, own: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Of a class, in the order in which its areas begin to get samples: the level where each does, and then the
-        samples of all that have not begun, and the weight of those that have."""
+        """For a class, in the order in which its areas begin to get samples: the level at which each begins, then the
+        samples of all areas that have not begun, and the weight of those that have."""
         members, weights = self._pixels[..., own].ravel(), self.weights[..., own].ravel().astype(float)
         counts = self.counts[..., own].ravel().astype(float)
         levels = counts / weights

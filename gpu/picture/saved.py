@@ -1,4 +1,4 @@
-"""A picture's state off the device: kept when the device's memory is needed, or for when the renderer is lost."""
+"""A picture's state off the device, saved when the device's memory is needed, or in case the renderer is lost."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from gpu.settings import RenderSettings
 
 @dataclass(frozen=True)
 class Saved:
-    """What `Picture.restore` needs to go on to the same bits; `buffers` in the order of `Picture.state`, as bytes."""
+    """The state from which `Picture.restore` goes on to the same bits; `buffers` in the order of `Picture.state`."""
 
     settings: RenderSettings
     samples: int

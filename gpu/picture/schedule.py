@@ -1,4 +1,5 @@
-"""What a pass asks of its schedule. `Tiles` gives every pixel as many samples; `Adaptive` follows a sample plan."""
+"""The protocol of schedules. `Tiles` gives every pixel the same number of samples; `Adaptive` follows a sample
+plan."""
 
 from __future__ import annotations
 
@@ -42,28 +43,28 @@ class Schedule(Protocol):
         """Look at the accumulators, before the pass that begins at `samples`."""
 
     def pass_samples(self, samples: int) -> int:
-        """How many samples a pixel gets, in the mean, in the pass that begins at `samples`."""
+        """The mean number of samples that a pixel gets in the pass that begins at `samples`."""
 
     def begin(self, before: int, after: int, most: int) -> None:
         """Begin a pass from `before` samples to `after`; an invocation takes at most `most`."""
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
-        """The tile that begins there and takes about as long as a slice."""
+        """The tile that begins there and takes about SLICE_S."""
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
-        """Learn from what a tile has cost."""
+        """Record what a tile has cost, to size the next ones."""
 
     def bind(self) -> None:
         """Bind what the kernel reads of the schedule."""
 
     def dispatch(self, tile: Tile) -> Dispatch:
-        """The run for a tile; what is the schedule's own is bound for it."""
+        """The dispatch for a tile; it binds the schedule's own buffers."""
 
     def meter_samples(self, since: int) -> tuple[int, int]:
         """First sample and number of samples for the noise meter's pixels, which began at 0 and joined at `since`."""
 
     def resume(self, row: int, column: int) -> tuple[int, int]:
-        """Where a pass that was saved goes on, once `buffers` have been written."""
+        """The tile from which a saved pass goes on, after `buffers` were written."""
 
     def forget(self) -> None:
         """Forget the plan: `buffers` were written or cleared."""

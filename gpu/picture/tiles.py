@@ -1,4 +1,5 @@
-"""How a pass over a picture is cut: by what each band of rows has cost, so that slices take about as long everywhere.
+"""How a pass over a picture is cut into tiles: by the cost of each band of rows, so that all take about the same
+time.
 
 Runs without GL.
 """
@@ -12,18 +13,18 @@ import numpy as np
 from gpu.layout.bindings import Slot
 from gpu.picture.schedule import Dispatch, Tile
 
-SLICE_S = 0.008  # a dispatch aims at this: short enough to turn to another client, long beside its overhead
-PASS_S = 0.2  # samples per pass aim at this, once there are some
+SLICE_S = 0.008  # seconds of a dispatch: short enough to turn to another client, long beside its overhead
+PASS_S = 0.2  # seconds of a pass, once there are some samples
 # Samples per pass, at least, as soon as there are twice as many: to begin and end an invocation, which fetches and
 # stores 48 bytes of sums, costs llvmpipe a third of a sample of a simple scene.
 LEAST_A_PASS = 4
 MAX_SAMPLES_A_PASS = 256
-LOOP_TURNS = 65_535  # llvmpipe ends all loops of an invocation after so many turns together
+LOOP_TURNS = 65_535  # turns of all loops of an invocation together, after which llvmpipe ends them
 BAND = 16  # rows
-_LEAST = 8  # columns of a tile: a work group's
-_LONG_BAND, _LONG_LEAST = 4, 16  # where paths may be so long that 128 pixels take a tenth of a second
-GUESS_S = 2e-7  # of a sample of a pixel, before any was measured
-USUAL_BOUNCES = 16  # of more, a path that nobody has seen yet may cost as much more than those seen
+_LEAST = 8  # columns of a tile: those of a work group
+_LONG_BAND, _LONG_LEAST = 4, 16  # rows and columns where paths may be so long that 128 pixels take 0.1 s
+GUESS_S = 2e-7  # seconds for a sample of a pixel, before any was measured
+USUAL_BOUNCES = 16  # with more, paths that come later may be that many times as long as those measured
 
 
 class Tiles:
@@ -64,7 +65,7 @@ class Tiles:
         return column, row, min(columns, self._most_columns, width - column), rows
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
-        """What a tile has cost: a dearer one counts at once, a cheaper one bit by bit."""
+        """Record what a tile has cost: a rise counts at once, a fall little by little."""
         _, y, width, height = tile
         rate = seconds / (width * height * samples)
         self.cost_s = rate if self.cost_s == 0 else 0.7 * self.cost_s + 0.3 * rate
@@ -72,7 +73,7 @@ class Tiles:
         bands[:] = np.where(bands == 0, rate, np.maximum(rate, 0.7 * bands + 0.3 * rate))
 
     def pass_samples(self, samples: int) -> int:
-        """How many samples of every pixel to take at once after `samples`: the smallest tile shall fit a slice."""
+        """The samples of every pixel to take in the pass after `samples`, so that the smallest tile fits a slice."""
         if samples == 0 or self.cost_s == 0:
             return 1
         fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
@@ -111,14 +112,14 @@ class Tiles:
 
 
 def usual_pass(size: tuple[int, int], cost_s: float, samples: int) -> int:
-    """How many samples of every pixel to take at once after `samples`, each at `cost_s`: as many as take PASS_S or
-    LEAST_A_PASS, but never so many that a picture at its beginning would be long in changing."""
+    """The samples of every pixel to take in the pass after `samples`, each at `cost_s` seconds: as many as take
+    PASS_S or LEAST_A_PASS, but fewer at the beginning of a picture, so that it changes often."""
     width, height = size
     return min(samples, max(int(PASS_S / (cost_s * width * height)), min(LEAST_A_PASS, samples // 2)))
 
 
 def samples_at_once(max_bounces: int, shapes: int, nodes: int) -> int:
-    """How many samples an invocation may take on llvmpipe without coming near the end of its loops.
+    """The number of samples that an invocation may take on llvmpipe without coming near the end of its loops.
 
     Three rays a bounce, each past all shapes outside of the tree (`shapes`) and, in the tree, past 16 nodes for each
     doubling of `nodes`: several times the mean over a mesh of 80 000 triangles.
