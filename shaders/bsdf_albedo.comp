@@ -1,7 +1,7 @@
 // Entry: directional albedo by sampling. Each invocation takes one batch of samples of one wo, and adds up what they
 // multiply radiance by; the host adds up the batches, in double precision. Transmitted light counts as basic radiance.
-layout(local_size_x = 64) in;
 #include "layout.glsl"
+layout(local_size_x = BSDF_GROUP) in;
 #include "constants.glsl"
 #include "sobol.glsl"
 #include "sampling.glsl"

@@ -1,7 +1,7 @@
 // Entry: the terms of a surface of microfacets, as far as its model has them: the density of facets, the share of them
 // that is neither masked nor shadowed, and the reflectance of one.
-layout(local_size_x = 64) in;
 #include "layout.glsl"
+layout(local_size_x = BSDF_GROUP) in;
 #include "constants.glsl"
 #include "sobol.glsl"
 #include "sampling.glsl"

@@ -1,7 +1,7 @@
 // Entry: f, without the cosine of wi, and the density of wi, for pairs of a wo and a wi, both in the frame of
 // bsdf_lone.glsl; and what is perfectly specular as seen from each wo.
-layout(local_size_x = 64) in;
 #include "layout.glsl"
+layout(local_size_x = BSDF_GROUP) in;
 #include "constants.glsl"
 #include "sobol.glsl"
 #include "sampling.glsl"

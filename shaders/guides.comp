@@ -1,7 +1,7 @@
 // Entry: albedo, normal, depth and incidence of the first hit, over the same camera rays as the picture's first samples, and the
 // shape and the material that the first of these rays met.
-layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
+layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit
 layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
 layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec4 met[]; }; // index + 1 of shape and material, 0: none; the sum of

@@ -1,8 +1,8 @@
 // Entry: what the noise meter needs of the accumulators, of which a part is bound. METER_WEIGH 1 computes how much each
 // block of pixels errs, as far as its own samples and its neighbours' tell; 0 computes sums over all pixels, and the
 // values of the metered pixels.
-layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
+layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "luminance_variance.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 

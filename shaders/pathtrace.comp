@@ -1,7 +1,7 @@
 // Entry: adds samples [sample_first, sample_first + sample_count) of each pixel of a tile, one by one, in order. With
 // ADAPTIVE it adds those that the pixels of the listed areas are short of.
-layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
+layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 layout(std430, binding = SLOT_SUM) buffer sum_buffer { vec4 sums[]; };
 layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 compensations[]; };
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };

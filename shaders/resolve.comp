@@ -1,6 +1,6 @@
 // Entry: turns the accumulator into an exposed, tone-mapped, sRGB-encoded picture with straight alpha.
-layout(local_size_x = 8, local_size_y = 8) in;
 #include "layout.glsl"
+layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "constants.glsl"
 #include "tonemap/linear.glsl"
 #include "tonemap/exponential.glsl"

@@ -21,13 +21,12 @@ from gpu.bsdf import lobes as single
 from gpu.device.scene import upload_tables
 from gpu.device.textures import KINDS, bound_textures, linear_texture
 from gpu.kernels.cache import KernelCache
-from gpu.layout import MaterialModel, bindings
+from gpu.layout import BSDF_GROUP, MaterialModel, bindings
 from gpu.layout.bindings import Slot
 
 DELTAS = 3  # as in shaders/bsdf_deltas.glsl
 BATCH = 64  # samples of one invocation: their sums in single precision are right to 4e-6
 SLICE_S = 0.01  # seconds of a slice
-_GROUP = 64  # invocations
 _FIRST = 1024  # invocations of the first slice; the time that a slice takes decides the size of the next one
 _MOST = 1 << 16  # invocations of any slice, which bounds the buffers
 
@@ -243,7 +242,7 @@ class _Dispatch:
             yield first, count
             first += count
             growth = min(max(slice_s / max(seconds, 1e-6), 0.25), 4.0)
-            size = min(max(int(size * growth) // _GROUP, 1) * _GROUP, _MOST)
+            size = min(max(int(size * growth) // BSDF_GROUP, 1) * BSDF_GROUP, _MOST)
 
     def _run(self, first: int, count: int, uniforms: dict[str, int]) -> None:
         contexts.use(self._context)
@@ -255,7 +254,7 @@ class _Dispatch:
             texture.use(unit)
         for name, value in {**self._uniforms, **uniforms, "first": first, "count": count}.items():
             self._kernel[name].value = value
-        self._kernel.run(-(-count // _GROUP))
+        self._kernel.run(-(-count // BSDF_GROUP))
         self._context.finish()
 
     def release(self) -> None:

@@ -101,6 +101,7 @@ def _constants() -> str:
     for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", MaterialModel)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
     out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
+    out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
     out += [f"#define FRAME_BLOCK {bindings.FRAME_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
     for name in (
         "NONE",

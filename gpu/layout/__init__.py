@@ -22,6 +22,7 @@ from gpu.layout.links import (
 )
 from gpu.layout.records import (
     ABSENT,
+    BSDF_GROUP,
     BUFFERS,
     HIDDEN,
     LEAST_ROUGHNESS,
@@ -38,6 +39,7 @@ from gpu.layout.records import (
     TANGENT_SHIFT,
     TANGENT_STEPS,
     TEXTURED,
+    WORK_GROUP,
     Camera,
     EnvironmentCell,
     Frame,
@@ -61,6 +63,7 @@ from gpu.layout.records import (
 
 __all__ = [
     "ABSENT",
+    "BSDF_GROUP",
     "BUFFERS",
     "CLUSTER_BIT",
     "HIDDEN",
@@ -87,6 +90,7 @@ __all__ = [
     "TEXTURED",
     "TREELET_BIT",
     "TREELET_MAX_NODES",
+    "WORK_GROUP",
     "Camera",
     "EnvironmentCell",
     "Frame",

@@ -301,7 +301,11 @@ class Frame(Record):
     instance_shift: u32  # of an instance's number in an id, above its triangle's
 
 
-PLAN_AREA = 8  # pixels a side of the areas that a sample plan knows: a work group of the path tracer
+WORK_GROUP = 8  # invocations a side of the work groups of kernels over pixels; fewer than 8 can hang llvmpipe
+BSDF_GROUP = 64  # invocations of a work group of the kernels that evaluate a BSDF
+PLAN_AREA = (
+    WORK_GROUP  # pixels a side of the areas of a sample plan, each of which is a work group of the path tracer
+)
 PLAN_CLASSES = 4  # of an area's rows, each planned by itself: llvmpipe works on a row of eight pixels at once
 METER_REPLICATES = 8  # more than the noise meter takes of a pixel; the replicate's number over this is x's fraction
 

@@ -13,7 +13,7 @@ from gpu.layout import PLAN_AREA as AREA
 from gpu.layout import PLAN_CLASSES as CLASSES
 from gpu.layout.bindings import Slot
 from gpu.picture.sample_plan import DECISIONS, WORDS, SamplePlan, pixels_of, weights_of
-from gpu.picture.schedule import Dispatch, Tile
+from gpu.picture.schedule import Dispatch, Tile, work_groups
 from gpu.picture.tiles import GUESS_S, SLICE_S, USUAL_BOUNCES, usual_pass
 
 _MOST_AREAS = 1 << 14  # of a dispatch
@@ -89,7 +89,7 @@ class Adaptive:
             moments.bind_to_storage_buffer(int(Slot.MOMENTS), offset=16 * width * first, size=16 * width * rows)
             output.bind_to_storage_buffer(int(Slot.OUTPUT))
             kernel["size"].value = (width, rows)
-            kernel.run(-(-columns // 8), -(-lines // 8))
+            kernel.run(*work_groups(columns, lines))
             parts.append(np.frombuffer(output.read(), np.float32).reshape(lines, columns, 2, CLASSES))
             output.release()
         seen = np.concatenate(parts)

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
+from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
 from gpu.picture.schedule import Tile
 from gpu.settings import ID_AOVS
@@ -49,7 +50,7 @@ class FirstHit:
         """Trace up to `want` samples while the clock (perf_counter) is before `until`; `dispatch` traces the n-th
         sample of a tile."""
         width, height = self._size
-        rows = max(1 if width > _PIXELS else 8, _PIXELS // width // 8 * 8)
+        rows = max(1 if width > _PIXELS else WORK_GROUP, _PIXELS // width // WORK_GROUP * WORK_GROUP)
         while self.samples < want and time.perf_counter() < until:
             lines = min(rows, height - self._row)
             dispatch((0, self._row, width, lines), self.samples)

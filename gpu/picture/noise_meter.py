@@ -24,6 +24,7 @@ from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout import LUMINANCE, METER_REPLICATES
 from gpu.layout.bindings import Slot
+from gpu.picture.schedule import work_groups
 
 FROM = 8  # samples of each pixel at which the meter starts; before, the variance of the samples must do
 LINE = 64  # metered pixels in a row of their buffers
@@ -79,7 +80,7 @@ class NoiseMeter:
             moments.bind_to_storage_buffer(int(Slot.MOMENTS), offset=16 * width * first, size=16 * width * rows)
             output.bind_to_storage_buffer(int(Slot.OUTPUT))
             kernel["size"].value, kernel["block"].value, kernel["rim"].value = (width, rows), side, int(side > 1)
-            kernel.run(-(-columns // 8), -(-lines // 8))
+            kernel.run(*work_groups(columns, lines))
             parts.append(np.frombuffer(output.read(), np.float32).reshape(lines, columns))
             output.release()
         weights = np.concatenate(parts)
@@ -119,7 +120,7 @@ class NoiseMeter:
             for slot in (Slot.SUM, Slot.MOMENTS):
                 main[slot].bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
             kernel["first"].value, kernel["count"].value = first, count
-            kernel.run(LINE // 8, -(-self.lines // 8))
+            kernel.run(*work_groups(LINE, self.lines))
             results = np.frombuffer(output.read(), np.float32).reshape(-1, 4).astype(float)
             totals += results[:, :2].sum(axis=0)
             seen += results[:, 2]

@@ -16,7 +16,7 @@ from gpu.picture import noise_meter
 from gpu.picture.adaptive import Adaptive
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.noise_meter import NoiseMeter
-from gpu.picture.schedule import Schedule, Tile
+from gpu.picture.schedule import Schedule, Tile, work_groups
 from gpu.picture.tiles import MAX_SAMPLES_A_PASS, Tiles, samples_at_once
 
 
@@ -181,4 +181,4 @@ class Passes:
         frame = d.frame(tile[:2], tile[2:], *self.schedule.meter_samples(noise_meter.FROM))
         frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, noise_meter.LINE
         frame["slot_first"] = d.bind_part(self._meter.buffers, tile, noise_meter.LINE)
-        d.run(self._kernel, frame, (-(-tile[2] // 8), -(-tile[3] // 8)))
+        d.run(self._kernel, frame, work_groups(tile[2], tile[3]))

@@ -14,7 +14,7 @@ from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.resolve import resolve
-from gpu.picture.schedule import Tile
+from gpu.picture.schedule import Tile, work_groups
 
 
 class Readout:
@@ -79,5 +79,5 @@ class Readout:
         d = self._dispatcher
         frame = d.frame(tile[:2], tile[2:], sample, 1)
         frame["slot_first"] = d.bind_part(self.first_hit.buffers, tile, d.settings.width)
-        d.run(kernel, frame, (-(-tile[2] // 8), -(-tile[3] // 8)))
+        d.run(kernel, frame, work_groups(tile[2], tile[3]))
         d.context.finish()

@@ -10,6 +10,7 @@ from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
+from gpu.picture.schedule import work_groups
 
 _LINE = 1024  # pixels in a row of resolve.comp's invocations
 
@@ -42,7 +43,7 @@ def resolve(
             sources[slot].bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
         kernel["count"].value = count
-        kernel.run(_LINE // 8, -(-count // (8 * _LINE)))
+        kernel.run(*work_groups(_LINE, -(-count // _LINE)))
         parts.append(output.read())
         output.release()
     return np.frombuffer(b"".join(parts), np.float32 if floats else np.uint8).reshape(pixels, 4)

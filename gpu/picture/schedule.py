@@ -6,6 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
+from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
 
 Tile = tuple[int, int, int, int]  # x, y, width, height
@@ -20,6 +21,11 @@ class Dispatch(NamedTuple):
     first: int  # sample; 0 where each pixel goes on from those it has
     samples: int  # of an invocation
     groups: tuple[int, int]
+
+
+def work_groups(columns: int, rows: int) -> tuple[int, int]:
+    """The work groups that cover `columns` x `rows` invocations."""
+    return -(-columns // WORK_GROUP), -(-rows // WORK_GROUP)
 
 
 class Schedule(Protocol):

@@ -10,8 +10,9 @@ from typing import Any
 
 import numpy as np
 
+from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
-from gpu.picture.schedule import Dispatch, Tile
+from gpu.picture.schedule import Dispatch, Tile, work_groups
 
 SLICE_S = 0.008  # seconds of a dispatch: short enough to turn to another client, long beside its overhead
 PASS_S = 0.2  # seconds of a pass, once there are some samples
@@ -21,7 +22,7 @@ LEAST_A_PASS = 4
 MAX_SAMPLES_A_PASS = 256
 LOOP_TURNS = 65_535  # turns of all loops of an invocation together, after which llvmpipe ends them
 BAND = 16  # rows
-_LEAST = 8  # columns of a tile: those of a work group
+_LEAST = WORK_GROUP  # columns of a tile
 _LONG_BAND, _LONG_LEAST = 4, 16  # rows and columns where paths may be so long that 128 pixels take 0.1 s
 GUESS_S = 2e-7  # seconds for a sample of a pixel, before any was measured
 USUAL_BOUNCES = 16  # with more, paths that come later may be that many times as long as those measured
@@ -83,7 +84,7 @@ class Tiles:
         self._before, self.chunk = before, after - before
 
     def dispatch(self, tile: Tile) -> Dispatch:
-        groups = -(-tile[2] // 8), -(-tile[3] // 8)
+        groups = work_groups(tile[2], tile[3])
         return Dispatch(tile, tile[:2], tile[2:], self._before, self.chunk, groups)
 
     def meter_samples(self, since: int) -> tuple[int, int]:

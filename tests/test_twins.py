@@ -1,0 +1,46 @@
+"""Numbers that stand in two places because neither may import the other: these tests fail when only one changes."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from gpu import RenderSettings, footprint
+from gpu.layout import ShapeKind
+from service.assets.gltf import json_view
+from service.pack.lights import light_bounds
+from service.rendering.jobs import job
+from service.scene import numbers
+from tests.documents import packed
+
+
+def test_the_server_counts_a_picture_s_bytes_as_the_renderer_takes_them() -> None:
+    """The server counts the denoised picture as well, and a copy of it that is on its way: a vec4 a pixel each."""
+    settings = RenderSettings(1920, 1080, adaptive=True)
+    pixels = settings.width * settings.height
+    taken = (footprint.picture_bytes(settings, guided=True) - footprint.PICTURE_BYTES) / pixels
+    assert taken - 1 + 2 * 16 == job.PICTURE_BYTES  # a byte of the plan is below what the server counts
+
+
+def test_gltf_files_have_the_ranges_of_scenes() -> None:
+    """Parsers of files do not load service.scene: that takes a quarter of a second."""
+    assert (json_view.LARGEST, json_view.BRIGHTEST) == (numbers.LARGEST, numbers.BRIGHTEST)
+
+
+@pytest.mark.parametrize("angles", [(20, 60), (0, 5), (30, 30), (0.01, 90)])
+def test_the_lights_tree_bounds_a_spot_as_its_shader_fades_it(angles: tuple[float, float]) -> None:
+    """`spot.glsl` is compared with these angles in tests/shaders/test_lights.py."""
+    spot = {"type": "spot", "position": [1, 2, 3], "direction": [0, 0, -5], "intensity": 1,
+            "inner_angle": angles[0], "outer_angle": angles[1]}  # fmt: skip
+    arrays = packed(lights=[spot]).arrays
+    shapes = {
+        ShapeKind.SPHERE: arrays.spheres, ShapeKind.QUAD: arrays.quads, ShapeKind.BOX: arrays.boxes,
+        ShapeKind.ELLIPSOID: arrays.ellipsoids, ShapeKind.TRIANGLE: arrays.triangles,
+    }  # fmt: skip
+    bounds = light_bounds.bounds(arrays.lights, shapes, np.ones(1))
+    inner, outer = np.cos(np.radians(angles))
+    np.testing.assert_allclose(bounds.axis, [[0, 0, -1]], atol=1e-6)
+    # A rim is at least a thousandth of the cone wide, so that its inverse fits into float32.
+    np.testing.assert_allclose(bounds.normals, inner, atol=2e-3 * (1 - outer))
+    np.testing.assert_allclose(np.arccos(bounds.beyond), np.radians(angles[1] - angles[0]), atol=0.02)
+    np.testing.assert_allclose(bounds.solid_angle, np.pi * (2 - inner - outer), rtol=2e-3)
