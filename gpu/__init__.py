@@ -22,7 +22,7 @@ analysis    measurements of a scene at hand; public
 """
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light
-from gpu.arrays import EnvironmentArrays, SceneArrays, TextureArrays, apply_edit
+from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, TextureArrays, apply_edit
 from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfTerms, BsdfValues
 from gpu.device.scene import Scene
 from gpu.errors import (
@@ -58,6 +58,7 @@ __all__ = [
     "EnvironmentArrays",
     "GpuError",
     "KernelKey",
+    "MovedArrays",
     "NothingRendered",
     "OutOfMemory",
     "Picture",

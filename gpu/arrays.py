@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from typing import Any
+from typing import Any, TypedDict
 
 import numpy as np
 
@@ -120,6 +120,23 @@ class SceneArrays:
         return self.light_tree if len(self.light_tree) else np.zeros((2, 4), np.uint32)
 
 
+class MovedArrays(TypedDict):
+    """The members of `SceneArrays` that say where shapes stand, for a scene in which shapes were moved."""
+
+    spheres: np.ndarray
+    quads: np.ndarray
+    boxes: np.ndarray
+    ellipsoids: np.ndarray
+    lights: np.ndarray
+    light_tree: np.ndarray
+    instances: np.ndarray
+    nodes: np.ndarray
+    node_count: int
+    node_origin: Vec3
+    node_scale: Vec3
+    radiance_scale: float
+
+
 def apply_edit(
     arrays: SceneArrays,
     camera: np.void | None = None,
@@ -127,14 +144,14 @@ def apply_edit(
     texture_words: np.ndarray | None = None,
     microfacets: np.ndarray | None = None,
     environment: tuple[float, float] | None = None,
-    moved: Mapping[str, Any] | None = None,
+    moved: MovedArrays | None = None,
 ) -> SceneArrays:
     """The arrays after an edit. None leaves a part as it is.
 
     `materials` are as many records as before, `texture_words` their `TextureArrays.words`, `microfacets` the words of
-    the model `microfacet`, `environment` is (rotation, scale). `moved` maps names of members to their new arrays, of
-    the same length: those that say where shapes stand, the scene's tree and the lights. The length of the tree may
-    change where there are instances. Raises ValueError for another number of materials.
+    the model `microfacet`, `environment` is (rotation, scale). The arrays of `moved` have the same lengths as before,
+    except that the scene's tree may differ in length where there are instances. Raises ValueError for another number
+    of materials.
     """
     changes: dict[str, Any] = dict(moved or {})
     if camera is not None:

@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
 from gpu import context as contexts
 from gpu import layout
-from gpu.arrays import SceneArrays, apply_edit
+from gpu.arrays import MovedArrays, SceneArrays, apply_edit
 from gpu.device import buffers
 from gpu.device.textures import IMAGE_UNITS, KINDS, TextureCache, bound_textures, linear_texture, placeholder
 from gpu.errors import OutOfMemory
@@ -173,7 +172,7 @@ class Scene:
         texture_words: np.ndarray | None = None,
         microfacets: np.ndarray | None = None,
         environment: tuple[float, float] | None = None,
-        moved: Mapping[str, Any] | None = None,
+        moved: MovedArrays | None = None,
     ) -> None:
         """Change the parts that `gpu.arrays.apply_edit` describes, and upload nothing else.
 

@@ -1,26 +1,22 @@
-"""What differs between the arrays of two scenes in which shapes stand elsewhere: all that must then be uploaded."""
+"""The difference between the arrays of two scenes in which shapes stand at other places: what must be uploaded."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from gpu import EnvironmentArrays, SceneArrays, TextureArrays
+from gpu import EnvironmentArrays, MovedArrays, SceneArrays, TextureArrays
 
-# Members that may differ; of these arrays those of MANY in length, too.
-MOVED = (
-    "spheres", "quads", "boxes", "ellipsoids", "lights", "light_tree", "instances", "nodes", "node_count",
-    "node_origin", "node_scale", "radiance_scale",
-)  # fmt: skip
-MANY = ("nodes", "light_tree")
-EDITED = ("camera", "materials", "microfacets")  # as many as before; see Scene.edit
-SMALL = 1 << 20  # bytes that are compared; of more it is asked whether they are the very same
+MOVED = tuple(MovedArrays.__annotations__)  # the members that may differ
+MANY = ("nodes", "light_tree")  # those of them whose length may differ
+EDITED = ("camera", "materials", "microfacets")  # `Scene.edit` takes these, in their old length
+SMALL = 1 << 20  # bytes of an array whose contents are compared; a larger one must be the same object
 
 
-def scene_delta(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
-    """What `Scene.edit` takes for this; None where it is not enough."""
+def scene_delta(old: SceneArrays, new: SceneArrays) -> MovedArrays | None:
+    """The argument `moved` of `Scene.edit` that leads from one scene to the other; None where no edit does."""
     if len(old.materials) != len(new.materials) or bool(len(old.light_tree)) != bool(len(new.light_tree)):
         return None
     if not len(new.instances) and not _same(old.nodes, new.nodes):  # in which triangles lie, too
@@ -32,7 +28,7 @@ def scene_delta(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
         fits = _as_many(a, b) if name in MOVED else _same(a, b)
         if not fits:
             return None
-    return {name: getattr(new, name) for name in MOVED}
+    return cast(MovedArrays, {name: getattr(new, name) for name in MOVED})
 
 
 def _as_many(a: Any, b: Any) -> bool:

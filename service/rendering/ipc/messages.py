@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 import numpy as np
 
@@ -13,6 +14,24 @@ BsdfQuestion = Literal["values", "albedo", "terms"]
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 
 EDITS = ("camera", "materials", "texture_words", "microfacets", "environment", "moved")  # what `Scene.edit` takes
+
+
+class SceneData(Protocol):
+    """A gpu.SceneArrays, of which the server reads nothing: it may not import gpu."""
+
+    @property
+    def materials(self) -> np.ndarray: ...
+
+
+class PictureData(Protocol):
+    """A gpu.Saved: a picture's state off the device."""
+
+    @property
+    def samples(self) -> int: ...
+    @property
+    def under_way(self) -> tuple[int, int, int]: ...
+    @property
+    def buffers(self) -> list[np.ndarray]: ...
 
 
 @dataclass(frozen=True)
@@ -50,13 +69,13 @@ class Progress:
 class Update:
     """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
 
-    `scene` is a gpu.SceneArrays, `settings` the arguments of gpu.RenderSettings. Any of these, or of EDITS, starts
-    accumulation again, `stop` and `denoise` don't.
+    `settings` are the arguments of gpu.RenderSettings. Any of these, or of EDITS, starts accumulation again; `stop`
+    and `denoise` do not.
     """
 
     task: int
     generation: int
-    scene: Any = None
+    scene: SceneData | None = None
     settings: dict[str, Any] | None = None
     stop: StopRule | None = None
     camera: np.void | None = None  # gpu.layout.Camera
@@ -64,7 +83,7 @@ class Update:
     texture_words: np.ndarray | None = None
     microfacets: np.ndarray | None = None
     environment: tuple[float, float] | None = None
-    moved: dict[str, Any] | None = None
+    moved: Mapping[str, object] | None = None  # a gpu.MovedArrays
     denoise: bool | None = None
     base: int | None = None  # the generation that it changes; without one it is whole
     client: str = ""  # tasks of one client share its part of the GPU's time
@@ -153,7 +172,7 @@ class Restore:
 
     task: int
     generation: int
-    saved: Any
+    saved: PictureData
     reason: Reason | None  # why it had ended; None: it goes on
     progress: Progress
 
@@ -164,7 +183,7 @@ class EvaluateBsdf:
 
     task: int
     question: BsdfQuestion
-    material: Any  # a gpu.SceneArrays of one material
+    material: SceneData  # of one material
     wo: np.ndarray  # (n, 3), unit length
     wi: np.ndarray  # (m, 3), unit length; for "albedo" none
     samples: int = 0  # for "albedo"
@@ -243,7 +262,7 @@ class Done:
     reason: Reason
     progress: Progress
     warnings: list[str]
-    saved: Any = None  # the gpu.Saved picture of a render that nobody edits; None: no samples
+    saved: PictureData | None = None  # of a render that no stream edits; None: no samples
 
 
 @dataclass(frozen=True)
@@ -253,7 +272,7 @@ class Checkpoint:
     task: int
     generation: int
     progress: Progress
-    saved: Any  # a gpu.Saved
+    saved: PictureData
 
 
 @dataclass(frozen=True)

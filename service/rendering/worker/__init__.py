@@ -10,6 +10,7 @@ bsdf_task       one question about the BSDF of a material, in its turns
 updates         the update that waits to be applied, perhaps for its kernel
 ending          how a render ends, and how its picture comes to the server
 context         what all tasks of a process share
+payloads        the payloads of messages by their types in gpu
 kernel_savings  what a scene's own kernel saves, measured on demand
 device          what a task has on the device
 progress        how far a picture is, and when it is finished

@@ -9,6 +9,7 @@ from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import EvaluateBsdf, Evaluated
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.helpers.kernel_wait import KernelWait
+from service.rendering.worker.payloads import scene_arrays
 
 
 class BsdfTask:
@@ -19,10 +20,10 @@ class BsdfTask:
     def __init__(self, context: WorkerContext, question: EvaluateBsdf) -> None:
         self.number, self.client = question.task, question.client
         self.used_s = 0.0
-        self._question = question
+        self._question, self._material = question, scene_arrays(question.material)
         self._send = context.send
         self._evaluator = context.renderer.bsdf
-        self._key = kernel_keys.bsdf_key(question.material, question.question)
+        self._key = kernel_keys.bsdf_key(self._material, question.question)
         self._wait = KernelWait(context.compiler)
         self._steps: Steps[BsdfValues | BsdfAlbedo | BsdfTerms] | None = None
         self._begun = self._ended = False
@@ -62,10 +63,10 @@ class BsdfTask:
     def _work(self) -> Generator[None, None, BsdfValues | BsdfAlbedo | BsdfTerms]:
         asked, evaluator = self._question, self._evaluator
         if asked.question == "albedo":
-            return evaluator.albedo(asked.material, asked.wo, asked.samples)
+            return evaluator.albedo(self._material, asked.wo, asked.samples)
         if asked.question == "terms":
-            return evaluator.terms(asked.material, asked.wo, asked.wi)
-        return evaluator.values(asked.material, asked.wo, asked.wi, lobes=asked.lobes)
+            return evaluator.terms(self._material, asked.wo, asked.wi)
+        return evaluator.values(self._material, asked.wo, asked.wi, lobes=asked.lobes)
 
     def fail(self) -> None:
         """The server is told by the loop."""

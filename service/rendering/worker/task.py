@@ -12,6 +12,7 @@ from service.rendering.worker.device.residency import Residency
 from service.rendering.worker.device.resolution_ladder import FULL_S
 from service.rendering.worker.ending import Ending
 from service.rendering.worker.kernel_savings import KernelSavings
+from service.rendering.worker.payloads import saved_picture
 from service.rendering.worker.progress.progress import ProgressTracker
 from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.denoise_policy import DenoisePolicy
@@ -221,7 +222,7 @@ class Task:
         if self._residency.loaded is None:
             return
         tracker = self._tracker
-        self._residency.full.restore(restore.saved)
+        self._residency.full.restore(saved_picture(restore.saved))
         tracker.reason, self._frames.scale = restore.reason, 1.0
         tracker.clock.set(restore.progress.elapsed_s)
         tracker.meter.set(restore.progress.samples, restore.progress.noise)

@@ -9,6 +9,7 @@ from gpu import RenderSettings, Steps, apply_edit, picture_bytes, scene_bytes
 from gpu.precompile import kernel_keys
 from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
+from service.rendering.worker.payloads import updated_scene
 
 if TYPE_CHECKING:
     from gpu import KernelKey, Renderer, Saved, Scene, SceneArrays
@@ -107,8 +108,9 @@ def kernel_request(
     edits, raised = update.edits, frozenset[str]()
     if settings is None:
         return None
-    if update.scene is not None:
-        arrays, editing = update.scene, update.interactive
+    scene = updated_scene(update)
+    if scene is not None:
+        arrays, editing = scene, update.interactive
         raised = kernel_keys.flags(arrays, editing)
     elif loaded is not None:
         arrays, editing, raised = loaded.scene.arrays, loaded.editing, loaded.scene.flags

@@ -11,6 +11,7 @@ from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.loaded_scene import LoadedScene, Offloaded, needed
 from service.rendering.worker.device.memory import Holder, Memory
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
+from service.rendering.worker.payloads import updated_scene
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
@@ -70,14 +71,16 @@ class Residency:
                 self.ladder.configure(settings)
                 return None
 
+        scene = updated_scene(update)
+
         def make() -> LoadedScene | None:
-            if update.scene is None:
+            if scene is None:
                 assert self.loaded is not None
                 self.loaded.resize(settings)
                 return None
-            return LoadedScene(self._renderer, update.scene, settings, update.interactive, update.edits)
+            return LoadedScene(self._renderer, scene, settings, update.interactive, update.edits)
 
-        return self._with_room(needed(update.scene, settings), make, update.scene is not None)
+        return self._with_room(needed(scene, settings), make, scene is not None)
 
     def make_room(self, size: int) -> None:
         """Make room on the device for that many more bytes. Raises OutOfMemory."""

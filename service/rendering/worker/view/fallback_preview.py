@@ -8,7 +8,7 @@ from __future__ import annotations
 import logging
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 from gpu import FIRST_HIT_AOVS, GpuError, OutOfMemory, scene_bytes
 from gpu.precompile import fallback
@@ -29,6 +29,14 @@ BEGIN_S = 4e-6  # a sample of a pixel, before there was one (llvmpipe with 2 cor
 log = logging.getLogger(__name__)
 
 
+class _Content(NamedTuple):
+    """What a frame shows: one with equal content would show nothing new."""
+
+    generation: int
+    scale: float
+    samples: int
+
+
 class FallbackPreview:
     """Shows an update between `begin` and `release` with a kernel that suits many scenes."""
 
@@ -44,7 +52,7 @@ class FallbackPreview:
         self._next = 1.0  # the scale that is traced
         self._pixel_s = BEGIN_S
         self._spent_s = 0.0
-        self._served: tuple[object, ...] = ()
+        self._served: _Content | None = None  # of the last frame that was sent
         self._shown = (0, 0.0)
         self._began = 0.0
 
@@ -125,7 +133,7 @@ class FallbackPreview:
         if want is None or self.scale is None or self._ladder is None or want.view.aov in FIRST_HIT_AOVS:
             return False
         picture = self._ladder.picture(self.scale)
-        content = (self.generation, self.scale, picture.samples)
+        content = _Content(self.generation, self.scale, picture.samples)
         if content == self._served and not want.anyway:
             return False
         self._served, self._shown = content, (self.generation, self.scale)

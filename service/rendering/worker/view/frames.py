@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 
 from gpu import FIRST_HIT_AOVS, picture_bytes
 from gpu.denoise import GUIDE_SAMPLES
 from gpu.precompile import kernel_keys
-from service.rendering.ipc.messages import Frame, Image, Read, View, Want
+from service.rendering.ipc.messages import Frame, Image, Read, Reason, View, Want
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.residency import Residency
 from service.rendering.worker.helpers.kernel_wait import KernelWait
@@ -21,6 +21,16 @@ if TYPE_CHECKING:
     from gpu import Picture
 
 SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
+
+
+class _Content(NamedTuple):
+    """What a frame shows: one with equal content would show nothing new."""
+
+    generation: int
+    scale: float
+    samples: int
+    reason: Reason | None  # why the render has ended
+    fine: bool  # denoised with the fine network
 
 
 class FrameSource:
@@ -43,7 +53,7 @@ class FrameSource:
         self._number, self._send, self._finish = number, context.send, finish
         self._residency, self._tracker = residency, tracker
         self._wait = KernelWait(context.compiler)  # for the kernel of the AOVs of the first hit
-        self._served: tuple[object, ...] = ()
+        self._served: _Content | None = None  # of the last frame that was sent
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
         self._denoised_reads: list[Read] = []  # waiting for the denoised picture
@@ -90,7 +100,7 @@ class FrameSource:
         if want is None or shown is None:
             return False
         if self._residency.offloaded is not None:  # at rest: there is nothing new in it
-            if self._served and self._served[3] == tracker.reason and not want.anyway:
+            if self._served and self._served.reason == tracker.reason and not want.anyway:
                 return False
             self._residency.wake()
         if self._residency.loaded is None:
@@ -105,7 +115,8 @@ class FrameSource:
                 return False
         progress = clean.progress if clean else tracker.progress(self._residency, shown)
         whole = clean is None or clean is self.denoising.has(picture.samples)
-        content = (tracker.generation, shown, progress.samples, tracker.reason, clean is not None and clean.fine)
+        fine = clean is not None and clean.fine
+        content = _Content(tracker.generation, shown, progress.samples, tracker.reason, fine)
         if content == self._served and not want.anyway:
             return False
         pixels = pixels_of(picture, want.view, clean)
@@ -117,16 +128,16 @@ class FrameSource:
 
     def _denoised_frame(self) -> Denoised | None:
         """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
-        latest = self.denoising.latest
-        if latest is None or self._served[:2] != (self._tracker.generation, 1.0):
+        latest, served = self.denoising.latest, self._served
+        if latest is None or served is None or (served.generation, served.scale) != (self._tracker.generation, 1.0):
             return latest
-        samples, seen = latest.progress.samples, int(str(self._served[2]))
+        samples, seen = latest.progress.samples, served.samples
         stale = samples == seen < self._residency.full.samples and not self.denoising.under_way
         return None if samples < seen or stale else latest
 
     def _holds_frame(self, want: Want) -> bool:
         """Whether the client has something to look at until the denoised picture comes, which can't be long."""
-        seen = self._served[:1] == (self._tracker.generation,)
+        seen = self._served is not None and self._served.generation == self._tracker.generation
         return self.denoising.under_way and seen and not want.anyway
 
     def read(self, read: Read) -> None:
