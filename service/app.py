@@ -25,6 +25,7 @@ from starlette.staticfiles import StaticFiles
 
 from service import presets
 from service.config import Config, unknown_variables
+from service.confined import hide
 from service.connection_limits import Watch
 from service.connections import connection_class, listen
 from service.data_lock import FolderInUse, locked
@@ -104,6 +105,7 @@ def create_app(config: Config) -> FastAPI:
 def run(config: Config) -> int:
     """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 where it could not start."""
     _give_memory_back()
+    hide()
     sys.setswitchinterval(SWITCH_S)
     if unknown := unknown_variables():
         log.warning("these variables are no settings and change nothing names=%s", ",".join(unknown))
@@ -216,9 +218,11 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     if own.renderers.process_id is None:
         own.renderers.start()
     own.assets.warm()
+    asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
     warming = asyncio.create_task(warm_up(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)))
     yield
     warming.cancel()
+    asking.cancel()
     await own.farewell()
     await own.renderers.close()
     await asyncio.to_thread(own.assets.close)

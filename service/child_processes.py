@@ -1,10 +1,11 @@
 """Children that parse strangers' files and texts, as the service starts, reuses and ends them.
 
-`confined.py` is their own side: what they give up before they read anything.
+`service.confined` is their own side: what they give up before they read anything.
 """
 
 from __future__ import annotations
 
+import json
 import os
 import signal
 import socket
@@ -12,13 +13,15 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from service.confined import Rights
 from service.cpu_time import answers
 
 ROOT = Path(__file__).parents[1]
 START_SECONDS = 30.0  # libraries read from a cold disk
+RIGHTS_BYTES = 4096  # of the message that says what a child gave up
 CLOSING_SECONDS = 5.0  # from a hung-up socket to the end of its process
 # One thread each: a second one gains nothing on files of this size and takes address space from the limit.
 THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
@@ -29,7 +32,10 @@ class Closed(Exception):
 
 
 class Child:
-    """`python -m MODULE DESCRIPTOR`, the descriptor being its end of a socket of whole messages, `link` ours."""
+    """`python -m MODULE DESCRIPTOR`, the descriptor being its end of a socket of whole messages, `link` ours.
+
+    Its first message says which rights it has given up. `is_spent` is set where it should get no more work.
+    """
 
     def __init__(self, module: str, environment: dict[str, str], is_quiet: bool) -> None:
         self.link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
@@ -45,14 +51,21 @@ class Child:
                 stdout=subprocess.DEVNULL,
                 stderr=subprocess.DEVNULL if is_quiet else None,
             )
-        self._has_answered = False
+        self.is_spent = False
+        self.given = 0  # how often it got work
+        self._rights: Rights | None = None
+
+    def rights(self) -> Rights | None:
+        """What it has given up. Waits for its start; None where it did not come to that."""
+        if self._rights is None and answers(self.link, self.process.pid, START_SECONDS):
+            with suppress(OSError, ValueError, TypeError):  # it has ended
+                self._rights = Rights(**json.loads(self.link.recv(RIGHTS_BYTES)))
+        return self._rights
 
     def answers(self, seconds: float) -> bool:
         """Wait until `link` can be read, for at most `seconds` of the child's own time, and longer for its start."""
-        self._has_answered = answers(
-            self.link, self.process.pid, seconds if self._has_answered else seconds + START_SECONDS
-        )
-        return self._has_answered
+        ended = self.rights() is None and self.process.poll() is not None
+        return ended or answers(self.link, self.process.pid, seconds)
 
     def exit_code(self) -> int | None:
         """How a child ended that hung up; minus the signal's number for a signal, None where it runs on."""
@@ -70,9 +83,14 @@ class Child:
 class Children:
     """Children of one module, for any thread. They start on demand, and each serves many requests in turn."""
 
-    def __init__(self, module: str, environment: dict[str, str] | None = None, is_quiet: bool = False) -> None:
-        """`environment` is added to each child's; `is_quiet` throws away what its libraries print to stderr."""
-        self._module, self._environment, self._is_quiet = module, environment or {}, is_quiet
+    def __init__(
+        self, module: str, most: int, environment: dict[str, str] | None = None, is_quiet: bool = False
+    ) -> None:
+        """`environment` is added to each child's; `is_quiet` throws away what its libraries print to stderr.
+
+        A child gets work `most` times: what one piece of it may have done to its memory does not stay for ever.
+        """
+        self._module, self._most, self._environment, self._is_quiet = module, most, environment or {}, is_quiet
         self._lock = threading.Lock()
         self._idle: list[Child] = []
         self._is_closed = False
@@ -87,12 +105,22 @@ class Children:
     def one(self) -> Iterator[Child]:
         """A child of the caller's own, which is killed where the block raises. Raises Closed."""
         child = self._take()
+        child.given += 1
         try:
             yield child
         except BaseException:
             child.kill()
             raise
+        if child.is_spent or child.given >= self._most:
+            child.kill()
+            child = self._start()  # it is ready when the next work comes
         self._give_back(child)
+
+    def rights(self) -> Rights | None:
+        """What a child of these gives up; None where none could be started. Waits for a first one to start."""
+        with self.one() as child:
+            child.given -= 1
+            return child.rights()
 
     def close(self) -> None:
         """Ends the children that wait; one that works ends with its work."""
@@ -111,6 +139,9 @@ class Children:
                 if child.process.poll() is None:
                     return child
                 child.kill()
+        return self._start()
+
+    def _start(self) -> Child:
         return Child(self._module, self._environment, self._is_quiet)
 
     def _give_back(self, child: Child) -> None:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import time
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from importlib import metadata
 from typing import Any
 
@@ -64,6 +64,7 @@ class AppState:
         return {
             "version": metadata.version("sunbox"),
             "renderer": renderer,
+            "sandbox": asdict(await asyncio.to_thread(self.assets.rights)),
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": priced(),
         }

@@ -20,6 +20,7 @@ from service.assets.integrity import Integrity, damaged
 from service.assets.scene_import import Imported, take_apart
 from service.assets.source import Source, digest, format_of, handed, length
 from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
+from service.confined import Rights
 from service.disk_usage import Usage, expected
 from service.garbage import collector_paused
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
@@ -168,6 +169,10 @@ class AssetStore:
     def warm(self) -> None:
         """Makes the first file as quick as the later ones; does not wait."""
         self.loader.sandbox.warm()
+
+    def rights(self) -> Rights:
+        """Which rights the processes that parse uploads have given up. Waits for the first of them."""
+        return self.loader.sandbox.rights()
 
     def close(self) -> None:
         self.loader.close()

@@ -97,7 +97,7 @@ def _watch(server: Server, tally: Tally, over: threading.Event, chance: random.R
     while not over.wait(WATCH_S):
         pid = server.renderer()
         settled = time.monotonic() - began > SETTLED_S
-        tally.seen(resident(server.pid), resident(pid), descriptors(server.pid), settled)
+        tally.seen(resident(server.pid), resident(pid), descriptors(server), settled)
 
 
 if __name__ == "__main__":

@@ -79,7 +79,7 @@ class Tally:
             self._page.append((heap, nodes))
 
     def end(self, server: Server) -> None:
-        self._ended = resident(server.pid), resident(server.renderer()), descriptors(server.pid)
+        self._ended = resident(server.pid), resident(server.renderer()), descriptors(server)
 
     def good(self, growth: float, fair: float, page_growth: float) -> bool:
         early, late = _halves(self._memory, 0)

@@ -1,9 +1,11 @@
 """Image files -> texels, bytes or float32. Runs in the parsing child."""
 
 import io
+import os
 import re
 import struct
 from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
@@ -34,18 +36,15 @@ SRGB_NAMES = (b"sRGB", "sRGB".encode("utf-16-be"))  # in the description of a pr
 SRGB_GAMMA = 1 / 2.2
 
 
-def parse_image(format: str, data: bytes, path: str, limits: AssetLimits) -> ImageData:
-    """`path` leads to the same bytes, for the library that reads only files.
-
-    Raises ParseError, or what the libraries raise.
-    """
+def parse_image(format: str, data: bytes, limits: AssetLimits) -> ImageData:
+    """Raises ParseError, or what the libraries raise."""
     if not data.startswith(SIGNATURES[format]):
         raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
     is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
     if is_8bit:
         texels, warnings = _pillow(format, data, limits)
         return ImageData(np.ascontiguousarray(texels), tuple(warnings))
-    pixels = _openimageio(format, data, path, limits)
+    pixels = _openimageio(format, data, limits)
     told = tuple(_header(format, data))
     if not np.isfinite(pixels).all():
         y, x = (int(n) for n in np.argwhere(~np.isfinite(pixels).all(axis=2))[0])
@@ -112,30 +111,40 @@ def _unfollowed(image: Any) -> Iterator[str]:
         yield f"its gamma ({image.info['gamma']:g}) is not followed: set the texture's color_space"
 
 
-def _openimageio(format: str, data: bytes, path: str, limits: AssetLimits) -> Floats:
+def _openimageio(format: str, data: bytes, limits: AssetLimits) -> Floats:
     """EXR and Radiance as stored; a PNG of 16 bits with straight alpha, which Pillow would round to 8."""
     import OpenImageIO as oiio
 
     _check_header(format, data, limits)
     config = oiio.ImageSpec()
     config.attribute("oiio:UnassociatedAlpha", 1)
-    file = oiio.ImageInput.open(path, config)
-    if file is None or file.format_name() != OIIO.get(format, format):
-        oiio.geterror()  # says only that no reader took it
-        raise ParseError(f"it begins as {format.upper()} does, but its header can't be read or is cut off")
-    try:
-        part, names = _part(file)
-        spec = file.spec()
-        check_size(spec.width, spec.height, limits)
-        check_size(spec.full_width, spec.full_height, limits)
-        first, last = min(names), max(names) + 1
-        pixels = file.read_image(part, 0, first, last, "float")
-        if pixels is None:
-            raise ParseError(_said(file.geterror(), path))
-        picked = np.asarray(pixels).reshape(spec.height, spec.width, -1)[:, :, [k - first for k in names]]
-        return _upright(_framed(picked, spec), data) if format == "hdr" else _framed(picked, spec)
-    finally:
-        file.close()
+    with _path(data) as path:
+        file = oiio.ImageInput.open(path, config)
+        if file is None or file.format_name() != OIIO.get(format, format):
+            oiio.geterror()  # says only that no reader took it
+            raise ParseError(f"it begins as {format.upper()} does, but its header can't be read or is cut off")
+        try:
+            part, names = _part(file)
+            spec = file.spec()
+            check_size(spec.width, spec.height, limits)
+            check_size(spec.full_width, spec.full_height, limits)
+            first, last = min(names), max(names) + 1
+            pixels = file.read_image(part, 0, first, last, "float")
+            if pixels is None:
+                raise ParseError(_said(file.geterror(), path))
+            picked = np.asarray(pixels).reshape(spec.height, spec.width, -1)[:, :, [k - first for k in names]]
+            return _upright(_framed(picked, spec), data) if format == "hdr" else _framed(picked, spec)
+        finally:
+            file.close()
+
+
+@contextmanager
+def _path(data: bytes) -> Iterator[str]:
+    """Of a file in memory: OpenImageIO reads by path only, and this process may open no file that can be uploaded."""
+    with open(os.memfd_create("sunbox-image", os.MFD_CLOEXEC), "wb") as file:
+        file.write(data)
+        file.flush()
+        yield f"/proc/self/fd/{file.fileno()}"
 
 
 def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:

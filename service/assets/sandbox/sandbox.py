@@ -14,6 +14,7 @@ from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
 from service.child_processes import Child, Children, Closed, signal_name
+from service.confined import Rights
 
 log = logging.getLogger(__name__)
 
@@ -25,6 +26,7 @@ BYTES_PER_TEXEL = 48
 BYTES_PER_MESH_BYTE, BYTES_PER_BIG_MESH_BYTE, BIG_MESH_BYTES = 64, 12, 4 << 30
 # That OBJ is read at 0.05 s a megabyte; for a slower machine under load.
 SECONDS_PER_BYTE = 0.25 / (1 << 20)
+FILES = 64  # for one child
 USUAL_RATIO = 6  # of a zip's files to the zip: a text of numbers shrinks to a third, its faces to a fifth
 # What a big file took goes back to the machine: glibc else keeps blocks of up to 32 MiB for the next one.
 ENVIRONMENT = {
@@ -44,17 +46,31 @@ class Sandbox:
     def __init__(self, limits: AssetLimits) -> None:
         self.limits = limits
         self._turn = threading.BoundedSemaphore(limits.children)
-        self.children = Children("service.assets.sandbox.child", ENVIRONMENT, is_quiet=True)
+        self._asking = threading.Lock()
+        self._rights: Rights | None = None
+        self.children = Children("service.assets.sandbox.child", FILES, ENVIRONMENT, is_quiet=True)
 
     def start(self) -> None:
         """Start a child for the first file, without waiting."""
-        with self.children.one():
-            pass
+        with self.children.one() as child:
+            child.given = 0
 
     def warm(self) -> None:
         """Starts a child and has it load every library, without waiting: the first file then finds it ready."""
         with self.children.one() as child:
+            child.given = 0
             send(child.link, {}, -1)
+
+    def rights(self) -> Rights:
+        """Which rights a child gives up before it reads a file. Waits for the first child, and logs it once."""
+        with self._asking:
+            if self._rights is None:
+                try:
+                    self._rights = self.children.rights() or Rights()
+                except Closed:
+                    return Rights()
+                _log_rights(self._rights)
+            return self._rights
 
     def parse(self, format: str, source: bytes | int) -> MeshData | ImageData:
         """`format` is a key of KINDS; `source` the bytes or an open file. Of a scene all its triangles as one mesh.
@@ -92,13 +108,20 @@ class Sandbox:
             worst = min(BYTES_PER_MESH_BYTE * size, BIG_MESH_BYTES + BYTES_PER_BIG_MESH_BYTE * size)
         limits = replace(self.limits, seconds=self.limits.seconds + SECONDS_PER_BYTE * size)
         memory = min(BASE_BYTES + worst, self.limits.memory)
-        request = {"format": format, "whole": whole, "memory": memory, "limits": asdict(limits)}
+        caps = {"memory": self.limits.memory, "seconds": FILES * self._most_seconds, "written": self.limits.memory}
+        request = {"format": format, "whole": whole, "memory": memory, "limits": asdict(limits), "caps": caps}
         try:
             with self.children.one() as child:
                 reply, result = _ask(child, request, fd, limits)
+                child.is_spent = "error" in reply  # it may have been an attempt
         except Closed:
             raise ParseError("the service is shutting down") from None
         return _result(reply, result)
+
+    @property
+    def _most_seconds(self) -> float:
+        """For the largest file."""
+        return self.limits.seconds + SECONDS_PER_BYTE * self.limits.max_file
 
     def close(self) -> None:
         """Ends the children that wait; one that parses ends with its file."""
@@ -111,6 +134,15 @@ class Sandbox:
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
         self.close()
+
+
+def _log_rights(rights: Rights) -> None:
+    given_up = [name for name in asdict(rights) if name not in rights.missing]
+    if rights.missing:
+        text = "the kernel leaves rights to the processes that parse uploads missing=%s given_up=%s"
+        log.warning(text, ",".join(rights.missing), ",".join(given_up) or "none")
+    else:
+        log.info("uploads are parsed without rights given_up=%s landlock=%d", ",".join(given_up), rights.landlock)
 
 
 def _ask(child: Child, request: dict[str, Any], fd: int, limits: AssetLimits) -> tuple[dict[str, Any], int]:

@@ -8,14 +8,15 @@ from __future__ import annotations
 
 import fcntl
 import gc
+import json
 import os
 import socket
 import sys
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 from service.config import Config
-from service.confined import bound, confine, unbind
+from service.confined import bound, confine, renounce, unbind
 from service.problems import ServiceError, TooLarge
 from service.rendering.ipc import channel
 from service.rendering.requests.request_parser import PARSERS, Kind
@@ -44,7 +45,7 @@ class Failed:
 
 def main() -> None:
     end = socket.socket(fileno=int(sys.argv[1]))
-    confine(NICENESS)
+    end.sendmsg([json.dumps(asdict(renounce(confine(NICENESS)))).encode()])
     gc.disable()  # it would go through all values again and again, and find nothing to free
     gc.freeze()
     end.settimeout(IDLE_S)

@@ -19,6 +19,7 @@ from service.rendering.requests.parser_child import Failed, Work
 from service.rendering.requests.request_parser import Kind
 from service.scene.text import most_bytes
 
+BODIES = 1000  # for one child
 SECONDS_PER_BYTE = 0.25 / MIB  # twice what the slowest body there is was seen to take
 
 log = logging.getLogger(__name__)
@@ -33,7 +34,7 @@ class ParserPool:
 
     def __init__(self, config: Config) -> None:
         self._config = config.model_copy(update={"api_key": []})  # a process that reads strangers' texts needs no key
-        self._children = Children("service.rendering.requests.parser_child")
+        self._children = Children("service.rendering.requests.parser_child", BODIES)
         self._room = _Room(config.max_json_memory)
 
     def parse(self, kind: Kind, body: bytearray) -> Any:

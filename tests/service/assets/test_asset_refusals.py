@@ -20,6 +20,7 @@ from service.problems import AssetError
 from tests import asset_files as make
 from tests.asset_files import OBJ
 from tests.gltf_files import Gltf
+from tests.parsing import one_child
 
 RNG = np.random.default_rng(11)
 SECONDS, MEGABYTES = 5, 1024  # what refusing any file may cost
@@ -30,9 +31,10 @@ BYTES = RNG.integers(0, 256, (8, 8, 3), np.uint8)
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
-    store = AssetStore(tmp_path_factory.mktemp("data"))
-    yield store
-    store.close()
+    with one_child():
+        store = AssetStore(tmp_path_factory.mktemp("data"))
+        yield store
+        store.close()
 
 
 def changed(path: str, value: Any) -> bytes:

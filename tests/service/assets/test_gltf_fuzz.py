@@ -18,6 +18,7 @@ from service.problems import AssetError, UnsupportedMedia
 from service.scene import parse_scene
 from tests import asset_files as make
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
+from tests.parsing import one_child
 
 FILES = 200
 SECONDS, MEGABYTES = 5, 1024  # of processor time in all for the worst of them; of memory
@@ -136,9 +137,10 @@ def mutated(file: Gltf, rng: random.Random) -> bytes:
 
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
-    store = AssetStore(tmp_path_factory.mktemp("data"))
-    yield store
-    store.close()
+    with one_child():
+        store = AssetStore(tmp_path_factory.mktemp("data"))
+        yield store
+        store.close()
 
 
 def tried(store: AssetStore, data: bytes) -> str:
