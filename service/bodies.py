@@ -30,11 +30,14 @@ class Bodies:
         self._pool = ParserPool(config)
         self._held = 0  # bytes of large bodies in memory
 
-    async def parsed(self, kind: Kind, body: bytearray) -> Any:
-        """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge."""
+    async def parsed(self, kind: Kind, body: bytearray, client: str = "") -> Any:
+        """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
+
+        Turns go round the clients.
+        """
         if len(body) <= SMALL:
-            return await parsing(partial(PARSERS[kind], self._config, body))
-        return await waiting_for_parsers(partial(self._pool.parse, kind, body))
+            return await parsing(partial(PARSERS[kind], self._config, body), client)
+        return await waiting_for_parsers(partial(self._pool.parse, kind, body), client)
 
     def close(self) -> None:
         self._pool.close()

@@ -4,9 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import os
+import threading
+from collections import deque
 from collections.abc import Callable
-from concurrent.futures import ThreadPoolExecutor
-from typing import TypeVar
+from concurrent.futures import Future, ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Any, TypeVar
 
 from service.rendering.priority import raise_thread_niceness
 
@@ -21,14 +24,44 @@ def _yield_to_others(niceness: int = NICENESS) -> None:
     raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, os.getpid()) + niceness)
 
 
+@dataclass(frozen=True)
+class _Work:
+    run: Callable[[], Any]
+    result: Future[Any]
+
+
 class Pool:
-    """Threads for one kind of work, which waits for no other kind: `await pool(work)`."""
+    """Threads for one kind of work, which waits for no other kind: `await pool(work, client)`.
+
+    Turns go round the clients that have work here, and then in the order of arrival: one client with much work delays
+    itself.
+    """
 
     def __init__(self, name: str, threads: int, niceness: int = 0) -> None:
         self._threads = ThreadPoolExecutor(threads, name, _yield_to_others, (niceness,))
+        self._lock = threading.Lock()
+        self._waiting = dict[str, deque[_Work]]()  # by client; the first one's turn is next
 
-    async def __call__(self, work: Callable[[], T]) -> T:
-        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+    async def __call__(self, work: Callable[[], T], client: str = "") -> T:
+        result = Future[T]()
+        with self._lock:
+            self._waiting.setdefault(client, deque()).append(_Work(work, result))
+        self._threads.submit(self._run_next)
+        return await asyncio.wrap_future(result)
+
+    def _run_next(self) -> None:
+        with self._lock:
+            client, works = next(iter(self._waiting.items()))
+            work = works.popleft()
+            del self._waiting[client]
+            if works:
+                self._waiting[client] = works  # behind the others
+        if not work.result.set_running_or_notify_cancel():
+            return
+        try:
+            work.result.set_result(work.run())
+        except BaseException as error:
+            work.result.set_exception(error)
 
 
 parsing = Pool("parsing", 2, NICENESS)  # small bodies: milliseconds

@@ -20,7 +20,7 @@ from service.downloads import FileAnswer
 from service.rendering.executors import storing
 from service.routes import answers
 from service.scene.text import dump_json
-from service.state import app_state
+from service.state import app_state, caller
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
@@ -48,7 +48,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
         with file:  # here: a request that is cancelled does not wait for this thread
             return own.assets.add(file, kind, filename)
 
-    info = await storing(add)
+    info = await storing(add, caller(request))
     return {name: value for name, value in asdict(info).items() if value is not None}
 
 
@@ -67,7 +67,7 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
         imported = app_state(request).assets.scene(id)
         return imported, dump_json(imported.scene(presets.default_environment()))
 
-    imported, text = await storing(read)
+    imported, text = await storing(read, caller(request))
     headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
     for name in ("exposure", "aspect_ratio"):
         if (value := getattr(imported, name)) is not None:
@@ -89,7 +89,7 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
     with ExitStack() as stack:
-        source = await storing(partial(stack.enter_context, app_state(request).assets.opened(id)))
+        source = await storing(partial(stack.enter_context, app_state(request).assets.opened(id)), caller(request))
         headers = {"content-disposition": "attachment", "cache-control": FOREVER}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)

@@ -19,7 +19,7 @@ from service.rendering.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfR
 from service.rendering.requests.request_parser import Kind
 from service.routes import answers
 from service.routes.errors import GONE
-from service.state import STARTING_S, app_state, owner
+from service.state import STARTING_S, app_state, caller, owner
 
 router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
 
@@ -75,7 +75,7 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
     own = app_state(request)
     async with own.bodies.taken(request) as body:
         await own.renderers.able(STARTING_S)
-        asked: BsdfRequest = await own.bodies.parsed(kind, body)
+        asked: BsdfRequest = await own.bodies.parsed(kind, body, caller(request))
     material = pack_material(asked.material)
     question = EvaluateBsdf(
         0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner(request)

@@ -61,8 +61,8 @@ async def put(
 ) -> answers.Named:
     own = app_state(request)
     async with own.bodies.taken(request) as body:
-        checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body)
-    kept, new = await saving(partial(own.documents.put, kind, name, checked, title))
+        checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body, caller(request))
+    kept, new = await saving(partial(own.documents.put, kind, name, checked, title), caller(request))
     if new:
         response.status_code = 201
     return answers.Named(name=name, title=kept)

@@ -280,6 +280,18 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
     assert asked == [common_keys(), []] and len(common_keys()) == 15
 
 
+def test_clients_take_turns_at_the_compiler(gpu: Renderer, cold: Path) -> None:
+    compiler, helper = CompileClient(gpu.info, None, lambda: True), Instant()
+    compiler._helper = helper  # type: ignore[assignment]
+    keys = list(common_keys()[:7])
+    of = dict(zip(keys, ["flood"] * 5 + ["other"] * 2, strict=True))
+    for key, client in of.items():
+        assert compiler.waits(key, lambda ms, key=key: None, client=client)  # type: ignore[misc]
+    while compiler.left_s is not None:
+        compiler.hear()
+    assert [of[key] for key in helper.asked] == ["flood", "other", "flood", "other", "flood", "flood", "flood"]
+
+
 @pytest.mark.parametrize("name", SCENES)
 def test_the_renderer_finds_all_of_it(gpu: Renderer, cold: Path, name: str) -> None:
     def run(program: str) -> str:

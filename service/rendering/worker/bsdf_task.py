@@ -24,7 +24,7 @@ class BsdfTask:
         self._send = context.send
         self._evaluator = context.renderer.bsdf
         self._key = kernel_keys.bsdf_key(self._material, question.question)
-        self._wait = KernelWait(context.compiler)
+        self._wait = KernelWait(context.compiler, self.client)
         self._steps: Steps[BsdfValues | BsdfAlbedo | BsdfTerms] | None = None
         self._begun = self._ended = False
 

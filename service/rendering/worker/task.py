@@ -42,9 +42,9 @@ class Task:
         self._residency = Residency(renderer, context.memory, self, self._part)
         self._tracker = ProgressTracker(renderer)
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
-        self._frames = FrameSource(context, number, self._residency, self._tracker, denoising, self._finish)
+        self._frames = FrameSource(context, number, client, self._residency, self._tracker, denoising, self._finish)
         self._ending = Ending(context, number, self._residency, self._tracker, self._frames, self.answer)
-        self._updates = Updates(context, number, self._residency, self._tracker)
+        self._updates = Updates(context, number, client, self._residency, self._tracker)
         self.savings = KernelSavings(context, number)
         self._scale = 1.0  # of what is traced
         self._paused = self._away = False

@@ -16,13 +16,15 @@ from service.rendering.worker.view.fallback_preview import FallbackPreview
 class Updates:
     """At most one update is pending. While its kernel is compiled, `preview` may show it with another one."""
 
-    def __init__(self, context: WorkerContext, number: int, residency: Residency, tracker: ProgressTracker) -> None:
+    def __init__(
+        self, context: WorkerContext, number: int, client: str, residency: Residency, tracker: ProgressTracker
+    ) -> None:
         self.pending: Update | None = None
         self.stops = False  # the render ends as soon as the pending update is applied
         self.settings: RenderSettings | None = None  # of the last update that was applied
         self.preview = FallbackPreview(number, context.send, context.renderer, context.spare)
         self._residency, self._tracker, self._spare = residency, tracker, context.spare
-        self._wait = KernelWait(context.compiler)
+        self._wait = KernelWait(context.compiler, client)
         self._request: KernelRequest | None = None  # of the pending update, once it was looked at
 
     @property

@@ -43,7 +43,7 @@ class Compiled:
 @dataclass
 class _CompileRequest:
     key: KernelKey
-    told: set[Told] = field(default_factory=set)
+    told: dict[Told, str] = field(default_factory=dict)  # callers, and the client of each
 
 
 class CompileClient:
@@ -71,6 +71,8 @@ class CompileClient:
         self._known: set[KernelKey] = set()  # kernels that need no helper any more, or that it could not compile
         self._met: set[KernelKey] = set()
         self._orders: list[_CompileRequest] = []  # the first is under way
+        self._served: dict[str, int] = {}  # by client: the number of its last kernel
+        self._begun = 0
         self._until = 0.0
         self._runnable: RunnableTime | None = None  # of the order under way
         self._failures = 0
@@ -89,10 +91,10 @@ class CompileClient:
         """Whether nobody needs to wait for this kernel any more."""
         return key in self._known
 
-    def waits(self, key: KernelKey, told: Told, alone: bool = False) -> bool:
+    def waits(self, key: KernelKey, told: Told, alone: bool = False, client: str = "") -> bool:
         """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
         it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop, as
-        where nobody else is there, unless there is something to do meanwhile (`alone`).
+        where nobody else is there, unless there is something to do meanwhile (`alone`). Turns go round the clients.
         """
         if told is not _nobody:
             self.forget(told)
@@ -102,13 +104,13 @@ class CompileClient:
         if order is None:
             if not self._able or not (alone or self._crowded()) or self._is_recorded(key):
                 return False
-            order = _CompileRequest(key)
+            order = _CompileRequest(key, {told: client})
             self._orders.append(order)
             if len(self._orders) == 1:
                 self._begin()
         if order not in self._orders:  # the helper cannot be started
             return False
-        order.told.add(told)
+        order.told[told] = client
         return True
 
     def prepare(self, keys: list[KernelKey]) -> None:
@@ -147,7 +149,7 @@ class CompileClient:
     def forget(self, told: Told) -> None:
         """Drop one caller's wait; a kernel that nobody waits for is not begun."""
         for order in self._orders:
-            order.told.discard(told)
+            order.told.pop(told, None)
         self._orders[1:] = [order for order in self._orders[1:] if order.told]
 
     def hear(self) -> None:
@@ -197,7 +199,8 @@ class CompileClient:
             told(milliseconds)
 
     def _begin(self) -> None:
-        """Send the first request; where the process cannot be started, all callers are told to compile themselves."""
+        """Send the next request; where the process cannot be started, all callers are told to compile themselves."""
+        self._choose()
         try:
             if self._failures < TRIES:
                 self._helper.ask(self._orders[0].key)
@@ -211,6 +214,18 @@ class CompileClient:
         log.warning("gave up compiling ahead: kernels are compiled in the loop")
         while self._orders:
             self._tell(0.0)
+
+    def _choose(self) -> None:
+        """Put the order first whose client was served longest ago; equal ones keep their order."""
+        first = min(
+            self._orders, key=lambda order: min((self._served.get(c, 0) for c in order.told.values()), default=0)
+        )
+        self._orders.remove(first)
+        self._orders.insert(0, first)
+        self._begun += 1
+        if len(self._served) > REMEMBERED:
+            self._served.clear()
+        self._served |= dict.fromkeys(first.told.values(), self._begun)
 
 
 def _nobody(milliseconds: float) -> None:

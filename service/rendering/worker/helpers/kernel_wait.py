@@ -13,14 +13,16 @@ if TYPE_CHECKING:
 class KernelWait:
     """One kernel at a time. Without a compiler nothing is waited for: kernels are compiled where they are used."""
 
-    def __init__(self, compiler: CompileClient | None) -> None:
+    def __init__(self, compiler: CompileClient | None, client: str = "") -> None:
+        """Turns at the compiler go round the clients."""
         self.compiling = False
         self.compiler = compiler
+        self._client = client
         self._compiled_ms = 0.0
 
     def begin(self, key: KernelKey, shown: bool = False) -> bool:
         """Whether that kernel is now being compiled; `shown`: with something to look at meanwhile."""
-        self.compiling = self.compiler is not None and self.compiler.waits(key, self._hear, shown)
+        self.compiling = self.compiler is not None and self.compiler.waits(key, self._hear, shown, self._client)
         return self.compiling
 
     def stop(self) -> None:

@@ -40,6 +40,7 @@ class FrameSource:
         self,
         context: WorkerContext,
         number: int,
+        client: str,
         residency: Residency,
         tracker: ProgressTracker,
         denoising: DenoisePolicy,
@@ -52,7 +53,7 @@ class FrameSource:
         self.denoising = denoising
         self._number, self._send, self._finish = number, context.send, finish
         self._residency, self._tracker = residency, tracker
-        self._wait = KernelWait(context.compiler)  # for the kernel of the AOVs of the first hit
+        self._wait = KernelWait(context.compiler, client)  # for the kernel of the AOVs of the first hit
         self._served: _Content | None = None  # of the last frame that was sent
         self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
         self._guided: Picture | None = None  # whose they are, while some are missing
