@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any, Protocol
 
-from service.rendering.ipc.messages import FromRenderer, ToRenderer, Update
+from service.rendering.ipc.messages import FromRenderer, Restore, ToRenderer, Update
 from service.rendering.statistics import Kind, Statistics
 
 
@@ -57,5 +57,8 @@ class Renderers(Protocol):
     def send(self, message: ToRenderer) -> None:
         """Hand a message on; nothing happens when its task was lost or dropped."""
 
-    async def send_scene(self, update: Update) -> None:
-        """Like `send`, for a whole scene: it is copied to shared memory off the event loop."""
+    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
+        """Like `send`, for a whole scene: it is copied to shared memory off the event loop.
+
+        `restore`: its picture as the server has it, which the task goes on from, or has ended with.
+        """

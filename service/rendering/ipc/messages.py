@@ -23,17 +23,6 @@ class SceneData(Protocol):
     def materials(self) -> np.ndarray: ...
 
 
-class PictureData(Protocol):
-    """A gpu.Saved: a picture's state off the device."""
-
-    @property
-    def samples(self) -> int: ...
-    @property
-    def under_way(self) -> tuple[int, int, int]: ...
-    @property
-    def buffers(self) -> list[np.ndarray]: ...
-
-
 @dataclass(frozen=True)
 class StopRule:
     """Rendering ends at the first of these; None: no such limit."""
@@ -60,6 +49,18 @@ class Progress:
     elapsed_s: float = 0.0
     eta_s: float | None = None
     missing: dict[int, float] | None = None  # by bounces, the share of the scene's light that comes later
+
+
+@dataclass(frozen=True)
+class SavedPicture:
+    """The accumulated samples of a picture: with the same scene and settings it goes on to the same bits.
+
+    The server knows nothing of what is in `buffers`, which are arrays of bytes.
+    """
+
+    samples: int
+    under_way: tuple[int, int, int]  # samples of the pass, row and column of its next tile
+    buffers: list[np.ndarray]
 
 
 # --- to the renderer ---
@@ -160,6 +161,13 @@ class MeasureKernel:
 
 
 @dataclass(frozen=True)
+class TakeCheckpoint:
+    """Asks for a Checkpoint of a render under way as soon as possible: the server is about to end."""
+
+    task: int
+
+
+@dataclass(frozen=True)
 class Settle:
     """Asks to apply the updates so far before the next one, which may be too much and fall back to them."""
 
@@ -172,7 +180,7 @@ class Restore:
 
     task: int
     generation: int
-    saved: PictureData
+    saved: SavedPicture
     reason: Reason | None  # why it had ended; None: it goes on
     progress: Progress
 
@@ -262,7 +270,7 @@ class Done:
     reason: Reason
     progress: Progress
     warnings: list[str]
-    saved: PictureData | None = None  # of a render that no stream edits; None: no samples
+    saved: SavedPicture | None = None  # of a render that no stream edits; None: no samples
 
 
 @dataclass(frozen=True)
@@ -272,7 +280,7 @@ class Checkpoint:
     task: int
     generation: int
     progress: Progress
-    saved: PictureData
+    saved: SavedPicture
 
 
 @dataclass(frozen=True)
@@ -341,7 +349,20 @@ class Failed:
     fallback: int | None = None
 
 
-ToRenderer = Update | Want | Read | Pause | Resume | Stop | Drop | Settle | Restore | MeasureKernel | EvaluateBsdf
+ToRenderer = (
+    Update
+    | Want
+    | Read
+    | Pause
+    | Resume
+    | Stop
+    | Drop
+    | Settle
+    | TakeCheckpoint
+    | Restore
+    | MeasureKernel
+    | EvaluateBsdf
+)
 FromRenderer = (
     Ready
     | Unable

@@ -67,6 +67,13 @@ class ReplayLog:
     def scene_told(self, update: Update, encoded: Encoded) -> None:
         self._push(_State(update.generation, channel.another(encoded), whole=True))
 
+    def restored(self, restore: Restore) -> None:
+        """The server had this picture already: the render goes on from it, or has ended with it."""
+        if restore.reason is None:
+            self._checkpoint = restore
+        else:
+            self.saved = restore
+
     def told(self, message: ToRenderer) -> None:
         if isinstance(message, Update):
             self._edited(message)

@@ -29,6 +29,7 @@ from service.rendering.ipc.messages import (
     Progressed,
     Read,
     Ready,
+    Restore,
     ToRenderer,
     Unable,
     Update,
@@ -162,8 +163,11 @@ class Supervisor:
         elif isinstance(message, Read | MeasureKernel):
             self._do(self._bring_back(message.task, held))
 
-    async def send_scene(self, update: Update) -> None:
-        """Like `send`, for a whole scene: copying that to shared memory is not the event loop's work."""
+    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
+        """Like `send`, for a whole scene: copying that to shared memory is not the event loop's work.
+
+        `restore`: its picture as the server has it.
+        """
         held = self._tasks.get(update.task)
         if held is None:
             return
@@ -172,7 +176,12 @@ class Supervisor:
         if update.task not in self._tasks:
             return channel.discard(encoded)
         held.record.scene_told(update, encoded)
-        self._send_encoded(encoded)
+        if restore is None:
+            return self._send_encoded(encoded)
+        held.record.restored(restore)
+        held.resident = False
+        channel.discard(encoded)
+        await self._bring_back(update.task, held)
 
     def _send(self, message: ToRenderer) -> None:
         if self._process is not None:

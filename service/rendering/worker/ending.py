@@ -10,6 +10,7 @@ from service.rendering.ipc.messages import Checkpoint, Done, Progressed, Reason
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.checkpoints import Checkpointer
 from service.rendering.worker.device.residency import Residency
+from service.rendering.worker.payloads import sent_picture
 from service.rendering.worker.progress.progress import ProgressTracker
 from service.rendering.worker.view.frames import FrameSource
 
@@ -48,7 +49,8 @@ class Ending:
         """Do a step of saving the picture, where that is due; whether there was one."""
         full, checkpoints = self._residency.full, self.checkpoints
         if not checkpoints.under_way:
-            if not self.kept or self._tracker.reason is not None or not checkpoints.due(full):
+            ended, elapsed_s = self._tracker.reason is not None, self._tracker.clock.elapsed_s
+            if not self.kept or ended or not checkpoints.due(full, elapsed_s):
                 return False
             checkpoints.begin(full)
         saved = checkpoints.step()
@@ -56,7 +58,7 @@ class Ending:
             self._say_done(saved)
         elif saved is not None:
             progress = self._tracker.progress(self._residency)
-            self._send(Checkpoint(self._number, self._tracker.generation, progress, saved))
+            self._send(Checkpoint(self._number, self._tracker.generation, progress, sent_picture(saved)))
         return True
 
     def end_if_reached(self) -> bool:
@@ -94,7 +96,8 @@ class Ending:
         assert reason is not None
         self._answer()
         progress = self._tracker.progress(self._residency)
-        self._send(Done(self._number, self._tracker.generation, reason, progress, self.warnings, saved))
+        sent = None if saved is None else sent_picture(saved)
+        self._send(Done(self._number, self._tracker.generation, reason, progress, self.warnings, sent))
 
     @property
     def warnings(self) -> list[str]:

@@ -26,6 +26,7 @@ from service.rendering.ipc.messages import (
     Resume,
     Settle,
     Stop,
+    TakeCheckpoint,
     ToRenderer,
     Update,
     Usage,
@@ -194,6 +195,8 @@ class Loop:
             self._work(task, task.settle)
         elif isinstance(message, Restore):
             self._work(task, lambda: task.restore(message))
+        elif isinstance(message, TakeCheckpoint):
+            task.take_checkpoint()
         elif isinstance(message, MeasureKernel):
             task.savings.ask()
         elif isinstance(message, Pause):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import cast
 
-from gpu import Saved, SceneArrays
-from service.rendering.ipc.messages import PictureData, SceneData, Update
+from gpu import RenderSettings, Saved, SceneArrays
+from service.rendering.ipc.messages import SavedPicture, SceneData, Update
 
 
 def scene_arrays(data: SceneData) -> SceneArrays:
@@ -17,5 +17,11 @@ def updated_scene(update: Update) -> SceneArrays | None:
     return None if update.scene is None else scene_arrays(update.scene)
 
 
-def saved_picture(data: PictureData) -> Saved:
-    return cast(Saved, data)
+def saved_picture(sent: SavedPicture, settings: RenderSettings) -> Saved:
+    """The picture that a message brings, with the settings that the task has."""
+    return Saved(settings, sent.samples, sent.under_way, sent.buffers)
+
+
+def sent_picture(saved: Saved) -> SavedPicture:
+    """The picture for a message."""
+    return SavedPicture(saved.samples, saved.under_way, saved.buffers)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import time
 from enum import Enum
 
@@ -17,6 +18,8 @@ from service.rendering.worker.progress.progress import ProgressTracker
 from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.denoise_policy import DenoisePolicy
 from service.rendering.worker.view.frames import SLICE_S, FrameSource
+
+log = logging.getLogger(__name__)
 
 
 class Phase(Enum):
@@ -221,13 +224,16 @@ class Task:
         self.settle()
         if self._residency.loaded is None:
             return
-        tracker = self._tracker
-        self._residency.full.restore(saved_picture(restore.saved))
+        tracker, full, saved = self._tracker, self._residency.full, restore.saved
+        if [buffer.size for buffer in full.state] != [buffer.nbytes for buffer in saved.buffers]:
+            log.warning("another version saved this picture, which begins again task=%d", self.number)
+            return
+        full.restore(saved_picture(saved, full.settings))
         tracker.reason, self._frames.scale = restore.reason, 1.0
         tracker.clock.set(restore.progress.elapsed_s)
         tracker.meter.set(restore.progress.samples, restore.progress.noise)
-        tracker.eta.passed(restore.saved.samples, restore.progress.elapsed_s)
-        tracker.even = not restore.saved.under_way[0]
+        tracker.eta.passed(saved.samples, restore.progress.elapsed_s)
+        tracker.even = not saved.under_way[0]
         self._ending.checkpoints.restart()
 
     def look(self, want: Want) -> None:
@@ -244,6 +250,10 @@ class Task:
 
     def read(self, read: Read) -> None:
         self._frames.read(read)
+
+    def take_checkpoint(self) -> None:
+        """Save the picture in the next turn."""
+        self._ending.checkpoints.hasten()
 
     def measure_kernel(self) -> None:
         """A step of `savings`."""

@@ -128,32 +128,41 @@ def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
     scene.release()
 
 
-def test_it_takes_a_hundredth_of_the_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    now = 0.0
+def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+    now, step_s = 0.0, 0.005
 
     def slow(room: Any) -> Generator[None, None, str]:
         nonlocal now
         for _ in range(4):
-            now += 0.5
+            now += step_s
             yield
         return "saved"
 
+    def saved(kept: checkpoints.Checkpointer) -> None:
+        kept.begin(picture)
+        assert [kept.step() for _ in range(5)] == [None] * 4 + ["saved"] and not kept.under_way
+
+    def pause_s(kept: checkpoints.Checkpointer, elapsed_s: float) -> float:
+        nonlocal now
+        began = now
+        while not kept.due(picture, elapsed_s):
+            now += 0.125
+        return now - began
+
     monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
-    kept, shown = (
-        checkpoints.Checkpointer(10.0),
-        SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[], save=slow),
-    )
-    small: Any = shown
-    assert not kept.due(small)
-    now = 10.0
-    assert kept.due(small)
-    for side, kept_too in ((2236, True), (2400, False)):  # up to 5 megapixels, as the configuration says
-        large: Any = SimpleNamespace(samples=1, settings=RenderSettings(side, side))
-        assert kept.due(large) is kept_too
-    kept.begin(small)
-    steps = [kept.step() for _ in range(5)]
-    assert steps == [None] * 4 + ["saved"] and not kept.under_way
-    now += 199.0
-    assert not kept.due(small)
-    now += 1.0
-    assert kept.due(small)
+    picture: Any = SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[], save=slow)
+    kept = checkpoints.Checkpointer(1.0)
+    assert pause_s(kept, 1.0) == 1.0
+    saved(kept)
+    assert pause_s(kept, 20.0) == pytest.approx(2.0, abs=0.2)
+    step_s = 0.5  # a large picture: a hundredth would be 200 s, and at most 10 s may be lost
+    saved(kept)
+    assert pause_s(kept, 20.0) <= 4.0
+    assert pause_s(kept, 20.0) == 0.0  # it is due until it is taken
+    saved(kept)
+    assert pause_s(kept, 10_000.0) == pytest.approx(40.0, abs=0.2)  # 1 % of the render may be lost
+    saved(kept)
+    kept.hasten()
+    assert pause_s(kept, 10_000.0) == 0.0
+    picture.samples = 0
+    assert not kept.due(picture, 10_000.0)

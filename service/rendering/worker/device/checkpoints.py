@@ -2,19 +2,23 @@
 
 from __future__ import annotations
 
+import math
 import time
 from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import Steps, picture_bytes
+from gpu import Steps
 from service import shared_memory
 
 if TYPE_CHECKING:
     from gpu import Picture, Saved
 
-REST = 100  # times the duration of a checkpoint pass until the next one: they cost 1 % at most
-MOST_BYTES = 256 << 20  # of a picture under way: the server keeps one for each render
+REST = 100  # times the duration of a checkpoint pass until the next one: they cost 1 % at most, up to LONGEST_S
+# Seconds between two checkpoints, however long they take. When all processes end, at most 10 s of a render are to be
+# lost, and until a checkpoint of a gigabyte is on the disk some of these have passed.
+LONGEST_S = 4.0
+SHARE = 0.004  # of the time that a render has taken, and so of what would be lost; 1 % may be
 
 
 class Checkpointer:
@@ -25,22 +29,26 @@ class Checkpointer:
         self._every_s = every_s
         self._steps: Steps[Saved] | None = None
         self._took_s = 0.0
-        self._due_at = 0.0
+        self._ended_at = 0.0
         self.restart()
 
     def restart(self) -> None:
         """Begin anew: the picture is another one, or no longer wanted."""
         self._steps, self._took_s = None, 0.0
-        self._due_at = time.monotonic() + self._every_s
+        self._ended_at = time.monotonic()
 
     @property
     def under_way(self) -> bool:
         return self._steps is not None
 
-    def due(self, picture: Picture) -> bool:
-        """Whether the picture under way is to be kept as it is now."""
-        late = time.monotonic() >= self._due_at
-        return late and picture.samples > 0 and picture_bytes(picture.settings) <= MOST_BYTES
+    def hasten(self) -> None:
+        """Make the next checkpoint due now."""
+        self._ended_at = -math.inf
+
+    def due(self, picture: Picture, elapsed_s: float) -> bool:
+        """Whether the picture under way, which has taken that many seconds, is to be saved as it is now."""
+        pause_s = max(self._every_s, min(REST * self._took_s, LONGEST_S), SHARE * elapsed_s)
+        return picture.samples > 0 and time.monotonic() >= self._ended_at + pause_s
 
     def begin(self, picture: Picture) -> None:
         # One descriptor goes with the picture.
@@ -55,7 +63,6 @@ class Checkpointer:
         saved = self._steps.step()
         if saved is not None:
             self._steps = None
-        now = time.monotonic()
-        self._took_s += now - began
-        self._due_at = now + max(self._every_s, REST * self._took_s)
+        self._ended_at = time.monotonic()
+        self._took_s += self._ended_at - began
         return saved
