@@ -36,6 +36,8 @@ from service.logs import Requests
 from service.problems import Unavailable
 from service.rendering.first_frame import warm_up
 from service.rendering.jobs.queue import QueueLimits, RenderQueue
+from service.rendering.jobs.retention import Retention
+from service.rendering.jobs.store.store import RenderStore
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
@@ -70,7 +72,8 @@ log = logging.getLogger(__name__)
 
 def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
-    kept = storage(config)
+    kept = storage(config, lambda: store.pictures)
+    store = RenderStore(config.data_dir, kept.quota.room)
     own = AppState(
         config,
         kept.assets,
@@ -78,7 +81,7 @@ def create_app(config: Config) -> FastAPI:
         Supervisor(Options(config.device, config.hang_s, config.gpu_memory, config.checkpoint_s)),
         kept.documents,
         kept.quota,
-        RenderQueue(_bounds(config)),
+        RenderQueue(_limits(config), store),
     )
     app = FastAPI(
         title="Sunbox",
@@ -219,6 +222,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
         own.renderers.start()
     own.assets.warm()
     asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
+    await own.resume_renders()
     warming = asyncio.create_task(warm_up(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)))
     yield
     warming.cancel()
@@ -229,15 +233,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own.bodies.close()
 
 
-def _bounds(config: Config) -> QueueLimits:
-    return QueueLimits(
-        running=config.max_running,
-        waiting=config.max_queue,
-        each=config.max_jobs,
-        kept=config.keep_renders,
-        kept_bytes=config.keep_bytes,
-        kept_s=config.keep_seconds,
-    )
+def _limits(config: Config) -> QueueLimits:
+    retention = Retention(config.keep_renders, config.keep_bytes, config.keep_seconds)
+    return QueueLimits(config.max_running, config.max_queue, config.max_jobs, retention)
 
 
 async def _docs() -> Response:

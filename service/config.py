@@ -53,13 +53,13 @@ class Config(BaseSettings):
     )
     data_dir: Path = Field(
         default_factory=_default_data_dir,
-        description="Folder of assets and documents (default: `sunbox` in `$XDG_CACHE_HOME` or `~/.cache`).",
+        description="Folder of assets, documents and renders (default: `sunbox` in `$XDG_CACHE_HOME` or `~/.cache`).",
     )
     data_quota: int = Field(
         10 * GIB,
         ge=1,
-        description="Most bytes of assets and documents, in whole blocks; assets unused longest make room, unless "
-        "documents use them.",
+        description="Most bytes of assets, documents and renders, in whole blocks; assets unused longest make room, "
+        "unless documents or renders use them.",
     )
     data_files: int = Field(1_000_000, ge=1, description="Most files that they take, two for an asset.")
     device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
@@ -98,9 +98,9 @@ class Config(BaseSettings):
         description="A renderer is replaced that makes no progress for so long, and for ten times its last step.",
     )
     checkpoint_s: Seconds = Field(
-        2.0,
-        description="How often a render of up to 5 megapixels is saved, to go on after a renderer's loss; less often "
-        "where that would cost more than 1 % of its time.",
+        4.0,
+        description="How often a render is stored, to go on after the loss of its renderer or of all processes; "
+        "after 17 minutes less often: every 0.4 % of its time.",
     )
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(
@@ -123,14 +123,20 @@ class Config(BaseSettings):
     parse_memory: int = Field(8 * GIB, ge=256 * MIB, description="Most bytes of memory that parsing an asset takes.")
     max_seconds: Seconds | None = Field(None, description="Longest that a picture is rendered (default: no limit).")
     max_running: int = Field(8, ge=1, description="Most renders at a time; others wait in line.")
-    max_queue: int = Field(256, ge=1, description="Most renders that wait in line.")
-    max_jobs: int = Field(64, ge=1, description="Most renders, running and waiting, of one key.")
-    keep_renders: int = Field(64, ge=1, description="Most ended renders that are kept for each key.")
-    keep_bytes: int = Field(GIB, ge=1, description="Most bytes that the ended renders of all keys hold.")
+    max_queue: int = Field(
+        10_000,
+        ge=1,
+        description="Most renders that wait in line; a key with less than its share may add more.",
+    )
+    max_jobs: int = Field(2_000, ge=1, description="Most renders, running and waiting, of one key.")
+    keep_renders: int = Field(2_000, ge=1, description="Most ended renders that are kept for each key.")
+    keep_bytes: int = Field(4 * GIB, ge=1, description="Most bytes on the disk of the ended renders of all keys.")
     keep_packed: int = Field(
         GIB, ge=1, description="Most bytes of packed scenes that are kept for the next edits of all streams."
     )
-    keep_seconds: Seconds = Field(3600.0, description="How long an ended render is kept.")
+    keep_seconds: Seconds = Field(
+        86_400.0, description="How long an ended render is kept; the time while the server is down counts."
+    )
 
     @property
     def limits(self) -> dict[str, float | None]:

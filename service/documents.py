@@ -118,13 +118,15 @@ class Documents:
 
     @contextmanager
     def assets_in_use(self) -> Iterator[set[str]]:
-        """The ids of all assets that saved documents refer to; while it lasts no document is saved."""
+        """The ids of all assets that saved documents and renders refer to; while it lasts none of these is stored."""
         if not self._database.exists():
             yield set()
             return
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
-            yield {asset for (asset,) in database.execute("SELECT DISTINCT asset FROM uses")}
+            yield {
+                asset for (asset,) in database.execute("SELECT asset FROM uses UNION SELECT asset FROM render_uses")
+            }
 
     def usage(self) -> Usage:
         """Of the database, whose unused pages don't count."""

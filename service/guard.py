@@ -48,10 +48,10 @@ HEADERS = {
 }
 PREFLIGHT = {
     "access-control-allow-methods": "GET, HEAD, POST, PUT, DELETE",
-    "access-control-allow-headers": "authorization, content-type, x-request-id",
+    "access-control-allow-headers": "authorization, content-type, idempotency-key, x-request-id",
     "access-control-max-age": "600",
 }
-EXPOSED = "location, retry-after, x-request-id"
+EXPOSED = "link, location, retry-after, x-request-id"
 
 Refuse = Callable[[ServiceError], ASGIApp]
 

@@ -40,5 +40,25 @@ MIGRATIONS = (
             "DROP TABLE former",
         ),
     ),
+    Migration(
+        "renders that outlive the server",
+        (
+            # `number` rises in the order of arrival, also after the last ones were deleted.
+            """CREATE TABLE renders (
+                number INTEGER PRIMARY KEY AUTOINCREMENT, id TEXT NOT NULL UNIQUE, owner TEXT NOT NULL, label TEXT,
+                priority INTEGER NOT NULL, created_at REAL NOT NULL, settings TEXT NOT NULL, bytes INTEGER NOT NULL,
+                state TEXT NOT NULL, ended_at REAL, outcome TEXT NOT NULL, gone INTEGER NOT NULL DEFAULT 0
+            )""",
+            # Documents have a table of their own, so that reading all renders does not read them.
+            "CREATE TABLE render_documents (number INTEGER PRIMARY KEY, body BLOB NOT NULL)",
+            """CREATE TABLE render_uses (
+                asset TEXT NOT NULL, number INTEGER NOT NULL, PRIMARY KEY (number, asset)
+            ) WITHOUT ROWID""",
+            """CREATE TABLE render_keys (
+                owner TEXT NOT NULL, key TEXT NOT NULL, digest TEXT NOT NULL, number INTEGER NOT NULL,
+                taken_at REAL NOT NULL, PRIMARY KEY (owner, key)
+            ) WITHOUT ROWID""",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

@@ -3,8 +3,10 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import time
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from importlib import metadata
 from typing import Any
 
@@ -15,13 +17,18 @@ from service.bodies import Bodies
 from service.config import Config
 from service.documents import Documents
 from service.downloads import Downloads
+from service.pack import Packed
 from service.problems import Unavailable
 from service.quality import priced
 from service.quota import Quota
 from service.readiness import SOFTWARE, Readiness
 from service.rendering.bsdf import BsdfQuestions
+from service.rendering.executors import packing
+from service.rendering.jobs.job import Job
 from service.rendering.jobs.queue import RenderQueue
+from service.rendering.jobs.store.record import Order, Outcome, StoredRender
 from service.rendering.renderers import Renderers
+from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.sessions import Sessions
 from service.traffic import Traffic
@@ -30,6 +37,8 @@ MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
 GPU_S = 60.0  # the same at start, where SUNBOX_REQUIRE_GPU is set
 FAREWELL_S = 4.0  # for the farewell to reach a client that reads slowly
+
+log = logging.getLogger(__name__)
 
 
 @dataclass
@@ -69,6 +78,31 @@ class AppState:
             "quality": priced(),
         }
 
+    async def resume_renders(self) -> None:
+        """Take up the renders that an earlier server left. Without a data folder renders end with the server."""
+        store = self.renders.store
+        if store is None:
+            return
+        if not await asyncio.to_thread(store.usable):
+            log.warning("renders will not outlive this server: the data folder cannot be written to")
+            self.renders.store = None
+            return
+        self.renders.resume(await asyncio.to_thread(store.load), self._resumed)
+
+    def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
+        """A render that is asked for now."""
+        outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
+        return Job(self.renderers, order, self._pack, document, packed, outcome)
+
+    def _resumed(self, stored: StoredRender) -> Job:
+        return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome)
+
+    async def _pack(self, document: bytes) -> Packed:
+        """The scene of a folded document, which was valid when it was stored. Raises what reading it raises."""
+        body = await packing(lambda: bytearray(f'{{"scene":{unfolded(document)}}}', "ascii"))
+        parsed: ParsedRequest = await self.bodies.parsed("request", body)
+        return await packing(partial(self.reader.pack, parsed.scene))
+
     async def gpu_missing(self) -> str | None:
         """Why SUNBOX_REQUIRE_GPU forbids to start; None where nothing does. Waits for the renderer."""
         if not self.config.require_gpu:
@@ -81,10 +115,10 @@ class AppState:
         return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None
 
     async def farewell(self) -> None:
-        """Tell all clients that the server ends: close streams and cancel renders, so that requests are answered."""
-        self.renders.close()
+        """Tell all clients that the server ends, so that requests are answered; renders go on at the next start."""
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S
+        await self.renders.close()
         while self.sessions.attended and time.monotonic() < until:
             await asyncio.sleep(0.01)
 

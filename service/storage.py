@@ -1,12 +1,16 @@
-"""What is kept in the data folder: assets and documents, within one quota."""
+"""What is kept in the data folder: assets, documents and the pictures of renders, within one quota."""
 
 from __future__ import annotations
 
+import os
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
+from pathlib import Path
 
 from service.assets import AssetStore
 from service.config import Config
-from service.disk_usage import Usage
+from service.disk_usage import Usage, usage
 from service.documents import Documents
 from service.quota import Quota
 
@@ -18,13 +22,27 @@ class Storage:
     quota: Quota
 
 
-def storage(config: Config) -> Storage:
+RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
+
+
+def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Storage:
+    """`pictures`: what the pictures of renders take, for a server that counts them; else they are looked at."""
+    beside = pictures or (lambda: _pictures(config.data_dir / RENDERS))
     # They depend on each other: assets need room, the quota the documents' references, documents the assets.
     limit = Usage(config.data_quota, config.data_files)
-    quota = Quota(config.data_dir, limit, lambda: documents.assets_in_use(), lambda: documents.usage())
+    quota = Quota(config.data_dir, limit, lambda: documents.assets_in_use(), lambda: documents.usage() + beside())
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota)
     return Storage(assets, documents, quota)
+
+
+def _pictures(folder: Path) -> Usage:
+    total = Usage()
+    with suppress(FileNotFoundError), os.scandir(folder) as entries:
+        for entry in entries:
+            with suppress(FileNotFoundError):  # a checkpoint that the server replaced just now
+                total += usage(entry.stat(follow_symlinks=False))
+    return total
 
 
 def _builtin_assets() -> dict[str, bytes]:

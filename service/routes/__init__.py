@@ -1,6 +1,8 @@
 """The endpoints: a handler parses, asks, answers. What they share is `service.state`.
 
 renders      renders asked for over REST
+submission   how a request for a render becomes one that waits
+events       a render's progress as server-sent events
 stream       the stream's WebSocket
 bsdf         a material's BSDF as numbers
 assets       uploads

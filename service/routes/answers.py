@@ -11,6 +11,7 @@ from pydantic import BaseModel, Field
 from service import documents, presets
 from service.problems import ANSWERS
 from service.rendering.requests.bsdf_request import MOST_SAMPLES
+from service.rendering.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
 from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE, TERMS
 
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
@@ -67,6 +68,8 @@ class Forecast(BaseModel):
 class Render(BaseModel):
     id: str
     state: Literal["queued", "running", "done", "cancelled", "failed"]
+    label: str | None
+    priority: int
     reason: Literal["max_samples", "time_limit", "target_noise", "stopped"] | None
     samples: int = Field(description="Complete ones per pixel; with `adaptive` their mean over the pixels.")
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
@@ -186,15 +189,32 @@ def reference(name: str) -> dict[str, str]:
 
 _ANY = {"application/json": {"schema": ANY_DOCUMENT}}
 DOCUMENT: Responses = {200: {"description": "The document.", "content": _ANY}}
-RENDER_BODY = body(
-    {
-        "type": "object",
-        "required": ["scene"],
-        "additionalProperties": False,
-        "properties": {"scene": reference("Scene"), "settings": reference("Settings")},
+_RENDER: dict[str, Any] = {
+    "type": "object",
+    "required": ["scene"],
+    "additionalProperties": False,
+    "properties": {"scene": reference("Scene"), "settings": reference("Settings")},
+}
+_NAMED = {
+    "label": {
+        "type": ["string", "null"],
+        "maxLength": LONGEST_LABEL,
+        "default": None,
+        "description": "A name to find renders by; several may have the same.",
     },
-    sphere=RENDER,
-)
+    "priority": {
+        "type": "integer",
+        "minimum": -HIGHEST_PRIORITY,
+        "maximum": HIGHEST_PRIORITY,
+        "default": 0,
+        "description": "Of one's own renders that wait the highest starts first; nothing is interrupted.",
+    },
+}
+RENDER_BODY = body(_RENDER, sphere=RENDER)
+LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | _NAMED}, sphere=RENDER)
+EVENTS: Responses = {
+    200: {"description": "The events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
+}
 DOCUMENT_BODY = body({"anyOf": [reference("Scene"), reference("Material")]}, material=MATERIAL, scene=SCENE)
 _DIRECTIONS = {
     "type": "array",

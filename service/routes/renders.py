@@ -4,26 +4,27 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import time
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
 from typing import Annotated, Any, BinaryIO, get_args
+from urllib.parse import urlencode
 
 import numpy as np
-from fastapi import APIRouter, Query, Request, Response
+from fastapi import APIRouter, Header, Query, Request, Response
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import images, recipe, views
 from service.downloads import Downloads, FileAnswer, Written, disconnected, present
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
-from service.rendering.executors import packing, writing
+from service.rendering.executors import writing
 from service.rendering.ipc.messages import View
 from service.rendering.jobs.job import Job
-from service.rendering.requests.request_parser import ParsedRequest, unfolded
-from service.routes import answers
+from service.rendering.jobs.store.record import State
+from service.rendering.requests.request_parser import LONGEST_LABEL, unfolded
+from service.routes import answers, events, submission
 from service.routes.errors import GONE
-from service.state import STARTING_S, AppState, app_state, caller, owner
+from service.state import app_state, caller, owner
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["renders"])
@@ -39,6 +40,20 @@ Saving = Annotated[
     ),
 ]
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
+
+
+IdempotencyHeader = Annotated[str | None, Header(description="1 to 200 characters, the caller's own name for this.")]
+MOST_LISTED = 200
+
+
+class ListQuery(BaseModel):
+    """Which of one's renders are listed."""
+
+    model_config = ConfigDict(extra="forbid")
+    label: Annotated[str | None, Field(max_length=LONGEST_LABEL, description="Exactly this label.")] = None
+    state: State | None = None
+    limit: Annotated[int, Field(ge=1, le=MOST_LISTED)] = 100
+    after: Annotated[str | None, Field(description="The last id of the page before.")] = None
 
 
 class Bits(IntEnum):
@@ -74,8 +89,7 @@ class ImageQuery(BaseModel):
 )
 async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Response:
     view = query.view()
-    job = await _job(request)
-    app_state(request).renders.submit(job, listed=False)
+    job = await submission.one_shot(request)
     try:
         await _finished_or_gone(request, job)
         if not job.finished.is_set():
@@ -84,7 +98,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
             raise Unavailable("The server is shutting down.")
         return await _image(request, job, query, view)
     finally:
-        job.cancel()
+        app_state(request).renders.cancel(job)
         job.release()
 
 
@@ -92,26 +106,32 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
     "/renders",
     status_code=202,
     summary="Start a render",
-    openapi_extra=answers.RENDER_BODY,
+    description="It is stored before this answers, and outlives the server. `Idempotency-Key`: for 24 h the same key "
+    "with the same body gives the same render, with another body 409.",
+    openapi_extra=answers.LASTING_RENDER_BODY,
     response_model=None,
     responses=answers.shaped(answers.Render, "It waits for its turn; `Location` leads to it.", 202)
-    | answers.problems(400, 413, 415, 422, 429, 503),
+    | answers.problems(400, 409, 413, 415, 422, 429, 503),
 )
-async def start(request: Request, response: Response) -> dict[str, Any]:
-    job = await _job(request)
-    app_state(request).renders.submit(job)
-    response.headers["location"] = f"renders/{job.id}"
-    return job.status()
+async def start(request: Request, response: Response, idempotency_key: IdempotencyHeader = None) -> dict[str, Any]:
+    status = await submission.submitted(request, idempotency_key)
+    response.headers["location"] = f"renders/{status['id']}"
+    return status
 
 
 @router.get(
     "/renders",
-    summary="One's own renders",
+    summary="One's own renders, the newest first",
+    description="A page of them; `Link` with `rel=next` leads to the next page while there is one.",
     response_model=None,
-    responses=answers.shaped(list[answers.Render]),
+    responses=answers.shaped(list[answers.Render]) | answers.problems(422),
 )
-async def renders(request: Request) -> list[dict[str, Any]]:
-    return [job.status() for job in app_state(request).renders.all(owner(request))]
+async def renders(request: Request, response: Response, query: Annotated[ListQuery, Query()]) -> list[dict[str, Any]]:
+    page = app_state(request).renders.page(owner(request), query.label, query.state, query.limit, query.after)
+    if page.more:
+        following = query.model_copy(update={"after": page.renders[-1].id})
+        response.headers["link"] = f'<renders?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
+    return [job.status() for job in page.renders]
 
 
 @router.get(
@@ -123,13 +143,27 @@ async def renders(request: Request) -> list[dict[str, Any]]:
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422),
 )
 async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving: Saving = False) -> dict[str, Any]:
-    job = app_state(request).renders.get(id, owner(request))
-    if saving:
-        job.measure_kernel()
-    if wait:
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(job.settled(saving), wait)
+    renders = app_state(request).renders
+    job = renders.get(id, owner(request))
+    with renders.looking(job):
+        if saving:
+            await job.measure_kernel()
+        if wait:
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(job.settled(saving), wait)
     return job.status()
+
+
+@router.get(
+    "/renders/{id}/events",
+    summary="Its progress as server-sent events",
+    description="`progress` at most ten times a second and once `done`, each with the status as data; then the "
+    "answer ends. When the server ends, it ends without `done`.",
+    response_class=Response,
+    responses=answers.EVENTS | answers.problems(404, 410),
+)
+async def progress(request: Request, id: answers.RenderId) -> Response:
+    return events.answer(app_state(request).renders.get(id, owner(request)))
 
 
 @router.get(
@@ -139,7 +173,10 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving:
     responses=FILES | answers.problems(404, 409, 410, 422),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
-    return await _image(request, app_state(request).renders.get(id, owner(request)), query, query.view())
+    renders = app_state(request).renders
+    job = renders.get(id, owner(request))
+    with renders.looking(job):
+        return await _image(request, job, query, query.view())
 
 
 @router.delete(
@@ -149,19 +186,10 @@ async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQu
     responses=answers.problems(404, 410),
 )
 async def cancel(request: Request, id: answers.RenderId) -> None:
-    app_state(request).renders.get(id, owner(request)).cancel()
-
-
-async def _job(request: Request) -> Job:
-    began = time.monotonic()
-    own: AppState = app_state(request)
-    async with own.bodies.taken(request) as body:
-        own.renders.admit(owner(request))
-        await own.renderers.able(STARTING_S)
-        parsed: ParsedRequest = await own.bodies.parsed("request", body)
-    packed = await packing(partial(own.reader.pack, parsed.scene))
-    setup_s = time.monotonic() - began
-    return Job(own.renderers, packed, parsed.settings, setup_s, owner(request), parsed.document)
+    renders = app_state(request).renders
+    job = renders.get(id, owner(request))
+    renders.cancel(job)
+    await job.recorded()
 
 
 async def _finished_or_gone(request: Request, job: Job) -> None:
@@ -196,7 +224,8 @@ async def _written(downloads: Downloads, job: Job, query: ImageQuery, view: View
         samples = samples or progress.samples
         if samples == 0:
             raise Conflict("There is no sample yet.")
-    return await writing(lambda: downloads.write(partial(_write, layers, query, job, samples)))
+    document = await job.document()
+    return await writing(lambda: downloads.write(partial(_write, layers, query, job, document, samples)))
 
 
 def _aovs(query: ImageQuery) -> list[Aov]:
@@ -211,12 +240,14 @@ def _most_bytes(job: Job, query: ImageQuery) -> int:
     return job.settings.width * job.settings.height * channels * bits // 8
 
 
-def _write(layers: dict[str, np.ndarray], query: ImageQuery, job: Job, samples: int, file: BinaryIO) -> None:
+def _write(
+    layers: dict[str, np.ndarray], query: ImageQuery, job: Job, document: bytes, samples: int, file: BinaryIO
+) -> None:
     bits: views.Bits = 16 if query.bits == Bits.SIXTEEN else 8
     made_from = None
     if images.FORMATS[query.format].has_metadata:
         view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
-        made_from = recipe.write_text(unfolded(job.document), job.settings, samples, view)
+        made_from = recipe.write_text(unfolded(document), job.settings, samples, view)
     if query.aov == "all":
         images.write_layers(file, layers, made_from)
     else:

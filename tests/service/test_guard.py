@@ -6,6 +6,7 @@ import asyncio
 import json
 import socket
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -39,7 +40,6 @@ def keyed(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         "SUNBOX_KEEP_RENDERS": "2",
         "SUNBOX_MAX_BODY": "4000",
         "SUNBOX_BODY_TIMEOUT": "0.5",
-        "SUNBOX_DATA_QUOTA": "3000",
         "SUNBOX_MAX_SECONDS": "5",
         "SUNBOX_ALLOWED_ORIGINS": "https://friend.example",
     }
@@ -150,15 +150,20 @@ def test_a_body_that_stops_is_ended(keyed: Server) -> None:
         assert b" 408 " in connection.recv(1000)
 
 
-def test_the_disk_has_its_quota(http: httpx.Client) -> None:
-    def post(size: int) -> httpx.Response:
-        return http.post("/v1/assets", content=OBJ + b"#" * (size - len(OBJ)), headers=ANNA)
+def test_the_disk_has_its_quota(tmp_path: Path) -> None:
+    served = Server(tmp_path, SUNBOX_DATA_QUOTA="40000")
 
-    assert is_problem(post(3500), 413)
-    first, second, third = (post(size) for size in (1100, 1200, 1300))
-    assert {answer.status_code for answer in (first, second, third)} == {201}
-    assert is_problem(http.get(f"/v1/assets/{first.json()['id']}", headers=ANNA), 404)
-    assert http.get(f"/v1/assets/{third.json()['id']}", headers=ANNA).status_code == 200
+    def post(size: int) -> httpx.Response:
+        return served.http.post("/v1/assets", content=OBJ + b"#" * (size - len(OBJ)))
+
+    try:
+        assert is_problem(post(45_000), 413)
+        first, second, third = (post(size) for size in (11_000, 11_100, 11_200))
+        assert {answer.status_code for answer in (first, second, third)} == {201}
+        assert is_problem(served.http.get(f"/v1/assets/{first.json()['id']}"), 404)
+        assert served.http.get(f"/v1/assets/{third.json()['id']}").status_code == 200
+    finally:
+        assert served.stop() == 0
 
 
 def test_no_address_in_a_document_is_asked(keyed: Server) -> None:

@@ -1,5 +1,11 @@
 """Renders asked for over REST.
 
-job    one render: its progress, its image, its end
-queue  all renders, with bounds on how many wait, run and are kept
+job        one render: its progress, its image, its end
+queue      all renders, with bounds on how many wait, run and are kept
+turns      whose render starts next
+retention  which ended renders make room
+recorder   writes what becomes of a render to the store
+reads      requests for a picture that the renderer has not answered yet
+status     the status of a render, as callers see it
+store      renders on the disk
 """

@@ -4,17 +4,19 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
-import itertools
-import secrets
+import logging
 import time
-from typing import Any, Literal
+from collections.abc import Awaitable, Callable
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 
 from service.pack import Packed
-from service.problems import Conflict, FieldError, Gone, Internal, InvalidDocument, ServiceError, answer, problem
-from service.quality import ResolvedSettings, forecast
+from service.problems import Conflict, Gone, Internal, ServiceError, Unavailable, answer
+from service.quality import ResolvedSettings
 from service.rendering.ipc.messages import (
+    Checkpoint,
     Done,
     Failed,
     FromRenderer,
@@ -25,221 +27,374 @@ from service.rendering.ipc.messages import (
     Progress,
     Progressed,
     Read,
+    Restore,
     Stop,
+    TakeCheckpoint,
     Update,
     View,
 )
+from service.rendering.jobs.reads import Reads
+from service.rendering.jobs.recorder import Recorder
+from service.rendering.jobs.status import KernelQuestion, error_of, status
+from service.rendering.jobs.store.record import Order, Outcome, State
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import stop_rule, weight
 
-State = Literal["queued", "running", "done", "cancelled", "failed"]
-
-UNASKED = KernelMeasured(0, "Not measured yet: GET this render with ?saving=true, and wait=60 to wait for it.")
-ASKED = KernelMeasured(
-    0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60."
-)
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
-ID_BYTES = 16  # 128 bits: an id cannot be guessed
+AGAIN_S = 5.0  # between two attempts to begin a render where nothing renders, or the disk fails
 PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
+
+log = logging.getLogger(__name__)
 
 
 class Job:
-    """A render, on the event loop. Once finished, it keeps its picture in the renderer until `release`."""
+    """A render, on the event loop.
+
+    With a `recorder` it outlives the server, and its picture comes back from the disk when somebody looks at it.
+    Without one it keeps its picture in the renderer until `release`.
+    """
+
+    recorder: Recorder | None = None
+    number = 0  # rises in the order of arrival
 
     def __init__(
         self,
         renderers: Renderers,
-        packed: Packed,
-        settings: ResolvedSettings,
-        setup_s: float,
-        owner: str = "",
-        document: bytes = b"",
+        order: Order,
+        load: Callable[[bytes], Awaitable[Packed]],
+        document: bytes | None = None,
+        packed: Packed | None = None,
+        outcome: Outcome | None = None,
     ) -> None:
-        """`owner` may ask for it, others may not; `document` is the scene as `parsing.folded` gave it."""
-        self.id = secrets.token_urlsafe(ID_BYTES)
-        self.owner = owner
-        self.document = document
+        """`load` packs the scene of a folded document; `document` may be left out where there is a recorder."""
+        self.order = order
+        self.outcome = outcome or Outcome()
+        self.began = self.outcome.state == "running"  # when the server ended before
         self.ended_at = 0.0  # by the monotonic clock, once it is finished
-        self.state: State = "queued"
         self.finished = asyncio.Event()
-        self.bytes = settings.render_width * settings.render_height * PICTURE_BYTES + weight(packed) + len(document)
+        self.scene_bytes = 0 if packed is None else weight(packed)
+        self._over = asyncio.Event()  # finished, or the server ends
+        self._changed = asyncio.Event()
         self._renderers = renderers
-        self._packed: Packed | None = packed
-        self._settings = settings
-        self._warnings = list(packed.warnings)
-        self._setup_s = setup_s
-        self._progress = Progress()
-        self._reason: str | None = None
-        self._kernel: dict[str, Any] | None = None  # before it is compiled
-        self._kernel_measured = UNASKED
-        self._answered = asyncio.Event()  # set once the renderer has answered about its kernel
+        self._load = load
+        self._document = document
+        self._packed = packed
+        self._kernel = KernelQuestion()
         self._error: ServiceError | None = None
         self._task: int | None = None
-        self._reads: dict[int, asyncio.Future[Image]] = {}
-        self._serials = itertools.count(1)
+        self._shown = False  # the task only shows what was stored, and renders nothing
+        self._loading = asyncio.Lock()
+        self._least_samples = 0  # of the checkpoint that it goes on from: the renderer may report fewer before that
+        self._reads = Reads()
+        self._looking = 0  # how many wait for an image
+        self._ending: asyncio.Task[None] | None = None
         self._sampled = asyncio.Event()  # cleared while there are no samples any more, the renderer having been lost
         self._sampled.set()
+        if self.outcome.state in ("queued", "running"):
+            self.outcome = replace(self.outcome, state="queued")
+        else:
+            self._error = self.outcome.error
+            self._finish()
 
-    async def run(self) -> None:
-        """Take the render from queued to finished, however it ends."""
-        if self._packed is None:
-            return
-        try:
-            self._task = self._renderers.open(self, "render", self.owner or "anybody")
-            arrays, self._packed = self._packed.arrays, None
-            settings, stop = self._settings.for_gpu(), stop_rule(self._settings)
-            update = Update(self._task, 1, arrays, settings, stop, denoise=self._settings.denoise)
-            await self._renderers.send_scene(update)
-            if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
-                self._renderers.send(Stop(self._task))
-        except ServiceError as error:
-            self._fail(error)
-        await self.finished.wait()
+    @property
+    def id(self) -> str:
+        return self.order.id
 
-    def cancel(self) -> None:
-        """Stop at once; the image so far stays."""
-        if self.finished.is_set():
-            return
-        self.state, self._packed = "cancelled", None
-        if self._task is not None:
-            self._renderers.send(Stop(self._task))
-        self._finish()
+    @property
+    def owner(self) -> str:
+        return self.order.owner
 
-    def release(self) -> None:
-        """Forget the picture."""
-        if self._task is not None:
-            self._renderers.drop(self._task)
-            self._task = None
+    @property
+    def priority(self) -> int:
+        return self.order.priority
 
-    def measure_kernel(self) -> None:
-        """Have the renderer measure what the kernel saves, when it has nothing else to do."""
-        if self._kernel_measured.sample_s is None and self._error is None:
-            self._kernel_measured = ASKED
-            self._answered.clear()
-            if self._kernel is not None and self._task is not None:
-                self._renderers.send(MeasureKernel(self._task))
-
-    async def settled(self, measured: bool) -> None:
-        """Return when the render is finished; with `measured`, once its kernel has been measured too."""
-        await self.finished.wait()
-        if measured and self._kernel is not None and self._task is not None:
-            await self._answered.wait()
+    @property
+    def state(self) -> State:
+        return self.outcome.state
 
     @property
     def settings(self) -> ResolvedSettings:
-        return self._settings
+        return self.order.settings
+
+    @property
+    def resident_bytes(self) -> int:
+        """About the memory that its scene and its picture take while the renderer has them; 0 otherwise."""
+        pixels = self.settings.render_width * self.settings.render_height
+        return 0 if self._task is None else pixels * PICTURE_BYTES + self.scene_bytes
+
+    @property
+    def size(self) -> int:
+        """The bytes that it keeps: on the disk, or in memory where it is not stored."""
+        if self.recorder is not None and self.recorder.whole:
+            return self.recorder.store.size(self.order)
+        return self.resident_bytes + self.order.bytes
+
+    def set_aside(self) -> None:
+        """Forget the packed scene: it waits as a document, and is packed again when its turn comes."""
+        self._packed = None
+
+    def forget_document(self) -> None:
+        """The store has it from now on."""
+        self._document = None
+
+    async def document(self) -> bytes:
+        """The folded document. Raises Unavailable, Internal."""
+        if self._document is not None:
+            return self._document
+        assert self.recorder is not None
+        return await self.recorder.store.document(self.recorder.number)
+
+    async def run(self) -> None:
+        """Take the render from queued to finished, however it ends; return early when the server ends."""
+        while not self._over.is_set():
+            try:
+                await self._begin()
+                break
+            except ServiceError as error:
+                if self.recorder is None or not isinstance(error, Unavailable):
+                    self._fail(error)
+                    break
+                log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
+                with contextlib.suppress(TimeoutError):
+                    await asyncio.wait_for(self._over.wait(), AGAIN_S)
+        await self._over.wait()
+
+    def cancel(self) -> None:
+        """Stop at once; the image so far stays."""
+        if self.finished.is_set() or self._ending is not None:
+            return
+        self._packed = None
+        self.outcome = replace(self.outcome, state="cancelled", ended_at=time.time())
+        if self._task is not None:
+            self._renderers.send(Stop(self._task))
+        self._finish()
+        if self.recorder is not None:
+            self._ending = asyncio.create_task(self.recorder.note(self.outcome))
+            self.recorder.whole = self._task is None or self._shown
+
+    async def recorded(self) -> None:
+        """Return when its end is on the disk."""
+        if self._ending is not None:
+            await asyncio.shield(self._ending)
+
+    async def close(self) -> None:
+        """The server ends: have the last samples stored, and leave the render for the next start."""
+        self._over.set()
+        self._wake()
+        if self.recorder is not None and self.state == "running" and self.outcome.progress.samples and self._task:
+            self.recorder.expect()
+            self._renderers.send(TakeCheckpoint(self._task))
+            await self.recorder.checkpointed()
+        await self.recorded()
+
+    def release(self) -> None:
+        """Forget the picture in the renderer."""
+        if self._task is not None:
+            self._renderers.drop(self._task)
+            self._task, self._shown = None, False
+
+    def rest(self) -> bool:
+        """Release what can be brought back from the disk, if nobody waits for it; whether that was possible."""
+        possible = self.recorder is not None and self.recorder.whole and self.finished.is_set()
+        possible = possible and not self._reads and not self._looking and not self._kernel.awaited
+        if possible:
+            self.release()
+        return possible
+
+    async def measure_kernel(self) -> None:
+        """Have the renderer measure what the kernel saves, when it has nothing else to do."""
+        if self._error is None and self._kernel.ask():
+            if self.finished.is_set():
+                with contextlib.suppress(Conflict):
+                    await self._bring_back()
+            if self.outcome.kernel is not None and self._task is not None:
+                self._renderers.send(MeasureKernel(self._task))
+
+    async def settled(self, measured: bool) -> None:
+        """Return when the render is finished, with `measured` once its kernel has been measured too, or when the
+        server ends."""
+        await self._over.wait()
+        if measured and self.finished.is_set() and self.outcome.kernel is not None and self._task is not None:
+            await self._kernel.answered.wait()
+
+    async def changed(self) -> bool:
+        """Return when the status is another one: True; or when the server ends, and leaves it for its next start."""
+        await self._changed.wait()
+        return self.finished.is_set() or not self._over.is_set()
 
     def status(self) -> dict[str, Any]:
-        progress = self._progress
-        status: dict[str, Any] = {
-            "id": self.id,
-            "state": self.state,
-            "reason": self._reason,
-            "samples": progress.samples,
-            "noise": progress.noise,
-            "elapsed_s": progress.elapsed_s,
-            "setup_s": self._setup_s,
-            "kernel": None if self._kernel is None else self._kernel | self._kernel_measured.kernel,
-            "eta_s": None if self.state in ("cancelled", "failed") else progress.eta_s,
-            "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
-            "warnings": self._warnings,
-            "settings": self._settings.document(),
-        }
-        return status if self._error is None else status | {"problem": problem(self._error)}
+        return status(self.order, self.outcome, self._kernel.known)
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
         """The picture so far. Raises Conflict before the first sample, and the render's own error where it failed."""
         if self._error is not None:
             raise self._error
-        if self._task is None:
-            raise Conflict("There is no sample yet.")
-        with contextlib.suppress(TimeoutError):
-            await asyncio.wait_for(self._sampled.wait(), PATIENCE_S)
-        if self._task is None:
-            raise self._error or Conflict("There is no sample yet.")
-        serial = next(self._serials)
-        self._reads[serial] = asyncio.get_running_loop().create_future()
-        self._renderers.send(Read(self._task, serial, view))
-        image = await self._reads[serial]
+        self._looking += 1
+        try:
+            await self._bring_back()
+            with contextlib.suppress(TimeoutError):
+                await asyncio.wait_for(self._sampled.wait(), PATIENCE_S)
+            if self._task is None:
+                raise self._error or Conflict("There is no sample yet.")
+            image = await self._reads.ask(view, self._send_read)
+        finally:
+            self._looking -= 1
         if image.pixels is None:
             raise Conflict("There is no sample yet.")
         return image.pixels, image.progress
 
     def heard(self, message: FromRenderer) -> None:
         if isinstance(message, Image):
-            self._answer(message.serial, message)
-        elif isinstance(message, Loaded):
-            self._setup_s += message.setup_s
-            self._kernel = message.kernel
-            if self._kernel_measured is ASKED:
-                self.measure_kernel()
-            self._warnings += message.warnings
-            if self.state == "queued":
-                self.state = "running"
-        elif isinstance(message, Progressed):
-            self._progress = message.progress
-            if message.progress.samples:
-                self._sampled.set()
+            self._reads.answer(message.serial, message)
         elif isinstance(message, KernelMeasured):
-            self._kernel_measured = message
-            self._answered.set()
+            self._kernel.answer(message)
+        elif isinstance(message, Failed) and message.serial is not None:
+            self._reads.answer(message.serial, error_of(message))
+        elif self._shown:
+            if isinstance(message, Failed):
+                self._reads.answer_all(error_of(message))
+                self.release()
+        elif isinstance(message, Loaded):
+            self.outcome = self.outcome.loaded(message)
+            if self._kernel.awaited and self._task is not None:
+                self._renderers.send(MeasureKernel(self._task))
+        elif isinstance(message, Progressed):
+            if message.progress.samples >= self._least_samples:
+                self._progressed(message.progress)
+        elif isinstance(message, Checkpoint):
+            if self.recorder is not None and not self.finished.is_set():
+                self.recorder.checkpoint(Restore(message.task, 1, message.saved, None, message.progress))
         elif isinstance(message, Done):
             self._end(message)
         elif isinstance(message, Failed):
-            error = error_of(message)
-            if message.serial is not None:
-                self._answer(message.serial, error)
-            else:
-                self._fail(error)
+            self._fail(error_of(message))
+        self._wake()
 
     def again(self) -> None:
         """Another renderer begins the render again; a cancelled one has no image until that has samples."""
-        if self._progress.samples:
+        self._least_samples = 0
+        if self.outcome.progress.samples:
             self._sampled.clear()
         if not self.finished.is_set():
-            self._progress = Progress()
+            self.outcome = replace(self.outcome, progress=Progress())
 
     def lost(self, detail: str) -> None:
-        self._task = None
-        if self.finished.is_set():
+        self._task, shown = None, self._shown
+        self._shown = False
+        if shown or (self.recorder is not None and (self.recorder.whole or self._over.is_set())):
+            self._reads.answer_all(Unavailable("The renderer was lost: ask again.", int(AGAIN_S)))
+        elif self.finished.is_set():
             self._forget(Gone(detail))
         else:
             self._fail(Internal(detail))
 
+    async def _begin(self) -> None:
+        """Raises what loading the scene raises, and Unavailable where nothing renders."""
+        packed, self._packed = self._packed, None
+        if packed is None:
+            packed = await self._load(await self.document())
+        self.scene_bytes = weight(packed)
+        async with self._loading:
+            if self._over.is_set():
+                return
+            self.release()
+            self._task = task = self._renderers.open(self, "render", self.owner)
+            restore = await self._checkpoint(task)
+            if self.recorder is not None and not self._over.is_set():
+                await self.recorder.note(replace(self.outcome, state="running"))
+            await self._send_scene(task, packed, restore)
+        if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
+            self._renderers.send(Stop(task))
+
+    async def _checkpoint(self, task: int) -> Restore | None:
+        if self.recorder is None or not self.recorder.store.has(self.id, "checkpoint"):
+            return None
+        restore = await self.recorder.store.read(self.id, "checkpoint", task)
+        progress = Progress() if restore is None else restore.progress
+        self.outcome, self._least_samples = replace(self.outcome, progress=progress), progress.samples
+        return restore
+
+    async def _bring_back(self) -> None:
+        """Have the renderer show what was stored last. Raises Conflict where nothing was."""
+        async with self._loading:
+            recorder = self.recorder
+            if self._task is not None:
+                return
+            if recorder is None or (kind := recorder.store.latest(self.id)) is None:
+                raise Conflict("There is no sample yet.")
+            packed = await self._load(await self.document())
+            self.scene_bytes = weight(packed)
+            self._task = task = self._renderers.open(self, "render", self.owner)
+            self._shown = True
+            restore = await recorder.store.read(self.id, kind, task)
+            if restore is None:
+                self.release()
+                raise Internal("The stored picture is damaged.")
+            await self._send_scene(task, packed, replace(restore, reason=restore.reason or "stopped"))
+
+    async def _send_scene(self, task: int, packed: Packed, restore: Restore | None) -> None:
+        settings = self.settings
+        stop, denoise = stop_rule(settings), settings.denoise
+        update = Update(task, 1, packed.arrays, settings.for_gpu(), stop, denoise=denoise)
+        await self._renderers.send_scene(update, restore)
+        self._reads.ask_again(self._send_read)
+
+    def _send_read(self, serial: int, view: View) -> None:
+        if self._task is not None:
+            self._renderers.send(Read(self._task, serial, view))
+
+    def _progressed(self, progress: Progress) -> None:
+        self.outcome = replace(self.outcome, progress=progress)
+        if progress.samples:
+            self._sampled.set()
+
     def _end(self, done: Done) -> None:
-        self._progress, self._reason = done.progress, done.reason
+        self._progressed(done.progress)
         self._sampled.set()
-        self._warnings += [warning for warning in done.warnings if warning not in self._warnings]
+        self.outcome = replace(self.outcome, reason=done.reason).warned(done.warnings)
+        saved = done.saved
+        picture = None if saved is None else Restore(done.task, 1, saved, done.reason, done.progress)
         if not self.finished.is_set():
-            self.state = "cancelled" if done.reason == "stopped" else "done"
+            state: State = "cancelled" if done.reason == "stopped" else "done"
+            self._end_with(replace(self.outcome, state=state, ended_at=time.time()), picture)
+        elif self.recorder is not None:
+            self._end_with(self.outcome, picture)
+
+    def _end_with(self, outcome: Outcome, picture: Restore | None = None) -> None:
+        """Finish, where it is stored once that is on the disk."""
+        if self.recorder is None:
+            self.outcome = outcome
+            self._finish()
+        else:
+            self._ending = asyncio.create_task(self._record_end(self.recorder, self._ending, outcome, picture))
+
+    async def _record_end(
+        self, recorder: Recorder, before: asyncio.Task[None] | None, outcome: Outcome, picture: Restore | None
+    ) -> None:
+        if before is not None:
+            await before
+        await recorder.end(outcome, picture)
+        if not self.finished.is_set():
+            self.outcome = outcome
             self._finish()
 
     def _finish(self) -> None:
-        self.ended_at = time.monotonic()
+        self.ended_at = time.monotonic() - max(0.0, time.time() - (self.outcome.ended_at or time.time()))
         self.finished.set()
+        self._over.set()
+        self._wake()
 
     def _fail(self, error: ServiceError) -> None:
-        self.state = "failed"
         self._renderers.statistics.errors[answer(error).type] += 1
         self._forget(error)
-        self._finish()
+        self._end_with(self.outcome.failed(error, time.time()))
 
     def _forget(self, error: ServiceError) -> None:
         self._error, self._packed = error, None
         self._sampled.set()
-        self._answered.set()
-        for serial in list(self._reads):
-            self._answer(serial, error)
+        self._kernel.answered.set()
+        self._reads.answer_all(error)
 
-    def _answer(self, serial: int, answer: Image | ServiceError) -> None:
-        future = self._reads.pop(serial, None)
-        if future is None or future.done():
-            return
-        if isinstance(answer, ServiceError):
-            future.set_exception(answer)
-        else:
-            future.set_result(answer)
-
-
-def error_of(failed: Failed) -> ServiceError:
-    return InvalidDocument([FieldError("/scene", failed.detail)]) if failed.refused else Internal(failed.detail)
+    def _wake(self) -> None:
+        self._changed.set()
+        self._changed = asyncio.Event()

@@ -1,117 +1,285 @@
-"""All renders asked for over REST: some run, some wait, finished ones are kept for a while. Each has its owner."""
+"""All renders asked for over REST: some run, some wait, ended ones are kept for a while. Each has its owner."""
 
 from __future__ import annotations
 
 import asyncio
+import contextlib
+import logging
 import time
 from collections import Counter, OrderedDict
-from dataclasses import dataclass
+from collections.abc import Callable, Collection, Coroutine, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from itertools import islice
+from typing import Any
 
-from service.problems import Gone, NotFound, TooManyRequests, Unavailable
+from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
 from service.rendering.jobs.job import Job
+from service.rendering.jobs.recorder import Recorder
+from service.rendering.jobs.retention import Retention, superfluous
+from service.rendering.jobs.store.record import ENDED, IdempotencyKey, State, StoredRender
+from service.rendering.jobs.store.rows import REMEMBERED
+from service.rendering.jobs.store.store import RenderStore
+from service.rendering.jobs.turns import Turns
 
-REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
 RETRY_S = 5  # when to ask again where there is no room
+# Bytes of scenes and pictures of ended renders that stay with the renderer, so that looking at them takes no time;
+# the last one stays however large it is. The others come back from the disk.
+RESTING_BYTES = 256 << 20
+CLOSING_S = 3.0  # for the last samples of running renders to reach the disk
+EVICTION_S = 60.0  # at most between two looks for renders that are too old
+
+log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class QueueLimits:
-    """How many renders run at once, and which of the ended ones are kept."""
+    """How many renders run and wait at once, and which of the ended ones are kept."""
 
     running: int = 8  # renders; the others wait, as each has its scene and its picture on the GPU
     waiting: int = 256
     each: int = 64  # running and waiting, of one owner
-    kept: int = 64  # ended, of one owner ...
-    kept_bytes: int = 1 << 30  # ... what the pictures and scenes of all of them may hold ...
-    kept_s: float = 3600.0  # ... and for how long
+    retention: Retention = field(default_factory=Retention)
+
+
+@dataclass(frozen=True)
+class Page:
+    """Renders, the newest first, and whether there are more."""
+
+    renders: list[Job]
+    more: bool
 
 
 class RenderQueue:
     """The renders of all owners. An owner is a text that the caller chooses; nobody else learns of its renders."""
 
-    def __init__(self, bounds: QueueLimits | None = None) -> None:
-        self._bounds = bounds or QueueLimits()
-        self._jobs: dict[str, Job] = {}
-        self._gone: OrderedDict[str, str] = OrderedDict()  # the owners of forgotten ones
-        self._room = asyncio.Semaphore(self._bounds.running)
+    def __init__(self, limits: QueueLimits | None = None, store: RenderStore | None = None) -> None:
+        """With a `store` renders outlive the server."""
+        self._limits = limits or QueueLimits()
+        self.store = store
+        self._jobs: dict[str, Job] = {}  # in the order of arrival
+        self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
+        self._number = 0  # of the last one
+        self._waiting: Turns[Job] = Turns()
         self._running: dict[asyncio.Task[None], Job] = {}
+        self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
+        self._resting: OrderedDict[str, Job] = OrderedDict()  # ended ones, the last one looked at last
+        self._chores: set[asyncio.Task[None]] = set()
+        self._timer: asyncio.TimerHandle | None = None
+        self.closing = False
 
-    def submit(self, job: Job, listed: bool = True) -> None:
-        """Queue a job, which runs when its turn comes; the caller releases one that is not `listed`.
+    def resume(self, stored: Collection[StoredRender], make: Callable[[StoredRender], Job]) -> None:
+        """Take up what the store has: ended ones are kept, the others go on or wait."""
+        assert self.store is not None
+        for each in stored:
+            if each.gone:
+                self._remember(each.order.id, each.order.owner, each.number)
+                continue
+            job = make(each)
+            job.number = self._number = each.number
+            job.recorder = Recorder(self.store, each.number, each.order.id, whole=each.outcome.state in ENDED)
+            self._jobs[job.id] = job
+            if not job.finished.is_set():
+                self._waiting.add(job)
+        if self._jobs:
+            log.info("took up stored renders waiting=%d ended=%d", len(self._waiting), self.kept)
+        self._evict()
+        self._dispatch()
 
-        Raises TooManyRequests where its owner has as many under way as one may have, Unavailable where the queue is
-        full.
+    async def submit(
+        self, job: Job, uses: Collection[str] = (), key: IdempotencyKey | None = None, listed: bool = True
+    ) -> None:
+        """Queue a job, which runs when its turn comes; it is stored first where that is possible.
+
+        `uses`: the assets that it refers to. The caller releases one that is not `listed`. Raises TooManyRequests
+        where its owner has as many under way as one may have, Unavailable where the queue or the disk is full.
         """
         self.admit(job.owner)
+        if listed and self.store is not None:
+            job.number = await self._stored(job, uses, key)
+            job.recorder = Recorder(self.store, job.number, job.id)
+            job.forget_document()
         if listed:
+            self._number = job.number = max(job.number, self._number + 1)
             self._jobs[job.id] = job
-        task = asyncio.get_running_loop().create_task(self._run(job))
-        self._running[task] = job
-        task.add_done_callback(self._running.pop)
+        self._waiting.add(job)
+        self._dispatch()
+        if not job.finished.is_set() and job not in self._running.values():
+            job.set_aside()
 
     def admit(self, owner: str) -> None:
         """Raise what `submit` would raise, before a scene is read for nothing."""
-        own = sum(job.owner == owner for job in self._running.values())
-        if own >= self._bounds.each:
-            detail = f"{own} renders of yours are under way: no more than {self._bounds.each} (SUNBOX_MAX_JOBS)"
+        if self.closing:
+            raise Unavailable("The server is shutting down.", RETRY_S)
+        own = self._waiting.count(owner) + self._storing[owner]
+        active = own + sum(job.owner == owner for job in self._running.values())
+        if active >= self._limits.each:
+            detail = f"{active} renders of yours are under way: no more than {self._limits.each} (SUNBOX_MAX_JOBS)"
             raise TooManyRequests(detail, RETRY_S)
-        if self.queued >= self._bounds.waiting:
+        # A queue that is full still takes renders of owners with less than their share of it.
+        share = self._limits.waiting // max(1, self._waiting.owners + (own == 0))
+        if self.queued >= self._limits.waiting and own >= share:
             raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
 
     def get(self, id: str, owner: str = "") -> Job:
-        if self._gone.get(id) == owner:
+        if id in self._gone and self._gone[id][0] == owner:
             raise Gone("This render ended long ago, and made room for newer ones.")
         job = self._jobs.get(id)
         if job is None or job.owner != owner:
             raise NotFound("There is no render of this id.")
         return job
 
+    def page(
+        self,
+        owner: str = "",
+        label: str | None = None,
+        state: State | None = None,
+        limit: int = 200,
+        after: str | None = None,
+    ) -> Page:
+        """An owner's renders, the newest first, of that label and state; those that were asked for before `after`.
+
+        Raises InvalidDocument where there never was a render `after`.
+        """
+        last = None if after is None else self._place(after, owner)
+        fits = (
+            job
+            for job in reversed(self._jobs.values())
+            if job.owner == owner
+            and (last is None or job.number < last)
+            and label in (None, job.order.label)
+            and state in (None, job.state)
+        )
+        found = list(islice(fits, limit))
+        return Page(found, more=len(found) == limit and next(fits, None) is not None)
+
+    def _place(self, id: str, owner: str) -> int:
+        """The number of a render, which may be gone. Raises InvalidDocument."""
+        job = self._jobs.get(id)
+        known, number = self._gone.get(id, (None, 0)) if job is None else (job.owner, job.number)
+        if known != owner:
+            raise InvalidDocument([FieldError("/after", "is not the id of one of your renders")])
+        return number
+
     @property
     def queued(self) -> int:
-        return len(self._running) - self.running
+        return len(self._waiting) + self._storing.total()
 
     @property
     def running(self) -> int:
-        return min(len(self._running), self._bounds.running)
+        return len(self._running)
 
     @property
     def kept(self) -> int:
         return sum(job.finished.is_set() for job in self._jobs.values())
 
-    def all(self, owner: str = "") -> list[Job]:
-        return [job for job in self._jobs.values() if job.owner == owner]
+    @contextmanager
+    def looking(self, job: Job) -> Iterator[None]:
+        """Somebody looks at a render's picture: it stays with the renderer for a while."""
+        yield
+        if job.finished.is_set():
+            self._rest(job)
 
-    def close(self) -> None:
-        for job in self._running.values():
-            job.cancel()
+    async def close(self) -> None:
+        """Have the last samples of what runs stored, for the next start; what is not stored is cancelled."""
+        if self.closing:
+            return
+        self.closing = True
+        if self._timer is not None:
+            self._timer.cancel()
+        for job in [*self._running.values(), *self._waiting]:
+            if job.recorder is None:
+                job.cancel()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(CLOSING_S):
+                await asyncio.gather(*(job.close() for job in self._jobs.values() if not job.finished.is_set()))
+                await asyncio.gather(*self._chores, return_exceptions=True)
+
+    async def _stored(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
+        """The number that the store gave to the job."""
+        assert self.store is not None
+        self._storing[job.owner] += 1
+        try:
+            return await self.store.insert(job.order, job.outcome, await job.document(), uses, key)
+        finally:
+            self._storing[job.owner] -= 1
+
+    def _dispatch(self) -> None:
+        while len(self._running) < self._limits.running and not self.closing:
+            job = self._waiting.next(Counter(job.owner for job in self._running.values()))
+            if job is None:
+                break
+            task = asyncio.get_running_loop().create_task(self._run(job))
+            self._running[task] = job
+            task.add_done_callback(self._ran)
 
     async def _run(self, job: Job) -> None:
-        async with self._room:
-            await job.run()
+        await job.run()
+        if job.finished.is_set() and job.id in self._jobs:
+            self._rest(job)
+
+    def _ran(self, task: asyncio.Task[None]) -> None:
+        del self._running[task]
+        self._dispatch()
         self._evict()
-        # So that memory is freed also when no more requests come.
-        asyncio.get_running_loop().call_later(self._bounds.kept_s + 1, self._evict)
+
+    def cancel(self, job: Job) -> None:
+        """Cancel a job; one that waits leaves the queue."""
+        self._waiting.remove(job)
+        job.cancel()
+        self._evict()
+
+    def _rest(self, job: Job) -> None:
+        """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""
+        self._resting.pop(job.id, None)
+        self._resting[job.id] = job
+        total = sum(each.resident_bytes for each in self._resting.values())
+        for each in list(self._resting.values())[:-1]:
+            if total <= RESTING_BYTES:
+                break
+            size = each.resident_bytes
+            if each.rest():
+                total -= size
+                del self._resting[each.id]
 
     def _evict(self) -> None:
+        if self.closing:
+            return
+        now, retention = time.monotonic(), self._limits.retention
         ended = [job for job in self._jobs.values() if job.finished.is_set()]
-        now = time.monotonic()
-        for job in [job for job in ended if now - job.ended_at >= self._bounds.kept_s]:
-            self._forget(job, ended)
-        counts = Counter(job.owner for job in ended)
-        for owner, count in counts.items():
-            for job in [job for job in ended if job.owner == owner][: max(0, count - self._bounds.kept)]:
-                self._forget(job, ended)
-        while ended[1:] and sum(job.bytes for job in ended) > self._bounds.kept_bytes:
-            held: Counter[str] = Counter()
-            for job in ended:
-                held[job.owner] += job.bytes
-            most = held.most_common(1)[0][0]  # the owner of most pictures loses one, and not another owner of few
-            self._forget(next(job for job in ended if job.owner == most), ended)
+        goes = superfluous(ended, retention, now)
+        for job in goes:
+            job.release()
+            del self._jobs[job.id]
+            self._resting.pop(job.id, None)
+            self._remember(job.id, job.owner, job.number)
+        stored = [job.recorder for job in goes if job.recorder is not None]
+        if stored:
+            self._do(self._forget(stored))
+        # So that room is made also when no more requests come.
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        left = [job.ended_at + retention.kept_s - now for job in ended if job.id in self._jobs]
+        if left:
+            pause_s = min(EVICTION_S, max(0.0, min(left)) + 1.0)
+            self._timer = asyncio.get_running_loop().call_later(pause_s, self._evict)
 
-    def _forget(self, job: Job, ended: list[Job]) -> None:
-        ended.remove(job)
-        job.release()
-        del self._jobs[job.id]
-        self._gone[job.id] = job.owner
+    async def _forget(self, recorders: list[Recorder]) -> None:
+        assert self.store is not None
+        for recorder in recorders:
+            await recorder.close()
+        try:
+            await self.store.forget([(recorder.number, recorder.id) for recorder in recorders])
+        except ServiceError as error:
+            log.warning("could not delete renders from the disk error=%s", error)
+
+    def _remember(self, id: str, owner: str, number: int) -> None:
+        self._gone[id] = owner, number
         while len(self._gone) > REMEMBERED:
             self._gone.popitem(last=False)
+
+    def _do(self, work: Coroutine[Any, Any, None]) -> None:
+        chore = asyncio.get_running_loop().create_task(work)
+        self._chores.add(chore)
+        chore.add_done_callback(self._chores.discard)

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import zlib
 from collections.abc import Callable
-from dataclasses import dataclass, replace
-from typing import Any, Literal
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
 
+from service import recipe
 from service.config import Config
 from service.documents import checked
 from service.problems import FieldError, InvalidDocument
@@ -20,13 +22,22 @@ from service.scene.base import Model
 from service.scene.document import Parsed
 from service.scene.validation import validated
 
+LONGEST_LABEL = 200  # characters
+HIGHEST_PRIORITY = 10
+
 
 class _Request(Model):
     scene: Any
     settings: Any = Field(default_factory=dict)
 
 
+class _RenderRequest(_Request):
+    label: Annotated[str, Field(max_length=LONGEST_LABEL)] | None = None
+    priority: Annotated[int, Field(ge=-HIGHEST_PRIORITY, le=HIGHEST_PRIORITY)] = 0
+
+
 _REQUEST = TypeAdapter(_Request)
+_RENDER_REQUEST = TypeAdapter(_RenderRequest)
 
 
 @dataclass(frozen=True)
@@ -36,6 +47,10 @@ class ParsedRequest:
     settings: ResolvedSettings
     scene: Scene
     document: bytes
+    assets: list[str] = field(default_factory=list)  # that the scene refers to
+    label: str | None = None
+    priority: int = 0
+    digest: str = ""  # of the body as parsed JSON, where that was asked for
 
 
 class RequestParser:
@@ -49,6 +64,15 @@ class RequestParser:
         request = validated(_REQUEST, load_json(body), "")
         scene, settings = self.both(request.scene, request.settings)
         return ParsedRequest(settings, scene, folded(request.scene))
+
+    def render(self, body: bytearray | memoryview, keyed: bool = False) -> ParsedRequest:
+        """A whole `{scene, settings, label, priority}`; `keyed`: with its digest. Raises MalformedJson too."""
+        document = load_json(body)
+        request = validated(_RENDER_REQUEST, document, "")
+        scene, settings = self.both(request.scene, request.settings)
+        assets, digest = recipe.references(request.scene), digest_of(document) if keyed else ""
+        folded_scene = folded(request.scene)
+        return ParsedRequest(settings, scene, folded_scene, assets, request.label, request.priority, digest)
 
     def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
         """The scene and the settings. Raises InvalidDocument with the mistakes of both."""
@@ -87,9 +111,28 @@ def unfolded(data: bytes) -> str:
     return zlib.decompress(data).decode("ascii")
 
 
-Kind = Literal["request", "scenes", "materials", "bsdf", "albedo", "terms"]
+def digest_of(value: Any) -> str:
+    """The same for equal JSON values: the order of keys, blanks, and whether 1 is written 1.0 do not matter."""
+    text = json.dumps(_plain(value), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """The value with whole numbers as int."""
+    if type(value) is float:
+        return int(value) if value.is_integer() else value
+    if type(value) is list:
+        return [_plain(each) for each in value]
+    if type(value) is dict:
+        return {key: _plain(each) for key, each in value.items()}
+    return value
+
+
+Kind = Literal["render", "keyed_render", "request", "scenes", "materials", "bsdf", "albedo", "terms"]
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
+    "render": lambda config, body: RequestParser(config).render(body),
+    "keyed_render": lambda config, body: RequestParser(config).render(body, keyed=True),
     "request": lambda config, body: RequestParser(config).request(body),
     "scenes": lambda config, body: checked("scenes", load_json(body), config),
     "materials": lambda config, body: checked("materials", load_json(body), config),

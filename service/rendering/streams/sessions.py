@@ -62,7 +62,7 @@ class Sessions:
         if (session is None or not session.connections) and not is_second and self.attended >= self._most:
             raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
         if session is None:
-            session = Session(Stream(self._renderers, self._reader), owner)
+            session = Session(Stream(self._renderers, self._reader, owner), owner)
             session.beside = first
             self._kept[session.id] = session
         if session.timer is not None:

@@ -14,7 +14,7 @@ from typing import Any, Protocol, cast
 from service.problems import Conflict, Internal, MalformedJson, ServiceError, answer, problem
 from service.rendering.executors import ClientExecutor, encoding
 from service.rendering.ipc.messages import Done, Failed, Frame, FromRenderer, Loaded, Pause, Resume, Stop, Update
-from service.rendering.jobs.job import error_of
+from service.rendering.jobs.status import error_of
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams import protocol
@@ -69,10 +69,11 @@ class Attendance:
 class Stream:
     """`hear` takes the client's messages, `attend` sends frames and answers; `run` works until it is cancelled."""
 
-    def __init__(self, renderers: Renderers, reader: RequestReader) -> None:
+    def __init__(self, renderers: Renderers, reader: RequestReader, owner: str = "") -> None:
+        """`owner`: of the key; all that one owner renders shares one part of the GPU's time."""
         self.ended: Closing | None = None  # for good, and why
         self._renderers = renderers
-        self._task = renderers.open(self)
+        self._task = renderers.open(self, client=owner)
         self._flow = FlowControl(self._task, renderers.send)
         self._live = EditSession(reader, self._task)
         self._executor = ClientExecutor("stream")  # parses and packs for this client alone

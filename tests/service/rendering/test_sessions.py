@@ -104,7 +104,7 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
 
     async def test() -> None:
         supervisor: Any = Supervisor()
-        supervisor.open = lambda listener: 1
+        supervisor.open = lambda listener, client="": 1
         kept = Sessions(supervisor, READER, most=2)
         one, two = kept.enter(None), kept.enter(None)
         assert one.id != two.id and kept.attended == 2
@@ -139,7 +139,7 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
 def test_two_variants_count_as_one_client() -> None:
     async def test() -> None:
         supervisor: Any = Supervisor()
-        supervisor.open = lambda listener: 1
+        supervisor.open = lambda listener, client="": 1
         kept = Sessions(supervisor, READER, most=1)
         first = kept.enter(None)
         second = kept.enter(None, first.id)

@@ -1,0 +1,87 @@
+"""Writes what becomes of one render to the store, in order; of its checkpoints the newest."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+from contextlib import suppress
+
+from service.problems import ServiceError
+from service.rendering.ipc.messages import Restore
+from service.rendering.jobs.store.record import Outcome
+from service.rendering.jobs.store.store import RenderStore
+
+log = logging.getLogger(__name__)
+
+Writing = asyncio.Task[None]
+
+
+class Recorder:
+    """For the event loop. `whole` says that everything about an ended render is on the disk."""
+
+    def __init__(self, store: RenderStore, number: int, id: str, whole: bool = False) -> None:
+        self.store = store
+        self.number = number
+        self.whole = whole
+        self.id = id
+        self._checkpoint: Restore | None = None  # to be written next
+        self._writing: Writing | None = None
+        self._written = asyncio.Event()  # set by the next checkpoint that is on the disk
+        self._closed = False
+
+    def checkpoint(self, restore: Restore) -> None:
+        """Write a checkpoint as soon as the one before it is on the disk; if another one comes first, that one."""
+        self._checkpoint = restore
+        if self._writing is None and not self._closed:
+            self._writing = asyncio.get_running_loop().create_task(self._write_checkpoints())
+
+    async def checkpointed(self) -> None:
+        """Return when another checkpoint is on the disk."""
+        await self._written.wait()
+
+    def expect(self) -> None:
+        """Forget the checkpoints so far for `checkpointed`."""
+        self._written.clear()
+
+    async def note(self, outcome: Outcome) -> None:
+        """Write how far it is. Where that cannot be written, the next attempt counts."""
+        try:
+            await self.store.update(self.number, outcome)
+        except ServiceError as error:
+            self._failed("state", error)
+
+    async def end(self, outcome: Outcome, picture: Restore | None) -> bool:
+        """Write how it ended; whether that is on the disk. If not, the next start goes on from a checkpoint."""
+        await self.close()
+        try:
+            if picture is not None:
+                await self.store.write(self.id, "picture", picture)
+            await self.store.update(self.number, outcome)
+            if picture is not None:
+                await self.store.delete(self.id, "checkpoint")
+        except ServiceError as error:
+            self._failed("picture", error)
+            return False
+        self.whole = True
+        return True
+
+    async def close(self) -> None:
+        """Write no more checkpoints; return when the last one is written."""
+        self._closed, self._checkpoint = True, None
+        if self._writing is not None:
+            with suppress(asyncio.CancelledError):
+                await self._writing
+
+    async def _write_checkpoints(self) -> None:
+        while (restore := self._checkpoint) is not None:
+            self._checkpoint = None
+            try:
+                await self.store.write(self.id, "checkpoint", restore)
+                self._written.set()
+            except ServiceError as error:
+                self._failed("checkpoint", error)
+        self._writing = None
+
+    def _failed(self, what: str, error: ServiceError) -> None:
+        self.store.failures += 1
+        log.warning("could not store the %s of a render id=%s error=%s", what, self.id[:6], error)

@@ -1,0 +1,65 @@
+"""The status and the errors of a render, as callers see them."""
+
+from __future__ import annotations
+
+import asyncio
+from typing import Any
+
+from service.problems import FieldError, Internal, InvalidDocument, ServiceError
+from service.quality import forecast
+from service.rendering.ipc.messages import Failed, KernelMeasured
+from service.rendering.jobs.store.record import Order, Outcome
+
+UNASKED = KernelMeasured(0, "Not measured yet: GET this render with ?saving=true, and wait=60 to wait for it.")
+ASKED = KernelMeasured(
+    0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60."
+)
+
+
+class KernelQuestion:
+    """What a render's kernel saves, which the renderer measures once somebody asks."""
+
+    def __init__(self) -> None:
+        self.known = UNASKED
+        self.answered = asyncio.Event()
+
+    @property
+    def awaited(self) -> bool:
+        return self.known is ASKED
+
+    def ask(self) -> bool:
+        """Whether it has to be measured."""
+        if self.known.sample_s is None:
+            self.known = ASKED
+            self.answered.clear()
+        return self.awaited
+
+    def answer(self, known: KernelMeasured) -> None:
+        self.known = known
+        self.answered.set()
+
+
+def status(order: Order, outcome: Outcome, kernel: KernelMeasured) -> dict[str, Any]:
+    """As JSON; `kernel` is what is known of the time that the render's kernel saves."""
+    progress = outcome.progress
+    known: dict[str, Any] = {
+        "id": order.id,
+        "state": outcome.state,
+        "label": order.label,
+        "priority": order.priority,
+        "reason": outcome.reason,
+        "samples": progress.samples,
+        "noise": progress.noise,
+        "elapsed_s": progress.elapsed_s,
+        "setup_s": outcome.setup_s,
+        "kernel": None if outcome.kernel is None else outcome.kernel | kernel.kernel,
+        "eta_s": None if outcome.state in ("cancelled", "failed") else progress.eta_s,
+        "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
+        "warnings": outcome.warnings,
+        "settings": order.settings.document(),
+    }
+    return known if outcome.problem is None else known | {"problem": outcome.problem}
+
+
+def error_of(failed: Failed) -> ServiceError:
+    return InvalidDocument([FieldError("/scene", failed.detail)]) if failed.refused else Internal(failed.detail)

@@ -1,0 +1,7 @@
+"""Renders on the disk, so that they outlive the server.
+
+record    what is stored of one render, but for its document and its pictures
+rows      renders, their documents and idempotency keys, in an SQLite file
+pictures  checkpoints and finished pictures: a file each, written whole or not at all
+store     all of that for the event loop: whatever touches the disk runs in threads
+"""

@@ -1,0 +1,174 @@
+"""Checkpoints and finished pictures of renders: a file each, written whole or not at all.
+
+    ID.checkpoint  the picture of a render under way: it goes on from there to the same bits
+    ID.picture     that of an ended one
+    .*.tmp         a file that is being written, or what a crash left of one
+
+A file is a line of JSON, which tells how far the render was and how the bytes after it are divided, and these bytes.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import tempfile
+import zlib
+from collections.abc import Callable, Collection
+from contextlib import AbstractContextManager, nullcontext, suppress
+from dataclasses import asdict
+from pathlib import Path
+from typing import Any, BinaryIO, Literal
+
+import numpy as np
+
+from service.disk_usage import Usage, expected, usage
+from service.rendering.ipc.messages import Progress, Restore, SavedPicture
+from service.rendering.jobs.store.record import progress_of
+
+log = logging.getLogger(__name__)
+
+FORMAT = 1
+PART = ".tmp"
+LONGEST_LINE = 1 << 16  # bytes of the line of JSON
+PIECE = 8 << 20  # bytes that are written at a time
+
+Kind = Literal["checkpoint", "picture"]
+KINDS: tuple[Kind, ...] = ("picture", "checkpoint")  # the later one first
+Room = Callable[[Usage], AbstractContextManager[None]]
+
+
+class DamagedPicture(Exception):
+    """A file is not what was written; the text says in what."""
+
+
+class PictureFiles:
+    """For any number of threads, of one process. Methods raise OSError where the disk fails.
+
+    `room` is entered with what is to be written, and raises where there is no room for it.
+    """
+
+    def __init__(self, folder: Path, room: Room = lambda size: nullcontext()) -> None:
+        self._folder = folder
+        self._room = room
+        self._sizes: dict[tuple[str, Kind], Usage] = {}  # on the disk, once `prepare` was called
+        self._total = Usage()
+
+    def prepare(self, ids: Collection[str]) -> None:
+        """Count what is there, and delete what a crash left and the pictures of others than `ids`."""
+        known = {f"{id}.{kind}": (id, kind) for id in ids for kind in KINDS}
+        deleted = 0
+        with suppress(FileNotFoundError), os.scandir(self._folder) as entries:
+            for entry in entries:
+                if (key := known.get(entry.name)) is not None:
+                    self._count(key, usage(entry.stat()))
+                elif entry.name.endswith((PART, *(f".{kind}" for kind in KINDS))):
+                    os.unlink(entry.path)
+                    deleted += 1
+        if deleted:
+            log.info("deleted what a crash left of renders files=%d", deleted)
+
+    @property
+    def usage(self) -> Usage:
+        """Of all files."""
+        return self._total
+
+    def size(self, id: str) -> int:
+        """The bytes on the disk of one render's pictures."""
+        return sum(self._sizes.get((id, kind), Usage()).bytes for kind in KINDS)
+
+    def has(self, id: str, kind: Kind) -> bool:
+        return (id, kind) in self._sizes
+
+    def write(self, id: str, kind: Kind, restore: Restore) -> None:
+        """Store a picture in the place of an earlier one of this kind; it is on the disk when this returns."""
+        saved, parts = restore.saved, [buffer.data.cast("B") for buffer in restore.saved.buffers]
+        checksum = 0
+        for part in parts:
+            checksum = zlib.crc32(part, checksum)
+        head = {
+            "sunbox_picture": FORMAT,
+            "reason": restore.reason,
+            "progress": asdict(restore.progress),
+            "samples": saved.samples,
+            "under_way": saved.under_way,
+            "sizes": [part.nbytes for part in parts],
+            "crc32": checksum,
+        }
+        line = json.dumps(head, separators=(",", ":")).encode() + b"\n"
+        with self._room(expected([len(line) + sum(part.nbytes for part in parts)])):
+            self._folder.mkdir(parents=True, exist_ok=True)
+            fd, name = tempfile.mkstemp(prefix=".", suffix=PART, dir=self._folder)
+            try:
+                with open(fd, "wb", buffering=0) as file:
+                    for part in [memoryview(line), *parts]:
+                        _write_whole(file, part)
+                    os.fsync(fd)
+                    size = usage(os.fstat(fd))
+                os.replace(name, self.path(id, kind))
+            except BaseException:
+                with suppress(OSError):
+                    os.unlink(name)
+                raise
+            self._count((id, kind), size)
+        self._sync()
+
+    def read(self, id: str, kind: Kind, task: int) -> Restore:
+        """The picture for a task, whose generation is 1. Raises DamagedPicture, and FileNotFoundError."""
+        with open(self.path(id, kind), "rb") as file:
+            head = _head(file)
+            buffers, checksum = [], 0
+            for size in head["sizes"]:
+                buffer = np.empty(size, np.uint8)
+                if file.readinto(buffer.data) != size:
+                    raise DamagedPicture("the file is shorter than what was written")
+                checksum = zlib.crc32(buffer.data, checksum)
+                buffers.append(buffer)
+        if checksum != head["crc32"]:
+            raise DamagedPicture("its bytes are not those that were written")
+        saved = SavedPicture(head["samples"], tuple(head["under_way"]), buffers)
+        return Restore(task, 1, saved, head["reason"], progress_of(head["progress"]))
+
+    def progress(self, id: str, kind: Kind) -> Progress:
+        """How far the render was. Raises DamagedPicture, and FileNotFoundError."""
+        with open(self.path(id, kind), "rb") as file:
+            return progress_of(_head(file)["progress"])
+
+    def delete(self, id: str, *kinds: Kind) -> None:
+        for kind in kinds or KINDS:
+            self.path(id, kind).unlink(missing_ok=True)
+            self._count((id, kind), None)
+
+    def path(self, id: str, kind: Kind) -> Path:
+        return self._folder / f"{id}.{kind}"
+
+    def _count(self, key: tuple[str, Kind], size: Usage | None) -> None:
+        """Note what a file takes; None: it is not there any more."""
+        self._total += (size or Usage()) - self._sizes.pop(key, Usage())
+        if size is not None:
+            self._sizes[key] = size
+
+    def _sync(self) -> None:
+        """Have the disk know the files' names."""
+        fd = os.open(self._folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(fd)
+        finally:
+            os.close(fd)
+
+
+def _head(file: BinaryIO) -> dict[str, Any]:
+    line = file.readline(LONGEST_LINE)
+    try:
+        head: dict[str, Any] = json.loads(line)
+        if head["sunbox_picture"] == FORMAT:
+            return head
+    except (ValueError, TypeError, KeyError):
+        raise DamagedPicture("its first line is not that of a picture") from None
+    raise DamagedPicture("another version of Sunbox wrote it")
+
+
+def _write_whole(file: Any, part: memoryview) -> None:
+    written = 0
+    while written < part.nbytes:
+        written += file.write(part[written : written + PIECE])

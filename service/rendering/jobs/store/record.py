@@ -1,0 +1,100 @@
+"""What is stored of one render, but for its document and its pictures."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, field, replace
+from typing import Any, Literal
+
+from service.problems import ANSWERS, FieldError, Internal, InvalidDocument, ServiceError, problem
+from service.quality import ResolvedSettings
+from service.rendering.ipc.messages import Loaded, Progress, Reason
+
+State = Literal["queued", "running", "done", "cancelled", "failed"]
+ENDED: tuple[State, ...] = ("done", "cancelled", "failed")
+
+
+@dataclass(frozen=True)
+class Order:
+    """A render as it was asked for."""
+
+    id: str
+    owner: str  # of the key; others do not learn of the render
+    settings: ResolvedSettings
+    label: str | None = None
+    priority: int = 0  # among the owner's renders, higher ones start first
+    created_at: float = 0.0  # s since 1970
+    bytes: int = 0  # of its document
+
+
+@dataclass(frozen=True)
+class IdempotencyKey:
+    """The caller's name for one request: within 24 h it gives the same render."""
+
+    key: str
+    digest: str  # of the request's body as parsed JSON
+
+
+@dataclass(frozen=True)
+class Outcome:
+    """What has become of a render so far. `problem` is the body of an RFC 9457 answer."""
+
+    state: State = "queued"
+    reason: Reason | None = None
+    progress: Progress = field(default_factory=Progress)
+    setup_s: float = 0.0
+    warnings: list[str] = field(default_factory=list)
+    kernel: dict[str, Any] | None = None
+    problem: dict[str, Any] | None = None
+    ended_at: float | None = None  # s since 1970
+
+    def failed(self, error: ServiceError, ended_at: float) -> Outcome:
+        return replace(self, state="failed", problem=problem(error), ended_at=ended_at)
+
+    def warned(self, warnings: Iterable[str]) -> Outcome:
+        """With these warnings too, each once."""
+        return replace(self, warnings=list(dict.fromkeys([*self.warnings, *warnings])))
+
+    def loaded(self, message: Loaded) -> Outcome:
+        state: State = "running" if self.state == "queued" else self.state
+        setup_s = self.setup_s + message.setup_s
+        return replace(self, state=state, setup_s=setup_s, kernel=message.kernel).warned(message.warnings)
+
+    @property
+    def error(self) -> ServiceError | None:
+        """The error that `problem` is the body of."""
+        if self.problem is None:
+            return None
+        detail, type = str(self.problem["detail"]), str(self.problem["type"])
+        if "errors" in self.problem:
+            return InvalidDocument(FieldError(each["pointer"], each["detail"]) for each in self.problem["errors"])
+        kinds = (kind for kind, row in ANSWERS.items() if type.endswith(":" + row.type))
+        return next(kinds, Internal)(detail)
+
+    def json(self) -> str:
+        """Everything but the state and the time of its end, which have columns of their own."""
+        values = asdict(self)
+        del values["state"], values["ended_at"]
+        return json.dumps(values, separators=(",", ":"))
+
+    @classmethod
+    def of(cls, state: State, ended_at: float | None, text: str) -> Outcome:
+        values = json.loads(text)
+        return cls(**values | {"state": state, "ended_at": ended_at, "progress": progress_of(values["progress"])})
+
+
+def progress_of(values: dict[str, Any]) -> Progress:
+    """Progress from JSON, whose keys are texts."""
+    missing = values.get("missing")
+    return Progress(**values | {"missing": missing and {int(bounces): share for bounces, share in missing.items()}})
+
+
+@dataclass(frozen=True)
+class StoredRender:
+    """A render as the store has it. `number` rises in the order of arrival."""
+
+    number: int
+    order: Order
+    outcome: Outcome
+    gone: bool = False  # its document and pictures were deleted, and its id is remembered

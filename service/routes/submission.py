@@ -1,0 +1,114 @@
+"""A request for a render becomes a render that waits: read, validated, packed once, and stored."""
+
+from __future__ import annotations
+
+import asyncio
+import secrets
+import time
+import weakref
+from collections.abc import AsyncIterator, Collection
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+from starlette.requests import Request
+
+from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, Unavailable
+from service.quota import Quota
+from service.rendering.executors import packing, storing
+from service.rendering.jobs.job import Job
+from service.rendering.jobs.status import UNASKED, status
+from service.rendering.jobs.store.record import IdempotencyKey, Order, StoredRender
+from service.rendering.requests.request_parser import ParsedRequest
+from service.state import STARTING_S, AppState, app_state, owner
+
+ID_BYTES = 16  # 128 bits: an id cannot be guessed
+LONGEST_KEY = 200  # characters
+
+_turns: weakref.WeakValueDictionary[tuple[int, str, str], asyncio.Lock] = weakref.WeakValueDictionary()
+
+
+async def one_shot(request: Request) -> Job:
+    """A render that waits for its turn, and is not listed."""
+    began, own = time.monotonic(), app_state(request)
+    parsed = await _parsed(request, "request")
+    job = await _packed(own, parsed, owner(request), began)
+    await own.renders.submit(job, listed=False)
+    return job
+
+
+async def submitted(request: Request, key: str | None) -> dict[str, Any]:
+    """The status of a render that waits for its turn, or of the one that the idempotency key gave before."""
+    began, own, name = time.monotonic(), app_state(request), owner(request)
+    if key is None:
+        return (await _submitted(own, await _parsed(request, "render"), name, began)).status()
+    if not 1 <= len(key) <= LONGEST_KEY:
+        raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
+    store = own.renders.store
+    if store is None:
+        raise Unavailable("Idempotency-Key needs the data folder, which cannot be written to.", 60)
+    parsed = await _parsed(request, "keyed_render")
+    async with _turn(own, name, key):
+        known = await store.keyed(name, key)
+        if known is None:
+            job = await _submitted(own, parsed, name, began, IdempotencyKey(key, parsed.digest))
+            return job.status()
+    digest, stored = known
+    if digest != parsed.digest:
+        raise Conflict("This Idempotency-Key was used for another request.")
+    return _status(own, stored)
+
+
+async def _parsed(request: Request, kind: Any) -> ParsedRequest:
+    own = app_state(request)
+    async with own.bodies.taken(request) as body:
+        if kind != "keyed_render":  # that may be a repetition, which needs no room
+            own.renders.admit(owner(request))
+        await own.renderers.able(STARTING_S)
+        parsed: ParsedRequest = await own.bodies.parsed(kind, body)
+    return parsed
+
+
+async def _submitted(
+    own: AppState, parsed: ParsedRequest, name: str, began: float, key: IdempotencyKey | None = None
+) -> Job:
+    own.renders.admit(name)
+    async with _pinned(own.quota, parsed.assets):  # until the store says that they are in use
+        job = await _packed(own, parsed, name, began)
+        await own.renders.submit(job, parsed.assets, key)
+    return job
+
+
+async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float) -> Job:
+    """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
+    packed = await packing(partial(own.reader.pack, parsed.scene))
+    id, document = secrets.token_urlsafe(ID_BYTES), parsed.document
+    order = Order(id, name, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
+    return own.job(order, document, packed, time.monotonic() - began)
+
+
+def _status(own: AppState, stored: StoredRender) -> dict[str, Any]:
+    """The status of a render of before, which may be gone."""
+    try:
+        return own.renders.get(stored.order.id, stored.order.owner).status()
+    except ServiceError:
+        return status(stored.order, stored.outcome, UNASKED)
+
+
+def _turn(own: AppState, name: str, key: str) -> asyncio.Lock:
+    """A lock that lets in one request at a time of a key: another one waits until it is accepted or refused."""
+    return _turns.setdefault((id(own), name, key), asyncio.Lock())
+
+
+@asynccontextmanager
+async def _pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
+    """The assets stay while it lasts. Making room may have the quota's lock for seconds, so threads wait for it."""
+    if not ids:
+        yield
+        return
+    pin = quota.pinned(ids)
+    await storing(pin.__enter__)
+    try:
+        yield
+    finally:
+        await storing(partial(pin.__exit__, None, None, None))

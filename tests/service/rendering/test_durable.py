@@ -1,0 +1,274 @@
+"""Renders outlive the server: every process is killed at any moment, and the next start goes on to the same bits."""
+
+from __future__ import annotations
+
+import json
+import os
+import signal
+import sqlite3
+import threading
+import time
+from collections.abc import Iterator
+from contextlib import closing, suppress
+from pathlib import Path
+from typing import Any
+
+import httpx
+import pytest
+
+from gpu import Renderer
+from service.database import FILE
+from tests.serving import ENDLESS, SCENE, SMALL, Server
+
+OFTEN = {"SUNBOX_CHECKPOINT_S": "0.1", "SUNBOX_MAX_RUNNING": "1"}
+LONG = {"width": 96, "height": 96, "max_samples": 1500, "seed": 3}
+ANNA, BERT = {"authorization": "Bearer anna"}, {"authorization": "Bearer bert"}
+
+
+def start(server: Server, settings: Any = SMALL, headers: Any = None, **more: Any) -> str:
+    body = {"scene": SCENE, "settings": settings, **more}
+    return str(server.http.post("/v1/renders", json=body, headers=headers).raise_for_status().json()["id"])
+
+
+def status(server: Server, id: str, wait: float = 0) -> dict[str, Any]:
+    found: dict[str, Any] = server.http.get(f"/v1/renders/{id}", params={"wait": wait}).raise_for_status().json()
+    return found
+
+
+def pixels(server: Server, id: str, aov: str = "color") -> bytes:
+    return server.http.get(f"/v1/renders/{id}/image?format=npy&aov={aov}").raise_for_status().content
+
+
+def until_samples(server: Server, id: str, samples: int) -> dict[str, Any]:
+    by = time.monotonic() + 60
+    while (found := status(server, id))["samples"] < samples:
+        assert time.monotonic() < by and found["state"] in ("queued", "running"), found
+        time.sleep(0.02)
+    return found
+
+
+def until_checkpoint(folder: Path, id: str) -> None:
+    by, path = time.monotonic() + 60, folder / "data" / "renders" / f"{id}.checkpoint"
+    while not path.exists():
+        assert time.monotonic() < by
+        time.sleep(0.02)
+
+
+def kill(server: Server) -> None:
+    """The server and all its processes at once, which cannot know."""
+    for pid in [server.process.pid, *server.children()]:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    server.process.wait()
+    server.http.close()
+
+
+@pytest.fixture(scope="module")
+def undisturbed(server: Server) -> bytes:
+    """The picture of LONG from a server that nobody kills."""
+    id = start(server, LONG)
+    assert status(server, id, 60)["state"] == "done"
+    return pixels(server, id)
+
+
+def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: bytes, tmp_path: Path) -> None:
+    first = Server(tmp_path, **OFTEN)
+    done = start(first, label="mine", priority=3)
+    told = status(first, done, 60)
+    assert told["state"] == "done" and (told["label"], told["priority"]) == ("mine", 3)
+    seen = {aov: pixels(first, done, aov) for aov in ("color", "variance", "normal")}
+    running = start(first, LONG)
+    queued = [start(first, {**SMALL, "seed": seed}) for seed in range(3)]
+    until_checkpoint(tmp_path, running)
+    before = until_samples(first, running, 100)
+    kill(first)
+
+    second = Server(tmp_path, **OFTEN)
+    assert status(second, done) == told
+    after = status(second, running)
+    assert after["samples"] > 0 and before["elapsed_s"] - after["elapsed_s"] < 10
+    assert {aov: pixels(second, done, aov) for aov in seen} == seen  # brought back from the disk
+    gone_on = until_samples(second, running, after["samples"] + 50)
+    assert gone_on["elapsed_s"] > after["elapsed_s"]
+    assert {status(second, id)["state"] for id in queued} == {"queued"}
+    assert second.stop() == 0  # this time in good order: nothing is lost, and nothing is cancelled
+
+    third = Server(tmp_path, **OFTEN)
+    try:
+        assert status(third, running)["samples"] >= gone_on["samples"]
+        ends = []
+        for id in queued:
+            assert status(third, id, 60)["state"] == "done"
+            ends.append(status(third, running)["state"])
+        assert ends == ["done"] * 3  # the one that was running went first, the others in their order
+        assert pixels(third, running) == undisturbed
+        assert third.http.delete(f"/v1/renders/{running}").status_code == 204
+        assert not list((tmp_path / "data" / "renders").glob("*.checkpoint"))
+        cancelled = start(third, ENDLESS)
+        until_checkpoint(tmp_path, cancelled)
+        assert third.http.delete(f"/v1/renders/{cancelled}").status_code == 204
+    finally:
+        kill(third)
+
+    fourth = Server(tmp_path, **OFTEN)
+    try:
+        assert status(fourth, cancelled)["state"] == "cancelled" and status(fourth, cancelled)["samples"] > 0
+        assert pixels(fourth, cancelled)
+    finally:
+        assert fourth.stop() == 0
+
+
+def test_time_counts_while_the_server_is_down(tmp_path: Path) -> None:
+    short = {"SUNBOX_KEEP_SECONDS": "3600"}
+    first = Server(tmp_path, **short)
+    old, new = start(first), start(first)
+    assert [status(first, id, 60)["state"] for id in (old, new)] == ["done", "done"]
+    assert first.stop() == 0
+    with closing(sqlite3.connect(tmp_path / "data" / FILE)) as file, file:
+        file.execute("UPDATE renders SET ended_at = ended_at - 3700 WHERE id = ?", (old,))
+    second = Server(tmp_path, **short)
+    try:
+        assert second.http.get(f"/v1/renders/{old}").status_code == 410
+        assert pixels(second, new)
+        assert [path.name for path in (tmp_path / "data" / "renders").iterdir()] == [f"{new}.picture"]
+    finally:
+        assert second.stop() == 0
+    third = Server(tmp_path, **short)
+    try:
+        assert third.http.get(f"/v1/renders/{old}").status_code == 410  # and it is remembered
+    finally:
+        assert third.stop() == 0
+
+
+@pytest.fixture(scope="module")
+def keyed(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+    served = Server(tmp_path_factory.mktemp("lasting"), SUNBOX_API_KEY="anna,bert")
+    served.wait()
+    yield served
+    assert served.stop() == 0
+
+
+def submit(server: Server, key: str | None, body: Any, headers: Any = ANNA) -> httpx.Response:
+    sent = {**headers, "content-type": "application/json"} | ({} if key is None else {"idempotency-key": key})
+    text = body if isinstance(body, str) else json.dumps(body)
+    return server.http.post("/v1/renders", content=text, headers=sent)
+
+
+def test_an_idempotency_key_gives_one_render(keyed: Server) -> None:
+    body = {"scene": SCENE, "settings": SMALL, "priority": 1}
+    answers: list[httpx.Response] = []
+    threads = [threading.Thread(target=lambda: answers.append(submit(keyed, "once", body))) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert {answer.status_code for answer in answers} == {202}
+    (id,) = {answer.json()["id"] for answer in answers}
+    assert {answer.headers["location"] for answer in answers} == {f"renders/{id}"}
+    same = {**SCENE, "camera": {"target": [0, 0.0, 0], "position": [0, 0, 4.0]}}
+    text = json.dumps({"priority": 1, "settings": SMALL, "scene": same}, indent=2)
+    assert submit(keyed, "once", text).json()["id"] == id
+    assert submit(keyed, "once", {**body, "priority": 2}).status_code == 409
+    assert submit(keyed, "once", body, BERT).json()["id"] != id
+    assert submit(keyed, None, body).json()["id"] != id
+
+
+def test_only_an_accepted_request_takes_a_key(keyed: Server) -> None:
+    body = {"scene": SCENE, "settings": SMALL}
+    assert submit(keyed, "later", {**body, "settings": {"width": 0}}).status_code == 422
+    assert submit(keyed, "later", body).status_code == 202
+    for wrong in ("", "x" * 201):
+        assert submit(keyed, wrong, body).status_code == 422
+    assert submit(keyed, "x" * 200, body).status_code == 202
+
+
+@pytest.mark.parametrize(
+    ("wrong", "pointer"),
+    [
+        ({"label": "x" * 201}, "/label"),
+        ({"label": 3}, "/label"),
+        ({"priority": 11}, "/priority"),
+        ({"priority": 0.5}, "/priority"),
+        ({"priority": True}, "/priority"),
+        ({"lable": "x"}, "/lable"),
+    ],
+)
+def test_labels_and_priorities_are_checked(keyed: Server, wrong: Any, pointer: str) -> None:
+    answer = submit(keyed, None, {"scene": SCENE, "settings": SMALL, **wrong})
+    assert answer.status_code == 422 and [each["pointer"] for each in answer.json()["errors"]] == [pointer]
+
+
+def test_lists_have_pages(keyed: Server) -> None:
+    ids = [start(keyed, headers=BERT, label="page") for _ in range(5)]
+    start(keyed, headers=BERT, label="pages")
+    found, address = [], "/v1/renders?label=page&limit=2"
+    while address:
+        answer = keyed.http.get(address, headers=BERT)
+        assert len(answer.json()) <= 2 and all(each["label"] == "page" for each in answer.json())
+        found += [each["id"] for each in answer.json()]
+        address = "/v1/" + answer.links["next"]["url"] if "next" in answer.links else ""
+    assert found == ids[::-1]
+    for id in ids:
+        keyed.http.get(f"/v1/renders/{id}?wait=20", headers=BERT)
+    assert len(keyed.http.get("/v1/renders?state=done&label=page", headers=BERT).json()) == 5
+    assert keyed.http.get("/v1/renders?label=page", headers=ANNA).json() == []
+    for wrong in ("state=ended", "limit=0", "limit=201", "limit=x", f"after={'x' * 22}"):
+        assert keyed.http.get(f"/v1/renders?{wrong}", headers=BERT).status_code == 422
+
+
+def events(server: Server, id: str) -> list[tuple[float, str, dict[str, Any]]]:
+    found, name = [], ""
+    with server.http.stream("GET", f"/v1/renders/{id}/events", headers=ANNA) as answer:
+        assert answer.headers["content-type"].startswith("text/event-stream")
+        for line in answer.iter_lines():
+            field, _, value = line.partition(": ")
+            if field == "event":
+                name = value
+            elif field == "data":
+                found.append((time.monotonic(), name, json.loads(value)))
+    return found
+
+
+def test_events_tell_how_far_a_render_is(keyed: Server) -> None:
+    id = start(keyed, {**SMALL, "max_samples": 1 << 24, "time_limit": 1.0}, headers=ANNA)
+    told = events(keyed, id)
+    assert [name for _, name, _ in told] == ["progress"] * (len(told) - 1) + ["done"]
+    samples = [each["samples"] for _, _, each in told]
+    assert 4 <= len(told) <= 40 and samples == sorted(samples) and samples[-1] > samples[1]
+    assert told[-1][0] - told[0][0] >= 0.1 * (len(told) - 2) - 0.05
+    assert told[-1][2]["state"] == "done" and told[-1][2]["id"] == id
+    began = time.monotonic()
+    assert [name for _, name, _ in events(keyed, id)] == ["done"] and time.monotonic() - began < 1
+    endless = start(keyed, ENDLESS, headers=ANNA)
+    threading.Timer(0.5, lambda: keyed.http.delete(f"/v1/renders/{endless}", headers=ANNA)).start()
+    assert events(keyed, endless)[-1][2]["state"] == "cancelled"
+
+
+def test_the_end_of_the_server_ends_events(tmp_path: Path) -> None:
+    served = Server(tmp_path, **OFTEN)
+    id = start(served, ENDLESS)
+    until_samples(served, id, 1)
+    with served.http.stream("GET", f"/v1/renders/{id}/events") as answer:
+        lines = answer.iter_lines()
+        assert next(lines) == "event: progress"
+        began = time.monotonic()
+        served.process.send_signal(signal.SIGTERM)
+        assert "event: done" not in list(lines)
+    assert served.process.wait(15) == 0 and time.monotonic() - began < 8
+
+
+def test_a_full_disk_fails_no_server(tmp_path: Path) -> None:
+    """The quota stands for the disk: there is room for the document, but not for the picture."""
+    served = Server(tmp_path, SUNBOX_DATA_QUOTA=str(400_000))
+    try:
+        id = start(served, {**SMALL, "width": 256, "height": 256})
+        told = status(served, id, 30)
+        assert told["state"] == "done" and pixels(served, id)
+        assert "could not store the picture" in served.log.read_text()
+    finally:
+        kill(served)
+    again = Server(tmp_path)  # with room it is rendered again
+    try:
+        assert status(again, id, 30)["state"] == "done" and pixels(again, id)
+    finally:
+        assert again.stop() == 0
