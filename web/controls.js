@@ -131,13 +131,13 @@ function toggle(field, id, { input, commit }) {
   return { element: box, show: (value) => { box.checked = Boolean(value); } };
 }
 
-// Numbers in a row, three or as two for u and v; a single one in the document stands for all.
+// Numbers in a row, three or as two for u and v; a single one stands for all, in the document and where none is set.
 function vector(field, id, { input, commit, refuse, restore }) {
-  const names = field.length === 2 ? ["U", "V"] : ["X", "Y", "Z"];
-  let latest = names.map(() => 0);
+  const names = field.length === 2 ? ["U", "V"] : field.isPerChannel ? ["red", "green", "blue"] : ["X", "Y", "Z"];
+  let latest = null;
   const entries = names.map((axis, i) => {
     const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
-      input: (value) => input(latest.map((x, k) => (k === i ? value : x))), commit, refuse, restore,
+      input: (value) => input(latest ? latest.map((x, k) => (k === i ? value : x)) : names.map(() => value)), commit, refuse, restore,
     });
     entry.element.setAttribute("aria-label", `${field.title}, ${axis}`);
     return entry;
@@ -145,8 +145,9 @@ function vector(field, id, { input, commit, refuse, restore }) {
   return {
     element: element("div", { class: "vector" }, ...entries.map((entry) => entry.element)),
     show(value) {
-      latest = Array.isArray(value) ? value : names.map(() => value ?? 0);
-      entries.forEach((entry, i) => entry.show(latest[i]));
+      const known = value ?? (field.isPerChannel ? null : 0);
+      latest = Array.isArray(known) || known === null ? known : names.map(() => known);
+      entries.forEach((entry, i) => entry.show(latest?.[i]));
     },
   };
 }

@@ -76,9 +76,13 @@ export class Editor extends Store {
     this.change(put(this.state, place, value), gesture);
   }
 
-  // Another distribution for the material at a place; `own` are the fields of its model.
-  redistribute(place, distribution, own) {
-    this.edit(place, redistributed(at(this.state, place), distribution, own));
+  // A choice of the material at a place with what follows from it; `own` are the fields of its model.
+  choose(place, name, value, own) {
+    const material = at(this.state, place);
+    const isDistribution = own.some(({ ranges }) => ranges?.field === name);
+    const begun = own.filter(({ name: each, used, example }) => example && used?.field === name && used.values.includes(value) && material[each] === undefined)
+      .map(({ name: each, example }) => [each, example]);
+    this.edit(place, { ...(isDistribution ? redistributed(material, value, own) : { ...material, [name]: value }), ...Object.fromEntries(begun) });
   }
 
   rest() { this.seal(); }

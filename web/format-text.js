@@ -3,6 +3,7 @@
 const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²" };
 const NAMES = {
   aces: "ACES", agx: "AgX", pbr_neutral: "PBR neutral", mis: "MIS", bsdf: "BSDF", blackman_harris: "Blackman\u2013Harris", blinn_phong: "Blinn-Phong",
+  ggx: "GGX", gtr: "GTR", abc: "ABC", sgd: "SGD", eon: "EON", oren_nayar: "Oren\u2013Nayar", cook_torrance: "Cook\u2013Torrance", schlick_ggx: "Schlick\u2013GGX",
   color: "Colour", shape_id: "Shapes", material_id: "Materials",
 };
 

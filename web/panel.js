@@ -95,9 +95,10 @@ export class Panel {
     return { place, textures, ...form };
   }
 
+  // A choice by which others change is made together with them.
   #edit(chosen, place, name, value) {
-    const isLeader = value !== undefined && chosen.some(({ ranges }) => ranges?.field === name);
-    if (isLeader) this.acts.redistribute(place, value, chosen);
+    const isLeader = value !== undefined && chosen.some(({ ranges, used }) => ranges?.field === name || used?.field === name);
+    if (isLeader) this.acts.choose(place, name, value, chosen);
     else this.acts.edit(`${place}/${name}`, value);
   }
 

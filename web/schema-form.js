@@ -87,6 +87,7 @@ export function schemaForm(fields, acts) {
         const valueOf = (leader) => values[leader] ?? fields.find((one) => one.name === leader)?.initial;
         const ends = field.ranges && endsOf(field, valueOf(field.ranges.field));
         each.show(values[name], initials[name], followed(field, valueOf(field.follows?.field)), ends);
+        each.element.classList.toggle("unused", Boolean(field.used) && !field.used.values.includes(valueOf(field.used.field)));
       }
     },
     // Says at a field what is wrong with it; false where this form has no such field.

@@ -90,6 +90,9 @@ function field(schema, name, raw, required) {
     absent: bound(nodes, "x-absent"),
     follows: bound(nodes, "x-follows"),
     ranges: bound(nodes, "x-ranges"),
+    used: bound(nodes, "x-used"),
+    example: bound(nodes, "examples")?.[0],
+    isPerChannel: Boolean(vector) && bound(nodes, "x-widget") === "number",
   };
 }
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from types import NoneType
 from typing import Any, get_args
@@ -56,12 +56,15 @@ def hint(
     absent: str | None = None,
     follows: tuple[str, Callable[[float], float]] | None = None,
     ranges: tuple[str, Mapping[Any, tuple[float, float]]] | None = None,
+    used: tuple[str, Sequence[str]] | None = None,
+    example: list[float] | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
     `soft` is where a slider ends whose range goes on, or both its ends; `default` is told where the model's is None.
     For a field that may be left out: `absent` is a word for what holds then; `follows` names the field, of the range
-    0 to 1, that sets it then, and how. `ranges` names a field with a choice, and the range for each of its values.
+    0 to 1, that sets it then, and how. `ranges` names a field with a choice, and the range for each of its values;
+    `used` the choices with which the field has a meaning, and `example` is what it begins with there.
     """
     extra: dict[str, Any] = {}
     if unit is not None:
@@ -82,6 +85,11 @@ def hint(
     if ranges is not None:
         name, bounds = ranges
         extra["x-ranges"] = {"field": name, "bounds": {key: list(ends) for key, ends in bounds.items()}}
+    if used is not None:
+        name, values = used
+        extra["x-used"] = {"field": name, "values": list(values)}
+    if example is not None:
+        extra["examples"] = [example]
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

@@ -152,3 +152,24 @@ def test_the_sliders_of_microfacet_follow_the_distribution(editor: Editor) -> No
     assert float(page.input_value(editor.field("alpha", "number"))) == 0.1
     editor.settled()
     assert editor.text("#messages") == "" and editor.complaints == []
+
+
+def test_a_conductor_begins_with_numbers_of_its_own(editor: Editor) -> None:
+    editor.settled()
+    page = editor.page
+    page.select_option("#model", "microfacet")
+    before = editor.settled()
+    index, k = ("#panel [data-field=conductor_eta]", "#panel [data-field=conductor_k]")
+    f0 = page.locator("#panel [data-field=f0]")
+    assert page.input_value(f"{index} input") == "", "no number is no zero"
+    assert page.locator(f"{index}.unused").count() == 1 and "unused" not in (f0.get_attribute("class") or "")
+    page.select_option("#panel [data-field=fresnel] select", "conductor")
+    editor.wait_for_change(before)
+    assert page.locator(f"{index}.unused").count() == 0 and "unused" in (f0.get_attribute("class") or "")
+    shown = [[float(x.input_value()) for x in page.locator(f"{each} input").all()] for each in (index, k)]
+    assert shown == [[0.2, 0.9, 1.1], [3.9, 2.4, 2.2]]
+    page.click(f"{index} .reset")
+    editor.wait("its mark", lambda: page.locator(f"{index} .trouble").is_visible())
+    page.keyboard.press("Control+z")
+    editor.settled()
+    assert editor.text("#messages") == "" and editor.complaints == []

@@ -89,6 +89,7 @@ class MicrofacetMaterial(SolidSurface):
             widget="slider",
             soft=(0.1, 10.0),
             ranges=("distribution", dict(GAMMA_RANGES)),
+            used=("distribution", list(GAMMA_RANGES)),
         ),
     ] = 2.0
     geometry: Annotated[
@@ -97,21 +98,47 @@ class MicrofacetMaterial(SolidSurface):
     fresnel: Annotated[Fresnel, hint("Fresnel", "The reflectance of one microfacet: F.")] = "schlick"
     f0: Annotated[
         AnyReflectance,
-        hint("F0", "Reflectance head-on, for schlick and cook_torrance.", unit="", widget="color"),
+        hint(
+            "F0",
+            "Reflectance head-on, for schlick and cook_torrance.",
+            unit="",
+            widget="color",
+            used=("fresnel", ["schlick", "cook_torrance"]),
+        ),
     ] = (0.04, 0.04, 0.04)
     ior: Annotated[
         RefractiveIndex,
-        hint("Index of refraction", "For dielectric: water 1.33, glass 1.5, diamond 2.42.", unit="", widget="slider"),
+        hint(
+            "Index of refraction",
+            "For dielectric: water 1.33, glass 1.5, diamond 2.42.",
+            unit="",
+            widget="slider",
+            used=("fresnel", ["dielectric"]),
+        ),
     ] = 1.5
     conductor_eta: Annotated[
         ConductorIndex | None,
         OMITTABLE,
-        hint("Conductor's index", "For conductor: its index of refraction, per channel.", unit="", widget="number"),
+        hint(
+            "Conductor's index",
+            "For conductor: its index of refraction, per channel.",
+            unit="",
+            widget="number",
+            used=("fresnel", ["conductor"]),
+            example=[0.2, 0.9, 1.1],
+        ),
     ] = None
     conductor_k: Annotated[
         Extinction | None,
         OMITTABLE,
-        hint("Conductor's k", "For conductor: its extinction coefficient, per channel.", unit="", widget="number"),
+        hint(
+            "Conductor's k",
+            "For conductor: its extinction coefficient, per channel.",
+            unit="",
+            widget="number",
+            used=("fresnel", ["conductor"]),
+            example=[3.9, 2.4, 2.2],
+        ),
     ] = None
     diffuse: Annotated[
         AnyReflectance,
@@ -125,6 +152,7 @@ class MicrofacetMaterial(SolidSurface):
             "Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it.",
             unit="",
             widget="slider",
+            used=("diffuse_model", ["oren_nayar", "disney", "eon"]),
         ),
     ] = 0.0
 
