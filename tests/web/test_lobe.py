@@ -311,6 +311,21 @@ def test_a_moving_hand_gets_a_curve_for_each_answer(lobe: Editor) -> None:
     plotted(lobe)
 
 
+def test_kernels_of_other_models_are_there_before_they_are_chosen(lobe: Editor) -> None:
+    asked: list[tuple[str, str]] = []
+    lobe.page.on("request", lambda request: "/v1/bsdf" in request.url and asked.append(
+        (request.url.rpartition("/v1/")[2], request.post_data_json["material"]["type"])))  # fmt: skip
+    paste(lobe, {"type": "diffuse", "albedo": 0.5})
+    others = {"diffuse", "disney", "principled", "metal_rough", "blinn_phong", "phong", "microfacet"}
+    lobe.wait("every model", lambda: others <= {kind for path, kind in asked if path == "bsdf"})
+    assert ("bsdf/albedo", "diffuse") in asked
+    lobe.page.wait_for_timeout(1500)
+    count = len(asked)
+    lobe.page.wait_for_timeout(1500)
+    assert len(asked) == count, "each once"
+    assert lobe.complaints == []
+
+
 def test_an_old_plot_is_dimmed_until_the_new_one_is_there(lobe: Editor) -> None:
     page = lobe.page
     held: list[Route] = []

@@ -11,6 +11,7 @@ import { solid } from "./solid.js";
 import { Table } from "./table.js";
 import { terms } from "./terms.js";
 import { channelClass, isGrey } from "./values.js";
+import { Warming } from "./warming.js";
 import { askBsdf } from "../api.js";
 import { element, freshId } from "../dom.js";
 import { saveAs } from "../files.js";
@@ -34,6 +35,7 @@ export class LobePanel {
   #shown = null; // {view, data} that the plot shows
   #wanted = null; // the key of what was asked for last
   #latest = new Latest();
+  #warming = new Warming(askBsdf);
   #waiting = null; // the timer of an answer that does not come
   #means = new Map(); // of textures, as far as they are known
 
@@ -211,6 +213,7 @@ export class LobePanel {
     const key = JSON.stringify([view, materials, this.#view.hasIncidence ? incidence : null, this.#view.hasLobes ? byLobe : null]);
     if (key === this.#wanted) return this.#draw();
     this.#wanted = key;
+    this.#warming.end();
     this.root.setAttribute("aria-busy", "true");
     this.#await();
     const options = { ...this.#options };
@@ -237,6 +240,7 @@ export class LobePanel {
         });
         if (isBetter && !isStale()) this.#show(view, data);
       }
+      if (!isStale()) this.#warm(materials.a);
     } catch (problem) {
       this.#answered();
       this.root.setAttribute("aria-busy", "false");
@@ -246,6 +250,15 @@ export class LobePanel {
       this.trouble.textContent = problemText(problem, this.titles);
       this.plot.replaceChildren();
     }
+  }
+
+  // What may be asked for next: the other views of this material, and this view of other models.
+  #warm(material) {
+    const others = Object.keys(this.models).filter((type) => type !== material.type);
+    this.#warming.begin([
+      ...this.views.map((name) => ({ material, needs: VIEWS[name].needs })),
+      ...others.map((type) => ({ material: this.acts.converted(material, type), needs: this.#view.needs })),
+    ]);
   }
 
   #await() { this.#waiting ??= setTimeout(() => this.plot.classList.add("stale"), STALE_MS); }
