@@ -85,7 +85,14 @@ class Gone(ServiceError):
 
 
 class TooLarge(ServiceError):
-    pass
+    """`pointer` says which part of a document is too large, where it is one."""
+
+    def __init__(self, detail: str = "", pointer: str = "") -> None:
+        super().__init__(detail)
+        self.pointer = pointer
+
+    def __reduce__(self) -> tuple[type[TooLarge], tuple[str, str]]:
+        return TooLarge, (self.detail, self.pointer)  # crosses process borders
 
 
 class UnsupportedMedia(ServiceError):
@@ -164,6 +171,8 @@ def problem(error: Exception) -> dict[str, Any]:
     }
     if isinstance(error, InvalidDocument):
         body["errors"] = [{"pointer": e.pointer, "detail": e.detail} for e in error.errors]
+    elif isinstance(error, TooLarge) and error.pointer:
+        body["errors"] = [{"pointer": error.pointer, "detail": error.detail}]
     elif isinstance(error, AssetError) and error.place:
         body["errors"] = [{"pointer": error.place, "detail": error.detail}]
     return body

@@ -146,10 +146,13 @@ def test_too_many_pairs_or_samples(server: Server) -> None:
     for n, m in ((1, MOST_PAIRS + 1), (70_000, 1), (side + 1, side)):
         refused = ask(server, GREY, UP * n, UP * m)
         assert refused.status_code == 413 and refused.headers["content-type"] == "application/problem+json"
+        assert [error["pointer"] for error in refused.json()["errors"]] == ["/wi" if m > n else "/wo"]
     body = {"material": GREY, "cosines": [0.5] * (MOST_WORK // (1 << 20) + 1), "samples": 1 << 20}
-    assert server.http.post("/v1/bsdf/albedo", json=body).status_code == 413
+    refused = server.http.post("/v1/bsdf/albedo", json=body)
+    assert refused.status_code == 413 and refused.json()["errors"][0]["pointer"] == "/samples"
     body = {"material": GREY, "cosines": [0.5] * (MOST_PAIRS + 1), "samples": 1}
-    assert server.http.post("/v1/bsdf/albedo", json=body).status_code == 413
+    refused = server.http.post("/v1/bsdf/albedo", json=body)
+    assert refused.status_code == 413 and refused.json()["errors"][0]["pointer"] == "/cosines"
 
 
 def test_a_stream_goes_on_beside_questions(server: Server) -> None:

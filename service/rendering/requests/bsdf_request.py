@@ -67,7 +67,8 @@ def parse_values(body: bytes | bytearray | memoryview) -> BsdfRequest:
     document = load_json(body)
     n, m = _length(document, "wo"), _length(document, "wi")
     if n * m > MOST_PAIRS:
-        raise TooLarge(f"{n} wo and {m} wi are {n * m} pairs: at most {MOST_PAIRS} are evaluated at a time")
+        detail = f"{n} wo and {m} wi are {n * m} pairs: at most {MOST_PAIRS} are evaluated at a time"
+        raise TooLarge(detail, "/wi" if m > n else "/wo")
     parsed = validated(_BSDF, document, "")
     _without_textures(parsed.material)
     wo, wi = normalized(parsed.wo), normalized(parsed.wi)
@@ -80,7 +81,8 @@ def parse_albedo(body: bytes | bytearray | memoryview) -> BsdfRequest:
     _without_textures(parsed.material)
     work = len(parsed.cosines) * parsed.samples
     if work > MOST_WORK:
-        raise TooLarge(f"{len(parsed.cosines)} cosines of {parsed.samples} samples are {work}: at most {MOST_WORK}")
+        detail = f"{len(parsed.cosines)} cosines of {parsed.samples} samples are {work}: at most {MOST_WORK}"
+        raise TooLarge(detail, "/samples")
     return BsdfRequest("albedo", parsed.material, in_plane(parsed.cosines), samples=parsed.samples)
 
 
@@ -116,7 +118,7 @@ def in_plane(cosines: list[float]) -> np.ndarray:
 def _with_few_cosines(body: bytes | bytearray | memoryview) -> Any:
     document = load_json(body)
     if (count := _length(document, "cosines")) > MOST_PAIRS:
-        raise TooLarge(f"{count} cosines are too many: at most {MOST_PAIRS} are evaluated at a time")
+        raise TooLarge(f"{count} cosines are too many: at most {MOST_PAIRS} are evaluated at a time", "/cosines")
     return document
 
 
