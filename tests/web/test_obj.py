@@ -1,0 +1,41 @@
+"""An OBJ with its materials and images, as a zip that is dropped on the page."""
+
+from __future__ import annotations
+
+import json
+
+from tests.asset_files import png
+from tests.service.assets.test_obj_scene import GREY, TEXTURED, zipped
+from tests.web.conftest import Editor
+
+TWO = TEXTURED + "usemtl shiny\nv 0 0 1\nf 1/1 2/2 5/3\n"
+MATERIALS = (
+    "newmtl m\nKd 1 1 1\nmap_Kd maps/grey.png\nnewmtl shiny\nKd 0.8 0.1 0.1\nKs 0.5 0.5 0.5\nNs 200\nillum 9\n"
+)
+
+
+def test_a_zip_becomes_a_scene_with_its_materials(editor: Editor) -> None:
+    before = editor.settled()
+    packed = zipped({"model/quad.obj": TWO, "model/m.mtl": MATERIALS, "model/maps/grey.png": png(GREY)})
+    editor.drop("#stage", {"quad.zip": packed})
+    editor.page.click("dialog[open] [value=open]")
+    editor.wait_for_change(before)
+    editor.settled()
+    editor.tab("save")
+    scene = json.loads(editor.shot("text=Scene as JSON"))
+    assert [shape["type"] for shape in scene["shapes"]] == ["mesh", "mesh"]
+    made = {shape["material"]: scene["materials"][shape["material"]] for shape in scene["shapes"]}
+    assert set(made) == {"m", "shiny"}
+    assert made["shiny"]["base_color"] == [0.8, 0.1, 0.1]
+    assert scene["textures"][made["m"]["albedo"]["texture"]]["asset"].startswith("sha256:")
+    editor.tab("material")
+    assert {"M", "Shiny"} <= set(editor.page.locator("#material option").all_text_contents())
+    assert editor.complaints == []
+
+
+def test_a_zip_without_a_model_is_refused_in_words(editor: Editor) -> None:
+    before = editor.settled()
+    editor.drop("#stage", {"nothing.zip": zipped({"readme.txt": "hello"})})
+    editor.page.click("dialog[open] [value=open]")
+    editor.wait("the refusal", lambda: "nothing.zip was not taken" in editor.text("#messages"))
+    assert not editor.differs(before, 8)
