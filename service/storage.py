@@ -38,6 +38,8 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
 
 def _pictures(folder: Path) -> Usage:
     total = Usage()
+    if not folder.is_dir():
+        return total
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:
             with suppress(FileNotFoundError):  # a checkpoint that the server replaced just now

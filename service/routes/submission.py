@@ -20,7 +20,7 @@ from service.rendering.jobs.job import Job
 from service.rendering.jobs.status import UNASKED, status
 from service.rendering.jobs.store.record import IdempotencyKey, Order, StoredRender
 from service.rendering.requests.request_parser import ParsedRequest
-from service.state import STARTING_S, AppState, app_state, owner
+from service.state import STARTING_S, AppState, app_state, caller, owner
 
 ID_BYTES = 16  # 128 bits: an id cannot be guessed
 LONGEST_KEY = 200  # characters
@@ -65,7 +65,7 @@ async def _parsed(request: Request, kind: Any) -> ParsedRequest:
         if kind != "keyed_render":  # that may be a repetition, which needs no room
             own.renders.admit(owner(request))
         await own.renderers.able(STARTING_S)
-        parsed: ParsedRequest = await own.bodies.parsed(kind, body)
+        parsed: ParsedRequest = await own.bodies.parsed(kind, body, caller(request))
     return parsed
 
 
@@ -81,7 +81,7 @@ async def _submitted(
 
 async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float) -> Job:
     """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
-    packed = await packing(partial(own.reader.pack, parsed.scene))
+    packed = await packing(partial(own.reader.pack, parsed.scene), name)
     id, document = secrets.token_urlsafe(ID_BYTES), parsed.document
     order = Order(id, name, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
     return own.job(order, document, packed, time.monotonic() - began)

@@ -36,12 +36,13 @@ class Recorder:
             self._writing = asyncio.get_running_loop().create_task(self._write_checkpoints())
 
     async def checkpointed(self) -> None:
-        """Return when another checkpoint is on the disk."""
+        """Return when another checkpoint is on the disk, or there will be none."""
         await self._written.wait()
 
     def expect(self) -> None:
         """Forget the checkpoints so far for `checkpointed`."""
-        self._written.clear()
+        if not self._closed:
+            self._written.clear()
 
     async def note(self, outcome: Outcome) -> None:
         """Write how far it is. Where that cannot be written, the next attempt counts."""
@@ -68,6 +69,7 @@ class Recorder:
     async def close(self) -> None:
         """Write no more checkpoints; return when the last one is written."""
         self._closed, self._checkpoint = True, None
+        self._written.set()
         if self._writing is not None:
             with suppress(asyncio.CancelledError):
                 await self._writing
