@@ -1,13 +1,13 @@
-"""Scene -> gpu.SceneArrays: the only room fluent in both vocabularies.
+"""Scene -> gpu.SceneArrays: the only package that knows both the document's words and the renderer's.
 
-scene               the whole, from a document and its assets
+scene               the arrays of a whole scene, from a document and its assets
 parameters          camera, materials, the environment's rotation: an edit of one of them needs nothing else from here
 microfacets         the terms of `microfacet`, and the tables for those that have no closed form
 geometry            shapes in world space, as records, triangles and the tree over them
 lights              lights with how often each is picked, and environments with the tables that draw from them
 textures            images -> texels, and which number of which material reads which of them
 textured_emission   the mean emission of textured shapes that shine
-edits               what serves again after an edit, and which arrays differ
+edits               parts that are reused after an edit, and the arrays that differ
 """
 
 from service.pack.edits.cache import CacheBudget, PackCache

@@ -32,7 +32,7 @@ def pack_microfacets(scene: Scene) -> np.ndarray:
 
 
 def _fill(record: np.void, material: MicrofacetMaterial) -> list[np.ndarray]:
-    """The rows of the material's table; sets all of `record` but where that begins."""
+    """The rows of the material's table. Sets all members of `record` except the place where the table begins."""
     for kind, terms in TERMS.items():
         record[kind] = terms[getattr(material, kind).upper()]
     record["gamma"], record["diffuse_roughness"] = material.gamma, material.diffuse_roughness

@@ -1,4 +1,4 @@
-"""The camera, the materials and the environment's turn: what an edit changes without touching anything else."""
+"""The camera, the materials and the environment's rotation: an edit changes these without packing anything else."""
 
 from __future__ import annotations
 
@@ -14,10 +14,10 @@ from service.scene.material import Material, MicrofacetMaterial
 from service.scene.numbers import Vec3
 from service.scene.texture import ColorTexture, ScalarTexture
 
-# What a material's parameter is called in the renderer, where it is not its own name. All others go by name.
+# The renderer's names of a material's parameters, where they differ from the document's.
 RENAMED = {"albedo": "base_color", "diffuse": "base_color", "alpha": "opacity", "alpha_cutoff": "cutoff"}
 RENAMED |= {"normal_map": "normal", "clearcoat_normal_map": "coat_normal"}
-# Where a name means another thing in one model.
+# Names that mean something else in one model.
 RENAMED_IN = {
     "blinn_phong": {"specular": "phong_specular"},
     "phong": {"specular": "phong_specular"},
@@ -70,14 +70,14 @@ def pack_materials(scene: Scene) -> np.ndarray:
 
 
 def member_of(material: Material, name: str) -> str:
-    """What the renderer calls a material's parameter."""
+    """The renderer's name of a material's parameter."""
     return RENAMED_IN.get(material.type, {}).get(name, RENAMED.get(name, name))
 
 
 def opacity(material: Material) -> float:
     """The chance that a ray meets the surface."""
     if isinstance(material, MicrofacetMaterial):
-        return 1.0  # its alpha is another thing
+        return 1.0  # its parameter `alpha` is a roughness
     if isinstance(material.alpha, ScalarTexture):
         return layout.TEXTURED
     if material.alpha_cutoff is None or isinstance(material.alpha_cutoff, ScalarTexture):

@@ -1,4 +1,4 @@
-"""The whole scene, from its parts."""
+"""A whole scene's arrays, from its parts."""
 
 from __future__ import annotations
 
@@ -46,7 +46,7 @@ class Limits(Protocol):
 
 @dataclass(frozen=True)
 class Packed:
-    """Arrays that share memory with the cache's: not to be written to."""
+    """A packed scene. Its arrays share memory with the cache and must not be written to."""
 
     arrays: SceneArrays
     warnings: list[str]
@@ -54,8 +54,8 @@ class Packed:
 
 @dataclass(frozen=True)
 class _Sky:
-    """The environment, with what it sends through a disk around the scene (W of luminance, for a brightness of 1) and
-    its greatest radiance."""
+    """The environment, with its power through a disk around the scene (W of luminance, for a brightness of 1) and its
+    greatest radiance."""
 
     arrays: EnvironmentArrays | None = None
     power: float = 0.0
@@ -65,7 +65,8 @@ class _Sky:
 
 @dataclass(frozen=True)
 class _Lights:
-    """All lights, the words of the tree they are picked by, and the greatest radiance that any of them causes."""
+    """All lights, the words of the tree by which they are picked, and the greatest radiance that any of them
+    causes."""
 
     records: np.ndarray
     tree: np.ndarray
@@ -118,7 +119,7 @@ def _lights(
     scene: Scene, built: Geometry, materials: np.ndarray, emission: np.ndarray, sky_power: float,
     cache: PackCache | None,
 ) -> _Lights:  # fmt: skip
-    """`emission`: the mean radiance of each light of `built` (n, 3)."""
+    """All lights of the scene. `emission` is the mean radiance of each light of `built` (n, 3)."""
     analytic, analytic_power = lights.analytic_lights(scene.lights, built.origin, built.radius)
     built_sides = lights.sides(built.lights, materials)
     area_power = np.pi * built.areas * lights.luminance(emission) * built_sides
@@ -161,13 +162,13 @@ def _with_geometry(arrays: SceneArrays, built: Geometry) -> SceneArrays:
 
 
 def pack_material(material: Material) -> SceneArrays:
-    """A scene that holds this material, which must not read textures, and nothing to look at."""
+    """A scene with this material alone, which must not read textures, and without shapes."""
     scene = Scene(version=1, camera=_NOWHERE, materials={"": material}, shapes=[])
     return pack(scene, _NoAssets()).arrays
 
 
 class _NoAssets:
-    """For a scene without meshes and images."""
+    """The assets of a scene without meshes and images."""
 
     def mesh(self, ref: str) -> MeshData:
         raise AssetError("there are no assets here")

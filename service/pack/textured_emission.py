@@ -1,4 +1,4 @@
-"""How much light textured shapes send out: the means by which lights are picked, and the greatest radiance."""
+"""The light of textured shapes: the mean emission by which lights are picked, and the greatest radiance."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from service.pack.textures.uses import TextureReference
 from service.pack.textures.words import record_of, values_of
 from service.scene.texture import CheckerTexture
 
-# Barycentric places at which a triangle's emission is looked at: the middles of its 16 quarters' quarters.
+# Barycentric places at which a triangle's emission is evaluated: the middles of the 16 quarters of its quarters.
 _EDGE = np.arange(4)
 PLACES = np.array(
     [((i + 1 / 3) / 4, (j + 1 / 3) / 4) for i in _EDGE for j in _EDGE if i + j < 4]
     + [((i + 2 / 3) / 4, (j + 2 / 3) / 4) for i in _EDGE for j in _EDGE if i + j < 3]
 )
-LEAST = 0.02  # of the whole texture's mean: what a triangle is taken to shine with where the places found nothing
+LEAST = 0.02  # share of the texture's mean that a triangle gets where all of its places are black
 
 
 def dark(uses: Sequence[TextureReference], texels: PackedTexels) -> list[int]:
-    """Materials whose emission is a black texture: lamps without a power that they could be picked by."""
+    """The materials whose emission is a black texture: they are no lamps, as they have no power."""
     return [
         use.material
         for use in uses
@@ -32,7 +32,7 @@ def dark(uses: Sequence[TextureReference], texels: PackedTexels) -> list[int]:
 
 
 def _pixels(use: TextureReference, texels: PackedTexels) -> np.ndarray:
-    """(height, width, channels) of an image, or of a checker its two fields."""
+    """(height, width, channels): the pixels of an image, or the two fields of a checker."""
     if isinstance(use.texture, CheckerTexture):
         return np.array([[use.texture.a, use.texture.b]], np.float32)
     return texels.places[use.kept][1].pixels
@@ -58,7 +58,7 @@ def mean_emission(
 
 
 def _levels(use: TextureReference, texels: PackedTexels) -> tuple[np.ndarray, float]:
-    """(mean (3,), greatest) of what a texture gives a radiance."""
+    """(mean (3,), greatest channel) of the radiance that a texture gives."""
     pixels = _pixels(use, texels)
     low, high = texture_records.TEXTURABLE[use.member]
     total, greatest = np.zeros(3), 0.0
@@ -72,7 +72,7 @@ def _levels(use: TextureReference, texels: PackedTexels) -> tuple[np.ndarray, fl
 def _triangles(
     use: TextureReference, texels: PackedTexels, built: Geometry, mean: np.ndarray, shining: np.ndarray
 ) -> None:
-    """Writes each emitting triangle's own mean: most of a textured mesh may be dark."""
+    """Write each emitting triangle's own mean, as most of a textured mesh may be dark."""
     mine = np.flatnonzero((built.lights["kind"] == LightKind.TRIANGLE) & (built.lights["material"] == use.material))
     second = not isinstance(use.texture, CheckerTexture) and use.texture.uv == 1
     uvs = built.triangle_uvs_1 if second else built.triangle_uvs
@@ -88,7 +88,7 @@ def _triangles(
 
 
 def nearest(use: TextureReference, texels: PackedTexels, uv: np.ndarray) -> np.ndarray:
-    """(n, channels) of the texels nearest to (n, 2) coordinates."""
+    """(n, channels): the texels nearest to (n, 2) coordinates."""
     record = record_of(use, texels)
     turn = record["turn"].astype(np.float64).reshape(2, 2)
     uv = uv @ turn.T + [float(record["offset_u"]), float(record["offset_v"])]

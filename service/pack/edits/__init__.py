@@ -1,4 +1,4 @@
-"""What of a packed scene serves again after an edit.
+"""Reuse of a packed scene's parts after an edit.
 
 cache         geometries and environments of earlier versions, within a budget
 scene_delta   which arrays of two versions differ

@@ -1,4 +1,4 @@
-"""Packed parts kept by what they were made from, so that an edit costs only what it changes."""
+"""A cache of packed parts, by what they were made from, so that an edit costs only what it changes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 
 class CacheBudget:
-    """Bytes that several caches may hold together. Any thread."""
+    """The bytes that several caches may hold together. It may be used from any thread."""
 
     def __init__(self, most: int = 1 << 30) -> None:
         self._most = most
@@ -36,7 +36,8 @@ class CacheBudget:
 
 
 class PackCache:
-    """The few last used geometries and skies, within `budget` (the newest is kept in any case). Any thread."""
+    """The last used geometries and environments within `budget`; the newest stays in any case. It may be used from
+    any thread."""
 
     def __init__(self, entries: int = 4, budget: CacheBudget | None = None) -> None:
         self.bytes = 0
@@ -48,7 +49,7 @@ class PackCache:
         self.moves = MovedMeshes()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """What was made for an equal key, or else `make()`, which runs outside the lock."""
+        """The part that was made for an equal key, or else `make()`, which runs outside the lock."""
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -64,13 +65,13 @@ class PackCache:
         return value
 
     def gather(self, kind: type[T]) -> list[T]:
-        """All of that kind, the newest last."""
+        """All parts of that kind, the newest last."""
         with self._lock:
             return [value for value, _ in self._kept.values() if isinstance(value, kind)]
 
 
 def _freeze(value: object) -> int:
-    """Makes the arrays in a dataclass read-only, as they are shared from now on; returns their bytes."""
+    """Make the arrays in a dataclass read-only, as they are shared from now on. Returns their bytes."""
     size = 0
     for member in vars(value).values():
         for array in member.values() if isinstance(member, dict) else [member]:

@@ -1,4 +1,4 @@
-"""Whether large meshes of a document that is being edited shall have trees of their own: from the first move on."""
+"""Large meshes of a document that is being edited: from the first move on they have trees of their own."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ STILL = [FIELDS.index(name) for name in FIELDS if name not in ("transform", "mat
 
 
 class MovedMeshes:
-    """What one stream has moved. One call at a time."""
+    """The large meshes that one stream has moved. It serves one call at a time."""
 
     def __init__(self) -> None:
         self._before: Sequence[Hashable] = ()
@@ -22,7 +22,7 @@ class MovedMeshes:
     def apart(
         self, shapes: Sequence[Shape], contents: Sequence[Hashable], triangles: Callable[[MeshShape], int]
     ) -> bool:
-        """Whether a mesh is there that was moved, now or before. `contents` as by cache.content."""
+        """Whether the scene has a mesh that was moved, now or before. `contents` are the shapes' `cache.content`."""
         here = {_still(each) for each in contents}
         for shape, old, new in zip(shapes, self._before, contents, strict=False):
             still = _still(new)
@@ -36,5 +36,5 @@ class MovedMeshes:
 
 
 def _still(content: Hashable) -> Hashable:
-    """What stays of a mesh that moves; of another shape nothing."""
+    """The part of a mesh's content that a move leaves as it is; None for another shape."""
     return tuple(content[i] for i in STILL) if isinstance(content, tuple) else None

@@ -1,8 +1,8 @@
 """Shapes -> records, triangles and the tree over them, relative to an origin near the camera.
 
-assemble          the whole
-geometry          what comes of it
-reuse             what of earlier geometries serves again
+assemble          the geometry of a whole scene
+geometry          the dataclass of the result
+reuse             parts of earlier geometries that are used again
 world             the document's shapes in world space: analytic ones, meshes and instances, in float64
 analytic          spheres, quads, boxes and ellipsoids in world space
 meshes            meshes in world space, and their triangles as records
@@ -10,10 +10,10 @@ vertex_normals    smooth normals at the corners, and their codes
 tangents          the directions that a material's highlights and normal maps run along
 shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
 instances         which meshes are shared, and the records of the shapes that show them
-scene_bvh         the tree over everything, or lists of what is few
+scene_bvh         the tree over the scene, and the few shapes that stand in a loop instead
 records           analytic shapes -> records with their bounds
 triangle_buffers  the finished arrays of all triangles, in shared memory
-shape_records     what is written into the records of all kinds alike: what is hidden, what shines
+shape_records     members that the records of all kinds have in common: hidden shapes, lights
 rebase            the origin that float32 coordinates are relative to
 parallel          work over many rows, in threads
 warnings          equal warnings about many shapes as one with a count

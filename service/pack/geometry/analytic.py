@@ -1,4 +1,4 @@
-"""Shapes in the world, in float64, before any rounding: where a transform has put each of them."""
+"""Analytic shapes in world space, in float64, before any rounding."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from service.scene.numbers import LARGEST
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
-SAME_SCALE = 1e-6  # a matrix typed with seven digits still turns a sphere into a sphere
-SLACK = 2.0  # of a box or an edge from one end of the range to the other
-LEAST = 1e-12  # m; the cube of a shorter length, or of its inverse, leaves float32
+SAME_SCALE = 1e-6  # relative difference of scales up to which a sphere stays one: matrices are typed with 7 digits
+SLACK = 2.0  # a box or an edge may reach from one end of the range of coordinates to the other
+LEAST = 1e-12  # m; the cube of a shorter length, or of its inverse, is outside float32
 
 # Corner and edges of the faces of the cube [-1, 1]^3: seen from outside u is right and v up, with +Y up;
 # on the top v is -Z, on the bottom +Z.
@@ -102,7 +102,8 @@ class AnalyticShapes:
             self.quad(origin, u, v, placed, used)
 
     def _fits(self, used: tuple[int, int], position: Vec3 | np.ndarray, *lengths: float) -> bool:
-        """False, and noted, for a shape too small for float32; refuses one that its transform puts out of range."""
+        """Whether the shape is large enough for float32; if not, it is noted. Raises InvalidDocument where its
+        transform puts it out of range."""
         check_reach(used[1], max(*map(abs, position), *lengths))
         if min(lengths) < LEAST:
             self.vanished.append(used[1])
@@ -111,7 +112,7 @@ class AnalyticShapes:
 
 
 def check_reach(shape: int, reach: float) -> None:
-    """Refuses a shape that its transform moves or stretches further than a document's own numbers may go."""
+    """Raise InvalidDocument where a transform moves or stretches a shape beyond the range of a document's numbers."""
     if not reach <= SLACK * LARGEST:
         detail = f"takes the shape {reach:.3g} m far; at most {LARGEST:g}"
         raise InvalidDocument([FieldError(f"/shapes/{shape}/transform", detail)])

@@ -1,4 +1,5 @@
-"""Shapes -> records, lights among them, and the tree: all that the camera, the sky and a colour leave as it is."""
+"""Shapes -> records, with those of area lights, and the tree: the part that does not depend on camera, sky or
+colours."""
 
 from __future__ import annotations
 
@@ -24,12 +25,12 @@ from service.pack.parameters import vec3
 from service.scene.shape import Shape
 from service.shared_memory import LEAST, SharedArena, trim
 
-MANY = 100_000  # triangles, from which on it is worth giving back the memory that packing them needed
+MANY = 100_000  # triangles from which on the memory that packing needed is given back to the system
 
 
 @dataclass
 class _Tree:
-    """What rays walk through: the tree, the instances in it, and which shapes stand where."""
+    """The tree, the instances in it, and the order of the shapes."""
 
     bvh: SceneBvh
     instances: np.ndarray  # layout.Instance
@@ -43,9 +44,9 @@ def assemble(
 ) -> Geometry:  # fmt: skip
     """The geometry of `shapes`.
 
-    Of `earlier` ones parts serve again: shared meshes; all of the triangles where shapes that show them have moved;
-    the tree as well where the meshes are the same and nothing else is in that tree. `apart`: large meshes shall move
-    without the others. Raises InvalidDocument.
+    Parts of `earlier` ones are used again: shared meshes; all triangles where only instances have moved; the tree as
+    well where the meshes are the same and nothing else is in that tree. With `apart` large meshes get trees of their
+    own, so that they can be moved. Raises InvalidDocument.
     """
     earlier = earlier or Earlier()
     again = earlier.among_other_shapes(shapes, materials)
@@ -83,7 +84,7 @@ def assemble(
 
 
 def _grow_tree(world: World, rebased: Rebased) -> tuple[Triangles, _Tree]:
-    """The triangles that have an area, and the tree over all kinds of shapes that are too many for a loop.
+    """The triangles that have an area, and the tree over all kinds of shapes of which there are too many for a loop.
 
     Raises InvalidDocument.
     """
@@ -93,7 +94,7 @@ def _grow_tree(world: World, rebased: Rebased) -> tuple[Triangles, _Tree]:
     outside = stand_out(bounds)
     bvh = build_scene_bvh(bounds, outside) if bounds else SceneBvh.empty()
     kinds, large = frozenset(bounds), {kind: len(places) for kind, places in outside.items()}
-    if len(placed):  # triangles are met through trees, though perhaps not through the scene's
+    if len(placed):  # rays find triangles through trees, though perhaps not through the scene's
         large.setdefault(ShapeKind.TRIANGLE, len(triangles))
         kinds |= {ShapeKind.TRIANGLE}
     return triangles, _Tree(bvh, placed, kinds, large)
@@ -120,7 +121,7 @@ def _in_shared_memory(
 
 
 def _inverse(order: np.ndarray | None) -> np.ndarray | None:
-    """Where each one goes, from which one goes where."""
+    """The inverse of a permutation."""
     if order is None:
         return None
     places = np.empty(len(order), np.uint32)

@@ -1,4 +1,4 @@
-"""What `assemble` makes of a scene's shapes."""
+"""The geometry that `assemble` makes from a scene's shapes."""
 
 from __future__ import annotations
 
@@ -15,10 +15,11 @@ from service.scene.numbers import Vec3
 
 @dataclass(frozen=True)
 class MeshExtents:
-    """Where the meshes of a geometry are; `key` is equal where they are, with all that goes into their triangles."""
+    """The places of a geometry's meshes. Keys are equal where the meshes and all that goes into their triangles
+    are."""
 
     key: Hashable
-    low: np.ndarray  # boxes around those with vertices (n, 3), and which shapes of the document they are
+    low: np.ndarray  # (n, 3) boxes around the meshes that have vertices, and their shapes' indices in the document
     high: np.ndarray
     owners: np.ndarray
     warnings: tuple[str, ...]
@@ -26,7 +27,8 @@ class MeshExtents:
 
 @dataclass(frozen=True)
 class Geometry:
-    """Records by kind, in final order: of a kind in `bvh_kinds` that of the leaves. Large ones are shared memory."""
+    """Records by kind, in final order: for a kind in `bvh_kinds` that of the leaves. Large arrays are shared
+    memory."""
 
     shapes: dict[ShapeKind, np.ndarray]
     triangle_normals: np.ndarray
@@ -41,11 +43,11 @@ class Geometry:
     node_origin: Vec3
     node_scale: Vec3
     bvh_kinds: frozenset[ShapeKind]
-    large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
+    large: dict[ShapeKind, int]  # how many shapes of such a kind stand first, outside the tree
     instances: np.ndarray
     instance_nodes: np.ndarray
     models: tuple[SharedMesh, ...]  # that the instances show, in the order of their triangles
-    unshared_key: Hashable  # equal where all other triangles are; None: they shine, or nothing can be compared
+    unshared_key: Hashable  # equal where all other triangles are; None: they shine, or cannot be compared
     origin: Vec3
     radius: float  # of a ball around everything; 1 where there is nothing
     meshes: MeshExtents

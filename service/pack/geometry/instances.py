@@ -1,4 +1,4 @@
-"""Which meshes share their triangles, and where each of them stands."""
+"""Meshes that share their triangles, and the instances that show them."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from service.problems import FieldError, InvalidDocument
 from service.scene.shape import MeshShape
 
 LEAST = SHAREABLE  # triangles of a mesh
-WORTH = 1 << 17  # triangles that sharing spares a scene at least: 26 MB, for what a walk through two levels costs
-# Bounds on a transform whose inverse float32 holds well enough: lengths, and what both maps make of a length at most.
+WORTH = 1 << 17  # triangles that sharing must save a scene: 26 MB, in exchange for slower walks through two levels
+# Bounds on transforms whose inverse float32 represents well enough: on lengths, and on the factors of both maps.
 SCALES = 1e-9, 1e9
 TWIST = 32.0
 # Twice the area of a triangle in the world, so that its square stays inside float32.
@@ -28,7 +28,7 @@ AREAS = 1e-18, 1e18
 
 @dataclass(frozen=True)
 class MeshRequest:
-    """A mesh of the document, before it is known whether it shares its triangles."""
+    """A mesh of the document before it is decided whether it shares its triangles."""
 
     shape: MeshShape
     data: MeshData
@@ -50,8 +50,8 @@ class Instance:
 
 
 def keys(wanted: Sequence[MeshRequest], apart: bool = False) -> list[Hashable | None]:
-    """Of each mesh what is equal where its triangles are; None where they shall be the scene's own, as nobody shares
-    them or that is not worth it. `apart`: all that are large enough shall move without the others.
+    """A key of each mesh, equal where its triangles are; None where they become the scene's own, because no other
+    shape shares them or sharing saves too little. With `apart` all meshes that are large enough are instances.
     """
     digests = dict[int, Hashable]()
     sized = [None if each.shines or len(each.data.faces) < LEAST else _size(each) for each in wanted]
@@ -69,7 +69,7 @@ def keys(wanted: Sequence[MeshRequest], apart: bool = False) -> list[Hashable | 
 
 
 def _size(each: MeshRequest) -> tuple[Hashable, ...]:
-    """What is quickly found out of that key."""
+    """The part of that key that is quickly found."""
     shape = each.shape
     same = shape.asset, shape.smooth, shape.double_sided, bool(each.read.uv_sets), 1 in each.read.uv_sets
     return *same, each.read.tangents, len(each.data.vertices), len(each.data.faces)
@@ -89,7 +89,7 @@ def _content(each: MeshRequest, digests: dict[int, Hashable]) -> Hashable:
 
 
 def place(model: SharedMesh, matrices: np.ndarray, used: Sequence[tuple[int, int]]) -> list[Instance | None]:
-    """Of shapes under these transforms (n, 4, 4); None where float32 can't take a ray through one and back."""
+    """Instances of the model under these transforms (n, 4, 4); None where float32 cannot map a ray there and back."""
     axes = matrices[:, :3, :3]
     lengths = np.linalg.svd(axes, compute_uv=False)
     least, greatest = model.least * lengths[:, 1] * lengths[:, 2], model.greatest * lengths[:, 0] * lengths[:, 1]
@@ -139,9 +139,10 @@ def records(
 
 
 def _errors(axes: np.ndarray, rows: np.ndarray, away: np.ndarray, reach: np.ndarray) -> np.ndarray:
-    """(n, 3), in units of a rounding: how far a place of each model is at most from where a ray that begins there is
-    taken to begin. Seven roundings go into it, two more when the center is added; eight into the way back, as the
-    float32 numbers of the two maps are not quite each other's inverse. `reach` (n, 3): the models' half extents.
+    """(n, 3), in units of a rounding: the largest distance between a place on each model and the origin that a ray
+    which begins there gets in the model's space. There are seven roundings on the way out, two more when the centre
+    is added, and eight on the way back, as the float32 numbers of the two maps are not exactly inverse. `reach` (n,
+    3) are the models' half extents.
     """
     far: np.ndarray = np.einsum("nij,nj->ni", np.abs(axes), reach)
     back = np.einsum("nij,njk,nk->ni", np.abs(axes), np.abs(rows), far)

@@ -24,7 +24,7 @@ Rows = slice | np.ndarray
 class PlacedMesh:
     """Vertices in the world (n, 3) float64, faces (m, 3) counter-clockwise from outside.
 
-    `normals` (k, 3) float64 in the world, some perhaps zero, met through `normal_faces` (m, 3); None: flat.
+    `normals` (k, 3) float64 in the world, some perhaps zero, are indexed by `normal_faces` (m, 3); None: flat.
     """
 
     vertices: np.ndarray
@@ -42,7 +42,7 @@ class PlacedMesh:
 
 @dataclass(frozen=True)
 class Chart:
-    """What a mesh's tangents come from: `given` (n, 4) as in a glTF file, or else the texture coordinates (n, 2)."""
+    """The source of a mesh's tangents: `given` (n, 4) as in a glTF file, or else the texture coordinates (n, 2)."""
 
     uvs: np.ndarray | None
     given: np.ndarray | None
@@ -89,7 +89,7 @@ def survey(meshes: list[PlacedMesh], origin: np.ndarray) -> tuple[Triangles, np.
 
 
 def _survey(points: np.ndarray, faces: np.ndarray, boxes: np.ndarray, flat: np.ndarray, which: slice) -> None:
-    """Fills the boxes of these faces, and which of them are degenerate: their normal would not survive float32."""
+    """Fill in the boxes of these faces, and which of them are degenerate: their normal would be lost in float32."""
     a, b, c = (points.take(faces[which, k], axis=0) for k in range(3))
     boxes[which, :3] = np.minimum(np.minimum(a, b), c)
     boxes[which, 3:] = np.maximum(np.maximum(a, b), c)
@@ -101,15 +101,15 @@ def _survey(points: np.ndarray, faces: np.ndarray, boxes: np.ndarray, flat: np.n
 
 @dataclass(frozen=True)
 class Triangles:
-    """Not yet laid out: a million's records are written once, into their last place.
+    """Triangles that are not laid out yet: the records of a million are written only once, into their final place.
 
-    Where `places` (n,) are asked for, they are where each goes; None: in the order of the meshes.
+    `places` (n,) of the methods below are the final places; None: the order of the meshes.
     """
 
     meshes: list[PlacedMesh]
     points: list[np.ndarray]  # their vertices (k, 3) float32, relative to the origin
-    kept: list[np.ndarray | None]  # which of their faces; None: all
-    degenerate: dict[int, int]  # how many are not, by shape
+    kept: list[np.ndarray | None]  # the faces that are not degenerate; None: all
+    degenerate: dict[int, int]  # the number of degenerate faces, by shape
 
     def __len__(self) -> int:
         return sum(self._counts())
@@ -135,7 +135,7 @@ class Triangles:
         return np.concatenate(out)
 
     def write(self, places: np.ndarray | None, out: np.ndarray) -> None:
-        """Fills `layout.Triangle` records."""
+        """Fill `layout.Triangle` records."""
 
         def some(number: int, which: Rows, where: Rows) -> None:
             mesh, record = self.meshes[number], np.empty(_count(which), layout.Triangle.dtype)
@@ -147,7 +147,7 @@ class Triangles:
         self._spread(places, some)
 
     def write_normals(self, places: np.ndarray | None, out: np.ndarray) -> None:
-        """Fills `layout.TriangleNormals` records."""
+        """Fill `layout.TriangleNormals` records."""
         smooth = [None if mesh.normals is None else _Smooth.of(mesh.normals) for mesh in self.meshes]
 
         def some(number: int, which: Rows, where: Rows) -> None:
@@ -167,7 +167,7 @@ class Triangles:
         self._spread(places, some)
 
     def write_corners(self, name: str, places: np.ndarray | None, out: np.ndarray) -> None:
-        """Fills `uvs`, `uvs_1` (n, 3, 2) or `colors` (n, 3, 4); zeros or white of a mesh without them."""
+        """Fill `uvs`, `uvs_1` (n, 3, 2) or `colors` (n, 3, 4), with zeros or white for a mesh without them."""
 
         def some(number: int, which: Rows, where: Rows) -> None:
             values = getattr(self.meshes[number], name)
@@ -189,7 +189,7 @@ class Triangles:
         return a, b, c
 
     def _spread(self, places: np.ndarray | None, some: Callable[[int, Rows, Rows], None]) -> None:
-        """Calls `some` with the number of a mesh, which of its faces, and where these go, until all are done."""
+        """Call `some` with a mesh's number, some of its faces and their final places, until all faces are done."""
         jobs, start = list[tuple[int, Rows, Rows]](), 0
         for number, (kept, count) in enumerate(zip(self.kept, self._counts(), strict=True)):
             for part in chunks(count):
@@ -205,7 +205,7 @@ def _count(which: Rows) -> int:
 
 
 def _words(records: np.ndarray) -> np.ndarray:
-    """As rows of words, which numpy moves faster than records."""
+    """The records as rows of words, which numpy moves faster."""
     return records.view(np.uint32).reshape(len(records), -1)
 
 
@@ -215,7 +215,7 @@ def _squares(v: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Smooth:
-    """A mesh's normals, and what is asked of each once, not at each of its corners."""
+    """A mesh's normals, with what is computed once for each normal and not at each corner."""
 
     normals: np.ndarray
     codes: np.ndarray
@@ -227,11 +227,12 @@ class _Smooth:
         return cls(normals, encode(normals), missing if missing.any() else None)
 
     def fill(self, corners: np.ndarray, cross: np.ndarray, record: np.ndarray) -> None:
-        """Fills records of faces that meet the normals through `corners`, and face along `cross`."""
+        """Fill the records of faces that index the normals by `corners`, and face along `cross`."""
         record["bits"] = layout.NORMALS_SMOOTH
         across = cross.astype(np.float64)
         found = [self.normals.take(corners[:, k], axis=0) for k in range(3)]
-        # Outward is counter-clockwise: normals of a file that all point inwards are turned round.
+        # The order of the vertices decides which side is outward: normals of a file that all point inwards are
+        # negated.
         behind = np.logical_and.reduce([np.einsum("ij,ij->i", normal, across) < 0 for normal in found])
         for name, normal, index in zip(("n0", "n1", "n2"), found, corners.T, strict=True):
             code = self.codes.take(index)
@@ -244,7 +245,7 @@ class _Smooth:
 
 
 def _tangents(tangents: Tangents, which: Rows, record: np.ndarray) -> None:
-    """Adds the tangents to records that hold the normals."""
+    """Add the tangents to records that have the normals already."""
     record["bits"] |= np.where(tangents.left[which], layout.NORMALS_LEFT, 0).astype(np.uint32)
     for k, name in enumerate(("n0", "n1", "n2")):
         code = codes(record[name], tangents.rows.take(tangents.corners[which, k], axis=0))

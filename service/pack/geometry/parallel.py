@@ -1,4 +1,4 @@
-"""Long arrays piece by piece: what is needed on the way stays in the cache, and all cores have work."""
+"""Work on long arrays piece by piece, so that intermediate values stay in the cache and all cores are busy."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import TypeVar
 T = TypeVar("T")
 U = TypeVar("U")
 
-CHUNK = 1 << 14  # rows; a few float64 of each take a megabyte
+CHUNK = 1 << 14  # rows of a piece; with a few float64 in each they take a megabyte
 
 
 def chunks(count: int) -> list[slice]:
@@ -19,7 +19,7 @@ def chunks(count: int) -> list[slice]:
 
 
 def in_threads(call: Callable[[T], None], jobs: Sequence[T]) -> None:
-    """Calls with every job, in any order: numpy lets go of the interpreter's lock."""
+    """Call `call` with every job, in threads and in any order; numpy releases the interpreter's lock."""
     if len(jobs) < 3:
         for job in jobs:
             call(job)
@@ -29,12 +29,12 @@ def in_threads(call: Callable[[T], None], jobs: Sequence[T]) -> None:
 
 
 def in_order(make: Callable[[T], U], take: Callable[[T, U], None], jobs: Sequence[T]) -> None:
-    """Calls `take` here with every job and what `make` gave for it in some thread, one after the other."""
+    """Call `make` for every job in threads, and `take` here with each job and its result, in order."""
     if len(jobs) < 3:
         for job in jobs:
             take(job, make(job))
         return
-    ahead = 2 * (os.cpu_count() or 1)  # what is made and not yet taken
+    ahead = 2 * (os.cpu_count() or 1)  # results that are made and not yet taken, at most
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         made = deque(pool.submit(make, job) for job in jobs[:ahead])
         for job, following in zip(jobs, [*jobs[ahead:], *[None] * ahead], strict=False):

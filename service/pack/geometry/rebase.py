@@ -1,4 +1,5 @@
-"""What is subtracted from every position before it becomes float32, and what float32 then cannot hold."""
+"""The origin that is subtracted from every position before it becomes float32, and warnings of what float32 then
+loses."""
 
 from __future__ import annotations
 
@@ -15,14 +16,14 @@ from service.pack.geometry.records import Bounds
 
 # Extents from 0 at which a scene's float32 positions begin to lose digits it needs.
 FAR = 4.0
-# At so many of its own extents from the origin a shape's places are rounded to 1 / 16 000 of it: no difference was
-# seen. Beyond, an origin nearer to the small shapes is looked for.
+# A distance from the origin in units of the shape's own extent: places there are rounded to 1 / 16 000 of the shape,
+# which was never visible. Beyond it, an origin nearer to the small shapes is chosen.
 NEAR = 2.0**10
-# From here rounding shows: 1 to 2 % of a picture's pixels change by more than 0.1 % (spheres, boxes and quads 2^15
-# extents away; a mesh of 80 triangles loses 13 % at 2^13).
+# A distance at which rounding becomes visible: 1 to 2 % of a picture's pixels change by more than 0.1 % (spheres,
+# boxes and quads 2^15 extents away; with a mesh of 80 triangles 13 % do at 2^13).
 LOST = 2.0**14
-# Least extents of a shape (that of one along an axis is 0) over the smallest shape's: its surface is known to 1 / 128
-# of that one, and shadows begin to part from what throws them.
+# Ratio of a shape's least extent (0 for one along an axis) to the smallest shape's: its surface is known to 1 / 128
+# of that shape, and shadows begin to separate from the shapes that cast them.
 VAST = 2.0**17
 
 
@@ -38,7 +39,7 @@ class Rebased:
 
 
 def rebase(placed: AnalyticShapes, meshes: MeshExtents) -> Rebased:
-    """These shapes, beside meshes that reach so far."""
+    """These shapes relative to an origin that suits them and the meshes with these extents."""
     found = records.analytic(placed, np.zeros(3))
     low = np.concatenate([*(bounds[0] for _, bounds in found.values()), meshes.low])
     high = np.concatenate([*(bounds[1] for _, bounds in found.values()), meshes.high])
@@ -75,14 +76,14 @@ def choose_origin(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, float]
     if remote <= NEAR:
         return origin, radius
     sizes = _sizes(low, high)
-    weights: np.ndarray = (sizes.min() / sizes) ** 2  # the smaller a shape, the nearer it wants the origin
+    weights: np.ndarray = (sizes.min() / sizes) ** 2  # the origin must be nearer to smaller shapes
     near = _rounded(weights @ ((low + high) / 2) / weights.sum(), float(sizes.min()))
     better = bool(remoteness(low, high, near).max() < remote / 4)
     return (near, radius) if better else (origin, radius)
 
 
 def remoteness(low: np.ndarray, high: np.ndarray, origin: np.ndarray) -> np.ndarray:
-    """(n,) how far the farthest point of each box is from the origin, in the box's own extents."""
+    """(n,) the distance of the farthest point of each box from the origin, in the box's own extents."""
     reach = np.maximum(np.abs(low - origin), np.abs(high - origin)).max(axis=1)
     return np.asarray(reach / _sizes(low, high))
 
@@ -93,7 +94,7 @@ def _sizes(low: np.ndarray, high: np.ndarray) -> np.ndarray:
 
 
 def _rounded(place: np.ndarray, size: float) -> np.ndarray:
-    """To a power of two of about `size`: round numbers stay round."""
+    """The place rounded to a power of two of about `size`, so that round numbers stay round."""
     step = 2.0 ** math.floor(math.log2(size)) if size else 1.0
     return np.asarray(np.rint(place / step) * step)
 
@@ -101,8 +102,8 @@ def _rounded(place: np.ndarray, size: float) -> np.ndarray:
 def warnings(
     low: np.ndarray, high: np.ndarray, shapes: np.ndarray, exact: np.ndarray, origin: np.ndarray
 ) -> list[str]:
-    """A line for each shape (indices `shapes`, (n,)) whose place float32 does not know well enough; the surface of an
-    `exact` one is known whatever its size."""
+    """A line for each shape (indices `shapes`, (n,)) whose place is not precise enough in float32; the surface of an
+    `exact` one is precise whatever its size."""
     if not len(low):
         return []
     remote, sizes = remoteness(low, high, origin), _sizes(low, high)

@@ -11,7 +11,7 @@ from gpu.layout import ShapeKind
 from gpu.layout.record import Record
 from service.pack.geometry.analytic import AnalyticShapes, Solids
 
-VAST = 2.0**8  # radii of a ball over the distance of its surface from the origin, and over the smallest shape
+VAST = 2.0**8  # ratio of a ball's radius to the distance of its surface from the origin, and to the smallest shape
 
 Bounds = tuple[np.ndarray, np.ndarray]  # (n, 3) each, float64
 
@@ -33,8 +33,8 @@ def spheres(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bou
     centers, radii, rotations = zip(*placed.spheres, strict=True)
     center, radius = np.array(centers) - origin, np.array(radii)
     records["center"], records["radius"], records["rotation"] = center, radius, rotations
-    # Near the surface of a ball float32 knows a place to no better than 2^-24 of the radius. Where the scene stands
-    # on it, around the origin, that is too little.
+    # Near the surface of a ball a place in float32 is precise to 2^-24 of the radius at best. Where the scene stands
+    # on the ball, around the origin, that is not enough.
     away = np.linalg.norm(center, axis=1)
     power = (away - radius) * (away + radius)
     records["power"] = np.where(np.abs(away - radius) * VAST < radius, power, layout.NOT_VAST)
@@ -42,7 +42,7 @@ def spheres(placed: AnalyticShapes, origin: np.ndarray) -> tuple[np.ndarray, Bou
 
 
 def only_vast(spheres: np.ndarray, low: np.ndarray, high: np.ndarray) -> None:
-    """Takes the power from those that are not vast beside the smallest of all shapes, which have boxes (n, 3)."""
+    """Clear the power of balls that are not vast beside the smallest of all shapes, which have boxes (n, 3)."""
     if len(spheres):
         least = (high - low).max(axis=1).min()
         spheres["power"] = np.where(spheres["radius"] > VAST * least, spheres["power"], layout.NOT_VAST)

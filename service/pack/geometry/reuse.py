@@ -1,4 +1,4 @@
-"""What of the geometries that were packed before serves again."""
+"""Parts of geometries that were packed before, for use in the next one."""
 
 from __future__ import annotations
 
@@ -29,11 +29,11 @@ class Earlier:
 
     @property
     def models(self) -> Mapping[Hashable, SharedMesh]:
-        """Shared meshes that need not be made again, by their keys."""
+        """The shared meshes that need not be made again, by their keys."""
         return {model.key: model for earlier in self.geometries for model in earlier.models}
 
     def among_other_shapes(self, shapes: Sequence[Shape], materials: ShapeMaterials) -> Geometry | None:
-        """The newest geometry with the same meshes, and now with `shapes` beside them; None: there is none.
+        """The newest geometry with the same meshes, but now with `shapes` beside them; None where there is none.
 
         Raises InvalidDocument.
         """
@@ -52,7 +52,7 @@ class Earlier:
         return own, vec3(origin) if own else None, tuple(materials.names), tuple(materials.charts.items())
 
     def same_triangles(self, unshared_key: Hashable, models: Sequence[SharedMesh]) -> Geometry | None:
-        """The newest geometry with the same triangles in the same order; None: there is none."""
+        """The newest geometry with the same triangles in the same order; None where there is none."""
         for earlier in reversed(self.geometries):
             same = len(earlier.models) == len(models) and all(map(operator.is_, earlier.models, models))
             if same and unshared_key is not None and earlier.unshared_key == unshared_key:
@@ -61,7 +61,7 @@ class Earlier:
 
 
 def _among_other_shapes(earlier: Geometry, shapes: Sequence[Shape], materials: ShapeMaterials) -> Geometry | None:
-    """The meshes of `earlier` among these shapes; None where the meshes' records or tree would be others."""
+    """The meshes of `earlier` among these shapes; None where the meshes' records or their tree would differ."""
     if earlier.bvh_kinds - {ShapeKind.TRIANGLE, ShapeKind.INSTANCE}:
         return None
     rebased = rebase(place_analytic(shapes, materials), earlier.meshes)

@@ -1,4 +1,4 @@
-"""Which kinds of shape go through a tree, and the order in which it wants them."""
+"""The tree over a scene: which kinds of shapes go into it, and the order that it gives them."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ LINEAR = {
     ShapeKind.TRIANGLE: 12,
 }
 
-# Of a kind in the tree at most so many stand in the loop, too: the largest, whose boxes most rays would meet.
+# The most shapes of a kind in the tree that stand in the loop instead: the largest, whose boxes most rays would hit.
 LARGE = {
     ShapeKind.SPHERE: 4,
     ShapeKind.QUAD: 12,
@@ -31,8 +31,8 @@ LARGE = {
     ShapeKind.TRIANGLE: 6,
     ShapeKind.INSTANCE: 0,
 }
-LARGE_SHARE = 1 / 32  # of the area of the box around everything, at least
-LARGE_RATIO = 16.0  # times the median of its kind, at least: a ball of few triangles is none the better for it
+LARGE_SHARE = 1 / 32  # least share of the area of the box around everything
+LARGE_RATIO = 16.0  # least ratio to the median of its kind: a ball of few triangles would gain nothing
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class SceneBvh:
 
     nodes: np.ndarray  # layout.Node
     count: int  # of one octant's order
-    order: dict[ShapeKind, np.ndarray]  # of each kind: those that stand in the loop, then the leaves'
+    order: dict[ShapeKind, np.ndarray]  # of each kind: the shapes that stand in the loop, then those of the leaves
     origin: Vec3
     scale: Vec3
 
@@ -51,12 +51,12 @@ class SceneBvh:
 
 
 def stand_out(bounds: dict[ShapeKind, Bounds]) -> dict[ShapeKind, np.ndarray]:
-    """Of each kind in the tree the indices of those few that stand in the loop instead, the largest first."""
+    """For each kind in the tree the indices of the few shapes that stand in the loop instead, the largest first."""
     area = {kind: _areas(*box) for kind, box in bounds.items()}
     ranked = {kind: _largest(a, LARGE[kind]) for kind, a in area.items()}
     ranked = {kind: r[area[kind][r] > LARGE_RATIO * float(np.median(area[kind]))] for kind, r in ranked.items()}
     out = dict.fromkeys(bounds, 0)
-    # What stands out no longer counts for the box around the others: a room on a globe has walls.
+    # A shape that stands out no longer counts for the box around the others: a room on a globe has walls.
     while any(map(len, ranked.values())):
         rest = [_without(box, ranked[kind][: out[kind]]) for kind, box in bounds.items()]
         low = np.min([low.min(axis=0) for low, _ in rest], axis=0)
@@ -70,7 +70,7 @@ def stand_out(bounds: dict[ShapeKind, Bounds]) -> dict[ShapeKind, np.ndarray]:
 
 
 def _largest(values: np.ndarray, count: int) -> np.ndarray:
-    """Their indices, the largest first, of equal ones the first first."""
+    """The indices of the `count` largest values, the largest first; equal ones in their order."""
     if not count:
         return np.zeros(0, np.intp)
     if len(values) > count:
@@ -132,6 +132,7 @@ def build_scene_bvh(bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.n
 
 
 def warm_builder() -> None:
-    """Loads numba and the builder's compiled code, or compiles it: half a second, or several, of the first mesh."""
+    """Load numba and the builder's compiled code, or compile it, which takes the first mesh half a second or
+    several."""
     low = np.arange(3.0 * (LINEAR[ShapeKind.TRIANGLE] + 1), dtype=np.float32).reshape(-1, 3)
     build_scene_bvh({ShapeKind.TRIANGLE: (low, low + 1)}, {ShapeKind.TRIANGLE: np.zeros(0, np.intp)})

@@ -1,4 +1,4 @@
-"""What is written into the records of all kinds of shapes alike: which ones the camera looks through, which shine."""
+"""Members that records of all kinds have in common: which shapes the camera looks through, and which are lights."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.scene.shape import Shape
 
 
 def hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
-    """Marks the records of shapes that the camera looks through."""
+    """Mark the records of shapes that the camera looks through."""
     hidden = np.array([not shape.visible_to_camera for shape in shapes], bool)
     if hidden.any():
         for array in records:
@@ -25,8 +25,8 @@ def hide(records: Sequence[np.ndarray], shapes: Sequence[Shape]) -> None:
 def area_lights(
     analytic: dict[ShapeKind, np.ndarray], triangles: np.ndarray, materials: ShapeMaterials
 ) -> tuple[np.ndarray, np.ndarray]:
-    """`layout.Light` of the shapes that shine, not yet weighted, and their areas (m^2). Writes into the records which
-    light each one is. `triangles` are those that no instance shows."""
+    """`layout.Light` records of the shapes that shine, not yet weighted, and their areas (m^2). The lights' numbers
+    are written into the shapes' records. `triangles` are those that no instance shows."""
     records = {**analytic, ShapeKind.TRIANGLE: triangles}
     found = lights.mark(records, np.array([name in materials.emissive for name in materials.names]))
     return found, lights.areas(records, found)

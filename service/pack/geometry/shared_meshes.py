@@ -12,12 +12,12 @@ from gpu.layout import ShapeKind
 from service.pack.geometry.meshes import PlacedMesh, Triangles, survey
 from service.scene.numbers import Vec3
 
-PARTS = 128  # boxes that a model is seen as when a box around it is asked for, under any transform
+PARTS = 128  # boxes that stand for a model when a box around it under a transform is computed
 
 
 @dataclass(frozen=True)
 class WrittenTriangles:
-    """Finished arrays, in the order of the tree's leaves; what no triangle has is None."""
+    """Finished arrays, in the order of the tree's leaves; an array is None where no triangle has such values."""
 
     triangles: np.ndarray
     normals: np.ndarray | None
@@ -28,7 +28,7 @@ class WrittenTriangles:
 
 @dataclass(frozen=True)
 class UnwrittenTriangles:
-    """Triangles that have not been written anywhere yet; `places`: where each goes."""
+    """Triangles that have not been written anywhere yet, and the final `places` of each."""
 
     triangles: Triangles
     places: np.ndarray
@@ -51,7 +51,7 @@ class SharedMesh:
 
     @property
     def reach(self) -> np.ndarray:
-        """(3,) how far it reaches from its center."""
+        """(3,) its greatest extent from its centre, per axis."""
         return np.asarray(np.abs(self.parts.reshape(-1, 2, 3)).max(axis=(0, 1)))
 
     @property
@@ -74,7 +74,8 @@ class SharedMesh:
         return self.source.triangles.have(name)
 
     def write(self, triangles: np.ndarray, normals: np.ndarray, corners: dict[str, np.ndarray]) -> SharedMesh:
-        """Fills its part of the scene's arrays, those of zero length left out; the model as it is kept there."""
+        """Fill its part of the scene's arrays, except those of zero length. Returns the model with views of that
+        part."""
         source = self.source
         if isinstance(source, WrittenTriangles):
             triangles[...] = source.triangles
@@ -127,13 +128,13 @@ def shared_mesh(key: Hashable, mesh: PlacedMesh) -> SharedMesh | None:
 
 
 def blank(mesh: PlacedMesh) -> PlacedMesh:
-    """The mesh as all shapes share it: of no material, and of no shape."""
+    """The mesh as all shapes share it, without a material and without a shape."""
     return replace(mesh, material=0, shape=0)
 
 
 def shift(models: Sequence[SharedMesh]) -> int:
-    """Bits for the number of a triangle in any of them: `SceneArrays.instance_shift`."""
+    """The bits that hold the number of a triangle in any of the models: `SceneArrays.instance_shift`."""
     return max(((each.count - 1).bit_length() for each in models), default=0)
 
 
-MOST_SEEN = layout.INSTANCED - 1  # triangles of all instances, their number in each taken as a power of two
+MOST_SEEN = layout.INSTANCED - 1  # triangles of all instances at most, their number rounded up to a power of two

@@ -1,4 +1,4 @@
-"""Which way u grows at the corners of triangles, for normal maps and stretched highlights; in ten bits a corner."""
+"""Tangents at the corners of triangles, for normal maps and anisotropic highlights, in ten bits a corner."""
 
 from __future__ import annotations
 
@@ -14,14 +14,14 @@ from service.pack.geometry.vertex_normals import add_up, decode, same
 
 @dataclass(frozen=True)
 class Tangents:
-    """Directions (k, 3) float32 of any length; `corners` (m, 3): which of them each has."""
+    """Directions (k, 3) float32 of any length; `corners` (m, 3) are indices into them."""
 
     rows: np.ndarray
     corners: np.ndarray
     left: np.ndarray  # (m,) whether v grows to the right of u, seen from outside
 
     def moved(self, axes: np.ndarray) -> Tangents:
-        """Under a linear map; where it mirrors, corners are in the order of faces that were turned round."""
+        """The tangents under a linear map; where it mirrors, corners follow the faces, whose order is reversed."""
         rows = self.rows @ (axes.T / np.abs(axes).max()).astype(np.float32)
         if np.linalg.det(axes) > 0:
             return Tangents(rows, self.corners, self.left)
@@ -32,10 +32,10 @@ def tangents(
     vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, normal_faces: np.ndarray,
     uvs: np.ndarray | None, given: np.ndarray | None,
 ) -> Tangents:  # fmt: skip
-    """Of a mesh in its own space, from `given` (n, 4), as glTF's TANGENT, or else from `uvs` (n, 2).
+    """The tangents of a mesh in its own space, from `given` (n, 4), as glTF's TANGENT, or else from `uvs` (n, 2).
 
-    A flat mesh (without normals) has its triangles' own. A vertex for which neither tells a direction gets that of a
-    turn about +Y, as the spheres of a document have it.
+    A flat mesh (without normals) has those of its triangles. A vertex for which neither gives a direction gets the
+    direction of a rotation about +Y, as on a sphere.
     """
 
     def charted() -> Tangents:
@@ -59,7 +59,7 @@ def tangents(
 
 
 def _otherwise(first: Tangents, other: Callable[[], Tangents]) -> Tangents:
-    """The other, wherever the first has no direction."""
+    """`first`, but `other` wherever the first has no direction."""
     without = ~first.rows.any(axis=1).take(first.corners)
     if not without.any():
         return first
@@ -72,13 +72,13 @@ def _otherwise(first: Tangents, other: Callable[[], Tangents]) -> Tangents:
 def _charted(
     vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, normal_faces: np.ndarray, uvs: np.ndarray
 ) -> Tangents:
-    """As [Mikkelsen 2008, "Simulation of wrinkled surfaces revisited"], whose way glTF prescribes: at each corner the
-    triangle's direction of growing u is laid into the plane of the normal there, and what the triangles of a vertex
-    have is added up by their angles in that plane.
+    """The tangents of [Mikkelsen 2008, "Simulation of wrinkled surfaces revisited"], which glTF prescribes: at each
+    corner the triangle's direction of growing u is projected into the plane of the normal, and the directions of a
+    vertex' triangles are summed, weighted by their angles in that plane.
 
-    A vertex is a position, a normal and a uv; where triangles with mirrored coordinates meet, they are added up
-    apart. Departing from his code, those that touch in no more than the vertex are one group, too, and polygons are
-    the triangles they were cut into. A triangle whose uvs have no area takes what its neighbours have.
+    A vertex is a position, a normal and a uv; triangles with mirrored coordinates are summed apart. Departing from
+    Mikkelsen's code, triangles that share only the vertex are one group, too, and polygons are the triangles that
+    they were cut into. A triangle whose uvs have no area takes the tangent of its neighbours.
     """
     if normals is None:
         rows = np.empty((len(faces), 3))
@@ -98,7 +98,7 @@ def _charted(
         weighted = _weighted(p, along, normals.take(normal_faces[some], axis=0))
         which = 2 * place.take(faces[some]) + left[some, None]
         add_up(sums, which.reshape(-1), weighted.reshape(-1, 3))
-    # Of directions that cancel there is nothing left but rounding.
+    # Where directions cancel, only rounding is left.
     sums *= np.einsum("ij,ij->j", sums, sums) > 1e-18
     rows = _small(sums.T)
     if flat.any():
@@ -108,7 +108,7 @@ def _charted(
 
 
 def _small(rows: np.ndarray) -> np.ndarray:
-    """As float32, no longer than 1, those that were not zero still not."""
+    """The rows as float32 of length 1 at most; those that were not zero are still not."""
     most = np.abs(rows).max(axis=1, keepdims=True)
     small: np.ndarray = np.divide(
         rows, most, out=np.zeros(rows.shape, np.float32), where=most > 0, casting="same_kind"
@@ -126,7 +126,8 @@ def _along(p: np.ndarray, w: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _weighted(p: np.ndarray, along: np.ndarray, n: np.ndarray) -> np.ndarray:
-    """(c, 3, 3): of corners at p with the normals n the direction in the normal's plane, as long as the angle."""
+    """(c, 3, 3): for corners at p with the normals n the direction in the normal's plane, with the angle as
+    length."""
     edges = p[:, [1, 2, 0]] - p
     out = np.empty_like(p)
     for k in range(3):
@@ -151,8 +152,8 @@ def _unit(v: np.ndarray) -> np.ndarray:
 
 
 def codes(normals: np.ndarray, rows: np.ndarray) -> np.ndarray:
-    """(n,) uint32 from 1 to TANGENT_STEPS: the angle of each row in the plane of the normal with these bits, as
-    triangle_tangent of triangle.glsl has it."""
+    """(n,) uint32 from 1 to TANGENT_STEPS: the angle of each row in the plane of the normal with these bits, which
+    triangle_tangent in triangle.glsl decodes."""
     n, below = decode(normals)
     s = np.where(below, -1.0, 1.0)
     a = -1.0 / (s + n[:, 2])

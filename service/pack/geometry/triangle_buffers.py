@@ -1,4 +1,5 @@
-"""What triangles have, written once into their last place: their records, normals, corners, and the models' trees."""
+"""The arrays of all triangles, written once into their final place: records, normals, corners and the models'
+trees."""
 
 from __future__ import annotations
 
@@ -16,7 +17,7 @@ from service.shared_memory import SharedArena
 
 @dataclass(frozen=True)
 class TriangleBuffers:
-    """What triangles have, in final order, those of the models last, and the models' nodes."""
+    """The arrays of all triangles in final order, those of the models last, and the models' nodes."""
 
     triangles: np.ndarray
     normals: np.ndarray
@@ -34,7 +35,7 @@ class TriangleBuffers:
 def write_triangles(
     triangles: Triangles, places: np.ndarray | None, shared: Sequence[SharedMesh]
 ) -> tuple[TriangleBuffers, tuple[SharedMesh, ...]]:
-    """All of it on one arena, which is what the models are kept on from now on."""
+    """Write everything into one arena, in which the models stay from now on."""
     own = len(triangles)
     count, node_count = own + sum(each.count for each in shared), sum(len(each.nodes) for each in shared)
     tangents = triangles.any_tangents or any(each.any_tangents for each in shared)
@@ -65,7 +66,7 @@ def write_triangles(
     )
 
 
-CORNERS = {"uvs": 2, "uvs_1": 2, "colors": 4}  # what triangles have there: how many numbers
+CORNERS = {"uvs": 2, "uvs_1": 2, "colors": 4}  # the attributes of corners, with how many numbers each has
 
 
 def _at_corner(name: str) -> np.dtype[Any]:

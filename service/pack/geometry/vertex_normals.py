@@ -71,14 +71,14 @@ def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
 
     in_order(weighted, add, chunks(len(faces)))
     length = np.sqrt(np.einsum("ij,ij->j", sums, sums))
-    cancelled = length < 1e-9  # of faces back to back there is nothing left but rounding
+    cancelled = length < 1e-9  # where faces are back to back, only rounding is left
     sums /= np.where(cancelled, np.inf, length)
     return np.ascontiguousarray(sums.T), joined  # rows: what takes some of them would copy all of them first
 
 
 def add_up(sums: np.ndarray, which: np.ndarray, rows: np.ndarray) -> None:
-    """Adds each of `rows` (n, 3) to the column of `sums` (3, k) that `which` (n,) names."""
-    index = which.astype(np.intp)  # of which numpy has the quick way
+    """Add each of `rows` (n, 3) to the column of `sums` (3, k) that `which` (n,) names."""
+    index = which.astype(np.intp)  # numpy is fast with this type only
     for axis in range(3):
         np.add.at(sums[axis], index, rows[:, axis])
 
@@ -107,7 +107,7 @@ def same(*columns: np.ndarray) -> np.ndarray:
 
 
 def _same(column: np.ndarray, first: np.ndarray, place: np.ndarray) -> bool:
-    """Whether rows that have one number are the same."""
+    """Whether all rows that have the same number are equal."""
     rows = column.take(first, axis=0)
     return all(np.array_equal(rows.take(place[some], axis=0), column[some]) for some in chunks(len(column)))
 

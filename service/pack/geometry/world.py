@@ -1,4 +1,4 @@
-"""The document's shapes -> shapes in the world."""
+"""The document's shapes -> shapes in world space."""
 
 from __future__ import annotations
 
@@ -23,11 +23,11 @@ from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereSha
 
 @dataclass(frozen=True)
 class ShapeMaterials:
-    """What shapes need to know of the materials."""
+    """The properties of the materials on which the shapes depend."""
 
     names: Sequence[str]  # in order
     emissive: Collection[str] = frozenset()  # those that shine
-    charts: Mapping[str, RequiredCharts] = field(default_factory=dict)  # what they read of their shapes
+    charts: Mapping[str, RequiredCharts] = field(default_factory=dict)  # the charts of shapes that they read
 
 
 @dataclass
@@ -48,8 +48,8 @@ def place(
     shapes: Sequence[Shape], materials: ShapeMaterials, assets: Assets, max_triangles: int,
     known: Mapping[Hashable, SharedMesh] | None = None, apart: bool = False,
 ) -> World:  # fmt: skip
-    """All shapes in the world. `known` are shared meshes that need not be made again; `apart`: large meshes shall
-    move without the others.
+    """All shapes in world space. `known` are shared meshes that need not be made again; with `apart` large meshes get
+    trees of their own.
 
     Raises InvalidDocument.
     """
@@ -81,7 +81,8 @@ def place(
 def _instances(
     wanted: Sequence[MeshRequest], known: Mapping[Hashable, SharedMesh], apart: bool, room: int
 ) -> tuple[list[Instance | None], int]:
-    """Each mesh as an instance, or None where its triangles are its own; and how many of these there is room for."""
+    """Each mesh as an instance, or None where its triangles are its own; and the number of these that there is room
+    for."""
     out: list[Instance | None] = [None] * len(wanted)
     groups = dict[Hashable, list[int]]()
     for i, key in enumerate(instances.keys(wanted, apart)):
@@ -148,7 +149,7 @@ def _check_room(each: MeshRequest, room: int) -> None:
 
 
 def _check_reach(instance: Instance, each: MeshRequest) -> None:
-    """By the boxes of its parts where they suffice."""
+    """Check an instance's reach, by the boxes of its parts where they suffice."""
     reach = float(np.abs(instance.box).max())
     if reach > LARGEST:
         matrix = np.eye(4) if each.matrix is None else each.matrix
@@ -177,7 +178,7 @@ def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshDa
 
 
 def triangles(shape: MeshShape, assets: Assets) -> int:
-    """How many it has; 0 of a file that can't be had, which is told elsewhere."""
+    """The number of its triangles; 0 for a file that cannot be read, which is reported when it is packed."""
     try:
         return len(_data(shape, 0, assets, {}).faces)
     except InvalidDocument:

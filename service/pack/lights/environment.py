@@ -28,12 +28,12 @@ from service.scene.numbers import BRIGHTEST
 
 LARGEST_SIDE = 16384  # texels; no driver promises larger textures
 LARGEST_FACE = LARGEST_SIDE // 3  # they share one texture, three across
-SUN_SHARE = (0.1, 0.9)  # bounds on the sun's part of the samples: a mirror looks at the dome, stone is lit by the sun
+SUN_SHARE = (0.1, 0.9)  # bounds on the sun's share of the samples: mirrors show the dome, stone is lit by the sun
 
 
 @dataclass(frozen=True)
 class PackedEnvironment:
-    """All that does not depend on rotation, scale and background."""
+    """The part of an environment that does not depend on rotation, scale and background."""
 
     texels: np.ndarray  # (h, w, 3) float32
     probability: np.ndarray
@@ -47,7 +47,8 @@ class PackedEnvironment:
 
 
 def environment_key(environment: Environment) -> Hashable:
-    """Equal where `pack_environment` makes equal skies; None where nothing is gained or a file may change."""
+    """A key that is equal where `pack_environment` gives equal results; None where a cache gains nothing or a file
+    may change."""
     if isinstance(environment, ImageEnvironment):
         return ("image", environment.asset, environment.blur) if lasting(environment.asset) else None
     if isinstance(environment, CubemapEnvironment):
@@ -60,7 +61,7 @@ def environment_key(environment: Environment) -> Hashable:
 
 
 def pack_environment(environment: Environment, assets: Assets) -> PackedEnvironment:
-    """Raises InvalidDocument."""
+    """The texels and tables of an environment. Raises InvalidDocument."""
     if isinstance(environment, ConstantEnvironment):
         return _packed(np.array(environment.radiance, np.float32).reshape(1, 1, 3), ())
     if isinstance(environment, CubemapEnvironment):
@@ -120,7 +121,7 @@ def _clear(environment: SkyEnvironment) -> PackedEnvironment:
         return dome
     sun = sun_disk(elevation, environment.turbidity)
     strength = float(sun.irradiance @ LUMINANCE)
-    if not strength > 0:  # behind all that air
+    if not strength > 0:  # the air absorbs all of it
         return dome
     low, high = SUN_SHARE
     total = dome.irradiance + strength
@@ -138,7 +139,7 @@ def _linear(image: ImageData) -> np.ndarray:
 
 
 def _clamped(image: ImageData, pointer: str) -> tuple[np.ndarray, tuple[str, ...]]:
-    """Radiance within its range, and what is told of that and of the image."""
+    """The radiance clamped to its range, and warnings about that and about the image."""
     texels, warnings = _linear(image), list[str]()
     for count, what in (
         (np.count_nonzero((texels < 0).any(axis=2)), "negative texels raised to 0"),

@@ -10,7 +10,7 @@ import numpy as np
 from gpu.tables.alias_table import cube_solid_angles, solid_angles
 
 MOST_WIDTH = 2048  # texels of a blurred picture, twice as wide as high: the most costly blur takes some seconds
-LEAST_WIDTH = 64  # of a coarser one the rows are too wide to hold the light
+LEAST_WIDTH = 64  # texels; the rows of a coarser picture would blur more than asked
 PER_BLUR = 4  # texels to one standard deviation: bilinear filtering between them errs by less than 1 % of a peak
 REACH = 6  # standard deviations: there the kernel is 2e-8 of its peak, which hides the light of any sun
 # Face -> directions at its middle, along s to the right and along t down, where s and t go from -1 to 1.
@@ -27,8 +27,8 @@ FACES = {
 def blur_image(texels: np.ndarray, degrees: float) -> np.ndarray:
     """A latitude-longitude map (h, w, 3) blurred over the sphere: (H, W, 3) float32, H <= h, W <= w.
 
-    The kernel is the von Mises-Fisher density of concentration 1 / blur^2, on a sphere what a Gaussian of that
-    standard deviation is in a plane. There are as few texels as hold what it leaves, at most MOST_WIDTH across.
+    The kernel is the von Mises-Fisher density of concentration 1 / blur^2, the counterpart on a sphere of a Gaussian
+    of that standard deviation. The result has as few texels as its detail needs, at most MOST_WIDTH across.
     """
     height, width = texels.shape[:2]
     wanted = _width(degrees)
@@ -43,7 +43,8 @@ def blur_cube(faces: list[np.ndarray], degrees: float) -> np.ndarray:
     n = faces[0].shape[0]
     width = min(4 * max(n, 2), _width(degrees))
     height = width // 2
-    # Each texel goes whole where its middle is: texels half as large as those of the map are small enough.
+    # Each texel counts as a whole for the place of its middle: texels half as large as those of the map are small
+    # enough.
     side = min(n, height)
     each = -(-width // (2 * side))
     sums = np.zeros((height * width, 4))
@@ -60,7 +61,8 @@ def blur_cube(faces: list[np.ndarray], degrees: float) -> np.ndarray:
         place += np.minimum(u * width, width - 1).astype(np.intp)
         for k in range(4):
             sums[:, k] += np.bincount(place.ravel(), parts[..., k].ravel(), height * width)
-    # Some texels of the map hold no middle of any texel of the cube: their neighbours have to reach them.
+    # Some texels of the map contain no middle of a texel of the cube: the kernel must reach them from their
+    # neighbours.
     return _convolved(sums.reshape(height, width, 4), max(math.radians(degrees), math.pi / height))
 
 
@@ -77,7 +79,7 @@ def _weighted(row: np.ndarray, solid: np.ndarray) -> np.ndarray:
 
 
 def _reduced(rows: Iterable[np.ndarray], count: int, shape: tuple[int, int]) -> np.ndarray:
-    """`count` rows (w, 4) summed into a grid of `shape`; what lies across its edges is shared out by length."""
+    """`count` rows (w, 4) summed into a grid of `shape`; a texel across an edge of the grid is divided by length."""
     height, width = shape
     out = np.zeros((height, width, 4))
     for i, row in enumerate(rows):
@@ -114,7 +116,7 @@ def _convolved(sums: np.ndarray, blur: float) -> np.ndarray:
         apart = 2 * np.sin((polar[i] - near) / 2) ** 2
         apart = apart[:, None] + math.sin(polar[i]) * np.sin(near)[:, None] * around
         kernel = np.fft.rfft(np.exp(-apart / blur**2), axis=1).real[:, :, None]
-        # The rows below the equator are met by the same kernel, upside down.
+        # For the rows below the equator the same kernel serves, upside down.
         mirrored = np.s_[height - last : height - first]
         for row, met in ((i, spectrum[first:last]), (height - 1 - i, spectrum[mirrored][::-1])):
             light = np.fft.irfft((kernel * met).sum(axis=0), width, axis=0)

@@ -1,4 +1,4 @@
-"""Where bounded lights are, where they send light to and how much: what their tree is made from."""
+"""Bounds of lights: their places, the directions of their light and its power, from which their tree is made."""
 
 from __future__ import annotations
 
@@ -10,10 +10,10 @@ from gpu.layout import LightKind, ShapeKind
 from service.pack.edits.cache import PackCache, digest
 
 MANY = 4
-APART = 4.0  # radii between the middles of fewer lights that are in more than one place
-LASTING = 4096  # lights whose tree is worth keeping beside geometries: it takes some ms
+APART = 4.0  # least distance between fewer lights, in radii of the largest, for a tree
+LASTING = 4096  # lights from which on their tree is cached, as building it takes some milliseconds
 
-Grown = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # as by `gpu.accel.light_tree.build`
+Grown = tuple[np.ndarray, np.ndarray, float, np.ndarray]  # the result of `gpu.accel.light_tree.build`
 _FLAT = np.array([0.0, 0.0, 1.0])
 
 
@@ -33,7 +33,7 @@ class LightBounds:
 
 
 def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray) -> LightBounds:
-    """Of `layout.Light` records of bounded lights (n,); `sides` (n,): how many of a flat one's send light."""
+    """The bounds of `layout.Light` records (n,) of bounded lights; `sides` (n,) of a flat one send light."""
     out = LightBounds(len(lights))
     kinds = lights["kind"]
 
@@ -60,7 +60,7 @@ def bounds(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np
 
 
 def _flats(out: LightBounds, mine: np.ndarray, corners: np.ndarray, across: np.ndarray, sides: np.ndarray) -> None:
-    """`corners` (n, k, 3), `across` (n, 3) along the outward normals."""
+    """Fill in flat lights with the `corners` (n, k, 3); `across` (n, 3) points along the outward normals."""
     low, high = corners.min(axis=1), corners.max(axis=1)
     away = np.linalg.norm(corners - 0.5 * (low + high)[:, None], axis=2).max(axis=1)
     out.set_box(mine, low, high, away)
@@ -84,7 +84,8 @@ def _ellipsoids(out: LightBounds, mine: np.ndarray, solids: np.ndarray) -> None:
 
 
 def _spots(out: LightBounds, mine: np.ndarray, spots: np.ndarray) -> None:
-    """What spot.glsl has of the two angles: 1 / (2 rim) as the square of the direction, outer / rim."""
+    """Fill in spots, whose angles their records have as in spot.glsl: 1 / (2 rim) is the square of the direction's
+    length, outer / rim is `spread`."""
     out.set_box(mine, spots["position"], spots["position"], np.zeros(len(mine)))
     direction = spots["direction"].astype(np.float64)
     length2 = (direction**2).sum(axis=1)
@@ -99,8 +100,8 @@ def _spots(out: LightBounds, mine: np.ndarray, spots: np.ndarray) -> None:
 
 
 def worth(b: LightBounds) -> bool:
-    """Whether a tree pays: a sample then costs 1.1 to 1.4 times as much. Two lamps some metres apart gain 1.4 to 2.9
-    by it, error by time, all of that counted; the two triangles of a rectangle gain nothing."""
+    """Whether a tree pays: a sample then costs 1.1 to 1.4 times as much. Two lamps some metres apart still have an
+    error 1.4 to 2.9 times smaller after equal time; the two triangles of a rectangle gain nothing."""
     middles = 0.5 * (b.low + b.high)
     if not 2 <= len(middles) < MANY:
         return len(middles) >= MANY
@@ -111,8 +112,8 @@ def grow_light_tree(
     lights: np.ndarray, power: np.ndarray, share: float, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray,
     reach: float, cache: PackCache | None,
 ) -> Grown | None:  # fmt: skip
-    """As `light_tree.build`, of `layout.Light` records (n,) with their `power` (n,), W of luminance; None where a
-    tree would not pay."""
+    """The result of `light_tree.build` for `layout.Light` records (n,) with their `power` (n,), W of luminance; None
+    where a tree would not pay."""
     b = bounds(lights, shapes, sides)
     if not worth(b):
         return None

@@ -1,4 +1,4 @@
-"""Which shapes, points, suns and sky shine, and how often each is picked."""
+"""The lights of a scene (shapes, points, spots, suns and the sky), and the probability of picking each."""
 
 from __future__ import annotations
 
@@ -20,11 +20,12 @@ SHINING = {
 }  # a box that shines was packed as quads
 
 # Power says little about what reaches a point: a far strong light must not starve a near weak one.
-EVEN = 0.05  # share of the picks that goes to all lights alike
+EVEN = 0.05  # share of the picks that is spread evenly over all lights
 # Bounds on the share of the sky and the suns where there are nearer lights; a wide floor makes their power look huge
 FAR_SHARE = (0.2, 0.8)
 
-# Share of a spot's cone that its fading rim takes at least: its inverse, and what is added to it, fit into float32.
+# The least share of a spot's cone that its fading rim takes, so that its inverse fits into float32 with some digits
+# left.
 LEAST_RIM = 1e-6
 # Radians: a disk narrower than this is a point, as float32 directions have no digits for a place on it.
 LEAST_DISK = 1e-6
@@ -53,7 +54,7 @@ def mark(shapes: dict[ShapeKind, np.ndarray], emissive: np.ndarray) -> np.ndarra
 
 
 def areas(shapes: dict[ShapeKind, np.ndarray], lights: np.ndarray) -> np.ndarray:
-    """(n,) float64, m^2: of each light made by `mark`."""
+    """(n,) float64: the area (m^2) of each light made by `mark`."""
     measures = {
         LightKind.SPHERE: (ShapeKind.SPHERE, _sphere_area),
         LightKind.QUAD: (ShapeKind.QUAD, lambda quads: quads["area"]),
@@ -68,7 +69,8 @@ def areas(shapes: dict[ShapeKind, np.ndarray], lights: np.ndarray) -> np.ndarray
 
 
 def sides(lights: np.ndarray, materials: np.ndarray) -> np.ndarray:
-    """(n,): how many sides of each light of `mark` send light to others; the inside of a closed shape does not."""
+    """(n,): the number of sides of each light of `mark` that send light to other shapes; the inside of a closed shape
+    does not count."""
     open_ = (lights["kind"] == LightKind.QUAD) | (lights["kind"] == LightKind.TRIANGLE)
     return np.where(open_, materials["emission_sides"][lights["material"]], 1)
 
@@ -83,7 +85,7 @@ def _triangle_area(triangles: np.ndarray) -> np.ndarray:
 
 
 def _ellipsoid_area(solids: np.ndarray) -> np.ndarray:
-    """Within 1.1 % by Thomsen's formula (p = 1.6075), from the lengths of the half axes."""
+    """The area by Thomsen's formula (p = 1.6075), within 1.1 %, from the lengths of the half axes."""
     rows = np.stack([solids["row_x"], solids["row_y"], solids["row_z"]], axis=1).astype(np.float64)
     a, b, c = (1.0 / np.linalg.svd(rows, compute_uv=False)).T if len(rows) else np.zeros((3, 0))
     p = 1.6075
@@ -91,8 +93,8 @@ def _ellipsoid_area(solids: np.ndarray) -> np.ndarray:
 
 
 def analytic_lights(lights: Sequence[Light], origin: Sequence[float], radius: float) -> tuple[np.ndarray, np.ndarray]:
-    """`layout.Light` records of the lights that are no shapes and shine, suns with a disk last; and their power, W of
-    luminance: of a directional light what it sends through a disk of `radius` around the scene.
+    """`layout.Light` records of the lights that are no shapes and shine, suns with a disk last, and their power, W of
+    luminance. The power of a directional light is what passes through a disk of `radius` around the scene.
     """
     records = np.zeros(len(lights), layout.Light.dtype)
     power = np.zeros(len(lights))
@@ -120,7 +122,8 @@ def _has_disk(records: np.ndarray) -> np.ndarray:
 
 
 def _spot(record: np.ndarray, light: SpotLight) -> float:
-    """Solid angle, sr, that holds as much light as the cone with its rim: smoothstep has a mean of a half."""
+    """Fill the record. Returns the solid angle (sr) that holds as much light as the cone with its rim, as smoothstep
+    has a mean of a half."""
     inner, outer = (2 * math.sin(math.radians(a) / 2) ** 2 for a in (light.inner_angle, light.outer_angle))
     record["kind"] = LightKind.SPOT
     if outer == 0:
@@ -132,7 +135,8 @@ def _spot(record: np.ndarray, light: SpotLight) -> float:
 
 
 def _sun(record: np.ndarray, light: DirectionalLight, radius: float) -> float:
-    """Area, m^2 (and sr where there is a disk), by which the power follows from the record's intensity."""
+    """Fill the record. Returns the area in m^2 (times sr where there is a disk) that gives the power when multiplied
+    by the record's intensity."""
     half = math.radians(light.angular_diameter) / 2
     record["kind"], record["direction"] = LightKind.DIRECTIONAL, _unit(light.direction)
     facing = 1.0
@@ -150,11 +154,11 @@ def _unit(v: Sequence[float]) -> np.ndarray:
 def weigh(
     lights: np.ndarray, power: np.ndarray, sky_power: float, grow: Grow | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
-    """The records, the sky's appended where it has power, with how they are picked; and the words of the tree that
-    the bounded ones are picked by, none where it would not pay: then an alias table knows them all.
+    """The records with their probabilities, the sky's appended where it has power; and the words of the tree by which
+    bounded lights are picked, none where a tree would not pay and an alias table picks among all of them.
 
-    `power` (n,), W of luminance, all positive. The sky's is for a brightness of 1: turning that up or down edits no
-    table, and the picture stays the same as one packed anew.
+    `power` (n,), W of luminance, is positive. The sky's power is for a brightness of 1: changing the brightness edits
+    no table, and the picture is the same as that of a scene packed anew.
     """
     power = power.astype(np.float64)
     words = np.zeros((0, 4), np.uint32)

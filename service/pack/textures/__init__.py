@@ -2,5 +2,5 @@
 
 uses    the references of materials to textures, and the charts that they need
 images  images -> texels one after another
-words   the whole, as the words that kernels read behind each material
+words   everything that kernels read of textures behind each material, as words
 """

@@ -18,7 +18,7 @@ from service.scene.texture import (
 )
 from service.scene.validation import escaped
 
-MAX_TEXELS = 2**27  # what two textures of the device hold, 16384 rows each
+MAX_TEXELS = 2**27  # the texels of a texture of 16384 rows on the device
 
 
 class TexelLimits(Protocol):
@@ -36,7 +36,7 @@ class PackedTexels:
 
 
 def images_of(scene: Scene, assets: Assets) -> dict[str, ImageData]:
-    """By asset: of all textures, used or not, so that none is wrong unnoticed."""
+    """The images of all textures by asset, of unused ones too, so that a broken one is noticed."""
     out: dict[str, ImageData] = {}
     errors = []
     for name, texture in scene.textures.items():
@@ -85,7 +85,7 @@ def _laid(images: dict[str, ImageData]) -> PackedTexels:
 
 
 def _decoded(image: ImageData) -> ImageData:
-    """Linear floats of sRGB ones, such as a PNG of 16 bits has; its alpha as it is."""
+    """Linear floats from sRGB ones, such as those of a PNG of 16 bits; alpha stays as it is."""
     pixels = np.array(image.pixels, np.float32)
     pixels[..., :3] = linear(pixels[..., :3])
     return ImageData(pixels)

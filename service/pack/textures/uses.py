@@ -1,4 +1,4 @@
-"""Which numbers of which materials read which textures, and which charts they need for that."""
+"""The references of materials to textures, and the charts of shapes that they need."""
 
 from __future__ import annotations
 
@@ -21,12 +21,12 @@ from service.scene.texture import (
 )
 from service.scene.validation import escaped
 
-DECODED = " decoded"  # after an asset's reference
+DECODED = " decoded"  # appended to the reference of an asset whose sRGB floats were made linear
 
 
 @dataclass(frozen=True)
 class TextureReference:
-    """One reference: `material` is an index, `pointer` leads to the reference."""
+    """One reference of a material to a texture. `material` is an index; `pointer` is that of the reference."""
 
     material: int
     member: str
@@ -39,26 +39,26 @@ class TextureReference:
 
     @property
     def kept(self) -> str:
-        """Under which the texels of an image are found."""
+        """The key under which the texels of an image are stored."""
         assert isinstance(self.texture, ImageTexture)
         return self.texture.asset + (DECODED if self.decoded else "")
 
     @property
     def look(self) -> tuple[str, bool]:
-        """Equal where one look at the texture serves both."""
+        """A key that is equal where one sample of the texture serves both references."""
         return self.reference.texture, self.srgb
 
 
 @dataclass(frozen=True)
 class RequiredCharts:
-    """What a material reads of its shapes: sets of texture coordinates, and the one that its tangents run along."""
+    """The charts of its shapes that a material reads: sets of texture coordinates, and the set of its tangents."""
 
     uv_sets: frozenset[int] = frozenset()
     tangents: int | None = None  # None: it needs none
 
 
 def required_charts(scene: Scene) -> dict[str, RequiredCharts]:
-    """Of the materials that read anything."""
+    """The charts of the materials that read any."""
     out = {}
     for name, material in scene.materials.items():
         sets = {key: _uv_set(scene, reference) for key, reference in references(material).items()}
@@ -74,7 +74,7 @@ def _uv_set(scene: Scene, reference: Reference) -> int:
 
 
 def _tangent_set(material: Material, sets: Mapping[str, int]) -> int | None:
-    """That of its normal map, or else of its coat's; the first where it only stretches highlights."""
+    """The set of its normal map, or else of its coat's; the first one where only its highlights are anisotropic."""
     for name in ("normal_map", "clearcoat_normal_map"):
         if name in sets:
             return sets[name]

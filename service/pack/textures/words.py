@@ -1,4 +1,4 @@
-"""Textures -> texels one after another, and for each material which of its numbers gets which of them."""
+"""Textures -> texels one after another, and for each material the words that say which number reads which of them."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
 def pack_textures(
     scene: Scene, assets: Assets, cache: PackCache | None, limits: TexelLimits | None
 ) -> tuple[TextureArrays | None, list[TextureReference], PackedTexels, list[str]]:
-    """The renderer's arrays or None, what they serve, and warnings. Raises InvalidDocument."""
+    """The renderer's arrays or None, the references that they serve, and warnings. Raises InvalidDocument."""
     images = images_of(scene, assets)
     uses = list(uses_of(scene, images))
     check_channels(uses, images)
@@ -52,7 +52,7 @@ def pack_textures(
 
 
 def _slots(uses: list[TextureReference]) -> dict[str, int]:
-    """Member -> slot. Members share one where no material would have to look at two textures for it."""
+    """Member -> slot. Members share a slot where no material reads two textures by them."""
     taken: dict[str, dict[int, tuple[str, bool]]] = {}
     for use in uses:
         taken.setdefault(use.member, {})[use.material] = use.look
@@ -81,7 +81,7 @@ def _words(materials: int, uses: list[TextureReference], slots: dict[str, int], 
         mine = [use for use in uses if slots[use.member] == slot]
         for use in mine:
             records[use.material, slot] = record_of(use, texels)
-        # A look that no material asked for still is a look: somewhere in the texels, and raising no other flag.
+        # Kernels sample the slots that a material does not use as well: those point at some texels and raise no flag.
         without = [m for m in range(materials) if all(use.material != m for use in mine)]
         records[without, slot] = records[mine[0].material, slot]
     slot_words = count * texture_records.TextureSlot.words
@@ -114,7 +114,7 @@ def record_of(use: TextureReference, texels: PackedTexels) -> np.ndarray:
 
 
 def write_uses(words: np.ndarray, scene: Scene, slots: dict[str, int]) -> None:
-    """Factors and channels into the uses of `words`: what an edit of a material may change of them."""
+    """Write factors and channels, which an edit of a material may change, into the uses of `words`."""
     first = (max(slots.values()) + 1) * texture_records.TextureSlot.words
     records = words[:, first:].copy().view(texture_records.TextureUse.dtype)
     records[:] = 0
@@ -139,14 +139,14 @@ def _factor(reference: Reference) -> tuple[float, float, float]:
 
 
 def repacked(textures: TextureArrays, scene: Scene) -> np.ndarray:
-    """`textures.words` of a scene whose materials differ in numbers only."""
+    """`textures.words` for a scene whose materials differ from the packed one in numbers only."""
     words = textures.words.copy()
     write_uses(words, scene, textures.slots)
     return words
 
 
 def values_of(use: TextureReference, pixels: np.ndarray) -> np.ndarray:
-    """(..., 3) float32: what texels (..., channels), bytes or floats, give a colour, before its range."""
+    """(..., 3) float32: the colour that texels (..., channels), bytes or floats, give, before it is clamped."""
     if pixels.dtype == np.uint8:
         linear = pixels.astype(np.float32) / np.float32(255)
         if use.srgb:
@@ -159,7 +159,7 @@ def values_of(use: TextureReference, pixels: np.ndarray) -> np.ndarray:
 
 
 def _told(wanted: Mapping[str, str], images: Mapping[str, ImageData]) -> Iterator[str]:
-    """What is odd about the images of these textures."""
+    """Warnings about the images of these textures."""
     for asset, name in wanted.items():
         yield from (f"/textures/{escaped(name)}/asset: {warning}" for warning in images[asset].warnings)
 
