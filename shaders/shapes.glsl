@@ -66,7 +66,8 @@ void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
     }
 #endif
 #if HAS_BVH
-    traverse_tree(o, d, shear, skip, any, hit);
+    // The loops may have found something that hides the lamp.
+    if (!any || hit.id == NONE) traverse_scene(o, d, shear, skip, any, hit);
 #endif
 }
 
