@@ -86,10 +86,10 @@ void light_tree_draw(float u, inout LightTreeEnd end) {
     end.inverse = uintBitsToFloat(cluster.z);
 }
 
-// Goes down the tree to a light: to the one that `code` leads to, or with `told` towards the one that `trail` leads to.
-// `near` is false where the light is not in the tree. The codes of a node are an interval, which its children share
-// out. A walk ends at a cluster that is far.
-LightTreeEnd light_tree_walk(bool near, bool told, uint code, uint trail, LightContext context) {
+// Goes down the tree to a light: to the one that `code` leads to, or with `trailed` to the one that the turns in `trail`
+// lead to. `near` is false where the light is not in the tree. The codes of a node are an interval, which its children
+// share out. A walk ends at a cluster that is far.
+LightTreeEnd light_tree_walk(bool near, bool trailed, uint code, uint trail, LightContext context) {
     uvec4 head = light_tree_head(), grid = texelFetch(light_tree_words, ivec2(1, 0), 0);
     vec3 p = (context.p - uintBitsToFloat(grid.xyz)) * uintBitsToFloat(grid.w);
     int rest = int(code) - int(head.y), width = int(head.x - head.y);
@@ -107,7 +107,7 @@ LightTreeEnd light_tree_walk(bool near, bool told, uint code, uint trail, LightC
         }
         int cut = int(float(width) * (first / (first + second)));
         cut = max(min(max(cut, 1), width - 1), 0); // both stay possible
-        bool right = told ? ((trail >> depth) & 1u) != 0u : rest >= cut;
+        bool right = trailed ? ((trail >> depth) & 1u) != 0u : rest >= cut;
         if (more) {
             uint link = right ? b.w : a.w;
             rest -= right ? cut : 0;
@@ -120,7 +120,7 @@ LightTreeEnd light_tree_walk(bool near, bool told, uint code, uint trail, LightC
         depth++;
     } while (more && depth < 32u);
     LightTreeEnd end = LightTreeEnd(near ? pair : 0u, float(width) * (1.0 / float(LIGHT_CODES)), 0.0);
-    if (far) light_tree_draw(told ? 0.0 : float(rest) / float(width), end);
+    if (far) light_tree_draw(trailed ? 0.0 : float(rest) / float(width), end);
     return end;
 }
 
@@ -128,4 +128,28 @@ LightTreeEnd light_tree_walk(bool near, bool told, uint code, uint trail, LightC
 float light_tree_chance(LightTreeEnd end, Light l) {
     return end.chance * (end.inverse > 0.0 ? l.threshold * end.inverse : 1.0);
 }
+
+// Picks a light by all 32 bits, as one among many has a chance too small for the 24 bits of a float. Some codes lead
+// down the tree, the others to the alias table of the lights that are outside it.
+Light light_tree_pick(uint bits, LightContext context) {
+    uvec4 head = light_tree_head();
+    uint code = bits >> 2u, far = frame.light_count - head.w;
+    bool near = code < head.x, even = code < head.y;
+    float x = float(code - head.x) * (float(far) / float(max(LIGHT_CODES - head.x, 1u)));
+    uint i = head.w + min(uint(x), far - 1u), first = near ? (even ? code >> head.z : 0u) : i;
+    Light drawn = light_pick(first);
+    LightTreeEnd end = light_tree_walk(near, even, code, drawn.alias, context);
+    uint other = fract(x) >= drawn.threshold ? drawn.alias : i;
+    Light l = light_pick(near ? (even ? first : end.found) : other);
+    if (near) l.probability += light_tree_chance(end, l);
+    return l;
+}
 #endif
+
+// Adds the chance of picking the light l, which has that number, by a walk down the tree.
+void light_tree_add_chance(uint light, LightContext context, inout Light l) {
+#if HAS_LIGHT_TREE
+    bool near = light != NONE && light_tree_head().x > 0u;
+    l.probability += light_tree_chance(light_tree_walk(near, true, 0u, l.alias, context), l);
+#endif
+}

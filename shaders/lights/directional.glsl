@@ -20,3 +20,9 @@ LightSample directional_light_sample(Light l, vec2 u) {
 #endif
     return LightSample(wi, INFINITY_T, l.intensity, 1.0, false, NONE);
 }
+
+void directional_light_sample_case(Light l, vec2 u, inout LightSample s) {
+#if HAS_DIRECTIONAL_LIGHTS
+    if (l.kind == LIGHT_DIRECTIONAL) s = directional_light_sample(l, u);
+#endif
+}

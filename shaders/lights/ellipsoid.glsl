@@ -32,3 +32,20 @@ LightSample ellipsoid_light_sample(Solid s, vec3 p, vec2 u, uint sides, float tr
     vec3 wi = t > 0.0 ? to / t : at.ng;
     return LightSample(wi, t, vec3(share), ellipsoid_light_pdf(s, t, at, wi, sides), true, NONE);
 }
+
+void ellipsoid_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
+#if HAS_ELLIPSOID_LIGHTS
+    if (l.kind == LIGHT_ELLIPSOID) {
+        s = ellipsoid_light_sample(ellipsoid_pick(l.index), p, u, e.sides, e.transparency);
+        s.id = (SHAPE_ELLIPSOID << LEAF_KIND_SHIFT) | l.index;
+    }
+#endif
+}
+
+void ellipsoid_light_pdf_case(Hit hit, SurfacePoint at, vec3 wi, Emitter e, inout float pdf) {
+#if HAS_ELLIPSOID_LIGHTS
+    if (hit.id >> LEAF_KIND_SHIFT == SHAPE_ELLIPSOID) {
+        pdf = ellipsoid_light_pdf(ellipsoid_pick(hit.id & LEAF_FIRST_MASK), hit.t, at, wi, e.sides);
+    }
+#endif
+}

@@ -97,3 +97,9 @@ LightSample environment_light_sample(uvec2 bits) {
     vec4 l = environment_radiance(wi);
     return LightSample(wi, INFINITY_T, l.rgb, l.a, true, NONE);
 }
+
+void environment_light_sample_case(Light l, uvec2 bits, inout LightSample s) {
+#if HAS_ENVIRONMENT
+    if (l.kind == LIGHT_ENVIRONMENT) s = environment_light_sample(bits);
+#endif
+}

@@ -6,3 +6,9 @@ LightSample point_light_sample(Light l, vec3 p) {
     if (d == 0.0) return LightSample(vec3(0.0, 0.0, 1.0), 0.0, vec3(0.0), 0.0, false, NONE);
     return LightSample(to / d, d, l.intensity / d2, 1.0, false, NONE);
 }
+
+void point_light_sample_case(Light l, vec3 p, inout LightSample s) {
+#if HAS_POINT_LIGHTS
+    if (l.kind == LIGHT_POINT) s = point_light_sample(l, p);
+#endif
+}

@@ -48,3 +48,20 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float tran
     float pdf = sphere_light_density(cap, sides, transparency);
     return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(share), pdf, true, NONE);
 }
+
+void sphere_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
+#if HAS_SPHERE_LIGHTS
+    if (l.kind == LIGHT_SPHERE) {
+        s = sphere_light_sample(sphere_pick(l.index), p, u, e.sides, e.transparency);
+        s.id = (SHAPE_SPHERE << LEAF_KIND_SHIFT) | l.index;
+    }
+#endif
+}
+
+void sphere_light_pdf_case(Hit hit, vec3 p, Emitter e, inout float pdf) {
+#if HAS_SPHERE_LIGHTS
+    if (hit.id >> LEAF_KIND_SHIFT == SHAPE_SPHERE) {
+        pdf = sphere_light_pdf(sphere_pick(hit.id & LEAF_FIRST_MASK), p, e.sides, e.transparency);
+    }
+#endif
+}

@@ -8,3 +8,9 @@ LightSample spot_light_sample(Light l, vec3 p) {
     s.radiance *= t * t * (3.0 - 2.0 * t);
     return s;
 }
+
+void spot_light_sample_case(Light l, vec3 p, inout LightSample s) {
+#if HAS_SPOT_LIGHTS
+    if (l.kind == LIGHT_SPOT) s = spot_light_sample(l, p);
+#endif
+}

@@ -90,3 +90,20 @@ LightSample triangle_light_sample(Triangle tri, vec3 p, vec2 u, uint sides) {
     return LightSample(wi, t, vec3(1.0), w.s > 0.0 ? 1.0 / w.s : triangle_light_area_pdf(tri, t, at.ng, wi), true,
                        NONE);
 }
+
+void triangle_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
+#if HAS_TRIANGLE_LIGHTS
+    if (l.kind == LIGHT_TRIANGLE) {
+        s = triangle_light_sample(triangle_pick(l.index), p, u, e.sides);
+        s.id = (SHAPE_TRIANGLE << LEAF_KIND_SHIFT) | l.index;
+    }
+#endif
+}
+
+void triangle_light_pdf_case(Hit hit, vec3 p, SurfacePoint at, vec3 wi, Emitter e, inout float pdf) {
+#if HAS_TRIANGLE_LIGHTS
+    if (hit.id >> LEAF_KIND_SHIFT == SHAPE_TRIANGLE) {
+        pdf = triangle_light_pdf(triangle_pick(hit.id & LEAF_FIRST_MASK), p, hit.t, at.ng, wi, e.sides);
+    }
+#endif
+}
