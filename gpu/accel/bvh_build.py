@@ -47,13 +47,14 @@ def grow(
     mixed: bool, grid: np.ndarray, first: int, last: int, leaf_min: int, leaf_max: int, whole: int,
     tasks: np.ndarray, split: int,
 ) -> tuple[int, int]:  # fmt: skip
-    """Grows the subtree over boxes [first, last), its root into `slot`, the others from slot `free` on.
+    """Grow the subtree over boxes [first, last), its root into `slot`, the others from slot `free` on.
 
     Reorders `boxes` and `index`. By `split`, a `Split`, it always splits ranges of more than `leaf_max` boxes, of
     several `kinds` or of instances, and never other ranges of `leaf_min` boxes or fewer. A range of at most `whole`
     boxes, unless it is the root's, is left to another call: its slot, first and last go into `tasks`. Returns (first
     free slot, number of tasks).
     """
+    # This stays one function: with a function of its own for the choice of the cut, building takes 1.2 times as long.
     # The smaller child is always done first, so the stack holds at most log2(boxes) ranges.
     stack = np.empty((64, 3), np.int64)
     stack[0, 0], stack[0, 1], stack[0, 2] = slot, first, last
@@ -102,7 +103,7 @@ def grow(
             continue
         rows[at, LINK] = free
         rows[at, AXIS] = max(axis, 0)
-        left_first = cut - a > b - cut  # into the stack, so that the smaller one comes off it next
+        left_first = cut - a > b - cut  # goes into the stack first, so that the smaller one comes off it next
         for turn in range(2):
             if (turn == 0) == left_first:
                 stack[depth, 0], stack[depth, 1], stack[depth, 2] = free, a, cut
