@@ -8,6 +8,7 @@ import moderngl
 import numpy as np
 
 from gpu import Picture, Renderer, RenderSettings
+from gpu.settings import ESTIMATORS
 from service.assets import ImageData
 from service.pack import pack
 from service.scene import parse_scene
@@ -68,3 +69,17 @@ def render(gpu: Renderer, scene: dict[str, Any], samples: int = 64, aov: str = "
     made.release()
     made.scene.release()
     return values
+
+def assert_estimators_agree(gpu: Renderer, scene: dict[str, Any]) -> None:
+    """That all estimators converge to the same picture of `scene`: in blocks of 4 x 4 pixels by their z-scores, and
+    in the mean."""
+    images, errors = [], []
+    for estimator in ESTIMATORS:
+        made = picture(gpu, scene, 1024, estimator=estimator, max_bounces=3, sampler="independent")
+        images.append(made.read()[..., :3].reshape(8, 4, 8, 4, 3).mean((1, 3)))
+        errors.append(made.read("variance").reshape(8, 4, 8, 4, 3).mean((1, 3)) / 16)
+        made.release()
+    for image, error in zip(images[1:], errors[1:], strict=True):
+        z = (image - images[0]) / np.sqrt(error + errors[0] + 1e-12)
+        assert np.sqrt((z**2).mean()) < 1.35
+        assert np.abs((image - images[0]).mean()) < 0.01 * images[0].mean()

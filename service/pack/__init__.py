@@ -13,12 +13,14 @@ edits               parts that are reused after an edit, and the arrays that dif
 from service.pack.edits.cache import CacheBudget, PackCache
 from service.pack.edits.scene_delta import scene_delta
 from service.pack.geometry.scene_bvh import warm_builder
+from service.pack.lights.environment_blur import CUBE_FACES
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.scene import Packed, pack, pack_material
 from service.pack.textures.words import repacked
 
 __all__ = [
+    "CUBE_FACES",
     "CacheBudget",
     "PackCache",
     "Packed",

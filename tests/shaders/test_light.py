@@ -11,7 +11,7 @@ import pytest
 from gpu import ESTIMATORS, FILTERS, Renderer, RenderSettings
 from service.pack import pack
 from service.scene import parse_scene
-from tests.rendering import Images, document, picture, render
+from tests.rendering import Images, assert_estimators_agree, document, picture, render
 
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
 SPHERE = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}
@@ -173,16 +173,7 @@ def _showcase() -> dict[str, Any]:
 
 
 def test_all_estimators_converge_to_the_same_picture(gpu: Renderer) -> None:
-    images, errors = [], []
-    for estimator in ESTIMATORS:
-        made = picture(gpu, _showcase(), 1024, estimator=estimator, max_bounces=3, sampler="independent")
-        images.append(made.read()[..., :3].reshape(8, 4, 8, 4, 3).mean((1, 3)))
-        errors.append(made.read("variance").reshape(8, 4, 8, 4, 3).mean((1, 3)) / 16)
-        made.release()
-    for image, error in zip(images[1:], errors[1:], strict=True):
-        z = (image - images[0]) / np.sqrt(error + errors[0] + 1e-12)
-        assert np.sqrt((z**2).mean()) < 1.35
-        assert np.abs((image - images[0]).mean()) < 0.01 * images[0].mean()
+    assert_estimators_agree(gpu, _showcase())
 
 
 @pytest.mark.parametrize("filter_name", FILTERS)

@@ -14,7 +14,7 @@ from service.pack import pack
 from service.scene import parse_scene
 from tests import stats
 from tests.probing import prober_of
-from tests.rendering import Images, document, picture, render
+from tests.rendering import Images, assert_estimators_agree, document, render
 
 FLOOR = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
 ASKEW = {"position": [-1, -1, 1], "target": [0, 0, 0], "vfov": 0.02}  # looks at the origin, past what hangs above it
@@ -308,13 +308,4 @@ def _crowd() -> dict[str, Any]:
 
 
 def test_all_estimators_agree_on_all_lights(gpu: Renderer) -> None:
-    images, errors = [], []
-    for estimator in ESTIMATORS:
-        made = picture(gpu, _crowd(), 1024, estimator=estimator, max_bounces=3, sampler="independent")
-        images.append(made.read()[..., :3].reshape(8, 4, 8, 4, 3).mean((1, 3)))
-        errors.append(made.read("variance").reshape(8, 4, 8, 4, 3).mean((1, 3)) / 16)
-        made.release()
-    for image, error in zip(images[1:], errors[1:], strict=True):
-        z = (image - images[0]) / np.sqrt(error + errors[0] + 1e-12)
-        assert np.sqrt((z**2).mean()) < 1.35
-        assert np.abs((image - images[0]).mean()) < 0.01 * images[0].mean()
+    assert_estimators_agree(gpu, _crowd())

@@ -155,6 +155,20 @@ class Grid:
         phi = np.arctan2(wm[:, 1], wm[:, 0]) % (2 * np.pi)
         return np.histogram2d(x, phi, [self.SLOPES, np.linspace(0, 2 * np.pi, self.AZIMUTHS + 1)])[0]
 
+    def assert_samples_follow(self, on_grid: np.ndarray, f: np.ndarray, wi: np.ndarray, cases: int) -> None:
+        """That samples `wi` (n, 3) with the values `f` (n, 4), rgb and density, follow the density of `on_grid`, by a
+        chi-square test among `cases`, and carry the albedo that its values integrate to."""
+        n, alive = len(f), f[:, 3] > 0
+        observed, expected = self.counts(wi[alive]), self.sums(on_grid[:, 3]) * len(f)
+        # Samples below the horizon are lost; quadrature knows their share to about a percent at grazing angles.
+        assert observed.sum() == pytest.approx(expected.sum(), abs=0.012 * n)
+        p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()))
+        assert p > stats.sidak(1e-3, cases), f"chi-square p = {p:.2g}"
+        weights = np.where(alive[:, None], f[:, :3] / np.where(alive, f[:, 3], 1)[:, None], 0)
+        albedo = np.array([self.sums(on_grid[:, c]).sum() for c in range(3)])
+        error = weights.std(0) / math.sqrt(n)
+        assert (np.abs(weights.mean(0) - albedo) < 4.5 * error + 2e-3 * albedo + 1e-6).all()
+
 
 @pytest.mark.parametrize("row", ROWS)
 def test_value_is_the_formula(prober: Prober, row: str) -> None:
@@ -182,22 +196,11 @@ def test_reciprocal(prober: Prober, row: str) -> None:
 @pytest.mark.parametrize(("row", "angle"), CASES)
 def test_samples_follow_their_pdf_and_carry_the_albedo(prober: Prober, row: str, angle: float) -> None:
     rng = np.random.default_rng(3)
-    n = 60_000
     wo = _wo(angle)
     grid = Grid(wo)
     on_grid = _eval(prober, row, wo, np.where(grid.solid_angle[:, None] > 0, grid.wi, [0, 0, 1]))
-    f, wi = _sample(prober, row, wo, rng.random((n, 3)))
-    alive = f[:, 3] > 0
-    observed = grid.counts(wi[alive])
-    expected = grid.sums(on_grid[:, 3]) * n
-    # Samples below the horizon are lost; quadrature knows their share to about a percent at grazing angles.
-    assert observed.sum() == pytest.approx(expected.sum(), abs=0.012 * n)
-    p = stats.chi_square(observed, expected * (observed.sum() / expected.sum()))
-    assert p > stats.sidak(1e-3, len(CASES)), f"chi-square p = {p:.2g}"
-    weights = np.where(alive[:, None], f[:, :3] / np.where(alive, f[:, 3], 1)[:, None], 0)
-    albedo = np.array([grid.sums(on_grid[:, c]).sum() for c in range(3)])
-    error = weights.std(0) / math.sqrt(n)
-    assert (np.abs(weights.mean(0) - albedo) < 4.5 * error + 2e-3 * albedo + 1e-6).all()
+    f, wi = _sample(prober, row, wo, rng.random((60_000, 3)))
+    grid.assert_samples_follow(on_grid, f, wi, len(CASES))
 
 
 def test_a_wrong_pdf_is_seen(prober: Prober) -> None:

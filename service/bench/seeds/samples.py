@@ -11,22 +11,13 @@ from service import presets
 from service.assets import ImageData, MeshData
 from service.bench.scenes import BenchAssets
 from service.bench.seeds.stage import Document, Stage, rmse, sheet, shown
-from service.pack import pack
+from service.pack import CUBE_FACES, pack
 from service.scene import parse_scene
 
 SIZE, ERROR_SIZE = 800, 128
 COUNTS = tuple(4**k for k in range(7))  # 1, 4, ... 4 096
 WAYS: dict[str, dict[str, str]] = {"uniform": {"estimator": "uniform", "sampler": "independent"}, "Sunbox": {}}
 FACE = 128  # texels of a side
-# Directions at the middle of a face, to its right and down.
-AXES = {
-    "px": ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
-    "nx": ((-1, 0, 0), (0, 0, 1), (0, -1, 0)),
-    "py": ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
-    "ny": ((0, -1, 0), (1, 0, 0), (0, 0, -1)),
-    "pz": ((0, 0, 1), (1, 0, 0), (0, -1, 0)),
-    "nz": ((0, 0, -1), (-1, 0, 0), (0, -1, 0)),
-}
 MATERIALS: dict[str, Document] = {
     "diffuse": {"type": "diffuse", "albedo": 0.8},
     "metal": {"type": "disney", "base_color": [1, 0.8, 0.4], "metallic": 1, "roughness": 0.3},
@@ -43,7 +34,7 @@ class CubeAssets:
         raise KeyError(ref)  # the scene has none
 
     def image(self, ref: str) -> ImageData:
-        ahead, right, down = AXES[ref]
+        ahead, right, down = CUBE_FACES[ref]
         s = (2 * np.arange(FACE) + 1) / FACE - 1
         d = np.array(ahead) + np.multiply.outer(s, down)[:, None] + np.multiply.outer(s, right)
         d /= np.linalg.norm(d, axis=2, keepdims=True)
@@ -64,7 +55,7 @@ def sphere(material: Document, **light: Any) -> Document:
     }
 
 
-CUBE = {"environment": {"type": "cubemap", "assets": {name: name for name in AXES}, "rotation": 150}}
+CUBE = {"environment": {"type": "cubemap", "assets": {name: name for name in CUBE_FACES}, "rotation": 150}}
 POINT = {"lights": [{"type": "point", "position": [2.5, 3, 3], "intensity": 60}]}
 
 

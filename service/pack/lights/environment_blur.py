@@ -14,7 +14,7 @@ LEAST_WIDTH = 64  # texels; the rows of a coarser picture would blur more than a
 PER_BLUR = 4  # texels to one standard deviation: bilinear filtering between them errs by less than 1 % of a peak
 REACH = 6  # standard deviations: there the kernel is 2e-8 of its peak, which hides the light of any sun
 # Face -> directions at its middle, along s to the right and along t down, where s and t go from -1 to 1.
-FACES = {
+CUBE_FACES = {
     "px": ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
     "nx": ((-1, 0, 0), (0, 0, 1), (0, -1, 0)),
     "py": ((0, 1, 0), (1, 0, 0), (0, 0, 1)),
@@ -39,7 +39,7 @@ def blur_image(texels: np.ndarray, degrees: float) -> np.ndarray:
 
 
 def blur_cube(faces: list[np.ndarray], degrees: float) -> np.ndarray:
-    """Six faces (n, n, 3) in the order of FACES, blurred: a latitude-longitude map (H, 2 H, 3) float32."""
+    """Six faces (n, n, 3) in the order of CUBE_FACES, blurred: a latitude-longitude map (H, 2 H, 3) float32."""
     n = faces[0].shape[0]
     width = min(4 * max(n, 2), _width(degrees))
     height = width // 2
@@ -49,7 +49,7 @@ def blur_cube(faces: list[np.ndarray], degrees: float) -> np.ndarray:
     each = -(-width // (2 * side))
     sums = np.zeros((height * width, 4))
     solid = cube_solid_angles(n)
-    for (ahead, right, down), face in zip(FACES.values(), faces, strict=True):
+    for (ahead, right, down), face in zip(CUBE_FACES.values(), faces, strict=True):
         rows = (_weighted(face[i : i + 1], solid[i : i + 1]) for i in range(n))
         parts = np.repeat(np.repeat(_reduced(rows, n, (side, side)), each, axis=0), each, axis=1) / each**2
         s = (2 * np.arange(side * each) + 1) / (side * each) - 1
