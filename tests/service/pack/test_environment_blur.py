@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from gpu.tables.alias_table import solid_angles
-from service.pack.lights.environment_blur import FACES, MOST_WIDTH, blur_cube, blur_image
+from service.pack.lights.environment_blur import CUBE_FACES, MOST_WIDTH, blur_cube, blur_image
 from tests.documents import Shelf, packed, picture, refused, sphere
 
 SKY = picture(np.random.default_rng(4).random((16, 32, 3)) ** 4)
 FACE = picture(np.random.default_rng(5).random((8, 8, 3)))
 IMAGE = {"type": "image", "asset": "sha256:sky"}
-CUBE = {"type": "cubemap", "assets": dict.fromkeys(FACES, "sha256:face")}
+CUBE = {"type": "cubemap", "assets": dict.fromkeys(CUBE_FACES, "sha256:face")}
 
 
 def directions(height: int, width: int) -> np.ndarray:
@@ -78,7 +78,7 @@ def test_a_cube_is_blurred_like_the_picture_of_the_same_light():
 
     t = (2 * np.arange(64) + 1) / 64 - 1
     faces = []
-    for ahead, right, down in FACES.values():
+    for ahead, right, down in CUBE_FACES.values():
         d = np.array(ahead) + np.multiply.outer(t, down)[:, None] + np.multiply.outer(t, right)
         faces.append(radiance(d / np.linalg.norm(d, axis=2, keepdims=True)).astype(np.float32))
     of_cube = blur_cube(faces, 6)
@@ -96,7 +96,7 @@ def test_the_faces_of_a_cube_lie_where_the_contract_says():
         "pz": lambda s, t: (2 * s - 1, 1 - 2 * t, 1),
         "nz": lambda s, t: (1 - 2 * s, 1 - 2 * t, -1),
     }
-    for name, (ahead, right, down) in FACES.items():
+    for name, (ahead, right, down) in CUBE_FACES.items():
         for s, t in ((0.5, 0.5), (0.2, 0.9)):
             ours = np.array(ahead) + (2 * s - 1) * np.array(right) + (2 * t - 1) * np.array(down)
             assert ours == pytest.approx(said[name](s, t))
