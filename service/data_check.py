@@ -103,7 +103,7 @@ def _check_database(folder: Path, report: Report) -> None:
     """Raises sqlite3.Error."""
     if not (folder / FILE).exists():
         return
-    with closing(_reading(folder / FILE)) as database:
+    with closing(reading(folder / FILE)) as database:
         (version,) = database.execute("PRAGMA user_version").fetchone()
         if version > VERSION:
             report.faults.append(f"{FILE}: a newer version of Sunbox wrote it")
@@ -118,9 +118,9 @@ def _check_database(folder: Path, report: Report) -> None:
             report.documents += 1
             used = {asset for _, _, asset in _uses(database, kind, name)}
             report.faults += [f"{kind}/{name}: {fault}" for fault in _document_faults(kind, body, used)]
-            missing |= {(kind, name, asset) for asset in used if not _is_here(folder, asset)}
+            missing |= {(kind, name, asset) for asset in used if not is_here(folder, asset)}
     if missing:
-        with closing(_reading(folder / FILE)) as database:  # again: documents and assets may have been deleted since
+        with closing(reading(folder / FILE)) as database:  # again: documents and assets may have been deleted since
             missing = {one for one in missing if one in _uses(database, *one[:2])}
     for kind, name, asset in sorted(missing):
         report.faults.append(f"{kind}/{name}: there is no asset {asset}")
@@ -140,14 +140,14 @@ def _document_faults(kind: str, body: str, used: set[str]) -> Iterator[str]:
         yield "the assets that it refers to are not those that are kept for it; save it again"
 
 
-def _is_here(folder: Path, asset: str) -> bool:
+def is_here(folder: Path, asset: str) -> bool:
     files = AssetFolder(folder / "assets")
     if files.file(asset).exists() and files.file(asset, RECORD).exists():
         return True
     return asset in presets.builtin_assets()
 
 
-def _reading(path: Path) -> sqlite3.Connection:
+def reading(path: Path) -> sqlite3.Connection:
     """A connection that writes nothing. Without a log beside the file nobody has it open, and no lock is needed."""
     alone = "" if path.with_name(path.name + "-wal").exists() else "&immutable=1"
     return sqlite3.connect(f"file:{quote(str(path.absolute()))}?mode=ro{alone}", uri=True, timeout=10)

@@ -9,15 +9,17 @@ from pathlib import Path
 from service.commands import BadInput
 from service.commands.configuration import configuration
 from service.data_check import check
+from service.rendering.jobs.store.check import check_renders
 
 
 def run(arguments: argparse.Namespace) -> int:
     folder = Path(arguments.folder) if arguments.folder else configuration().data_dir
     try:
         report = check(folder)
+        renders = check_renders(folder, report)
     except OSError as error:
         raise BadInput(f"{folder}: {error.strerror or error}") from None
-    print(f"{folder}: {report.documents} documents, {report.assets} assets")
+    print(f"{folder}: {report.documents} documents, {report.assets} assets, {renders} renders")
     if report.server is not None:
         print(f"in use by a server: {report.server}")
     for note in report.notes:

@@ -3,5 +3,6 @@
 record    what is stored of one render, but for its document and its pictures
 rows      renders, their documents and idempotency keys, in an SQLite file
 pictures  checkpoints and finished pictures: a file each, written whole or not at all
+check     whether the stored renders of a data folder are sound
 store     all of that for the event loop: whatever touches the disk runs in threads
 """

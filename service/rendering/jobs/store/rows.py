@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import sqlite3
 import time
 from collections.abc import Collection
 from dataclasses import asdict
@@ -66,8 +67,7 @@ class RenderRows:
         if not self._database.exists():
             return []
         with self._database.open() as database:
-            rows = database.execute(f"SELECT {_COLUMNS} FROM renders ORDER BY number").fetchall()
-        return [_stored(row) for row in rows]
+            return stored_renders(database)
 
     def keyed(self, owner: str, key: str) -> tuple[str, StoredRender] | None:
         """The digest and the render of a key that was taken within KEY_S, also where the render is gone."""
@@ -98,6 +98,12 @@ class RenderRows:
                 "(SELECT number FROM renders WHERE gone ORDER BY number DESC LIMIT ?)",
                 (REMEMBERED,),
             )
+
+
+def stored_renders(database: sqlite3.Connection) -> list[StoredRender]:
+    """Every render, those that are gone included, in the order of arrival. Raises sqlite3.Error."""
+    rows = database.execute(f"SELECT {_COLUMNS} FROM renders ORDER BY number").fetchall()
+    return [_stored(row) for row in rows]
 
 
 def _stored(row: tuple[Any, ...]) -> StoredRender:

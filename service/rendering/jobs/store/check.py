@@ -1,0 +1,83 @@
+"""Whether the stored renders of a data folder are sound. Nothing is written, and a server may use the folder."""
+
+from __future__ import annotations
+
+import sqlite3
+import zlib
+from collections.abc import Iterator
+from contextlib import closing
+from pathlib import Path
+
+from service.data_check import Report, is_here, reading
+from service.database import FILE
+from service.problems import ServiceError
+from service.rendering.jobs.store.pictures import KINDS, PART, DamagedPicture, PictureFiles
+from service.rendering.jobs.store.record import StoredRender
+from service.rendering.jobs.store.rows import stored_renders
+from service.scene import load_json
+from service.storage import RENDERS
+
+
+def check_renders(folder: Path, report: Report) -> int:
+    """How many renders there are; what is wrong with them is added to the report. Raises OSError."""
+    if not (folder / FILE).exists():
+        return 0
+    count, known = 0, set[str]()
+    files = PictureFiles(folder / RENDERS)
+    try:
+        with closing(reading(folder / FILE)) as database:
+            if database.execute("SELECT count(*) FROM sqlite_master WHERE name = 'renders'").fetchone() == (0,):
+                return 0  # an earlier version, which is migrated at a start
+            for render in stored_renders(database):
+                if render.gone:
+                    continue
+                count += 1
+                known |= {files.path(render.order.id, kind).name for kind in KINDS}
+                for fault in _faults(folder, database, files, render):
+                    if _is_kept(folder, render):  # it may have made room meanwhile
+                        report.faults.append(f"renders/{render.order.id}: {fault}")
+    except sqlite3.Error as error:
+        report.faults.append(f"{FILE}: the renders cannot be read: {error}")
+        return count
+    if report.server is None and (folder / RENDERS).exists():
+        for path in sorted((folder / RENDERS).iterdir()):
+            if path.name not in known:
+                left = "half-written by a crash" if path.name.endswith(PART) else "without its render"
+                report.notes.append(f"{RENDERS}/{path.name}: left {left}; it is deleted at a start")
+    return count
+
+
+def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, render: StoredRender) -> Iterator[str]:
+    row = database.execute("SELECT body FROM render_documents WHERE number = ?", (render.number,)).fetchone()
+    if row is None:
+        yield "its document is not there"
+    else:
+        try:
+            load_json(zlib.decompress(row[0]))
+        except (zlib.error, ServiceError) as error:
+            yield f"its document is damaged: {error}"
+    uses = database.execute("SELECT asset FROM render_uses WHERE number = ? ORDER BY asset", (render.number,))
+    for (asset,) in uses.fetchall():
+        if not is_here(folder, asset):
+            yield f"there is no asset {asset}"
+    found = False
+    for kind in KINDS:
+        try:
+            files.read(render.order.id, kind, 0)
+            found = True
+        except FileNotFoundError:
+            continue
+        except DamagedPicture as error:
+            yield f"its {kind} is damaged: {error}"
+            found = True
+        except OSError as error:
+            yield f"its {kind} cannot be read: {error.strerror or error}"
+            found = True
+    if not found and render.outcome.state == "done" and render.outcome.progress.samples:
+        yield "its picture is not there"
+
+
+def _is_kept(folder: Path, render: StoredRender) -> bool:
+    with closing(reading(folder / FILE)) as database:
+        row = database.execute("SELECT gone FROM renders WHERE number = ?", (render.number,)).fetchone()
+    return bool(row == (0,))
