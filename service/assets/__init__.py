@@ -1,11 +1,11 @@
 """Meshes and images that scenes refer to: uploaded ones by the hash of their bytes, files beside a scene by path.
 
-types         what assets are: meshes, images, scene files, limits, and the protocol that packing asks
+types         meshes, images, scene files, limits, and the protocol by which packing loads assets
 errors        ParseError, which readers raise
-formats       the formats, and how a file's is recognised
+formats       the formats, and how a file's format is recognised
 source        the bytes of an upload, in memory or in a file
 store         uploaded assets
-describe      what is said of an asset
+describe      the description of an asset: size, bounds, warnings
 folder        the files of the store, each written whole or not at all
 folder_totals  what they take on the disk, kept with each change
 integrity     whether the bytes on the disk still match their hash
@@ -16,7 +16,7 @@ sandbox       the child process that parses
 readers       readers of single formats
 gltf          the reader of glTF
 obj           the importer of OBJ files with materials and textures
-scenes        what importers of whole scenes share
+scenes        parts that the importers of whole scenes share
 """
 
 from service.assets.local_files import FileAssets

@@ -1,4 +1,4 @@
-"""Parsed assets, kept while there is room; a file that many ask for at once is parsed once."""
+"""A cache of parsed assets. A file that several threads load at once is parsed once."""
 
 import threading
 from collections import OrderedDict
@@ -16,7 +16,7 @@ Parsed = MeshData | ImageData
 
 
 class ParsedCache:
-    """For any number of threads."""
+    """Parsed assets by key, as many as fit. It may be used by any number of threads."""
 
     def __init__(self, limits: AssetLimits) -> None:
         self.sandbox = Sandbox(limits)
@@ -25,7 +25,7 @@ class ParsedCache:
         self._pending: dict[str, Future[Parsed]] = {}
 
     def load(self, key: str, parse: Callable[[], Parsed]) -> Parsed:
-        """What `parse` gave for this key, now or before. Raises what it raises; failures are not kept."""
+        """The result of `parse` for this key, now or before. Raises what it raises; failures are not cached."""
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)

@@ -1,4 +1,4 @@
-"""What the service says of an asset that was parsed: its size, bounds and warnings."""
+"""The description of a parsed asset: its size, bounds and warnings."""
 
 import numpy as np
 

@@ -1,8 +1,8 @@
-"""ParseError: what the parsing child says of a file. Imports nothing, so that the child stays small."""
+"""ParseError, the refusal of a file. This module imports nothing, so that the parsing child stays small."""
 
 
 class ParseError(Exception):
-    """A file that is refused; the message says what is wrong and where, to the person who made it.
+    """A file was refused; the message tells its author what is wrong and where.
 
     `pointer` (RFC 6901) is the place in the file's own JSON, where it has one; of an OBJ's files FILE or FILE:LINE.
     """

@@ -1,4 +1,4 @@
-"""Which format some bytes are in: by the bytes themselves, else by what the sender called them."""
+"""The format of some bytes: by the bytes themselves, else by the content type and the name that were sent."""
 
 import re
 from codecs import BOM_UTF8, BOM_UTF16_BE, BOM_UTF16_LE
@@ -54,7 +54,7 @@ CONTENT_TYPES = {
 
 SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe": "hdr"}
 
-# OBJ has no magic number: its first statement tells, after blank lines and comments.
+# OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
 OBJ_START = re.compile(rb"(?:\s++|#[^\n]*+\n)*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
 STL_TEXT = re.compile(rb"\s*+solid\b[^\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
@@ -62,7 +62,8 @@ GLTF_TEXT = re.compile(rb"\s*\{")
 
 
 def text(data: bytes) -> bytes:
-    """A text in UTF-8 without a byte order mark; whatever else it is, as it is. Windows writes marks, and UTF-16."""
+    """A text in UTF-8 without a byte order mark (Windows writes marks, and UTF-16); other bytes are left as they
+    are."""
     if data.startswith(BOM_UTF8):
         return data.removeprefix(BOM_UTF8)
     if data.startswith((BOM_UTF16_LE, BOM_UTF16_BE)):
@@ -71,7 +72,7 @@ def text(data: bytes) -> bytes:
 
 
 def sniff(data: bytes | mmap, content_type: str | None = None, filename: str | None = None) -> str | None:
-    """A key of KINDS, or None where nothing tells."""
+    """A key of KINDS, or None where the format is unknown."""
     head = data[:65536]
     for magic, name in MAGIC:
         if head.startswith(magic):

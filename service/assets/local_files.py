@@ -97,7 +97,7 @@ class FileAssets:
             raise refused(repr(ref), error) from None
 
     def _find(self, ref: str) -> Path:
-        """The file itself, no link on the way to it. It may be gone when it is opened."""
+        """The path of the file without links. The file may be gone when it is opened."""
         if not ref or "\0" in ref:
             raise AssetError(f"{ref[:100]!r} is not a file name")
         if os.path.isabs(ref):

@@ -1,18 +1,18 @@
 """glTF 2.0, GLB or JSON, read in the parsing child: its triangles as one mesh, or the whole as a scene.
 
-Our own, and not trimesh's: that one gives an accessor the memory it asks for, reads sparse accessors as zeros and
-normalised positions as integers, and skips fans.
+This reader is our own. trimesh's allocates whatever an accessor claims, reads sparse accessors as zeros and
+normalised positions as integers, and skips triangle fans.
 
 importer              a file -> a scene's document with its meshes and images as parts
 merged_mesh           a file -> one mesh
 document              the file: its JSON, buffers, views and limits
-json_view             a place in the JSON, and its values by type; errors name it
-extensions            which extensions are supported, and what is said of the others
+json_view             a place in the JSON, with its values by type and errors that name it
+extensions            which extensions are supported, and the warnings about the others
 accessors             accessors -> arrays
-draco                 meshes that KHR_draco_mesh_compression holds
+draco                 meshes that are compressed with KHR_draco_mesh_compression
 nodes                 nodes and their transforms
-placements            which mesh stands where, for the camera and the metering
-primitives            primitives -> triangles with normals, colours and charts
+placements            the transforms of all meshes, for the camera and the metering
+primitives            primitives -> triangles with normals, colours and texture coordinates
 deform                morph targets and skins, in the pose that the file shows
 materials             materials -> the document's
 material_reader       the numbers and textures of one material

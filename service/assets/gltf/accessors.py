@@ -43,7 +43,7 @@ def read(file: GltfDocument, source: JsonView, name: str, *types: str) -> Array:
 
 
 def indices(file: GltfDocument, source: JsonView, name: str = "indices") -> Array:
-    """(count,) whole numbers."""
+    """(count,) whole numbers: the accessor as indices."""
     place = file.follow(source, name, "accessors")
     if place.value.get("componentType") not in WHOLE:
         raise place.error("componentType", f"must be one of {', '.join(map(str, WHOLE))} for indices")
@@ -51,7 +51,7 @@ def indices(file: GltfDocument, source: JsonView, name: str = "indices") -> Arra
 
 
 def normalised(values: Array) -> Array:
-    """Integers as fractions of their greatest; the least of a signed type counts as -1 as well."""
+    """Integers as fractions of the type's greatest; the least value of a signed type counts as -1 as well."""
     if values.dtype.kind not in "iu":
         return values
     fractions: Array = np.maximum(values / np.float32(np.iinfo(values.dtype).max), np.float32(-1), dtype=np.float32)

@@ -1,4 +1,4 @@
-"""The directions of KHR_materials_anisotropy's texture, as angles: what `anisotropic_rotation` reads."""
+"""The directions of KHR_materials_anisotropy's texture as angles, which `anisotropic_rotation` reads."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.texture_bake import pixels, png
 from service.assets.gltf.textures import Textures
 
-BINS = 36  # of 5 degrees: where the fewest texels point is where the angles begin anew
-EVEN = 1.0  # degrees; an image whose directions differ by less is one direction
+BINS = 36  # bins of 5 degrees: angles begin at the one into which the fewest texels point
+EVEN = 1.0  # degrees; an image whose directions differ by less counts as one direction
 
 
 def rotation(textures: Textures, info: JsonView | None, name: str | None, turn: float) -> Any:
-    """Degrees, or the texture that gives them. `info` is the file's texture, `name` the document's, `turn` radians
-    that are added.
+    """The rotation in degrees, or the texture that gives it. `info` is the file's texture, `name` the document's name
+    for it; `turn` (radians) is added.
     """
     if info is None or name is None:
         return math.degrees(turn)
@@ -35,12 +35,12 @@ def rotation(textures: Textures, info: JsonView | None, name: str | None, turn: 
 
 
 def _made(texels: np.ndarray, turn: float) -> list[Any]:
-    """Of (h, w, 4) bytes: an angle, or a PNG and the factor that makes its bytes angles, all in degrees.
+    """From (h, w, 4) bytes an angle, or a PNG and the factor that makes its bytes angles, all in degrees.
 
-    A stretch has no sense, so angles are 0..180 degrees above the one at which the fewest texels lie: there a filter
-    that blends the last with the first goes astray. A step of 8 bits is at most 1.4 degrees.
+    Anisotropy has an axis but no sense, so angles are 0..180 degrees above the one at which the fewest texels lie:
+    there a filter that blends the last angle with the first goes astray. A step of 8 bits is at most 1.4 degrees.
     """
-    used = texels[..., 2] > 0  # where the strength is 0 a direction says nothing
+    used = texels[..., 2] > 0  # where the strength is 0 the direction has no meaning
     pair = texels[..., 0].astype(np.uint16) * 256 + texels[..., 1]
     counts = np.bincount(pair[used], minlength=1 << 16)
     x, y = np.divmod(np.arange(1 << 16), 256)

@@ -1,4 +1,4 @@
-"""Morph targets with the weights that the file gives, and skins as their joints stand: no animation is played."""
+"""Morph targets with the file's weights, and skins in the pose of their joints. No animation is played."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from service.assets.types import Doubles
 
 
 def weights(node: JsonView, mesh: JsonView) -> tuple[float, ...]:
-    """Of the mesh's morph targets: the node's or else the mesh's; () where none has an effect."""
+    """The weights of the mesh's morph targets: the node's, or else the mesh's; () where none has an effect."""
     owner = node if "weights" in node else mesh
     found = tuple(number(one, f"{owner.at('weights')}/{k}") for k, one in enumerate(owner.array("weights")))
     return found if any(found) else ()
@@ -48,7 +48,7 @@ def morphed(file: GltfDocument, primitive: Primitive, place: JsonView, weights: 
 
 
 class Skin:
-    """The joints' matrices: world from the mesh as it was bound."""
+    """The joints' matrices, from the mesh's bind pose to world space."""
 
     def __init__(self, file: GltfDocument, place: JsonView, nodes: Nodes) -> None:
         self.place = place
@@ -64,7 +64,7 @@ class Skin:
             self.matrices = self.matrices @ bound[: len(joints)].reshape(-1, 4, 4).transpose(0, 2, 1)
 
     def posed(self, primitive: Primitive, place: JsonView) -> Primitive:
-        """The primitive in the world. Raises ParseError where it names joints that there are not."""
+        """The primitive in world space. Raises ParseError where it names joints that do not exist."""
         if not primitive.joints:
             raise place.error("attributes", f"have no JOINTS_0 and WEIGHTS_0, which {self.place.pointer} needs")
         total = sum(w.sum(axis=1, dtype=np.float64) for w in primitive.weights)

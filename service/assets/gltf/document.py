@@ -1,4 +1,4 @@
-"""A glTF file as JSON and bytes, every length checked against the bytes that are there."""
+"""A glTF file as JSON and bytes. Every length is checked against the bytes that are there."""
 
 from __future__ import annotations
 
@@ -19,14 +19,14 @@ from service.assets.gltf.json_view import JsonView, escaped, shown, whole
 from service.assets.types import AssetLimits
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
-MOST_ITEMS = 1 << 20  # of one kind; the time to look at them all is bounded, and a stranger's file may list anything
+MOST_ITEMS = 1 << 20  # items of one kind, which bounds the time to read an untrusted file
 
 Array = npt.NDArray[Any]
 Bytes = npt.NDArray[np.uint8]
 
 
 class GltfDocument:
-    """`root` is the JSON. Raises ParseError wherever the file refers to what it does not hold."""
+    """A glTF file; `root` is its JSON. Methods raise ParseError where the file refers to something that it lacks."""
 
     def __init__(self, data: bytes | memoryview, limits: AssetLimits) -> None:
         self.limits = limits
@@ -104,7 +104,8 @@ def embedded(place: JsonView) -> Bytes:
             "uri", f"refers to another file, {shown(uri)}, which is not part of this one; save the model as a GLB"
         )
     try:
-        # Strictly, or else what is no base64 would be skipped and the bytes behind it shifted. Blanks are harmless.
+        # The check is strict: else characters outside base64 would be skipped and the bytes behind them shifted.
+        # Blanks are harmless.
         encoded = b"".join(unquote_to_bytes(body).split())
         return np.frombuffer(base64.b64decode(encoded, validate=True), np.uint8)
     except (ValueError, binascii.Error) as error:
@@ -130,7 +131,7 @@ def load(text: bytes) -> Any:
 
 
 class _Constant(Exception):
-    """NaN or Infinity, which Python's reader takes and JSON lacks."""
+    """NaN or Infinity, which Python's reader accepts although JSON has neither."""
 
 
 def _refuse_constant(name: str) -> None:

@@ -11,7 +11,7 @@ from service.assets.readers.polygons import Longs
 
 
 def decode(file: GltfDocument, extension: JsonView, attributes: JsonView) -> tuple[dict[str, Array], Longs]:
-    """Rows by the name of the attribute, and triangles (m, 3). The library raises ValueError on nonsense."""
+    """Rows by the name of the attribute, and triangles (m, 3). The library raises ValueError for invalid data."""
     import DracoPy
 
     data, _ = file.view(extension)

@@ -1,4 +1,4 @@
-"""glTF's extensions: which ones are read, which change nothing in a picture, and what is said of all others."""
+"""glTF's extensions: which ones are read, which do not change a picture, and the warnings about all others."""
 
 from __future__ import annotations
 
@@ -24,20 +24,20 @@ UNSEEN = {
     "EXT_instance_features", "EXT_mesh_features", "EXT_mesh_manifold", "EXT_structural_metadata", "FB_ngon_encoding",
     "GODOT_single_root", "MSFT_audio_emitter", "MSFT_lod",
 }  # fmt: skip
-# The program that takes a compression out of a file, as its user types it.
+# The commands that remove a compression from a file.
 DECOMPRESS = {
     "EXT_meshopt_compression": "`gltf-transform copy IN.glb OUT.glb`",
     "KHR_meshopt_compression": "`gltfpack -i IN.glb -o OUT.glb`",
     "KHR_texture_basisu": "`gltf-transform ktxdecompress IN.glb OUT.glb`",
 }
-PLAIN = {int, float, str}  # an array that begins with one holds no objects: most of a file are numbers
-DEEPEST = 32  # levels of the file that are looked through; a sound file has about ten
+PLAIN = {int, float, str}  # an array that begins with one of these has no objects: most of a file are numbers
+DEEPEST = 32  # levels of the file that are searched; a normal file has about ten
 
 Path = tuple[Any, ...]  # (name, path of the parent); () is the root: written out only where it is needed
 
 
 def check_required(root: JsonView) -> None:
-    """Raises ParseError where a file can't be shown without an extension that is not read."""
+    """Raise ParseError where a file requires an extension that is not read."""
     for k, name in enumerate(root.array("extensionsRequired")):
         if name not in READ | UNSEEN:
             detail = f"the file requires {shown(name)}, which is not supported"
@@ -45,13 +45,13 @@ def check_required(root: JsonView) -> None:
 
 
 def remedy(names: Any) -> str:
-    """The end of a sentence: how to get rid of one of these extensions. "" where nothing is known to help."""
+    """The end of a sentence that says how to remove one of these extensions from a file; "" where no way is known."""
     known = [DECOMPRESS[name] for name in names if isinstance(name, str) and name in DECOMPRESS]
     return f"; {known[0]} writes the model without it" if known else ""
 
 
 def note_unsupported(root: JsonView, notes: Warnings) -> None:
-    """Notes each extension that would change the picture, and each required one that would not."""
+    """Warn about each extension that would change the picture, and about each required one that would not."""
     for k, name in enumerate(root.array("extensionsRequired")):
         if name in UNSEEN:
             notes.add(f"/extensionsRequired/{k}", f"{name} is ignored: it changes nothing in a still picture")
@@ -61,7 +61,7 @@ def note_unsupported(root: JsonView, notes: Warnings) -> None:
 
 
 def _used(root: dict[str, Any]) -> Iterator[tuple[Path, str]]:
-    """Every extension that an object of the file has, with the path of the object that holds it."""
+    """Every extension that an object of the file has, with the path of that object."""
     stack: list[tuple[Any, Path, int]] = [(root, (), 0)]
     while stack:
         value, path, depth = stack.pop()

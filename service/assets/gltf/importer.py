@@ -26,7 +26,7 @@ from service.assets.types import AssetLimits, SceneFile
 
 
 def read_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
-    """Raises ParseError."""
+    """The scene of a glTF file. Raises ParseError."""
     return _Importer(GltfDocument(data, limits)).run()
 
 
@@ -70,7 +70,9 @@ class _Importer:
         return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect, bounds)
 
     def _metered(self, document: dict[str, Any], aspect: float | None, notes: Warnings) -> float | None:
-        """The exposure that suits the file's lights, where 0 does not; noted, as is that nothing else lights it."""
+        """The exposure that suits the file's lights, where 0 does not. It is noted, and so is that nothing else
+            lights the
+        scene."""
         place = "/extensions/KHR_lights_punctual"
         stops = metering.exposure(document, self.placements.placed(), aspect)
         if stops is not None:
@@ -93,7 +95,7 @@ class _Importer:
                 self.placements.add(part, node, worlds)
 
     def _part(self, place: JsonView, morph: tuple[float, ...], skin: Skin | None, node: Node) -> Part | None:
-        """Of one primitive in one pose; a skinned one belongs to its node."""
+        """The part of one primitive in one pose; a skinned one belongs to its node alone."""
         key = place.pointer, morph, node.index if skin else None
         if key not in self._parts:
             if place.pointer not in self._read:
@@ -107,7 +109,7 @@ class _Importer:
         return self._parts[key]
 
     def _asked(self, primitive: Primitive, place: JsonView) -> Primitive:
-        """The primitive without tangents, and without its colours' alpha, where its material has no use for them."""
+        """The primitive without tangents and without its colours' alpha, where its material does not use them."""
         material = self.file.follow(place, "material", "materials") if "material" in place else JsonView({}, "")
         coat = material.extension("KHR_materials_clearcoat")
         bent = "normalTexture" in material or (coat is not None and "clearcoatNormalTexture" in coat)
@@ -145,12 +147,12 @@ class _Importer:
             )
         sides = {"double_sided": material.flag("doubleSided")}
         shape = {"type": "mesh", "asset": reference, "material": name} | sides
-        if primitive.normals is None:  # then triangles are flat, says the specification
+        if primitive.normals is None:  # the specification demands flat triangles then
             shape["smooth"] = False
         return Part(shape, vertices, primitive.faces)
 
     def _unread(self) -> None:
-        """Notes whatever else the file holds that would change the picture."""
+        """Warn about everything else in the file that would change the picture."""
         root = self.file.root
         variants = root.extension("KHR_materials_variants")
         if variants is not None:

@@ -1,4 +1,4 @@
-"""A JSON object of a file and where it stands, so that every mistake is named by its pointer."""
+"""A JSON object of a file with its place, so that errors name their pointer."""
 
 from __future__ import annotations
 
@@ -8,13 +8,13 @@ from typing import Any
 
 from service.assets.errors import ParseError
 
-LARGEST_WHOLE = 1 << 53  # JSON's numbers are exact up to here
-NUMBERS = {int, float}  # true is none
+LARGEST_WHOLE = 1 << 53  # JSON's whole numbers are exact up to this one
+NUMBERS = {int, float}  # the types of numbers; bool is not among them
 LARGEST, BRIGHTEST = 1e9, 1e20  # the contract's ranges of lengths and of radiometric values
 
 
 class JsonView:
-    """Everything read through it has the type that was asked for. Raises ParseError."""
+    """A JSON object whose values are read by type. Methods raise ParseError where a value has another type."""
 
     def __init__(self, value: Any, pointer: str) -> None:
         if not isinstance(value, dict):
@@ -65,7 +65,7 @@ class JsonView:
         return value
 
     def numbers(self, name: str, default: tuple[float, ...], most: float = LARGEST) -> tuple[float, ...]:
-        """As many as the default has, none beyond `most` on either side."""
+        """As many numbers as the default has, each from -`most` to `most`."""
         found = self.value.get(name, default)
         if not isinstance(found, list | tuple) or len(found) != len(default):
             raise self.error(name, f"must be {len(default)} numbers, not {shown(found)}")
@@ -76,14 +76,14 @@ class JsonView:
         raise self.error(name, f"must be at most {most:g}: {shown(found)}")
 
     def color(self, name: str, default: tuple[float, ...]) -> tuple[float, ...]:
-        """Numbers none of which is negative."""
+        """Numbers that are not negative."""
         found = self.numbers(name, default)
         if min(found) < 0:
             raise self.error(name, f"must not be negative: {shown(list(found))}")
         return found
 
     def radiance(self, name: str, default: tuple[float, ...], scale: float) -> list[float]:
-        """A colour, scaled, within the contract's range."""
+        """A colour times `scale`, within the range of radiance."""
         found = [scale * value for value in self.color(name, default)]
         if max(found) > BRIGHTEST:
             raise self.error(name, f"times its strength or intensity must be at most {BRIGHTEST:g}: {max(found):g}")
@@ -103,7 +103,7 @@ class JsonView:
 
 
 def escaped(name: str | int) -> str:
-    """For a pointer [RFC 6901]."""
+    """A name as a part of a pointer [RFC 6901]."""
     return str(name).replace("~", "~0").replace("/", "~1")
 
 
@@ -124,7 +124,7 @@ def number(value: Any, pointer: str) -> float:
 
 
 def shown(value: Any) -> str:
-    """A value for a message: short, whatever it is."""
+    """A short text for any value, for messages."""
     if isinstance(value, dict):
         return "an object"
     if isinstance(value, list) and len(value) > 16:

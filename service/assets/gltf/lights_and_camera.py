@@ -1,4 +1,4 @@
-"""Lights and the camera of a file."""
+"""The lights and the camera of a file."""
 
 from __future__ import annotations
 
@@ -17,7 +17,8 @@ INSTEAD = "a perspective camera that shows the whole scene is used instead"
 
 
 def lights(file: GltfDocument, nodes: list[Node], notes: Warnings) -> list[dict[str, Any]]:
-    """KHR_lights_punctual: a candela is taken as a watt per steradian, a lux as a watt per square metre."""
+    """The lights of KHR_lights_punctual: a candela counts as a watt per steradian, a lux as a watt per square
+    metre."""
     found = []
     for node in nodes:
         used = node.place.extension("KHR_lights_punctual")
@@ -61,8 +62,8 @@ def _light(place: JsonView, node: Node, notes: Warnings) -> dict[str, Any]:
 def camera(
     file: GltfDocument, nodes: list[Node], bounds: Bounds, notes: Warnings
 ) -> tuple[dict[str, Any], float | None]:
-    """The first camera of the scene, or a framed one where none has a perspective; and, where the camera says it, the
-    width of its picture over the height."""
+    """The scene's first camera, or one that shows everything where none is a perspective camera; and the width of its
+    picture over the height, or None."""
     chosen: dict[str, Any] | None = None
     aspect: float | None = None
     for node in nodes:
@@ -94,7 +95,7 @@ def _perspective(place: JsonView, node: Node, bounds: Bounds) -> dict[str, Any]:
 
 
 def _axis(node: Node, axis: int, sign: int) -> list[float]:
-    """A direction of the node in the world, of length one; the world's own where its scale leaves none."""
+    """A direction of the node in world space, of length one; the world's own axis where its scale is zero."""
     direction = sign * node.world[:3, axis]
     length = float(np.linalg.norm(direction))
     unit = direction / length if length > 0 else sign * np.eye(3)[axis]

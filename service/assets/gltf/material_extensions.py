@@ -1,4 +1,4 @@
-"""The KHR_materials_* extensions that add to metal and roughness, as parameters of `principled`."""
+"""The KHR_materials_* extensions of the metallic-roughness model, as parameters of `principled`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from service.assets.gltf.material_reader import MaterialReader
 
 DEFAULT_IOR, LARGEST_IOR = 1.5, 4.0
-COAT_F0 = 0.04  # of principled's coat, whose index is 1.5
+COAT_F0 = 0.04  # reflectance head-on of principled's coat, whose index is 1.5
 
 
 def add(read: MaterialReader, document: dict[str, Any]) -> None:
@@ -60,7 +60,7 @@ def _ior(read: MaterialReader) -> float:
 
 
 def _specular(read: MaterialReader, document: dict[str, Any], ior: float, clear: bool) -> None:
-    """The reflectance head-on, F0 = ((ior - 1) / (ior + 1))^2 weight colour, becomes an index and a tint."""
+    """Turn the reflectance head-on, F0 = ((ior - 1) / (ior + 1))^2 weight colour, into an index and a tint."""
     extension = read.place.extension("KHR_materials_specular")
     if extension is None:
         return

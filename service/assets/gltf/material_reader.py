@@ -1,4 +1,4 @@
-"""The numbers and textures of one material of a file, each read once for the meshes that wear it."""
+"""The numbers and textures of one material of a file, each read once for the meshes that use it."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from service.assets.scenes.warnings import Warnings
 
 
 class MaterialReader:
-    """One material for meshes that have these uv sets, and perhaps a direction for what is brushed."""
+    """One material for meshes that have these uv sets, and perhaps tangents."""
 
     def __init__(
         self, place: JsonView, textures: Textures, charts: tuple[Chart | None, ...], directed: bool, notes: Warnings

@@ -17,7 +17,7 @@ WHITE = (1.0, 1.0, 1.0)
 
 
 class Materials:
-    """`documents` by name, as far as they were asked for."""
+    """The materials that meshes use; `documents` are the finished ones by name."""
 
     def __init__(self, file: GltfDocument, textures: Textures, notes: Warnings) -> None:
         self.file, self.textures, self.notes = file, textures, notes
@@ -72,7 +72,7 @@ class Materials:
         return document
 
     def _unlit(self, read: MaterialReader) -> dict[str, Any]:
-        """As it is: its colour is radiance, and nothing is reflected."""
+        """An unlit material: its colour is radiance, and it reflects nothing."""
         rough = read.place.object("pbrMetallicRoughness") or JsonView({}, read.place.at("pbrMetallicRoughness"))
         base = rough.color("baseColorFactor", (1.0,) * 4)
         document = {"type": "diffuse", "albedo": 0.0, "emission": read.color(rough, "baseColorTexture", base[:3])}

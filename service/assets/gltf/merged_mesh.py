@@ -1,4 +1,4 @@
-"""All meshes of a file's scene as one: what `{type: "mesh", asset}` shows of a glTF file."""
+"""All meshes of a file's scene as one, which `{type: "mesh", asset}` shows of a glTF file."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from service.assets.types import AssetLimits
 
 
 def read_merged(data: bytes | memoryview, limits: AssetLimits) -> RawMesh:
-    """Raises ParseError."""
+    """The merged mesh of a glTF file. Raises ParseError."""
     file, notes = GltfDocument(data, limits), Warnings()
     nodes, read, parts, triangles = Nodes(file, notes), dict[str, Primitive | None](), list[Primitive](), 0
     for node in nodes.shown:
@@ -60,7 +60,8 @@ def _joined(parts: list[Primitive], warnings: list[str]) -> RawMesh:
 
 
 def _rows(columns: list[Array | None], parts: list[Primitive], width: int, missing: float = 0.0) -> Array | None:
-    """None where no part has them; a part without gets `missing`: normals and tangents of zero are computed."""
+    """The parts' rows as one array; None where no part has any. A part without gets `missing`: normals and tangents
+    of zero are computed later."""
     if all(column is None for column in columns):
         return None
     return np.concatenate([

@@ -4,8 +4,8 @@ Blender writes a lamp of 1 000 W as 54 351 cd, and a sun in lux: true values, wh
 meters: it brings the logarithmic mean of the luminance in the picture to the reflectance of middle grey, 18 %
 [Reinhard et al. 2002, "Photographic tone reproduction for digital images", eq. 1]. Here a grid of rays goes through
 the file's camera. What they hit is lit by the file's lights, with shadows, by light that is reflected once (a ray for
-each) and by what follows from that (a geometric series). Every material counts as diffuse, and rays go through glass.
-The result is rounded to half a stop, which is as exact as that can be.
+each) and by further reflections (a geometric series). Every material counts as diffuse, and rays go through glass.
+The result is rounded to half a stop, which is about as exact as the method.
 """
 
 from __future__ import annotations
@@ -21,10 +21,10 @@ from service.assets.types import Doubles
 GRID = 12  # rays along each side of the picture
 MIDDLE_GREY = 0.18
 FAR = 4.0  # stops from middle grey up to which a picture stays as its author lit it: means from 0.011 to 2.9
-FEWEST = 6  # rays that must meet something lit: fewer say nothing about the picture
-SHADOWED = 4  # lights, the brightest ones at a place, whose shadows are looked for
-TEXTURE = 0.3  # the mean of an image of which nothing is known
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # of linear Rec.709
+FEWEST = 6  # rays that must hit something lit: fewer say nothing about the picture
+SHADOWED = 4  # lights, the brightest ones at a place, for which shadow rays are traced
+TEXTURE = 0.3  # the assumed mean of an image
+LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # weights of linear Rec.709
 BLACKEST, WHITEST = 0.04, 0.9  # reflectances: black plastic shines, and nothing reflects everything
 
 
@@ -51,7 +51,7 @@ def exposure(document: dict[str, Any], placed: list[Placed], aspect: float | Non
 
 
 class _Metered:
-    """What was found at the points that the picture shows."""
+    """The light at the points that the picture shows."""
 
     def __init__(self, document: dict[str, Any]) -> None:
         self._materials, self._lights = document["materials"], document["lights"]
@@ -78,7 +78,7 @@ class _Metered:
         self._reflected.append(reflected)
 
     def luminances(self) -> Doubles:
-        """Of the points. Reflected light is their mean: a ray each is too few to tell them apart."""
+        """The luminances of the points. For reflected light all get the mean, as one ray each is very noisy."""
         if not self._albedo:
             return np.empty(0)
         albedo, direct, emitted = (np.array(rows) for rows in (self._albedo, self._direct, self._emitted))
@@ -88,7 +88,8 @@ class _Metered:
         return found
 
     def _irradiance(self, scene: Scene, point: Doubles, normal: Doubles) -> float:
-        """By the lights, as luminance; lights beyond the brightest SHADOWED ones are in shadow as much as these."""
+        """The irradiance by the lights, as luminance. Lights beyond the brightest SHADOWED ones get the mean shadow
+        of those."""
         arriving = sorted((_arriving(light, point, normal) for light in self._lights), key=lambda one: -one[0])
         tested, rest = arriving[:SHADOWED], sum(amount for amount, _ in arriving[SHADOWED:])
         whole = sum(amount for amount, _ in tested)
@@ -118,7 +119,7 @@ def _arriving(light: dict[str, Any], point: Doubles, normal: Doubles) -> tuple[f
 
 
 def _directions(camera: dict[str, Any], aspect: float) -> Doubles:
-    """(GRID^2, 3): through the middles of a grid of cells that fill the picture."""
+    """(GRID^2, 3): the directions through the middles of a grid of cells that fill the picture."""
     forward = np.subtract(camera["target"], camera["position"])
     forward = forward / np.linalg.norm(forward)
     right = np.cross(forward, camera.get("up", (0.0, 1.0, 0.0)))

@@ -1,4 +1,4 @@
-"""The nodes of the scene that is shown, and where each stands in the world."""
+"""The nodes of the scene that is shown, and their transforms to world space."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from service.assets.gltf.json_view import JsonView, shown
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles
 
-MOST_INSTANCES = 100_000  # shapes in a document; beyond, the document itself is the burden
+MOST_INSTANCES = 100_000  # shapes in a document; with more the document itself would be too large
 IDENTITY = tuple(np.eye(4).reshape(-1).tolist())
 
 
@@ -33,7 +33,8 @@ class Nodes:
 
     @cached_property
     def shown(self) -> list[Node]:
-        """Those of the default scene, or of the first; all, where the file has no scenes. Parents first."""
+        """The nodes of the default scene, or of the first; all nodes where the file has no scenes. Parents come
+        first."""
         places, indices, parents = self._walk()
         locals_, worlds = local_matrices(places), np.empty((len(places), 4, 4))
         for place in places:
@@ -75,7 +76,7 @@ class Nodes:
         return {node.index: node.world for node in self.shown}
 
     def world(self, index: int, pointer: str) -> Doubles:
-        """Also of a node outside the scene: a skeleton may stand there."""
+        """The world matrix of a node, which may be outside the scene, as a skeleton's may be."""
         if index in self.worlds:
             return self.worlds[index]
         matrix: Doubles = np.eye(4)
@@ -107,7 +108,8 @@ class Nodes:
 
 
 def local_matrices(places: list[JsonView]) -> Doubles:
-    """(n, 4, 4): each node's matrix, given by columns, or T R S. In one go: numpy takes 100 us for a node alone."""
+    """(n, 4, 4): each node's matrix, given by columns, or T R S, all at once, as numpy takes 100 us for a single
+    node."""
     translations = np.array([place.numbers("translation", (0.0, 0.0, 0.0)) for place in places]).reshape(-1, 3)
     rotations = np.array([place.numbers("rotation", (0.0, 0.0, 0.0, 1.0)) for place in places]).reshape(-1, 4)
     scales = np.array([place.numbers("scale", (1.0, 1.0, 1.0)) for place in places]).reshape(-1, 3)
@@ -122,7 +124,7 @@ def local_matrices(places: list[JsonView]) -> Doubles:
 
 
 def trs(translation: Doubles, rotation: Doubles, scale: Doubles) -> Doubles:
-    """(n, 4, 4) of (n, 3), quaternions x y z w (n, 4) and (n, 3). A quaternion of any length but zero turns."""
+    """(n, 4, 4) from translations (n, 3), quaternions x y z w (n, 4) of any length but zero, and scales (n, 3)."""
     x, y, z, w = rotation.T
     square = x * x + y * y + z * z + w * w
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,4 +1,4 @@
-"""Where the parts of a file stand: computed in one go, because numpy takes 100 us for a single matrix."""
+"""The transforms of a file's parts, computed all at once because numpy takes 100 us for a single matrix."""
 
 from __future__ import annotations
 
@@ -18,8 +18,8 @@ from service.assets.scenes.framing import Bounds
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles, Indices
 
-MOST_SHAPES = 100_000  # beyond, the document itself is the burden
-LEAST_VOLUME = 1e-7  # of the axes at length one: what service.scene.transform takes for invertible
+MOST_SHAPES = 100_000  # with more, the document itself would be too large
+LEAST_VOLUME = 1e-7  # least volume of the axes at length one that service.scene.transform takes for invertible
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,8 @@ class Placements:
         self._matrices: list[Doubles] = []
 
     def add(self, part: Part, node: Node, worlds: Doubles) -> None:
-        """`part` stands under each of `worlds` (k, 4, 4), which are `node`'s. Raises ParseError at too many."""
+        """Add `part` under each of `worlds` (k, 4, 4), which are `node`'s. Raises ParseError where there are too
+        many."""
         if len(self._parts) + len(worlds) > MOST_SHAPES:
             raise ParseError(f"the scene has more than the {MOST_SHAPES} primitives allowed, counted in each node")
         self._parts += [part] * len(worlds)
@@ -56,7 +57,7 @@ class Placements:
         self._matrices.extend(worlds)
 
     def shapes(self, notes: Warnings) -> list[dict[str, Any]]:
-        """A shape for each; one whose matrix has no inverse is left out, and noted."""
+        """A shape for each placement; one whose matrix has no inverse is left out, with a warning."""
         stands, moves = self._stands.tolist(), (self._worlds != np.eye(4)).any(axis=(1, 2)).tolist()
         matrices = self._worlds.reshape(-1, 16).tolist()
         found = []
@@ -77,7 +78,7 @@ class Placements:
         return [part for part, stands in zip(self._parts, self._stands.tolist(), strict=True) if stands]
 
     def placed(self) -> list[Placed]:
-        """The shapes as rays meet them."""
+        """The shapes for rays to hit."""
         worlds = self._worlds[self._stands]
         return [
             Placed(part.vertices, part.faces, world, part.shape["double_sided"], part.shape["material"])

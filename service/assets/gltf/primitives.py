@@ -1,4 +1,4 @@
-"""A primitive's triangles, whatever its mode, with what its vertices carry."""
+"""A primitive's triangles, whatever its mode, with the attributes of its vertices."""
 
 from __future__ import annotations
 
@@ -35,13 +35,14 @@ class Primitive:
     kept: Longs | None = None  # which of the file's vertices these are; None: all
 
     def detail(self) -> Iterator[tuple[str, Array]]:
-        """What its vertices have besides a position, by the name of the attribute."""
+        """The attributes of its vertices besides the position, by name."""
         sets = {f"TEXCOORD_{k}": rows for k, rows in enumerate(self.uvs)}
         named = {"NORMAL": self.normals, "TANGENT": self.tangents, "COLOR_0": self.colors, **sets}
         yield from ((name, rows) for name, rows in named.items() if rows is not None)
 
     def moved(self, world: Doubles) -> Primitive:
-        """Under a 4x4 matrix. Outward stays outward: a mirroring one turns the triangles round."""
+        """The primitive under a 4x4 matrix. Under a mirroring one the order of vertices is reversed, so that outward
+        stays outward."""
         linear = world[:3, :3]
         mirrored = np.linalg.det(linear) < 0
         normals = self.normals
@@ -57,7 +58,7 @@ class Primitive:
         )
 
     def compact(self) -> Primitive:
-        """Without the vertices that no triangle names: files share one buffer among many primitives."""
+        """The primitive without unused vertices, as files share one buffer among many primitives."""
         used = np.zeros(len(self.vertices), bool)
         used[self.faces.reshape(-1)] = True
         if used.all():
@@ -82,7 +83,7 @@ class Primitive:
 
 
 def cofactors(linear: Doubles) -> Doubles:
-    """(..., 3, 3): takes normals along, up to a factor whose sign is the determinant's."""
+    """(..., 3, 3): the map of normals, up to a factor whose sign is the determinant's."""
     columns = [np.cross(linear[..., k - 2], linear[..., k - 1]) for k in range(3)]
     return np.stack(columns, axis=-1)
 
@@ -95,7 +96,7 @@ def turned(tangents: Array, linear: Doubles, mirrored: bool | np.bool_) -> Array
 
 
 def read_primitive(file: GltfDocument, place: JsonView, notes: Warnings) -> Primitive | None:
-    """None, and noted, where it has no area: points and lines."""
+    """The primitive; None, with a warning, where it has no area: points and lines."""
     mode, attributes = place.whole("mode", TRIANGLES), place.need("attributes")
     if mode >= len(MODES):
         raise place.error("mode", f"must be from 0 to {len(MODES) - 1}, not {mode}")
@@ -140,12 +141,12 @@ TYPES = {"POSITION": ("VEC3",), "NORMAL": ("VEC3",), "TANGENT": ("VEC4",), "TEXC
 
 
 def _rows(file: GltfDocument, attributes: JsonView, packed: dict[str, Array], notes: Warnings) -> dict[str, Array]:
-    """What is used of the attributes, `packed` ones taken from there."""
+    """The attributes that are used; those in `packed` are taken from there."""
     found = {}
     for name in attributes.value:
         kind, _, number = name.partition("_")
         if kind not in TYPES or (number and not (number.isascii() and number.isdigit())):
-            continue  # a program's own
+            continue  # an attribute for a program's own use
         if number and int(number[:4]) >= {"TEXCOORD": UV_SETS, "COLOR": 1}.get(kind, MOST_SETS):
             notes.add(
                 attributes.at(name),
@@ -162,7 +163,7 @@ def _rows(file: GltfDocument, attributes: JsonView, packed: dict[str, Array], no
 
 
 def _texcoord(rows: Array | None) -> Floats | None:
-    """As they are: KHR_mesh_quantization lets them be integers that are no fractions."""
+    """Texture coordinates as they are: with KHR_mesh_quantization they may be integers that are no fractions."""
     return None if rows is None else rows.astype(np.float32, copy=False)
 
 
@@ -171,7 +172,7 @@ def _floating(rows: Array) -> Array:
 
 
 def _unit(rows: Array) -> Floats:
-    """float32; an integer type is normalised: the specification allows no other meaning."""
+    """Directions as float32; integers are normalised, as the specification demands."""
     return accessors.normalised(rows).astype(np.float32, copy=False)
 
 

@@ -1,7 +1,7 @@
 """Rays against a file's triangles, for metering: a few hundred rays, so numpy does, and no tree is built.
 
 A ray tries the boxes of the parts first, then those of runs of triangles (files store neighbours together), then the
-triangles. What is too much to hold is thinned out, and the rest enlarged to the same area [Cook et al. 2007,
+triangles. Too many triangles are thinned out, and the rest is enlarged to the same area [Cook et al. 2007,
 "Stochastic simplification of aggregate detail"].
 """
 
@@ -50,8 +50,8 @@ class Triangles:
         self.high = np.maximum.reduceat(corners.max(axis=1), starts)
 
     def nearest(self, origin: Doubles, direction: Doubles, least: float, most: float, side: int) -> tuple[float, int]:
-        """How far the first hit is between `least` and `most`, and its triangle; `most`, -1 without one. `side`: of
-        triangles seen from the front 1, from behind -1, both 0."""
+        """The distance of the first hit between `least` and `most`, and its triangle; `most` and -1 where there is
+        none. `side` 1 takes triangles seen from the front only, -1 from behind only, 0 both."""
         enters = entry(self.low, self.high, origin, direction, most)
         runs = np.flatnonzero(enters < most)
         rows = (runs[:, None] * RUN + np.arange(RUN)).reshape(-1)
@@ -74,7 +74,7 @@ class Triangles:
 
 
 class Scene:
-    """What rays meet. Parts that many places share are prepared once."""
+    """The triangles that rays can hit. Parts that stand in many places are prepared once."""
 
     def __init__(self, placed: list[Placed]) -> None:
         boxes = np.array([_world_box(one) for one in placed])
@@ -87,7 +87,7 @@ class Scene:
         self._triangles: dict[int, Triangles] = {}
 
     def nearest(self, origin: Doubles, direction: Doubles, most: float = np.inf) -> Hit | None:
-        """The first thing that a ray meets before `most` lengths of its direction."""
+        """The first hit of a ray before `most` lengths of its direction; None where there is none."""
         enters = entry(self._low, self._high, origin, direction, most)
         found = None
         for k in np.argsort(enters, kind="stable"):
@@ -117,12 +117,12 @@ class Scene:
 
 
 def entry(low: Doubles, high: Doubles, origin: Doubles, direction: Doubles, most: float) -> Doubles:
-    """(n,): how far along the ray the boxes (n, 3) begin; infinite where it misses them or they begin beyond."""
-    direction = np.where(direction == 0, 1e-30, direction)  # or a ray along a face would ask for 0 / 0
+    """(n,): the distances at which the ray enters the boxes (n, 3); infinite where it misses them before `most`."""
+    direction = np.where(direction == 0, 1e-30, direction)  # else a ray along a face would give 0 / 0
     a, b = (low - origin) / direction, (high - origin) / direction
     near = np.maximum(np.minimum(a, b).max(axis=1), 0)
     far = np.minimum(np.maximum(a, b).min(axis=1), most)
-    return np.where(near <= far * (1 + 1e-9), near, np.inf)  # rounding must not lose a box that is flat
+    return np.where(near <= far * (1 + 1e-9), near, np.inf)  # a flat box must not be lost by rounding
 
 
 def _world_box(one: Placed) -> Doubles:

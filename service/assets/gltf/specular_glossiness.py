@@ -44,7 +44,7 @@ def metallic_roughness(diffuse: Floats, specular: Floats) -> tuple[Floats, Float
     """(base colour (n, 3), metallic (n,)) of linear colours (n, 3)."""
     one_minus = 1 - specular.max(axis=1)
     d, s = _brightness(diffuse), _brightness(specular)
-    # F0 m^2 + b m + c = 0 asks that both models send back as much [the extension's appendix].
+    # F0 m^2 + b m + c = 0 says that both models reflect the same amount of light [the extension's appendix].
     b = d * one_minus / (1 - F0) + s - 2 * F0
     c = F0 - s
     root = np.sqrt(np.maximum(b * b - 4 * F0 * c, 0))
@@ -63,7 +63,7 @@ def _brightness(color: Floats) -> Floats:
 
 
 def _textured(read: MaterialReader, place: JsonView, factors: tuple[Any, Any, float]) -> dict[str, Any]:
-    """Two images of our own in the place of the file's: colour with alpha, and metallic (blue) with roughness."""
+    """Two images that take the place of the file's: colour with alpha, and metallic (blue) with roughness."""
     textures = read.textures
     names = ("diffuseTexture", "specularGlossinessTexture")
     infos = [info for info in (place.object(name) for name in names) if info]

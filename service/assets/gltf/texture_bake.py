@@ -1,4 +1,4 @@
-"""Images of our own in the place of a file's: its texels in, a PNG out."""
+"""Computed images that take the place of a file's own: texels in, a PNG out."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from service.assets.gltf.textures import Textures
 
 
 def pixels(textures: Textures, info: JsonView | None) -> Any:
-    """RGBA of a texture's image; None without one."""
+    """The RGBA pixels of a texture's image; None where it has no image."""
     from PIL import Image
 
     from service.assets.readers.image import check_size

@@ -24,13 +24,13 @@ ColorSpace = Literal["srgb", "linear"]
 WRAPS = {10497: "repeat", 33071: "clamp", 33648: "mirror"}
 NEAREST = (9728, 9984, 9986)
 READ = ("png", "jpeg", "webp")
-SLACK = 1e-3  # of an image: a rounding beyond its edge is none
+SLACK = 1e-3  # of an image's side; coordinates that are beyond its edge by less are roundings
 Chart = tuple[np.ndarray, np.ndarray]  # the least and the greatest coordinates of a mesh (2,), v pointing down
 
 
 @dataclass
 class Textures:
-    """`keep` takes an image's bytes and place, and gives the reference that the document holds."""
+    """The textures of a file. `keep` takes an image's bytes and place, and returns its reference in the document."""
 
     file: GltfDocument
     notes: Warnings
@@ -42,7 +42,7 @@ class Textures:
     _channels: dict[str, str] = field(default_factory=dict)  # of images by their place: as Pillow calls them
 
     def use(self, info: JsonView | None, space: ColorSpace, charts: tuple[Chart | None, ...]) -> str | None:
-        """The name of a texture; None, and noted, where it can't be used. `charts`: the uv sets of the mesh."""
+        """The name of a texture; None, with a warning, where it cannot be used. `charts` are the mesh's uv sets."""
         if info is None:
             return None
         texture = self.file.follow(info, "index", "textures")
@@ -66,7 +66,7 @@ class Textures:
         return self.add(image, {"color_space": space, "wrap": wrap, **placing}, texture)
 
     def kinds(self, charts: tuple[Chart | None, ...]) -> tuple[Any, ...]:
-        """Equal where `use` does the same for all textures of the file."""
+        """A key that is equal where `use` gives the same for all textures of the file."""
         if not self._mixed:
             return tuple(chart is not None for chart in charts)
         return tuple(chart if chart is None else tuple(np.concatenate(chart).tolist()) for chart in charts)
@@ -86,7 +86,7 @@ class Textures:
         return self._names[key]
 
     def source(self, texture: JsonView) -> JsonView | None:
-        """The texture's image. None, and noted, where it is in a format that is not read."""
+        """The texture's image; None, with a warning, where its format is not read."""
         webp = texture.extension("EXT_texture_webp")
         for owner in (webp, texture):
             if owner is not None and "source" in owner:
@@ -122,7 +122,7 @@ class Textures:
         return self._channels[place.pointer]
 
     def _wrap(self, texture: JsonView, reach: tuple[bool, bool]) -> str:
-        """The way that both axes take: where these differ that of the one along which the mesh leaves the image."""
+        """The wrap mode of both axes; where they differ, that of the axis along which the mesh leaves the image."""
         if "sampler" not in texture:
             return "repeat"
         sampler = self.file.follow(texture, "sampler", "samplers")
@@ -189,7 +189,7 @@ def _reach(chart: Chart, placing: dict[str, Any]) -> tuple[bool, bool]:
 
 
 def _channels(data: bytes, place: JsonView) -> str:
-    """From the image's header."""
+    """The channels of an image, from its header."""
     from PIL import Image
 
     Image.MAX_IMAGE_PIXELS = None  # opening decodes nothing
@@ -203,5 +203,5 @@ def _channels(data: bytes, place: JsonView) -> str:
 
 
 def factor(values: tuple[float, ...]) -> Any:
-    """As a document has it: one number where all are the same."""
+    """The values as a document writes them: one number where all are the same."""
     return values[0] if len(set(values)) == 1 else [number(one, "") for one in values]
