@@ -1,4 +1,4 @@
-// Light that a path finds by chance: emission and ambient light of surfaces, and what arrives from infinity.
+// Light that a path finds by chance: emission and ambient light of surfaces, and light from infinity.
 
 #if HAS_SUN_DISKS
 // Radiance along d from the disks of directional lights, each weighted against sampling it directly. `pdf` is the
@@ -60,7 +60,7 @@ vec3 arriving_emission(SurfacePoint at, vec3 d) {
     return vec3(0.0);
 }
 
-// Ambient radiance, which phong and blinn_phong add without a cause: both sides send it, and it is never sampled as a light.
+// Ambient radiance, a constant that phong and blinn_phong add: both sides send it, and it is never sampled as a light.
 vec3 arriving_ambient(SurfacePoint at) {
 #if HAS_AMBIENT && HAS_TEXTURES
     return texture_ambient(at);

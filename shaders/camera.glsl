@@ -1,4 +1,4 @@
-// Where rays begin but for the lens: what the bodies around the camera are found from.
+// The middle of the lens, where the search for the bodies around the camera begins.
 vec3 camera_origin() { return frame.camera.position; }
 
 // A direction given along the camera's right, up and forward, in world space.

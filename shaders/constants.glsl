@@ -1,7 +1,7 @@
 const float PI = 3.14159265358979;
 const float TWO_PI = 6.28318530717959;
 const float INV_PI = 0.318309886183791;
-// The distance of what lies at infinity, in metres. It is farther than any hit, as coordinates end at 1e9, and stays
+// The distance in metres that stands for infinity. It is farther than any hit, as coordinates end at 1e9, and stays
 // finite when a constant multiplies it: with 3e38 a compiler that turns exp(-rate * t) into exp2(rate * (-1.44 t)) made
 // infinity of it, and NaN where the rate is 0.
 const float INFINITY_T = 1.0e30;

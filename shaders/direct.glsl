@@ -31,7 +31,7 @@ bool direct_counts(LightSample light, uint id) {
     counts = counts && !light.extended;
 #endif
 #if HAS_SPHERE_LIGHTS && !HAS_EMISSION_BOTH
-    counts = counts && light.id != id; // rounding may put a point on a ball's inside outside of it
+    counts = counts && light.id != id; // rounding may put a point on the inside of a ball outside of it
 #endif
     return counts;
 }

@@ -1,5 +1,5 @@
-// Entry: albedo, normal, depth and incidence of the first hit, over the same camera rays as the picture's first samples, and the
-// shape and the material that the first of these rays met.
+// Entry: albedo, normal, depth and incidence of the first hit, over the camera rays of the picture's first samples, and
+// the shape and the material that the first of these rays hits.
 #include "layout.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit

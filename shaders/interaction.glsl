@@ -18,7 +18,7 @@ void interaction_media(Material m, inout Interaction here, inout Path path) {
     vec3 rate = surface_attenuation(m);
     bool clear = here.transmits;
     if (clear && here.behind && path.medium.depth < 0.5) {
-        // This is the back of an open sheet: the path is taken to have been inside a body all along.
+        // This is the back of an open sheet: the path counts as inside a body since it began.
         path.medium = medium_entered(path.medium, rate);
         if (path.bounce == 0u) path.throughput = medium_share(path.medium, path.hit.t);
     }
@@ -66,7 +66,7 @@ Interaction interaction_make(inout Path path, out Material m) {
 #endif
     here.basis = frame_basis(facing_normal(path.at, wo_w));
     here.wo = frame_to_local(here.basis, wo_w);
-    here.facing = here.mapped ? here.front : here.basis.z; // a lobe that folds reaches all that is in front
+    here.facing = here.mapped ? here.front : here.basis.z; // a folded lobe reaches all directions in front
     here.transmits = material_transmits(m);
     interaction_tangent(path.at, m, here);
     interaction_media(m, here, path);

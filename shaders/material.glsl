@@ -1,4 +1,4 @@
-// What the numbers of a material say of it before it is a surface. features.py asks the same of all of a scene's.
+// Predicates over a material's numbers, before it is a surface. gpu/kernels/features.py has the same over arrays.
 
 // Whether light passes through its surfaces.
 bool material_transmits(Material m) {

@@ -19,7 +19,7 @@ vec3 medium_share(Medium m, float t) {
 }
 
 #if HAS_ATTENUATION
-const float MEDIUM_WALL = 1e20; // 1/m: a rate above lets nothing through and would round away the others in a sum
+const float MEDIUM_WALL = 1e20; // 1/m; a rate above absorbs all light and would round away the others in a sum
 const uint MEDIUM_LAYERS = 4096u; // surfaces that the search below passes at most
 // The direction of the search, off the camera's axes, where meshes tend to have their edges.
 const vec3 MEDIUM_SEARCH = vec3(0.1371, 0.0713, -1.0);
@@ -33,8 +33,8 @@ Medium medium_left(Medium m, vec3 rate) {
 }
 
 // The medium around the camera: that of the bodies whose surface a straight line leaves more often than it enters.
-// Opaque shapes do not count. The line goes backwards, where there is least to meet. If it says that the camera is in a
-// body, a second line forwards must agree, as an open sheet is no body.
+// Opaque shapes do not count. The line goes backwards, where there are fewest surfaces. If it says that the camera is
+// in a body, a second line forwards must agree, as an open sheet is no body.
 Medium medium_at_camera() {
     vec3 d = normalize(camera_to_world(MEDIUM_SEARCH));
     vec3 o = camera_origin();

@@ -1,5 +1,5 @@
-// Entry: what the noise meter needs of the accumulators, of which a part is bound. METER_WEIGH 1 computes how much each
-// block of pixels errs, as far as its own samples and its neighbours' tell; 0 computes sums over all pixels, and the
+// Entry: reductions of the accumulators, of which a part is bound, for the noise meter. METER_WEIGH 1 estimates the
+// error of each block of pixels from its own samples and its neighbours'; 0 computes sums over all pixels, and the
 // values of the metered pixels.
 #include "layout.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;

@@ -41,8 +41,8 @@ float path_begin(vec3 d, Hit hit, SurfacePoint at, Medium medium, out Path path)
 // Ends a path: adds what it finds at infinity, where it has left the scene.
 vec3 path_finish(Path path) {
     path_add_escaped(path);
-    // llvmpipe ends every loop of an invocation after 65 535 turns in all, without a word. What such a path met last
-    // may not be there.
+    // llvmpipe ends every loop of an invocation after 65 535 turns in all, without an error. The last hit of such a
+    // path may be wrong.
     path_was_cut = path.alive && path.bounce < frame.max_bounces;
     return path_was_cut ? path.radiance_before : path.radiance;
 }

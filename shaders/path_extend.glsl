@@ -1,4 +1,4 @@
-// A path, and its step from the surface where it is scattered to what it meets next.
+// A path, and its step from the surface where it is scattered to the next hit.
 struct Path {
     vec3 d;
     Hit hit;              // what d meets; hit.id is NONE where it meets nothing
@@ -92,7 +92,7 @@ void path_add_emission(float weight, inout Path path) {
 #endif
 }
 
-// Adds what arrives from infinity, where the path has left the scene.
+// Adds the light from infinity, where the path has left the scene.
 void path_add_escaped(inout Path path) {
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
     vec3 arriving = arriving_outside(path.d, path.found_pdf, path.bounce > 0u) * max(path.eta_scale, 1.0);

@@ -68,7 +68,7 @@ void main() {
         Path path;
         float alpha = path_begin(d, hit, at, medium, path);
         add(vec4(path_radiance(rng, path), alpha));
-        if (path_was_cut) break; // as this loop is by now
+        if (path_was_cut) break; // the driver has ended this loop as well
     } while (++i < count);
     if (i < count) atomicAdd(path_cut, count - i);
     sums[slot] = sum;

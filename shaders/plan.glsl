@@ -12,11 +12,11 @@ bool plan_pixel(out uvec2 pixel, out uint slot) {
     return all(lessThan(pixel, frame.resolution));
 }
 
-// How many samples this dispatch adds to a pixel that has had `had`.
-uint plan_due(uvec2 pixel, uint had) {
+// The number of samples that this dispatch adds to a pixel that has `done` samples.
+uint plan_due(uvec2 pixel, uint done) {
     uvec2 area = pixel / PLAN_AREA;
     uint columns = (frame.resolution.x + PLAN_AREA - 1u) / PLAN_AREA;
     uint wanted = plan_counts[area.y * columns + area.x][pixel.y % PLAN_CLASSES];
-    return min(wanted - min(had, wanted), frame.sample_count);
+    return min(wanted - min(done, wanted), frame.sample_count);
 }
 #endif

@@ -99,8 +99,8 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
 #else
     SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
 #endif
-    // llvmpipe reads all kinds, whichever was met: the index may be out of another kind's range, which robust buffer
-    // access turns into 0.
+    // llvmpipe reads all kinds, whichever was hit: the index may be outside another kind's range, for which robust
+    // buffer access returns 0.
 #if HAS_SPHERES || HAS_BVH_SPHERES
     if (kind == SHAPE_SPHERE) r = sphere_point(sphere_pick(index), p);
 #endif

@@ -48,7 +48,7 @@ struct Surface {
 };
 
 #if HAS_PRINCIPLED
-// Sets what `principled` has whatever the direction; principled_face adds the rest.
+// Sets the members for `principled` that do not depend on the direction; principled_face sets the others.
 void surface_principled(Material m, vec2 tangent, inout Surface s) {
     float largest = max_component(m.base_color);
     vec3 tint = largest > 0.0 ? m.base_color / largest : vec3(1.0);
@@ -91,7 +91,7 @@ void surface_principled(Material m, vec2 tangent, inout Surface s) {
 #endif
 
 #if HAS_MICROFACET
-// Sets what `microfacet` has.
+// Sets the members for `microfacet`.
 void surface_microfacet(Material m, inout Surface s) {
     s.terms = microfacet_load(m.number);
     s.terms_ior = m.ior;

@@ -1,6 +1,6 @@
 // Surfaces that a ray passes without being scattered: shapes that hide from the camera, and others by the chance that
 // their opacity leaves.
-const uint PAIR_TRANSPARENCY = 0x8000u; // the first, beyond the pairs of any path; each bounce has TRANSPARENCY_MAX
+const uint PAIR_TRANSPARENCY = 0x8000u; // the first pair, beyond those of any path; each bounce has TRANSPARENCY_MAX
 const uint TRANSPARENCY_MAX = 4096u;    // layers that a ray passes at most; it ends on the next one
 
 // The nearest surface that the ray does not pass; hit.t is its distance from o. `bounce` is how often the path was

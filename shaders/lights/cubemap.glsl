@@ -7,7 +7,8 @@ vec3 cubemap_place(vec3 d) {
     bool along_x = m.x >= m.y && m.x >= m.z, along_y = !along_x && m.y >= m.z;
     float major = along_x ? m.x : along_y ? m.y : m.z;
     bool back = (along_x ? d.x : along_y ? d.y : d.z) < 0.0;
-    vec2 ab = along_x ? vec2(back ? d.z : -d.z, -d.y) : along_y ? vec2(d.x, back ? -d.z : d.z) : vec2(back ? -d.x : d.x, -d.y);
+    vec2 ab = along_x ? vec2(back ? d.z : -d.z, -d.y)
+        : along_y ? vec2(d.x, back ? -d.z : d.z) : vec2(back ? -d.x : d.x, -d.y);
     return vec3(ab / major, (along_x ? 0.0 : along_y ? 2.0 : 4.0) + (back ? 1.0 : 0.0));
 }
 

@@ -1,5 +1,5 @@
 // Instances: triangles with a tree of their own under an affine map. A ray is intersected in their space, where its
-// direction is not of unit length, so that t is the same in both spaces; these functions bring back what it met.
+// direction is not of unit length, so that t is the same in both spaces; these functions map hits back to the world.
 #if HAS_INSTANCES
 uint instance_id(uint number, uint triangle) { return INSTANCED | (number << frame.instance_shift) | triangle; }
 

@@ -1,5 +1,5 @@
 // The hit of a parallelogram in (0, t_max), or t_max. The quad reaches beyond its edges by the rounding of a hit, so
-// that no ray slips through between two quads that share an edge: the one that is met less obliquely has the hit
+// that no ray slips through between two quads that share an edge: the one that the ray hits less obliquely has the hit
 // inside.
 float quad_hit(Quad q, vec3 o, vec3 d, float t_max) {
     vec3 w = q.origin - o;

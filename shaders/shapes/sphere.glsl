@@ -1,5 +1,5 @@
-// |p - c|^2 - r^2. For a ball so vast that p stands on it like on a plain, it is taken from s.power, which float64 has
-// made of the centre and the radius together: a float32 of 10 000 km is good to a metre only.
+// |p - c|^2 - r^2. For a ball so vast that the scene stands on it as on a plain, it comes from s.power, which was
+// computed in float64 from the centre and the radius: a float32 of 10 000 km is precise to a metre only.
 float sphere_power(Sphere s, vec3 p) {
     vec3 f = p - s.center;
 #if HAS_VAST_SPHERES

@@ -1,4 +1,4 @@
-// Khronos PBR Neutral: colours below .8 as they are, highlights rolled off and desaturated.
+// Khronos PBR Neutral: colours below 0.8 stay as they are; highlights are rolled off and desaturated.
 vec3 pbr_neutral_curve(vec3 c) {
     const float start = 0.8 - 0.04, desaturation = 0.15;
     float x = min(c.r, min(c.g, c.b));

@@ -21,7 +21,7 @@ vec3 microfacet_transmittance(Surface s, float c) {
     return (1.0 - s.metallic) * s.transmission * (1.0 - fresnel_dielectric(c, s.eta)) * s.base_color;
 }
 
-// The chance of reflecting rather than refracting at a facet that is met at cosine c.
+// The chance of reflecting rather than refracting at a facet that light hits at cosine c.
 float microfacet_reflect_chance(Surface s, float c) {
 #if HAS_TRANSMISSION
     if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not depend on the facet
