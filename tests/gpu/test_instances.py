@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
-from gpu.kernels import features
-from gpu.kernels.source import KernelSource
+from gpu.kernels import features, instances_glsl
+from gpu.kernels.source import SHADERS, KernelSource
 from service.pack import pack
 from service.pack.geometry import instances
 from service.scene import parse_scene
@@ -165,12 +165,20 @@ def test_a_ray_meets_the_same_triangle_of_another_instance(gpu: Renderer, monkey
 
 
 def test_kernels_of_other_scenes_have_nothing_of_it() -> None:
-    """Of what a kernel is compiled from, without the flag, no line knows of instances."""
+    """Of what a kernel is compiled from, without the flag, no line reads an instance: neither its record nor the
+    frame's members for it, and none calls the functions of shapes/instance.glsl. The walk's own functions are empty
+    then."""
+    declared = instances_glsl.text() + (SHADERS / "shapes" / "instance.glsl").read_text()
+    code = re.sub("//.*", "", declared)
+    names = set(re.findall(r"\w*instance\w*", code, re.IGNORECASE)) - {"HAS_INSTANCES"}
+    assert {"Instance", "instance_load", "instance_texels", "instance_rows", "INSTANCED"} <= names
+    names |= {rf"frame\.{member}" for member in instances_glsl.FRAME}
+    reads = re.compile(rf"\b({'|'.join(names)})\b")
     flags = frozenset(features.FLAGS) - {"HAS_INSTANCES"}
     for entry in ("pathtrace.comp", "guides.comp"):
         text = KernelSource(entry, features.defines(flags)).text.replace("#define HAS_INSTANCES 0\n", "")
-        assert re.search("instance", text, re.IGNORECASE)
-        assert not re.search("instance|node_first", _without_instances(text), re.IGNORECASE)
+        assert reads.search(text)
+        assert not reads.search(_without_instances(text))
 
 
 def _without_instances(text: str) -> str:
