@@ -86,7 +86,7 @@ def _kernels(seen: Statistics) -> Iterator[Metric]:
 def _failures(seen: Statistics) -> Iterator[Metric]:
     restarts = {(reason,): float(count) for reason, count in seen.restarts.items()}
     yield _counters("renderer_restarts", "Renderers lost, by how.", ("reason",), restarts)
-    yield _counter("checkpoints", "Renders under way that were saved against such a loss.", seen.checkpoints)
+    yield _counter("checkpoints", "Renders under way that were saved, to go on later.", seen.checkpoints)
     yield _histogram("recovery_seconds", "From a renderer's loss to the next one.", seen.recovery_s)
     errors = {(kind,): float(count) for kind, count in seen.errors.items()}
     yield _counters("errors", "Errors on streams and of failed renders, by problem.", ("type",), errors)
@@ -96,6 +96,10 @@ def _clients(state: AppState) -> Iterator[Metric]:
     renders = state.renders
     states = {"queued": renders.queued, "running": renders.running, "kept": renders.kept}
     yield _gauges("renders", "Renders requested over REST.", "state", states)
+    if renders.store is not None:
+        pictures, failures = renders.store.pictures.bytes, renders.store.failures
+        yield _gauge("render_picture_bytes", "Checkpoints and pictures of renders on the disk.", pictures)
+        yield _counter("render_write_failures", "Writes of renders to the disk that failed.", failures)
     sessions = {"connected": state.sessions.attended, "waiting": state.sessions.waiting}
     yield _gauges("streams", "Streams with a client, and those whose client may come back.", "state", sessions)
 
@@ -110,8 +114,8 @@ def _memory(state: AppState) -> Iterator[Metric]:
 def _disk(state: AppState) -> Iterator[Metric]:
     with suppress(Unavailable, OSError):  # the disk fails: all other metrics are still given
         stored = state.quota.used()
-        yield _gauge("data_bytes", "Assets and documents on the disk, in whole blocks.", stored.bytes)
-        yield _gauge("data_files", "Files of assets and documents.", stored.files)
+        yield _gauge("data_bytes", "Assets, documents and renders on the disk, in whole blocks.", stored.bytes)
+        yield _gauge("data_files", "Files of assets, documents and renders.", stored.files)
     yield _gauge("data_quota_bytes", "What they may take.", state.config.data_quota)
 
 

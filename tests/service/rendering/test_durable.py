@@ -265,6 +265,9 @@ def test_a_full_disk_fails_no_server(tmp_path: Path) -> None:
         told = status(served, id, 30)
         assert told["state"] == "done" and pixels(served, id)
         assert "could not store the picture" in served.log.read_text()
+        lines = [line.split() for line in served.http.get("/metrics").text.splitlines()]
+        counted = {line[0]: float(line[1]) for line in lines if line[0].startswith("sunbox_render_")}
+        assert counted["sunbox_render_write_failures_total"] >= 1 and counted["sunbox_render_picture_bytes"] == 0
     finally:
         kill(served)
     again = Server(tmp_path)  # with room it is rendered again
