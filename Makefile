@@ -38,6 +38,7 @@ image-test: setup
 soak:
 	@.ci/setup test
 	.venv/bin/python -m service.bench.soak --minutes $(or $(MINUTES),60)
+	.venv/bin/python -m service.bench.soak_restarts
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json

@@ -23,6 +23,7 @@ pareto             from measured curves to prices
 soak               mixed clients for a long time
 soak_clients       what they do
 soak_page          a hand on the editor meanwhile
+soak_restarts      a thousand renders while the whole server is restarted, its disk fills up and its clock jumps
 soak_server        the server that is soaked
 soak_tally         what they went through
 seeds              the experiments of the programs that Sunbox grew out of

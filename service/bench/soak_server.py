@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import json
 import os
+import signal
 import subprocess
 import sys
+import time
 import urllib.error
 import urllib.request
+from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,9 +22,10 @@ PATIENCE_S = 60.0
 class Server:
     """`sunbox serve` on a free port."""
 
-    def __init__(self, folder: Path) -> None:
+    def __init__(self, folder: Path, settings: Mapping[str, str] | None = None) -> None:
+        """`settings` are further variables of its environment."""
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
-        environment |= {"SUNBOX_DATA_DIR": str(folder), "SUNBOX_LOG_LEVEL": "error"}
+        environment |= {"SUNBOX_DATA_DIR": str(folder), "SUNBOX_LOG_LEVEL": "error", **(settings or {})}
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
         with (folder / "server.log").open("wb") as log:
             self._process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
@@ -34,10 +39,12 @@ class Server:
     def pid(self) -> int:
         return self._process.pid
 
-    def ask(self, method: str, path: str, body: bytes | Any = None) -> tuple[int, bytes]:
+    def ask(
+        self, method: str, path: str, body: bytes | Any = None, headers: Mapping[str, str] | None = None
+    ) -> tuple[int, bytes]:
         """Status and body; 0 when there was no answer."""
         data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
-        request = urllib.request.Request(self.url + path, data, method=method)
+        request = urllib.request.Request(self.url + path, data, dict(headers or {}), method=method)
         request.add_header(
             "content-type", "application/octet-stream" if isinstance(body, bytes) else "application/json"
         )
@@ -62,6 +69,19 @@ class Server:
                 continue
         return None
 
+    def family(self) -> list[int]:
+        """The server's process and all processes below it."""
+        return list(_family(self.pid))
+
+    def kill(self, everything: bool) -> list[int]:
+        """SIGKILL to the server, and with `everything` to all processes below it; those, which have to end."""
+        below = self.family()[1:]
+        for pid in (self.pid, *below) if everything else (self.pid,):
+            with suppress(ProcessLookupError):
+                os.kill(pid, signal.SIGKILL)
+        self._process.wait()
+        return below
+
     def stop(self) -> tuple[int, int]:
         """The exit code after SIGTERM, and how many children were left."""
         children = self.children()
@@ -71,7 +91,7 @@ class Server:
         except subprocess.TimeoutExpired:
             self._process.kill()
             code = -9
-        return code, sum(Path(f"/proc/{pid}").exists() for pid in children)
+        return code, still_there(children, 1.0)
 
 
 def resident(pid: int | None) -> int:
@@ -85,3 +105,27 @@ def descriptors(server: Server) -> int:
     """Of the server, which only root could count from outside; 0 where it gives no answer."""
     lines = server.ask("GET", "/metrics")[1].decode().splitlines()
     return next((int(float(line.split()[1])) for line in lines if line.startswith("process_open_fds ")), 0)
+
+
+def still_there(pids: list[int], within_s: float) -> int:
+    """How many of these processes have not ended `within_s` seconds from now."""
+    until = time.monotonic() + within_s
+    while (left := sum(_lives(pid) for pid in pids)) and time.monotonic() < until:
+        time.sleep(0.1)
+    return left
+
+
+def _lives(pid: int) -> bool:
+    try:
+        state = Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+    return state != "Z"  # one that has ended and waits for its parent
+
+
+def _family(pid: int) -> Iterator[int]:
+    yield pid
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in task.read_text().split():
+                yield from _family(int(child))

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
+import random
 import threading
 import time
+from pathlib import Path
 
+import pytest
+
+from gpu import Renderer
+from service.bench import soak_restarts
 from service.bench.soak_tally import Tally
 
 
@@ -50,3 +56,24 @@ def test_who_gets_further_is_not_stuck() -> None:
     assert tally.still_s(threading.get_ident(), began) >= 100.0
     tally.advance()
     assert tally.still_s(threading.get_ident(), began) < 100.0 <= tally.still_s(None, began)
+
+
+@pytest.mark.calm
+def test_a_short_soak_with_restarts(gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The long form has 20 restarts and 1 000 renders."""
+    monkeypatch.setattr(soak_restarts, "LONG_SAMPLES", 100)
+    monkeypatch.setattr(soak_restarts, "LOOK_S", 0.2)
+    outcome = soak_restarts.run(tmp_path, restarts=2, renders=12, seconds=4.0, chance=random.Random(3))
+    assert outcome.good, outcome
+    assert outcome.restarts == 2 and outcome.done == 13 and outcome.compared == 12 and outcome.checked
+
+
+def test_a_soak_that_lost_something_is_not_good() -> None:
+    outcome = soak_restarts.Outcome(restarts=1, accepted=2, done=2, starts_s=[0.5, 2.0])
+    assert outcome.good and ("kill to first answer, median / longest (s)", "2.0 / 2.0") in outcome.rows()
+    outcome.done = 1
+    assert not outcome.good
+    outcome.done, outcome.orphans = 2, 1
+    assert not outcome.good
+    outcome.orphans, outcome.wrong = 0, ["image 404"]
+    assert not outcome.good and ("lost or wrong", "image 404") in outcome.rows()
