@@ -16,6 +16,7 @@ _thread = threading.local()
 
 REQUIRED = 430  # compute shaders and storage buffers
 PACKAGES = "libegl1 libopengl0 libgl1-mesa-dri"
+DEDICATED_VIDEO_MEMORY = 0x9047  # GPU_MEMORY_INFO_DEDICATED_VIDMEM_NVX
 _SOFTWARE = ("llvmpipe", "softpipe", "swrast")
 
 
@@ -27,8 +28,7 @@ def create(device: int | None = None) -> Any:
     """
     import moderngl
 
-    # Either holds OpenGL's functions; the first comes without X11's libraries.
-    opengl = ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL")
+    opengl = _opengl()
     for name, library in (("libEGL", ctypes.util.find_library("EGL")), ("libOpenGL", opengl)):
         if library is None:
             raise ContextError(f"{name} is not installed: on Debian `apt-get install {PACKAGES}`")
@@ -82,7 +82,8 @@ def storage_block_bytes(context: Any) -> int:
 
 
 def describe(context: Any) -> dict[str, Any]:
-    """Renderer, version and vendor as the driver says them; `software`: it runs on the CPU."""
+    """Renderer, version and vendor as the driver says them; `software`: it runs on the CPU; `memory`: its own, in
+    bytes, None where the driver does not say."""
     info = context.info
     renderer = str(info["GL_RENDERER"])
     return {
@@ -90,4 +91,19 @@ def describe(context: Any) -> dict[str, Any]:
         "version": str(info["GL_VERSION"]),
         "vendor": str(info["GL_VENDOR"]),
         "software": any(s in renderer.lower() for s in _SOFTWARE),
+        "memory": _memory(context),
     }
+
+
+def _memory(context: Any) -> int | None:
+    """Bytes of a GPU's own memory, by the extension GL_NVX_gpu_memory_info, which moderngl has no name for."""
+    if "GL_NVX_gpu_memory_info" not in context.extensions:
+        return None
+    kibibytes = ctypes.c_int(0)
+    ctypes.CDLL(_opengl()).glGetIntegerv(DEDICATED_VIDEO_MEMORY, ctypes.byref(kibibytes))
+    return kibibytes.value * 1024 or None
+
+
+def _opengl() -> str | None:
+    """The library with OpenGL's functions; the first of these comes without X11's libraries."""
+    return ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL")

@@ -28,6 +28,7 @@ documents          what users saved, in SQLite
 database           the SQLite file: its version, its connections
 migrations         its tables, as the ordered steps that made them
 data_lock          one server at a time on a data folder
+memory             one budget of memory for all work
 quota              room on the disk
 disk_usage         what files take on a disk: blocks and inodes
 garbage            the garbage collector, out of the way of large imports

@@ -33,6 +33,7 @@ from service.database import DamagedFile
 from service.downloads import Pieces
 from service.guard import Guard, turning_away
 from service.logs import Requests
+from service.memory import MemoryBudget
 from service.problems import Unavailable
 from service.rendering.first_frame import warm_up
 from service.rendering.jobs.queue import QueueLimits, RenderQueue
@@ -74,11 +75,12 @@ def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
     kept = storage(config, lambda: store.pictures)
     store = RenderStore(config.data_dir, kept.quota.room)
+    memory = MemoryBudget(config.memory)
     own = AppState(
         config,
         kept.assets,
-        RequestReader(config, kept.assets),
-        Supervisor(Options(config.device, config.hang_s, config.gpu_memory, config.checkpoint_s)),
+        RequestReader(config, kept.assets, memory),
+        Supervisor(Options(config.device, config.hang_s, config.gpu_memory, memory.limit, config.checkpoint_s)),
         kept.documents,
         kept.quota,
         RenderQueue(_limits(config), store),

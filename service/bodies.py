@@ -10,6 +10,7 @@ from typing import Any
 from starlette.requests import Request
 
 from service.config import Config
+from service.memory import MemoryBudget
 from service.problems import TooLarge, Unavailable, UnsupportedMedia
 from service.rendering.executors import parsing, waiting_for_parsers
 from service.rendering.requests.parser_pool import ParserPool
@@ -25,9 +26,10 @@ RETRY_S = 5
 class Bodies:
     """The JSON bodies of all requests."""
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
         self._config = config
-        self._pool = ParserPool(config)
+        self._memory = memory or MemoryBudget(config.memory)
+        self._pool = ParserPool(config, self._memory)
         self._held = 0  # bytes of large bodies in memory
 
     async def parsed(self, kind: Kind, body: bytearray, client: str = "") -> Any:
@@ -59,6 +61,7 @@ class Bodies:
                 if received > SMALL:
                     more = received - held
                     self._held, held = self._held + more, received
+                    self._memory.hold("bodies", self, self._held)
                     if self._held > AT_ONCE * self._config.max_json:
                         raise Unavailable("There is no room for this body just now (SUNBOX_MAX_JSON).", RETRY_S)
             if received > self._config.max_json:
@@ -66,3 +69,4 @@ class Bodies:
             yield body
         finally:
             self._held -= held
+            self._memory.hold("bodies", self, self._held)

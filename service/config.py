@@ -87,11 +87,17 @@ class Config(BaseSettings):
     max_stream_memory: int = Field(
         512 * MIB, ge=8, description="Most bytes of memory that the streams' scenes take as values; one's, an eighth."
     )
+    memory: int | None = Field(
+        None,
+        ge=64 * MIB,
+        description="Most bytes of memory that all work takes together, queued, running and kept, beside what idle "
+        "processes take (default: half of the machine's, or of the container's limit).",
+    )
     gpu_memory: int | None = Field(
         None,
         ge=1,
-        description="Most bytes of scenes and pictures on the device (default: all that a GPU has; half of the "
-        "machine's memory for a software renderer).",
+        description="Most bytes of scenes and pictures on the device (default: 80 % of a GPU's, where its driver "
+        "tells; `SUNBOX_MEMORY` for a software renderer).",
     )
     hang_s: Seconds = Field(
         10.0,

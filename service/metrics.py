@@ -108,6 +108,8 @@ def _memory(state: AppState) -> Iterator[Metric]:
     seen = state.renderers.statistics
     yield _gauge("renderer_tasks", "Pictures that the renderer stores.", seen.tasks)
     yield _gauge("gpu_bytes", "GPU memory that they take.", seen.gpu_bytes)
+    yield _gauges("memory_bytes", "Memory of SUNBOX_MEMORY, by what is in it.", "owner", state.memory.used())
+    yield _gauge("memory_limit_bytes", "Most of it (SUNBOX_MEMORY).", state.memory.limit)
     yield _gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(state))
 
 

@@ -17,6 +17,7 @@ from service.bodies import Bodies
 from service.config import Config
 from service.documents import Documents
 from service.downloads import Downloads
+from service.memory import MemoryBudget
 from service.pack import Packed
 from service.problems import Unavailable
 from service.quality import priced
@@ -53,12 +54,16 @@ class AppState:
     traffic: Traffic = field(default_factory=Traffic)
     sessions: Sessions = field(init=False)
     downloads: Downloads = field(init=False)
+    memory: MemoryBudget = field(init=False)
     bodies: Bodies = field(init=False)
     readiness: Readiness = field(init=False)
     bsdf: BsdfQuestions = field(init=False)
 
     def __post_init__(self) -> None:
-        self.bodies = Bodies(self.config)
+        self.memory = self.reader.budget
+        self.memory.cache("assets", lambda: self.assets.loader.bytes, self.assets.loader.shrink)
+        self.memory.cache("pictures", lambda: 0, self.renders.shrink)  # renders count themselves
+        self.bodies = Bodies(self.config, self.memory)
         self.bsdf = BsdfQuestions(self.renderers)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
@@ -74,6 +79,7 @@ class AppState:
             "version": metadata.version("sunbox"),
             "renderer": renderer,
             "sandbox": asdict(await asyncio.to_thread(self.assets.rights)),
+            "memory": {"limit": self.memory.limit, "used": self.memory.used()},
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": priced(),
         }
@@ -90,12 +96,12 @@ class AppState:
         self.renders.resume(await asyncio.to_thread(store.load), self._resumed)
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
-        """A render that is asked for now."""
+        """A render that is asked for now. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
-        return Job(self.renderers, order, self._pack, document, packed, outcome)
+        return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory)
 
     def _resumed(self, stored: StoredRender) -> Job:
-        return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome)
+        return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)
 
     async def _pack(self, document: bytes) -> Packed:
         """The scene of a folded document, which was valid when it was stored. Raises what reading it raises."""

@@ -9,7 +9,7 @@ from gpu import RenderSettings, footprint
 from gpu.layout import ShapeKind
 from service.assets.gltf import json_view
 from service.pack.lights import light_bounds
-from service.rendering.jobs import job
+from service.rendering.jobs import memory
 from service.scene import numbers
 from tests.documents import packed
 
@@ -19,7 +19,7 @@ def test_the_server_counts_a_picture_s_bytes_as_the_renderer_takes_them() -> Non
     settings = RenderSettings(1920, 1080, adaptive=True)
     pixels = settings.width * settings.height
     taken = (footprint.picture_bytes(settings, guided=True) - footprint.PICTURE_BYTES) / pixels
-    assert taken - 1 + 2 * 16 == job.PICTURE_BYTES  # a byte of the plan is below what the server counts
+    assert taken - 1 + 2 * 16 == memory.PICTURE_BYTES  # a byte of the plan is below what the server counts
 
 
 def test_gltf_files_have_the_ranges_of_scenes() -> None:

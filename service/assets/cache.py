@@ -54,6 +54,17 @@ class ParsedCache:
         while room < 0:
             room += _bytes(self._kept.popitem(last=False)[1])
 
+    @property
+    def bytes(self) -> int:
+        with self._lock:
+            return sum(map(_bytes, self._kept.values()))
+
+    def shrink(self, size: int) -> None:
+        """Free that many bytes, as far as there are any; what was asked for longest ago goes first."""
+        with self._lock:
+            while size > 0 and self._kept:
+                size -= _bytes(self._kept.popitem(last=False)[1])
+
     def close(self) -> None:
         self.sandbox.close()
 

@@ -39,6 +39,7 @@ Saving = Annotated[
         "of a core by llvmpipe). Answers bring it from then on."
     ),
 ]
+FLOAT_BYTES = 4  # of a number in a layer, as the renderer gives it
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
 
 
@@ -170,7 +171,7 @@ async def progress(request: Request, id: answers.RenderId) -> Response:
     "/renders/{id}/image",
     summary="The image so far",
     response_class=Response,
-    responses=FILES | answers.problems(404, 409, 410, 422),
+    responses=FILES | answers.problems(404, 409, 410, 422, 503),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
     renders = app_state(request).renders
@@ -202,7 +203,7 @@ async def _finished_or_gone(request: Request, job: Job) -> None:
 
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
-    downloads = app_state(request).downloads
+    own, downloads = app_state(request), app_state(request).downloads
     client = caller(request)
     key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
     async with present(request.receive) as gone, downloads.turn(client):
@@ -211,7 +212,8 @@ async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> R
         written = downloads.find(key)
         if written is None:
             downloads.admit(client, _most_bytes(job, query))
-            written = await _written(downloads, job, query, view)
+            with own.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
+                written = await _written(downloads, job, query, view)
             downloads.keep(client, key, written)
     return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)
 
@@ -235,9 +237,13 @@ def _aovs(query: ImageQuery) -> list[Aov]:
 def _most_bytes(job: Job, query: ImageQuery) -> int:
     """About the bytes of a file that cannot be compressed."""
     format = images.FORMATS[query.format]
-    channels = sum(len(images.LAYERS[aov]) for aov in _aovs(query))
     bits = query.bits if query.bits in format.bits else format.bits[0]
-    return job.settings.width * job.settings.height * channels * bits // 8
+    return _texels(job, query) * bits // 8
+
+
+def _texels(job: Job, query: ImageQuery) -> int:
+    """The numbers in the layers of an image."""
+    return job.settings.width * job.settings.height * sum(len(images.LAYERS[aov]) for aov in _aovs(query))
 
 
 def _write(

@@ -30,9 +30,21 @@ class CacheBudget:
             self._caches.add(cache)
 
     @property
-    def exceeded(self) -> bool:
+    def bytes(self) -> int:
         with self._lock:
-            return sum(cache.bytes for cache in self._caches) > self._most
+            return sum(cache.bytes for cache in self._caches)
+
+    @property
+    def exceeded(self) -> bool:
+        return self.bytes > self._most
+
+    def shrink(self, size: int) -> None:
+        """Free that many bytes, as far as they are not a cache's newest part; the largest caches lose first."""
+        with self._lock:
+            caches = sorted(self._caches, key=lambda cache: cache.bytes, reverse=True)
+        for cache in caches:
+            while size > 0 and (freed := cache.drop_oldest()):
+                size -= freed
 
 
 class PackCache:
@@ -63,6 +75,15 @@ class PackCache:
             while len(self._kept) > 1 and (len(self._kept) > self._entries or self._budget.exceeded):
                 self.bytes -= self._kept.popitem(last=False)[1][1]
         return value
+
+    def drop_oldest(self) -> int:
+        """Forget the part that was used longest ago, unless it is the only one; the bytes that it had."""
+        with self._lock:
+            if len(self._kept) < 2:
+                return 0
+            size = self._kept.popitem(last=False)[1][1]
+            self.bytes -= size
+            return size
 
     def gather(self, kind: type[T]) -> list[T]:
         """All parts of that kind, the newest last."""

@@ -3,6 +3,8 @@
 job        one render: its progress, its image, its end
 queue      all renders, with bounds on how many wait, run and are kept
 turns      whose render starts next
+ordered    what was asked for, and what became of it
+memory     what a render takes in memory
 retention  which ended renders make room
 recorder   writes what becomes of a render to the store
 reads      requests for a picture that the renderer has not answered yet

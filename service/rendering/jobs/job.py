@@ -12,9 +12,9 @@ from typing import Any
 
 import numpy as np
 
+from service.memory import MemoryBudget
 from service.pack import Packed
 from service.problems import Conflict, Gone, Internal, ServiceError, Unavailable, answer
-from service.quality import ResolvedSettings
 from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
@@ -33,21 +33,22 @@ from service.rendering.ipc.messages import (
     Update,
     View,
 )
+from service.rendering.jobs.memory import RenderMemory
+from service.rendering.jobs.ordered import Ordered
 from service.rendering.jobs.reads import Reads
 from service.rendering.jobs.recorder import Recorder
 from service.rendering.jobs.status import KernelQuestion, error_of, status
 from service.rendering.jobs.store.record import Order, Outcome, State
 from service.rendering.renderers import Renderers
-from service.rendering.requests.request_reader import stop_rule, weight
+from service.rendering.requests.request_reader import stop_rule
 
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
 AGAIN_S = 5.0  # between two attempts to begin a render where nothing renders, or the disk fails
-PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
 
 log = logging.getLogger(__name__)
 
 
-class Job:
+class Job(Ordered):
     """A render, on the event loop.
 
     With a `recorder` it outlives the server, and its picture comes back from the disk when somebody looks at it.
@@ -65,14 +66,20 @@ class Job:
         document: bytes | None = None,
         packed: Packed | None = None,
         outcome: Outcome | None = None,
+        budget: MemoryBudget | None = None,
     ) -> None:
-        """`load` packs the scene of a folded document; `document` may be left out where there is a recorder."""
-        self.order = order
-        self.outcome = outcome or Outcome()
+        """`load` packs the scene of a folded document; `document` may be left out where there is a recorder.
+
+        Raises TooLarge for a render that never fits into the `budget`.
+        """
+        super().__init__(order, outcome or Outcome())
         self.began = self.outcome.state == "running"  # when the server ended before
         self.ended_at = 0.0  # by the monotonic clock, once it is finished
         self.finished = asyncio.Event()
-        self.scene_bytes = 0 if packed is None else weight(packed)
+        self._memory = RenderMemory(order.settings, budget)
+        if packed is not None:
+            self._memory.packed(packed)
+            self._memory.check()
         self._over = asyncio.Event()  # finished, or the server ends
         self._changed = asyncio.Event()
         self._renderers = renderers
@@ -97,30 +104,9 @@ class Job:
             self._finish()
 
     @property
-    def id(self) -> str:
-        return self.order.id
-
-    @property
-    def owner(self) -> str:
-        return self.order.owner
-
-    @property
-    def priority(self) -> int:
-        return self.order.priority
-
-    @property
-    def state(self) -> State:
-        return self.outcome.state
-
-    @property
-    def settings(self) -> ResolvedSettings:
-        return self.order.settings
-
-    @property
     def resident_bytes(self) -> int:
         """About the memory that its scene and its picture take while the renderer has them; 0 otherwise."""
-        pixels = self.settings.render_width * self.settings.render_height
-        return 0 if self._task is None else pixels * PICTURE_BYTES + self.scene_bytes
+        return 0 if self._task is None else self._memory.bytes
 
     @property
     def size(self) -> int:
@@ -192,6 +178,7 @@ class Job:
         if self._task is not None:
             self._renderers.drop(self._task)
             self._task, self._shown = None, False
+        self._memory.release()
 
     def rest(self) -> bool:
         """Release what can be brought back from the disk, if nobody waits for it; whether that was possible."""
@@ -281,6 +268,7 @@ class Job:
     def lost(self, detail: str) -> None:
         self._task, shown = None, self._shown
         self._shown = False
+        self._memory.release()
         if shown or (self.recorder is not None and (self.recorder.whole or self._over.is_set())):
             self._reads.answer_all(Unavailable("The renderer was lost: ask again.", int(AGAIN_S)))
         elif self.finished.is_set():
@@ -291,13 +279,15 @@ class Job:
     async def _begin(self) -> None:
         """Raises what loading the scene raises, and Unavailable where nothing renders."""
         packed, self._packed = self._packed, None
+        self._memory.hold()  # as far as it is known, so that no scene is packed for nothing
         if packed is None:
             packed = await self._load(await self.document())
-        self.scene_bytes = weight(packed)
+        self._memory.packed(packed)
         async with self._loading:
+            self.release()
             if self._over.is_set():
                 return
-            self.release()
+            self._memory.hold()
             self._task = task = self._renderers.open(self, "render", self.owner)
             restore = await self._checkpoint(task)
             if self.recorder is not None and not self._over.is_set():
@@ -323,7 +313,8 @@ class Job:
             if recorder is None or (kind := recorder.store.latest(self.id)) is None:
                 raise Conflict("There is no sample yet.")
             packed = await self._load(await self.document())
-            self.scene_bytes = weight(packed)
+            self._memory.packed(packed)
+            self._memory.hold()
             self._task = task = self._renderers.open(self, "render", self.owner)
             self._shown = True
             restore = await recorder.store.read(self.id, kind, task)
@@ -382,6 +373,8 @@ class Job:
         self.ended_at = time.monotonic() - max(0.0, time.time() - (self.outcome.ended_at or time.time()))
         self.finished.set()
         self._over.set()
+        if self._task is None:
+            self._memory.release()
         self._wake()
 
     def _fail(self, error: ServiceError) -> None:
@@ -391,6 +384,7 @@ class Job:
 
     def _forget(self, error: ServiceError) -> None:
         self._error, self._packed = error, None
+        self._memory.release()
         self._sampled.set()
         self._kernel.answered.set()
         self._reads.answer_all(error)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import concurrent.futures
 import contextlib
 import logging
 import time
@@ -26,6 +27,7 @@ RETRY_S = 5  # when to ask again where there is no room
 # Bytes of scenes and pictures of ended renders that stay with the renderer, so that looking at them takes no time;
 # the last one stays however large it is. The others come back from the disk.
 RESTING_BYTES = 256 << 20
+SHRINK_S = 0.5  # how long a thread waits for the event loop to free memory
 CLOSING_S = 3.0  # for the last samples of running renders to reach the disk
 EVICTION_S = 60.0  # at most between two looks for renders that are too old
 
@@ -66,11 +68,13 @@ class RenderQueue:
         self._resting: OrderedDict[str, Job] = OrderedDict()  # ended ones, the last one looked at last
         self._chores: set[asyncio.Task[None]] = set()
         self._timer: asyncio.TimerHandle | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
         self.closing = False
 
     def resume(self, stored: Collection[StoredRender], make: Callable[[StoredRender], Job]) -> None:
         """Take up what the store has: ended ones are kept, the others go on or wait."""
         assert self.store is not None
+        self._loop = asyncio.get_running_loop()
         for each in stored:
             if each.gone:
                 self._remember(each.order.id, each.order.owner, each.number)
@@ -94,6 +98,7 @@ class RenderQueue:
         `uses`: the assets that it refers to. The caller releases one that is not `listed`. Raises TooManyRequests
         where its owner has as many under way as one may have, Unavailable where the queue or the disk is full.
         """
+        self._loop = asyncio.get_running_loop()
         self.admit(job.owner)
         if listed and self.store is not None:
             job.number = await self._stored(job, uses, key)
@@ -228,6 +233,31 @@ class RenderQueue:
         self._waiting.remove(job)
         job.cancel()
         self._evict()
+
+    def shrink(self, size: int) -> None:
+        """Have ended renders leave the renderer until they have freed that many bytes. For any thread."""
+        loop = self._loop
+        try:
+            elsewhere = loop is not asyncio.get_running_loop()
+        except RuntimeError:
+            elsewhere = True
+        if loop is None or not elsewhere:
+            self._shrink(size)
+            return
+        with contextlib.suppress(concurrent.futures.TimeoutError, RuntimeError):  # busy, or closed
+            asyncio.run_coroutine_threadsafe(self._shrunk(size), loop).result(SHRINK_S)
+
+    async def _shrunk(self, size: int) -> None:
+        self._shrink(size)
+
+    def _shrink(self, size: int) -> None:
+        for job in list(self._resting.values()):
+            if size <= 0:
+                break
+            freed = job.resident_bytes
+            if job.rest():
+                size -= freed
+                del self._resting[job.id]
 
     def _rest(self, job: Job) -> None:
         """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""

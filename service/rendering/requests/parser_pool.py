@@ -13,6 +13,7 @@ from typing import Any
 from service.child_processes import Child, Children, Closed
 from service.config import MIB, Config
 from service.garbage import collector_paused
+from service.memory import MemoryBudget
 from service.problems import ServiceError, TooLarge, Unavailable
 from service.rendering.ipc import channel
 from service.rendering.requests.parser_child import Failed, Work
@@ -32,9 +33,10 @@ class ParserFailed(Exception):
 class ParserPool:
     """Processes that parse, started on demand: one for each thread that calls `parse` at the same time."""
 
-    def __init__(self, config: Config) -> None:
+    def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
         self._config = config.model_copy(update={"api_key": []})  # a process that reads strangers' texts needs no key
         self._children = Children("service.rendering.requests.parser_child", BODIES)
+        self._memory = memory or MemoryBudget(config.memory)
         self._room = _Room(config.max_json_memory)
 
     def parse(self, kind: Kind, body: bytearray) -> Any:
@@ -46,7 +48,11 @@ class ParserPool:
         seconds = self._config.parse_seconds + SECONDS_PER_BYTE * len(body)
         work = Work(kind, pickle.PickleBuffer(body), self._config, needed, seconds)
         try:
-            with self._room.taken(needed), self._children.one() as child:
+            with (
+                self._room.taken(needed),
+                self._memory.held("bodies", needed),
+                self._children.one() as child,
+            ):
                 answer = _ask(child, work)
         except Closed:
             raise Unavailable("The server is shutting down.") from None

@@ -7,6 +7,7 @@ from contextlib import contextmanager
 
 from service.assets import Assets
 from service.config import Config
+from service.memory import MemoryBudget
 from service.pack import CacheBudget, PackCache, Packed, pack
 from service.problems import InvalidDocument
 from service.quality import ResolvedSettings
@@ -19,10 +20,12 @@ from service.scene import Scene
 class RequestReader(RequestParser):
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
-    def __init__(self, config: Config, assets: Assets) -> None:
+    def __init__(self, config: Config, assets: Assets, budget: MemoryBudget | None = None) -> None:
         super().__init__(config)
-        self.memory = StreamMemory(config.max_stream_memory)
+        self.budget = budget or MemoryBudget(config.memory)
+        self.memory = StreamMemory(config.max_stream_memory, self.budget)
         self.caches = CacheBudget(config.keep_packed)
+        self.budget.cache("scenes", lambda: self.caches.bytes, self.caches.shrink)
         self._assets = assets
 
     def pack(self, scene: Scene, cache: PackCache | None = None) -> Packed:

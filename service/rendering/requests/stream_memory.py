@@ -6,6 +6,7 @@ import threading
 import weakref
 
 from service.config import MIB
+from service.memory import MemoryBudget
 from service.problems import TooLarge, Unavailable
 
 EACH = 8  # one stream may take an eighth of it
@@ -15,8 +16,9 @@ RETRY_S = 5
 class StreamMemory:
     """Counts the bytes of each holder for as long as it lives. For any thread."""
 
-    def __init__(self, most: int) -> None:
+    def __init__(self, most: int, budget: MemoryBudget | None = None) -> None:
         self.each = most // EACH
+        self._budget = budget or MemoryBudget()
         self._most = most
         self._held: weakref.WeakKeyDictionary[object, int] = weakref.WeakKeyDictionary()
         self._lock = threading.Lock()
@@ -31,7 +33,14 @@ class StreamMemory:
             if size > before and sum(self._held.values()) - before + size > self._most:
                 raise Unavailable("There is no room for this scene just now (SUNBOX_MAX_STREAM_MEMORY).", RETRY_S)
             self._held[holder] = size
+        try:
+            self._budget.hold("documents", holder, size)
+        except BaseException:
+            with self._lock:
+                self._held[holder] = before
+            raise
 
     def release(self, holder: object) -> None:
         with self._lock:
             self._held.pop(holder, None)
+        self._budget.release(holder)

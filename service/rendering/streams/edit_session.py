@@ -11,7 +11,8 @@ from service.pack import PackCache, pack_camera, pack_materials, pack_microfacet
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.rendering.ipc.messages import Update
-from service.rendering.requests.request_reader import RequestReader, stop_rule
+from service.rendering.jobs.memory import COPIES, picture_bytes
+from service.rendering.requests.request_reader import RequestReader, stop_rule, weight
 from service.rendering.streams import protocol
 from service.rendering.streams.scene_diff import may_be_refused, scene_diff
 from service.scene import Scene, merge_patch
@@ -48,6 +49,7 @@ class EditSession:
         self._reader = reader
         self._task = task
         self._cache = PackCache(budget=reader.caches)
+        self._picture_bytes = 0
         self._bytes = 0  # that the scene's document takes at most
         self._given: Version | None = None  # the last one that the renderer has
         self._good: dict[int, Accepted] = {}  # that the renderer may go back to, by generation
@@ -136,7 +138,8 @@ class EditSession:
         return new
 
     def _give(self, version: Version) -> Update:
-        update = self._difference(version)
+        with self._room(version):
+            update = self._difference(version)
         self._given = version
         newest = max((g for g in self._good if g <= self.works), default=None)
         if newest is not None:
@@ -145,6 +148,17 @@ class EditSession:
         if len(self._good) > MOST_GOOD:  # the one that works, and the newest
             del self._good[sorted(self._good)[1]]
         return update
+
+    @contextmanager
+    def _room(self, version: Version) -> Iterator[None]:
+        """Counts the version's picture; as before where it is refused after all. Raises TooLarge, Unavailable."""
+        budget, before, after = self._reader.budget, self._picture_bytes, picture_bytes(version.settings)
+        budget.hold("pictures", self, max(before, after))
+        try:
+            yield
+            self._picture_bytes = after
+        finally:
+            budget.hold("pictures", self, self._picture_bytes)
 
     def _difference(self, new: Version) -> Update:
         old, update = self._given, Update(self._task, new.generation, interactive=True)
@@ -156,7 +170,9 @@ class EditSession:
             update = replace(update, denoise=new.settings.denoise)
         touched = scene_diff(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
-            arrays = self._reader.pack(new.scene, self._cache).arrays
+            packed = self._reader.pack(new.scene, self._cache)
+            arrays = packed.arrays
+            self._reader.budget.hold("scenes", self, COPIES * weight(packed))
             elsewhere = None if old is None else scene_delta(self._arrays, arrays)
             self._arrays, lit = arrays, arrays.environment
             if old is None or elsewhere is None:

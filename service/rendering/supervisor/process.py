@@ -35,6 +35,7 @@ class Options:
     device: int | None = None
     patience_s: float = 10.0  # without progress
     memory: int | None = None  # bytes that may be held on the device; None: the worker decides
+    host_memory: int | None = None  # the same where that is the machine's memory
     checkpoint_s: float = 2.0  # between two of a render
 
 
@@ -131,6 +132,7 @@ def _spawn(
     command += ["--checkpoint", str(options.checkpoint_s)]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]
+    command += [] if options.host_memory is None else ["--host-memory", str(options.host_memory)]
     command += [] if lifeline is None else ["--lifeline", str(lifeline)]
     # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.
     # stdout is the command line's, who may be read by a script that waits for its end.

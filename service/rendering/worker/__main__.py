@@ -29,6 +29,7 @@ def main() -> int:
     parser.add_argument("descriptor", type=int)
     parser.add_argument("heartbeat", type=int)
     parser.add_argument("--memory", type=int, help="bytes that may be held on the device")
+    parser.add_argument("--host-memory", type=int, help="the same where the device's memory is the machine's")
     parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
     parser.add_argument("--device", type=int)
     parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
@@ -55,7 +56,7 @@ def main() -> int:
 
 def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     from gpu import GpuError, Renderer, denoise
-    from service.rendering.worker.device.memory import default_limit
+    from service.rendering.worker.device.memory import UNLIMITED, default_limit
     from service.rendering.worker.loop import Loop
 
     try:
@@ -65,13 +66,14 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
         return 1
     # Not earlier: beside a dozen busy programs, starting at this priority took 30 s instead of 3 s.
     raise_process_niceness(os.getpriority(os.PRIO_PROCESS, 0) + NICENESS)
-    channel.send(end, Ready({**renderer.info, "denoiser": denoise.version()}))
+    limit = arguments.memory or default_limit(renderer.info, arguments.host_memory)
+    told = {"denoiser": denoise.version(), "memory_limit": None if limit == UNLIMITED else limit}
+    channel.send(end, Ready({**renderer.info, **told}))
     log.info("started renderer=%s", renderer.info.get("renderer"))
     if renderer.info["software"] and (closed := closed_gpus(DEVICES)):
         log.warning(
             "the processor renders, as this user may not use the GPU device=%s group=%s", closed[0], closed[0].group()
         )
-    limit = arguments.memory or default_limit(bool(renderer.info["software"]))
     heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
     Loop(end, renderer, heartbeat, limit, arguments.device, arguments.checkpoint, lifeline).run()
     return 0

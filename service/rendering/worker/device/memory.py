@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import logging
-import os
-from collections.abc import Callable, Iterable
-from contextlib import suppress
-from pathlib import Path
-from typing import Protocol
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
 
 from gpu import OutOfMemory
+from service.memory import MemoryBudget
 
-SHARE = 0.5  # of the machine's memory, where that is the device's: the other half is the server's and the system's
+GPU_SHARE = 0.8  # of a GPU's memory: drivers, desktops and other programs need some
 UNLIMITED = 1 << 62
 
 log = logging.getLogger(__name__)
@@ -62,14 +60,15 @@ class Memory:
         return True
 
 
-def default_limit(software: bool) -> int:
-    """Bytes. A GPU's driver says no by itself; where it is the machine's memory, the kernel would kill somebody."""
-    if not software:
-        return UNLIMITED
-    total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    with suppress(OSError, ValueError):  # no such file, or "max"
-        total = min(total, int(Path("/sys/fs/cgroup/memory.max").read_text()))
-    return int(SHARE * total)
+def default_limit(info: Mapping[str, Any], host_memory: int | None) -> int:
+    """Bytes, by what `gpu.Renderer.info` says.
+
+    Where the device's memory is the machine's, the kernel would kill somebody; there it is `host_memory`, by default
+    half of the machine's. A GPU's driver says no by itself; what it is not asked for is left to other programs.
+    """
+    if info["software"]:
+        return host_memory or MemoryBudget().limit
+    return int(GPU_SHARE * info["memory"]) if info["memory"] else UNLIMITED
 
 
 def _mib(size: int) -> int:

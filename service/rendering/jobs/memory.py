@@ -1,0 +1,63 @@
+"""What a render takes in memory, counted within SUNBOX_MEMORY."""
+
+from __future__ import annotations
+
+from service.memory import MemoryBudget
+from service.pack import Packed
+from service.problems import ServiceError
+from service.quality import ResolvedSettings
+from service.rendering.requests.request_reader import weight
+
+PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
+SAVED_BYTES = 48  # a pixel's, in the server: three vec4 of the last checkpoint, or of the finished picture
+COPIES = 2  # of a packed scene: the server's, with which another renderer could go on, and the renderer's
+
+
+def picture_bytes(settings: ResolvedSettings) -> int:
+    """The bytes of a picture in the renderer."""
+    return settings.render_width * settings.render_height * PICTURE_BYTES
+
+
+class RenderMemory:
+    """The bytes of one render, from its beginning until the renderer lets it go."""
+
+    def __init__(self, settings: ResolvedSettings, budget: MemoryBudget | None = None) -> None:
+        """Without a budget nothing is counted."""
+        self.scene_bytes = 0  # as far as it is known
+        self._budget = budget
+        self._settings = settings
+
+    @property
+    def bytes(self) -> int:
+        """Of the scene and the picture while the renderer has them."""
+        return self._pictures + COPIES * self.scene_bytes
+
+    @property
+    def _pictures(self) -> int:
+        settings = self._settings
+        return picture_bytes(settings) + settings.render_width * settings.render_height * SAVED_BYTES
+
+    def packed(self, packed: Packed) -> None:
+        """Note how large the scene is."""
+        self.scene_bytes = weight(packed)
+
+    def check(self) -> None:
+        """Raises TooLarge for a render that never fits."""
+        if self._budget is not None:
+            self._budget.check(self.bytes)
+
+    def hold(self) -> None:
+        """Count all of it, or nothing where that raises TooLarge or Unavailable."""
+        if self._budget is None:
+            return
+        try:
+            self.check()
+            self._budget.hold("pictures", self, self._pictures)
+            self._budget.hold("scenes", self, COPIES * self.scene_bytes)
+        except ServiceError:
+            self.release()
+            raise
+
+    def release(self) -> None:
+        if self._budget is not None:
+            self._budget.release(self)

@@ -1,0 +1,253 @@
+"""One budget for the memory of all work: who would exceed it is refused, and caches give way."""
+
+from __future__ import annotations
+
+import asyncio
+import gc
+import time
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from starlette.requests import Request
+
+from gpu import context
+from service import memory
+from service.assets import AssetStore, ImageData
+from service.assets.cache import ParsedCache
+from service.assets.types import AssetLimits
+from service.bodies import Bodies
+from service.config import MIB, Config
+from service.memory import MemoryBudget, machine_memory
+from service.pack import CacheBudget, PackCache
+from service.problems import TooLarge, Unavailable
+from service.rendering.jobs.memory import PICTURE_BYTES, SAVED_BYTES
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.streams import protocol
+from service.rendering.streams.edit_session import EditSession
+from service.rendering.worker.device.memory import UNLIMITED, default_limit
+from tests.serving import PATIENCE_S, SCENE, Client, Server
+from tests.test_privileges import served
+
+
+class Work:
+    """Something that holds bytes."""
+
+
+def test_bytes_count_until_they_are_released() -> None:
+    budget, first, second = MemoryBudget(100), Work(), Work()
+    budget.hold("scenes", first, 60)
+    budget.hold("pictures", first, 10)
+    with pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
+        budget.hold("scenes", second, 31)
+    budget.hold("scenes", second, 30)
+    assert budget.used() == {"bodies": 0, "documents": 0, "scenes": 90, "pictures": 10, "assets": 0}
+    with pytest.raises(Unavailable):
+        budget.hold("scenes", first, 61)
+    assert budget.used()["scenes"] == 90  # as before
+    budget.hold("scenes", first, 20)
+    budget.release(second)
+    with budget.held("bodies", 70):
+        assert sum(budget.used().values()) == 100
+    with pytest.raises(TooLarge, match="SUNBOX_MEMORY"):
+        budget.hold("scenes", second, 101)
+    del first
+    gc.collect()
+    assert sum(budget.used().values()) == 0
+
+
+def test_caches_give_way_to_work() -> None:
+    budget, kept = MemoryBudget(100), [80]
+
+    def shrink(size: int) -> None:
+        kept[0] -= min(kept[0], size)
+
+    budget.cache("assets", lambda: kept[0], shrink)
+    with budget.held("bodies", 20):
+        assert kept == [80]
+    with budget.held("bodies", 50):
+        assert kept == [50] and budget.used()["assets"] == 50
+
+
+def test_the_caches_can_be_shrunk() -> None:
+    parsed = ParsedCache(AssetLimits())
+    for name in "abc":
+        parsed.load(name, lambda: ImageData(np.zeros((10, 10, 1), np.uint8), ()))
+    parsed.shrink(150)
+    assert parsed.bytes == 100
+    parsed.close()
+
+    class Part:
+        def __init__(self) -> None:
+            self.array = np.zeros(1000, np.uint8)
+
+    packed = CacheBudget()
+    caches = [PackCache(budget=packed), PackCache(budget=packed)]
+    for key in range(3):
+        caches[0].get(key, Part)
+    caches[1].get(0, Part)
+    packed.shrink(1001)
+    assert (caches[0].bytes, caches[1].bytes) == (1000, 1000)
+    packed.shrink(10**6)
+    assert packed.bytes == 2000  # what was made last is in use
+
+
+@pytest.mark.parametrize(
+    ("file", "text", "share"),
+    [("memory.max", "1000000", 1000000), ("memory.max", "max", None), ("memory/memory.limit_in_bytes", "9000", 9000)],
+)
+def test_a_container_s_limit_counts(
+    file: str, text: str, share: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(memory, "CGROUP", tmp_path / "none")
+    machine = machine_memory()
+    monkeypatch.setattr(memory, "CGROUP", tmp_path)
+    (tmp_path / file).parent.mkdir(exist_ok=True)
+    (tmp_path / file).write_text(text)
+    assert machine_memory() == (share or machine)
+    assert MemoryBudget().limit == machine_memory() // 2
+
+
+def test_the_device_has_a_share() -> None:
+    assert default_limit({"software": True, "memory": None}, 1000) == 1000
+    assert default_limit({"software": True, "memory": None}, None) == MemoryBudget().limit
+    assert default_limit({"software": False, "memory": 1000}, 5) == 800
+    assert default_limit({"software": False, "memory": None}, 5) == UNLIMITED
+
+
+def test_a_gpu_s_memory_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    class Context:
+        info = dict.fromkeys(("GL_RENDERER", "GL_VERSION", "GL_VENDOR"), "a GPU")
+        extensions = frozenset({"GL_NVX_gpu_memory_info"})
+
+    class Library:
+        def __init__(self, name: str) -> None:
+            pass
+
+        def glGetIntegerv(self, name: int, value: Any) -> None:
+            assert name == context.DEDICATED_VIDEO_MEMORY
+            value._obj.value = 4096
+
+    monkeypatch.setattr("ctypes.CDLL", Library)
+    assert context.describe(Context())["memory"] == 4 * MIB
+    monkeypatch.setattr(Context, "extensions", frozenset())
+    assert context.describe(Context())["memory"] is None
+
+
+@pytest.fixture
+def assets(tmp_path: Path) -> Iterator[AssetStore]:
+    store = AssetStore(tmp_path)
+    yield store
+    store.close()
+
+
+def start(width: int, generation: int) -> protocol.Start:
+    settings = {"width": width, "height": 100, "max_samples": 1}
+    return protocol.Start(type="start", generation=generation, scene=SCENE, settings=settings)
+
+
+def edit(session: EditSession, message: protocol.Start) -> None:
+    session.take(message)
+    session.settle()
+
+
+def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:
+    budget = MemoryBudget(200 * 100 * PICTURE_BYTES)
+    reader = RequestReader(Config(), assets, budget)
+    session, other = EditSession(reader, 1), EditSession(reader, 2)
+    edit(session, start(100, 1))
+    used = budget.used()
+    assert used["pictures"] == 100 * 100 * PICTURE_BYTES and used["scenes"] and used["documents"]
+    with pytest.raises(TooLarge, match="SUNBOX_MEMORY"):
+        edit(session, start(300, 2))
+    with pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
+        edit(other, start(120, 1))
+    assert budget.used()["pictures"] == used["pictures"]
+    edit(session, start(50, 3))
+    edit(other, start(120, 2))
+    assert budget.used()["pictures"] == 170 * 100 * PICTURE_BYTES
+    session.close()
+    other.close()
+    assert sum(budget.used().values()) - reader.caches.bytes == 0
+
+
+def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
+    budget = MemoryBudget(4 * MIB)
+    bodies = Bodies(Config(), budget)
+
+    async def receive() -> dict[str, Any]:
+        return {"type": "http.request", "body": bytes(2 * MIB), "more_body": False}
+
+    async def take(inner: bool) -> None:
+        request = Request({"type": "http", "method": "POST", "headers": []}, receive)
+        async with bodies.taken(request):
+            assert budget.used()["bodies"] >= 2 * MIB
+            if inner:
+                await take(False)
+
+    asyncio.run(take(True))
+    assert budget.used()["bodies"] == 0
+    with budget.held("scenes", MIB), pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
+        asyncio.run(take(True))
+    assert budget.used()["bodies"] == 0
+    bodies.close()
+
+
+def test_a_server_says_what_it_holds(tmp_path: Path) -> None:
+    with served(tmp_path, SUNBOX_MEMORY=str(64 * MIB)) as server, Client(server.url) as client:
+        assert client.until("hello")
+        client.start(settings={"width": 128, "height": 64, "max_samples": 1})
+        client.finished()
+        info = server.http.get("/v1/info").json()
+        assert info["memory"]["limit"] == info["renderer"]["memory_limit"] == 64 * MIB
+        assert info["memory"]["used"]["pictures"] == 128 * 64 * PICTURE_BYTES
+        lines = (line.rpartition(" ") for line in server.http.get("/metrics").text.splitlines())
+        metrics = {name: value for name, _, value in lines}
+        assert float(metrics['sunbox_memory_bytes{owner="pictures"}']) == 128 * 64 * PICTURE_BYTES
+        assert float(metrics["sunbox_memory_limit_bytes"]) == 64 * MIB
+        client.start(2, settings={"width": 1024, "height": 1024, "max_samples": 1})
+        told = client.until("error")[0]
+        assert told["generation"] == 2 and told["problem"]["status"] == 413
+        assert "SUNBOX_MEMORY" in told["problem"]["detail"]
+
+
+def test_the_session_server_is_within_its_memory(server: Server) -> None:
+    info = server.http.get("/v1/info").json()
+    assert sum(info["memory"]["used"].values()) < info["memory"]["limit"] == MemoryBudget().limit
+
+
+def test_renders_wait_for_memory(tmp_path: Path) -> None:
+    """A stored one goes on when there is some; who waits for the answer is told to come again."""
+
+    def body(size: int, samples: int) -> dict[str, Any]:
+        return {"scene": SCENE, "settings": {"width": size, "height": size, "max_samples": samples}}
+
+    def pictures() -> int:
+        return int(server.http.get("/v1/info").json()["memory"]["used"]["pictures"])
+
+    each = 500 * 500 * (PICTURE_BYTES + SAVED_BYTES)
+    with served(tmp_path, SUNBOX_MEMORY=str(64 * MIB)) as server:
+        for route in ("/v1/renders", "/v1/render"):
+            refused = server.http.post(route, json=body(1024, 1))
+            assert refused.status_code == 413 and "SUNBOX_MEMORY" in refused.json()["detail"]
+        first = server.http.post("/v1/renders", json=body(500, 1 << 24)).json()["id"]
+        wait_until(lambda: server.http.get(f"/v1/renders/{first}").json()["samples"] > 0)
+        second = server.http.post("/v1/renders", json=body(500, 1)).json()["id"]
+        refused = server.http.post("/v1/render", json=body(500, 1))
+        assert refused.status_code == 503 and int(refused.headers["retry-after"]) > 0
+        assert pictures() == each
+        assert server.http.get(f"/v1/renders/{second}").json()["state"] == "queued"
+        server.http.delete(f"/v1/renders/{first}")  # it rests with the renderer, and makes room
+        assert server.http.get(f"/v1/renders/{second}?wait=30").json()["state"] == "done"
+        assert pictures() == each
+        for id in (first, second):  # from the disk, one after the other
+            assert server.http.get(f"/v1/renders/{id}/image").status_code == 200
+
+
+def wait_until(condition: Callable[[], bool]) -> None:
+    until = time.monotonic() + PATIENCE_S
+    while not condition():
+        assert time.monotonic() < until
+        time.sleep(0.05)
