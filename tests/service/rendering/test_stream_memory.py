@@ -120,7 +120,7 @@ def test_large_messages_wait_in_the_network() -> None:
     """Behind another one; as values they take thirty times what their texts do."""
 
     class Quiet:
-        def open(self, stream: Stream) -> int:
+        def open(self, stream: Stream, client: str = "") -> int:
             return 1
 
         def send(self, message: object) -> None: ...
