@@ -1,12 +1,12 @@
 """Measurements of the product by the product: `sunbox bench`.
 
-speed              paths per second, compile times, and what a person at the editor waits for
-timing             how long a sample of every pixel takes
-growth             what triangles cost
+speed              paths per second, compile times, and the latencies of the editor
+timing             the time of a sample of every pixel
+growth             the cost of more triangles
 latency            start-up and slider moves, at the socket of a real server
 hand               from a slider to other pixels, in a real browser
 scenes             the scenes that are measured
-machine            what was measured on
+machine            a description of the machine
 hemisphere         how error falls with samples of the hemisphere, and with time
 compare            this checkout beside an earlier revision
 compare_run        one side of `compare`
@@ -16,16 +16,16 @@ peer_sunbox        Sunbox's side
 peer_mitsuba       Mitsuba's side
 peer_cycles        Cycles' side
 peer_blender       the scenes for Cycles
-tradeoff           the price list: what every knob that buys speed costs in error
-tradeoff_scenes    its scenes
-tradeoff_report    the same for people
+tradeoff           the price list: the error that each setting costs which saves time
+tradeoff_scenes    the scenes of `tradeoff`
+tradeoff_report    the price list as a page for people
 pareto             from measured curves to prices
 soak               mixed clients for a long time
-soak_clients       what they do
-soak_page          a hand on the editor meanwhile
+soak_clients       the clients of `soak`
+soak_page          a user of the editor in a browser, for `soak`
 soak_restarts      a thousand renders while the whole server is restarted, its disk fills up and its clock jumps
-soak_server        the server that is soaked
-soak_tally         what they went through
+soak_server        the server under test of `soak`
+soak_tally         the results of `soak`, counted
 seeds              the experiments of the programs that Sunbox grew out of
 gallery            the README's pictures
 thumbnails         the editor's pictures of the material presets

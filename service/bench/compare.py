@@ -1,4 +1,4 @@
-"""What a change did: this checkout beside an earlier revision, in turns, in speed and in error at equal samples."""
+"""This checkout beside an earlier revision, in turns: their speed, and their error at equal samples."""
 
 from __future__ import annotations
 
@@ -38,11 +38,11 @@ class Options:
 
 
 class NoRevision(Exception):
-    """This is no checkout, or it has no such revision."""
+    """The folder is no checkout, or it has no such revision."""
 
 
 class Side:
-    """A process that renders with one tree."""
+    """A process that renders with the source of one revision."""
 
     def __init__(self, tree: Path, folder: Path) -> None:
         command = [sys.executable, "-P", str(SCRIPT), str(folder / "cases.json")]
@@ -52,7 +52,8 @@ class Side:
         self._process = subprocess.Popen(command, cwd=tree, env=environment, text=True, stdin=pipe, stdout=pipe)
 
     def time(self, case: int, size: int, samples: int) -> dict[str, float]:
-        """Raises EOFError when the tree can't render it; stderr says why."""
+        """The seconds of a run by each clock. Raises EOFError where the revision cannot render the case; stderr says
+        why."""
         return self._ask({"case": case, "size": size, "samples": samples, "seed": 0})
 
     def picture(self, case: int, size: int, samples: int, seed: int) -> np.ndarray:
@@ -97,7 +98,7 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
 
 
 def unpack(revision: str, to: Path) -> str:
-    """Puts the tree of that revision there; its commit."""
+    """Unpack the source of that revision into a folder. Returns its commit."""
     root = str(machine.ROOT)
     found = subprocess.run(["git", "-C", root, "rev-parse", f"{revision}^{{commit}}"], capture_output=True, text=True)
     if found.returncode:
@@ -123,7 +124,7 @@ def _compared(case: int, sides: tuple[Side, Side], options: Options) -> dict[str
     try:
         runs = [[side.time(case, options.size, options.samples) for side in sides] for _ in range(options.runs)]
     except EOFError:
-        return {"failed": "one of the two can't render it"}
+        return {"failed": "one of the two revisions cannot render it"}
     row: dict[str, Any] = {}
     for key in ("wall", "cpu"):
         times = [[1e3 * side[f"{key}_s"] / options.samples for side in run] for run in runs]

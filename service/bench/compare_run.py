@@ -1,7 +1,7 @@
-"""One side of `compare`: `python -P compare_run.py CASES.json`, with the tree that is to be measured on the path.
+"""One side of `compare`: `python -P compare_run.py CASES.json`, with the source that is to be measured on the path.
 
-Uses only what every revision has. Answers each line {"case", "size", "samples", "seed", "out"?} with the seconds that
-took, of the clock and of the processors; the picture goes to `out`.
+It uses only functions that every revision has. It answers each line {"case", "size", "samples", "seed", "out"?} with
+the seconds that this took, of the clock and of the processors, and writes the picture to `out`.
 """
 
 from __future__ import annotations

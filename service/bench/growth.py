@@ -1,4 +1,4 @@
-"""What triangles cost: one bumpy ball, from some thousand triangles to a million, seen from one place."""
+"""The cost of triangles: one bumpy ball, of some thousand to a million triangles, seen from one place."""
 
 from __future__ import annotations
 
@@ -20,16 +20,16 @@ from service.scene import parse_scene
 
 LEVELS = range(3, 9)  # 1 280, 5 120, ... 1 310 720 triangles
 BOUNCES, RUNS = 4, 3
-BUMPS = 9  # of the ball, about
+BUMPS = 9  # bumps around the ball, about
 
 
 def measure(told: Callable[[str], None], levels: range = LEVELS) -> list[dict[str, float]]:
-    """A row for each level: triangles, what the tree took, milliseconds for a sample of every pixel."""
+    """A row for each level: triangles, the time to build the tree, milliseconds for a sample of every pixel."""
     return [_row(ball(level), told) for level in levels]
 
 
 def ball(level: int) -> MeshData:
-    """The same form at each level, to a triangle's size."""
+    """A ball of the same form at each level, up to the size of a triangle."""
     round_ = trimesh.creation.icosphere(subdivisions=level)
     x, y, z = (BUMPS * round_.vertices).T
     bumps = 1 + 0.12 * np.sin(x + 0.3) * np.sin(y + 1) * np.sin(z + 2)
@@ -66,7 +66,7 @@ def _row(mesh: MeshData, told: Callable[[str], None]) -> dict[str, float]:
 
 
 def table(rows: list[dict[str, float]]) -> str:
-    """Growth like log n adds the same for each fourfold."""
+    """A table of the rows; growth like log n adds the same for each factor of four."""
     lines = [f"{'triangles':>12}  tree s  Mtri/s  ms/sample   added"]
     before = None
     for row in rows:

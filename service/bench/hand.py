@@ -1,6 +1,7 @@
-"""From hand to eye, in a real browser: a slider's input event to other pixels on the canvas.
+"""The latency from hand to eye in a real browser: from a slider's input event to other pixels on the canvas.
 
-Once beside the server, once with 100 ms more between them (50 each way). Needs playwright and Chromium.
+It is measured beside the server, and with 100 ms added to the round trip (50 each way). This needs playwright and
+Chromium.
 """
 
 from __future__ import annotations
@@ -16,12 +17,12 @@ from typing import Any
 from service.bench.latency import server
 
 MOVES = 40
-ADDED_S = 0.1  # to a round trip
+ADDED_S = 0.1  # seconds that are added to a round trip
 CHUNK = 1 << 16
 PATIENCE_MS = 60_000
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage"]
 
-# Metallic goes from one end to the other: what changes by so much on a picture of 8 x 8 averages is no noise.
+# Metallic goes from one end to the other: a change of this size in a picture of 8 x 8 averages is not noise.
 MEASURE = """async (moves) => {
     const slider = document.querySelector("#material-form [data-field=metallic] input[type=range]");
     const picture = document.querySelector("#picture");
@@ -86,7 +87,7 @@ def _moves(port: int) -> list[float]:
 
 @contextmanager
 def _longer_way(port: int) -> Iterator[int]:
-    """A port whose bytes arrive half of ADDED_S later, each way and in order."""
+    """A port that forwards bytes in order, each way half of ADDED_S later."""
     loop = asyncio.new_event_loop()
     ready: asyncio.Future[Any] = loop.create_future()
 

@@ -1,6 +1,6 @@
 """Mixed clients for a long time while renderers are killed: `python -m service.bench.soak --minutes 60`.
 
-Prints a table of what they went through. The exit code is 1 when anything was lost, leaked or unfair.
+It prints a table of the results. The exit code is 1 when anything was lost, leaked or unfair.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from service.bench.soak_server import Server, descriptors, resident
 from service.bench.soak_tally import Tally
 
 STREAMS, RENDERS = 4, 2
-KILL_EVERY_S = (3.0, 12.0)  # a renderer lives so long
+KILL_EVERY_S = (3.0, 12.0)  # bounds on the life of a renderer, in seconds
 WATCH_S = 2.0
 STUCK_S = 60.0  # for a client to come to its end after the last kill, or for a render to get any further
 SETTLED_S = 20.0  # after which memory is compared with what it is at the end
@@ -50,7 +50,7 @@ def main() -> int:
 
 
 def _run(server: Server, tally: Tally, seconds: float, chance: random.Random) -> None:
-    """All of them at once, until the time is over."""
+    """Run all clients at once, until the time is over."""
     over = threading.Event()
     acts: list[Callable[[Server, Tally, threading.Event, random.Random], None]] = [
         *[clients.drag] * STREAMS,
@@ -92,7 +92,7 @@ def _kill(server: Server, tally: Tally, over: threading.Event, chance: random.Ra
 
 
 def _watch(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
-    """Memory and descriptors while it lasts."""
+    """Record memory and descriptors until the end."""
     began = time.monotonic()
     while not over.wait(WATCH_S):
         pid = server.renderer()

@@ -1,4 +1,5 @@
-"""The clients of a soak: who drags, renders, uploads, cancels, vanishes. Each counts what it did not get."""
+"""The clients of a soak, which drag, render, upload, cancel or vanish. Each counts the answers that it did not
+get."""
 
 from __future__ import annotations
 
@@ -25,7 +26,8 @@ SHARING_S = 15.0
 
 
 class Stream:
-    """Acknowledges every frame, as the editor does; takes its session up again when the connection drops."""
+    """A stream that acknowledges every frame, as the editor does, and resumes its session when the connection
+    drops."""
 
     def __init__(self, server: Server) -> None:
         self._url = server.url.replace("http://", "ws://") + "/v1/stream"
@@ -41,7 +43,7 @@ class Stream:
         return made
 
     def drop(self) -> None:
-        """The connection, not the session."""
+        """Close the connection, but not the session."""
         self.socket.socket.shutdown(socket.SHUT_RDWR)
         self.socket = self._connect()
 
@@ -53,7 +55,7 @@ class Stream:
         self.say(kind, generation=self.generation, **message)
 
     def hear(self, timeout_s: float = PATIENCE_S) -> dict[str, Any]:
-        """A message, or a frame's header."""
+        """The next message, or the header of the next frame."""
         message = self.socket.recv(timeout_s)
         if isinstance(message, str):
             told: dict[str, Any] = json.loads(message)
@@ -68,7 +70,7 @@ def scene(server: Server, name: str) -> Any:
 
 
 def drag(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
-    """Moves the camera now and then, drops its connection now and then, and wants to see each move."""
+    """Move the camera and drop the connection at random times, and wait for a frame of each move."""
     name = f"drag {threading.get_ident()}"
     stream = Stream(server)
     stream.move("start", scene=scene(server, chance.choice(SCENES)), settings={"width": SIDE, "height": SIDE})
@@ -103,7 +105,7 @@ def drag(server: Server, tally: Tally, over: threading.Event, chance: random.Ran
 
 
 def render(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
-    """A render to its end and its picture, which must have all its samples."""
+    """Render a picture to its end; it must have all its samples."""
     document = scene(server, chance.choice(SCENES))
     while not over.is_set():
         wanted = chance.randint(20, 200)
@@ -146,7 +148,7 @@ def cancel(server: Server, tally: Tally, over: threading.Event, chance: random.R
 
 
 def upload(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
-    """Meshes, good and bad."""
+    """Upload meshes, valid and broken ones."""
     while not over.wait(chance.uniform(0.2, 2.0)):
         points = [f"v {chance.random()} {chance.random()} {chance.random()}" for _ in range(300)]
         faces = [f"f {n} {n + 1} {n + 2}" for n in range(1, 298)]
@@ -159,7 +161,7 @@ def upload(server: Server, tally: Tally, over: threading.Event, chance: random.R
 
 
 def vanish(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
-    """Comes, starts something, and reads no more or is gone."""
+    """Connect, start something, and stop reading or disconnect."""
     document = scene(server, SCENES[0])
     silent: list[Stream] = []
     while not over.wait(chance.uniform(1.0, 5.0)):

@@ -1,4 +1,4 @@
-"""A hand on the editor, in a real browser, for as long as a soak takes: orbits, slides, and the page's memory."""
+"""A user of the editor in a real browser during a soak, who orbits and moves sliders; and the page's memory."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from service.bench.soak_tally import Tally
 if TYPE_CHECKING:
     from playwright.sync_api import CDPSession, Locator, Page
 
-PATIENCE_MS = 60_000  # renderers are killed under this page's hand
+PATIENCE_MS = 60_000  # long, as renderers are killed meanwhile
 MOVES = (10, 60)  # of the mouse in one drag
 WEIGH_S = 5.0
 SETTLED_S = 20.0  # after which the heap is compared with what it is at the end
@@ -24,14 +24,14 @@ NEWEST = "#stage.live[aria-busy=false]"
 
 
 def missing() -> str | None:
-    """What there would have to be for a drag session, or None."""
+    """The thing that is missing for a drag session, or None."""
     if find_spec("playwright") is None:
         return "playwright (pip install playwright)"
     return None if shutil.which("chromium") else "Debian's chromium"
 
 
 def drag(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
-    """Drags in turn over the picture and along a slider, and wants to see what came of each."""
+    """Drag over the picture and along a slider in turns, and wait for the frame of each drag."""
     from playwright.sync_api import Error, sync_playwright
 
     try:

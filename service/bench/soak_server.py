@@ -1,4 +1,4 @@
-"""The server that is soaked: its process, and what the system says of it."""
+"""The server under test: its process, and its use of memory and descriptors."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ class Server:
     def ask(
         self, method: str, path: str, body: bytes | Any = None, headers: Mapping[str, str] | None = None
     ) -> tuple[int, bytes]:
-        """Status and body; 0 when there was no answer."""
+        """The status and body of an answer; status 0 where there was none."""
         data = body if body is None or isinstance(body, bytes) else json.dumps(body).encode()
         request = urllib.request.Request(self.url + path, data, dict(headers or {}), method=method)
         request.add_header(
@@ -102,7 +102,7 @@ def resident(pid: int | None) -> int:
 
 
 def descriptors(server: Server) -> int:
-    """Of the server, which only root could count from outside; 0 where it gives no answer."""
+    """The server's descriptors, from its metrics, as only root could count them from outside; 0 without an answer."""
     lines = server.ask("GET", "/metrics")[1].decode().splitlines()
     return next((int(float(line.split()[1])) for line in lines if line.startswith("process_open_fds ")), 0)
 

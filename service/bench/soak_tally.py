@@ -1,4 +1,4 @@
-"""What the clients of a soak went through, counted from many threads, and its table."""
+"""The results of a soak's clients, counted from many threads, and their table."""
 
 from __future__ import annotations
 
@@ -17,9 +17,9 @@ class Tally:
     def __init__(self) -> None:
         self._lock = threading.Lock()
         self.kills = self.frames = self.renders = self.cancelled = self.uploads = self.vanished = self.stuck = 0
-        self.drags = 0  # by a hand on the page
-        self.lost: Counter[str] = Counter()  # what should not have happened, by what
-        self.errors: Counter[str] = Counter()  # what was refused, and meant to be
+        self.drags = 0  # on the page
+        self.lost: Counter[str] = Counter()  # losses, which should not happen, by kind
+        self.errors: Counter[str] = Counter()  # refusals that were expected, by kind
         self.first_frames_s: list[float] = []
         self.recoveries_s: list[float] = []
         self.jain: float | None = None
@@ -44,7 +44,7 @@ class Tally:
             self.errors[what] += 1
 
     def kill(self) -> None:
-        """A renderer was killed: who watches frames says when the next one comes."""
+        """Record that a renderer was killed; the clients that watch frames record when the next one comes."""
         with self._lock:
             self.kills += 1
             for watcher in self._watchers:
@@ -58,11 +58,11 @@ class Tally:
                 self.recoveries_s.append(time.monotonic() - self._killed_at.pop(watcher))
 
     def advance(self) -> None:
-        """What the calling thread waits for has got further."""
+        """Record that the work for which the calling thread waits has progressed."""
         self._advanced_at[threading.get_ident()] = time.monotonic()
 
     def still_s(self, thread: int | None, since: float) -> float:
-        """Seconds since what that thread waits for got further, from `since` at the earliest."""
+        """Seconds since the work for which that thread waits has progressed, counted from `since` at the earliest."""
         return time.monotonic() - max(since, self._advanced_at.get(thread, since))
 
     def moved(self, watcher: str, first_frame_s: float) -> None:
@@ -130,7 +130,7 @@ class Tally:
 
 
 def _halves(seen: Sequence[tuple[int, ...]], which: int) -> tuple[float, float]:
-    """Medians of the first and the second half of what was seen."""
+    """Medians of the first and the second half of the records."""
     values = [each[which] for each in seen]
     middle = len(values) // 2
     return (median(values[:middle]), median(values[middle:])) if middle else (0.0, 0.0)

@@ -1,4 +1,4 @@
-"""How fast: paths per second on scenes of each kind, compile times, and what a person at the editor waits for."""
+"""Speed: paths per second on scenes of each kind, compile times, and the latencies of the editor."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ class Options:
 
 
 def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
-    """Machine, a row for each case, latencies; `told` hears what is being measured."""
+    """The machine, a row for each case, latencies; `told` is called with the name of each measurement."""
     rows = []
     for case in cases():
         told(f"{case.name}, {case.max_bounces} bounces")

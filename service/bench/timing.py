@@ -1,4 +1,4 @@
-"""How long a sample of every pixel takes."""
+"""The time of a sample of every pixel."""
 
 from __future__ import annotations
 

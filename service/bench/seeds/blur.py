@@ -1,4 +1,4 @@
-"""A blurred environment: what it takes from the noise, and what it takes from the picture."""
+"""A blurred environment: how much noise it removes, and how much of the picture."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The experiments for people, as Markdown: what was measured, and what is to be seen."""
+"""The page about the experiments, as Markdown: their figures, and what the pictures show."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ from typing import Any
 
 from service.bench.seeds.spheres import NONE, OURS, SPLITS, UNORDERED
 
-NAME = "experiments"  # of the page, and of the folder with its pictures
+NAME = "experiments"  # the name of the page, and of the folder with its pictures
 Row = dict[str, Any]
 
-# What the earlier programs took on two llvmpipe cores (Mesa 22.3.6). These figures are not measured by this command.
+# Times of the earlier programs on two llvmpipe cores (Mesa 22.3.6). This command does not measure them.
 EARLIER_FIELDS_MS = {100: 249, 1000: 699, 10_000: 1890}  # a path of each of 960 x 544 pixels
 FIELD_PIXELS = 960 * 544
 EARLIER_CUBEMAP_MS = {1: 343, 16: 921, 64: 2357, 256: 8814}  # at 800 x 800

@@ -27,7 +27,7 @@ PLASTIC: dict[str, Document] = {
     "disney": {"type": "disney", "base_color": COLOR, "roughness": ROUGHNESS},
     "principled": {"type": "principled", "base_color": COLOR, "roughness": ROUGHNESS},
 }
-# The same without what lies under the surface, and a white metal.
+# The same without the light from under the surface, and a white metal.
 GLOSS = {
     name: {key: 0 if key in ("diffuse", "base_color") else value for key, value in document.items()}
     for name, document in PLASTIC.items()
@@ -40,13 +40,13 @@ METAL: dict[str, Document] = {
     "principled": {"type": "principled", "base_color": 1, "metallic": 1, "roughness": ROUGHNESS},
 }
 ANGLES = (0.0, 15.0, 30.0, 45.0, 60.0, 70.0, 80.0, 85.0, 89.0)
-LIT_FROM = 45.0  # degrees, where highlights are looked at
+LIT_FROM = 45.0  # degrees of incidence at which highlights are compared
 SIZE, SAMPLES, TIMED = 120, 96, 320
 T = TypeVar("T")
 
 
 def known() -> list[str]:
-    """Those of the models that the scene document has."""
+    """The models that the scene document supports."""
     return [name for name, document in PLASTIC.items() if _parsed(document) is not None]
 
 
@@ -93,7 +93,7 @@ def scene(material: Document, light: str) -> Document:
 
 
 def _albedo(stage: Stage, material: Document) -> list[float]:
-    """What share of the light that comes from an angle is reflected; the mean of the channels."""
+    """The share of the light from an angle that is reflected, as the mean of the channels."""
     samples = stage.either(1 << 16, 256)
     found = _done(stage.renderer.bsdf.albedo(_packed(material), _directions(np.array(ANGLES)), samples))
     return [float(x) for x in found.albedo.mean(axis=1)]

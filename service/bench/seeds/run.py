@@ -14,7 +14,8 @@ from service.bench.seeds.stage import Stage
 
 
 def measure(quick: bool, told: Callable[[str], None]) -> tuple[dict[str, Any], dict[str, np.ndarray]]:
-    """(the figures, as JSON; pictures (h, w, 3) of sRGB bytes by name). `quick`: small, and the figures mean nothing.
+    """(the figures, as JSON; pictures (h, w, 3) of sRGB bytes by name). `quick` runs are small; their figures mean
+    nothing.
 
     Raises GpuError.
     """

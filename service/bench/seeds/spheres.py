@@ -1,4 +1,5 @@
-"""Fields of 100 to 10 000 spheres: met one by one, through trees of several kinds, and in the order of building."""
+"""Fields of 100 to 10 000 spheres: tested one by one, through trees of several kinds, and in the order of
+building."""
 
 from __future__ import annotations
 
@@ -26,7 +27,7 @@ SPLITS = {
     "SAH, 16 bins": Split.SAH_16,
     "Sunbox": Split.SAH,
 }
-FAR = 1e6  # metres, far beyond what a ray meets
+FAR = 1e6  # metres, far beyond any hit
 OURS, UNORDERED, NONE = "Sunbox", "one order", "no tree"
 COLORS = ("#e76f51", "#f4a261", "#e9c46a", "#2a9d8f", "#264653", "#f1ede4")
 
@@ -81,8 +82,8 @@ def field(count: int) -> Document:
 
 
 def without_tree(arrays: SceneArrays) -> SceneArrays:
-    """Every ray tries every sphere: the nodes are a list of leaves around which the boxes hold everything. A leaf has
-    as many spheres as it can, so that its box hardly counts."""
+    """The scene without a tree, so that every ray tests every sphere: the nodes are a list of leaves whose boxes
+    contain everything. A leaf has as many spheres as it can, so that its box hardly costs time."""
     n = len(arrays.spheres)
     firsts = np.arange(0, n, LEAF_MAX_COUNT, dtype=np.uint32)
     counts = np.minimum(LEAF_MAX_COUNT, n - firsts).astype(np.uint32)

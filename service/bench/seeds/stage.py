@@ -1,4 +1,4 @@
-"""What the experiments share: scenes to pictures, time in interleaved rounds, pictures to sheets."""
+"""Functions that the experiments share: scenes to pictures, time in interleaved rounds, pictures to sheets."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ GAP = 4  # pixels between the pictures of a sheet
 
 @dataclass
 class Stage:
-    """A renderer, what is told on the way, and the pictures that the page will show: (h, w, 3) bytes by name."""
+    """A renderer, a function that reports progress, and the pictures of the page: (h, w, 3) bytes by name."""
 
     renderer: Renderer
     quick: bool
@@ -94,7 +94,7 @@ def shown(pixels: np.ndarray, exposure: float = 0.0) -> np.ndarray:
 
 
 def sheet(rows: Sequence[Sequence[np.ndarray]]) -> np.ndarray:
-    """Pictures of one size (h, w, 3) in rows, on white."""
+    """A sheet of pictures of one size (h, w, 3) in rows, on white."""
     height, width = rows[0][0].shape[:2]
     columns = max(map(len, rows))
     size = len(rows) * (height + GAP) - GAP, columns * (width + GAP) - GAP, 3
