@@ -1,4 +1,4 @@
-"""What the asset room hands out, and its limits. Imports nothing of the service."""
+"""The results of reading assets, and the limits. This module imports nothing of the service."""
 
 from dataclasses import dataclass
 from typing import Any, Literal, Protocol
@@ -14,16 +14,16 @@ Kind = Literal["mesh", "image", "scene"]
 
 @dataclass(frozen=True)
 class MeshData:
-    """Triangles as the file has them: neither merged nor reordered, polygons triangulated. Arrays are read-only."""
+    """Triangles as in the file, neither merged nor reordered; polygons are triangulated. The arrays are read-only."""
 
     vertices: Doubles  # (n, 3), finite
     faces: Indices  # (m, 3), in range, counter-clockwise from outside
     normals: Floats | None  # (n, 3), unit length; None where the file has none
-    uvs: Floats | None = None  # (n, 2), finite, v pointing up: of set 0
-    uvs_1: Floats | None = None  # the same of set 1
+    uvs: Floats | None = None  # (n, 2), finite, v pointing up: set 0
+    uvs_1: Floats | None = None  # the same for set 1
     colors: Floats | None = None  # (n, 3), linear, 0..1; or (n, 4), with an alpha that multiplies the material's
-    warnings: tuple[str, ...] = ()  # what is odd about it, for whoever made it
-    tangents: Floats | None = None  # (n, 4), as glTF's TANGENT: a direction of any length, zero of none; handedness
+    warnings: tuple[str, ...] = ()  # oddities, for the author of the file
+    tangents: Floats | None = None  # (n, 4), as glTF's TANGENT: a direction of any length, zero for none; handedness
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class ImageData:
 
 @dataclass(frozen=True)
 class ScenePart:
-    """A file of its own, made of a part of a scene's: a mesh as PLY, or an image as it was (then without counts)."""
+    """A separate file for a part of a scene: a mesh as PLY, or an image as it was (then without counts)."""
 
     data: bytes | memoryview
     pointer: str  # where it came from
@@ -53,7 +53,7 @@ class ScenePart:
 class SceneFile:
     """A file that is a whole scene. `document` refers to `parts[k]` as "part:k".
 
-    Without lights of its own it has no environment: whoever knows a default one adds it.
+    A file without lights has no environment here; the caller adds a default one.
     """
 
     document: dict[str, Any]
@@ -68,7 +68,7 @@ class SceneFile:
 
 @dataclass(frozen=True)
 class AssetInfo:
-    """What an upload is answered with; a mesh has no width and an image no triangles: those are None.
+    """The answer to an upload. A mesh has no width and an image no triangles: those are None.
 
     `warnings`, `[{pointer, detail, count?}]`, say what is odd about it, or what a scene asks for and does not get; a
     pointer is into the file's own JSON, or FILE:LINE of an OBJ's files, the first of `count` places.
@@ -91,7 +91,7 @@ class AssetInfo:
 
 @dataclass(frozen=True)
 class AssetLimits:
-    """Bounds on one file, on the process that parses it, and on what is kept in memory."""
+    """Bounds on one file, on the process that parses it, and on the cache in memory."""
 
     max_triangles: int = 16_000_000
     max_texels: int = 1 << 26  # 8192 x 8192: as float32 RGBA 1 GiB
@@ -103,7 +103,7 @@ class AssetLimits:
 
 
 class Assets(Protocol):
-    """Where a scene's asset references lead. Both methods raise AssetError, and may be called on any thread."""
+    """The assets to which a scene's references lead. Both methods raise AssetError, and any thread may call them."""
 
     def mesh(self, ref: str) -> MeshData: ...
 

@@ -1,4 +1,5 @@
-"""A zip's files. What they claim to be is bounded before one is unpacked, and what is unpacked by what they claim."""
+"""The files of a zip. The sizes that they claim are bounded before any is unpacked, and unpacking ends at those
+sizes."""
 
 from __future__ import annotations
 
@@ -12,18 +13,19 @@ from service.assets.errors import ParseError
 from service.assets.obj.paths import DRIVE
 
 MOST_ENTRIES = 10_000
-# A text of numbers shrinks to a third, a grid's to a tenth; a bomb to a thousandth. The slack is for small files.
+# A text of numbers is compressed to a third, that of a grid to a tenth, a zip bomb to a thousandth. The slack is for
+# small files.
 MOST_RATIO, SLACK = 32, 16 << 20
 METHODS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)
 ENCRYPTED = 0x1
-UNUSED = ("__MACOSX/", ".DS_Store")  # what programs put beside a folder's files
+UNUSED = ("__MACOSX/", ".DS_Store")  # files that programs add to a folder
 
 
 class Archive:
-    """Raises ParseError, on opening where an entry's name, kind or size is not allowed."""
+    """The files of a zip. Raises ParseError when it is opened if an entry's name, kind or size is not allowed."""
 
     def __init__(self, data: bytes | memoryview, max_bytes: int) -> None:
-        """`max_bytes` bounds what all its files may hold together once they are unpacked."""
+        """`max_bytes` bounds the size of all its files together when they are unpacked."""
         try:
             self._zip = zipfile.ZipFile(io.BytesIO(data))
         except (zipfile.BadZipFile, NotImplementedError, ValueError, OverflowError) as error:
@@ -57,7 +59,7 @@ class Archive:
         return self._files[name].file_size
 
     def read(self, name: str) -> bytes:
-        """The bytes of a file; as many as its entry promises."""
+        """The bytes of a file, as many as its entry claims."""
         entry = self._files[name]
         try:
             with self._zip.open(entry) as file:

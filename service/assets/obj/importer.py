@@ -1,7 +1,7 @@
-"""A zip with an OBJ file, its material libraries and textures as a scene document, and what it refers to.
+"""A zip with an OBJ file, its material libraries and textures as a scene document with meshes and images as parts.
 
-Each material's triangles become a mesh of their own. Coordinates stay as they are; nothing is merged or reordered
-otherwise.
+Each material's triangles become a mesh of their own. Coordinates stay as they are, and nothing else is merged or
+reordered.
 """
 
 from __future__ import annotations
@@ -29,12 +29,12 @@ from service.assets.scenes.ply_writer import ply
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import AssetLimits, Indices, SceneFile
 
-MOST_MATERIALS = 10_000  # that faces wear
+MOST_MATERIALS = 10_000  # materials that faces use
 MOST_LIBRARIES = 1_000
 
 
 def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
-    """Raises ParseError."""
+    """The scene of a zipped OBJ file. Raises ParseError."""
     archive = Archive(data, limits.max_file)
     path = _model(archive)
     read = read_obj_with_materials(text(archive.read(path)))
@@ -89,7 +89,7 @@ def _model(archive: Archive) -> str:
 
 
 def _library(model: str, statements: list[Named], archive: Archive, notes: Warnings) -> dict[str, MtlMaterial]:
-    """The materials of all libraries that are there; of equal names the first one's."""
+    """The materials of all libraries that the zip contains; the first of several with the same name."""
     if len(statements) > MOST_LIBRARIES:
         raise ParseError(f"it names {len(statements)} material libraries; {MOST_LIBRARIES} are allowed")
     found: dict[str, MtlMaterial] = {}
@@ -114,7 +114,7 @@ def _library(model: str, statements: list[Named], archive: Archive, notes: Warni
 
 
 def _by_material(read: MaterialMesh) -> list[tuple[str, Indices]]:
-    """The materials that triangles wear, in the order in which the file first uses them, and these triangles."""
+    """The materials that triangles use, in the order in which the file first uses them, and those triangles."""
     counts = np.bincount(read.of_triangle, minlength=len(read.materials))
     if np.count_nonzero(counts) > MOST_MATERIALS:
         raise ParseError(f"its faces wear {np.count_nonzero(counts)} materials; {MOST_MATERIALS} are allowed")

@@ -12,15 +12,15 @@ from service.assets.scenes.warnings import Warnings
 BRIGHTEST = 1e20  # the contract's range of radiometric values
 DEFAULT_IOR, MAX_IOR = 1.5, 4.0
 SPECULAR_F0 = 0.08  # reflectance head-on of principled's specular 1
-# `illum` names an illumination model: 0, 1 without highlight; 3, 5 mirrors; 4, 6, 7, 9 glass.
+# The illumination models of `illum`: 0 and 1 have no highlight; 3 and 5 are mirrors; 4, 6, 7 and 9 are glass.
 WITHOUT_HIGHLIGHT, MIRRORS, GLASS, REFRACTS = (0, 1), (3, 5), (4, 6, 7, 9), (6, 7)
-DARK = 0.1  # of Ks: a mirror whose Kd is darker than that is a metal of colour Ks
-UNKNOWN = {"type": "diffuse", "albedo": 0.8}  # of a face without material
+DARK = 0.1  # share of Ks: a mirror whose Kd is darker than that is a metal of colour Ks
+UNKNOWN = {"type": "diffuse", "albedo": 0.8}  # the material of a face without one
 PBR = ("pr", "pm", "ps", "pc", "pcr", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr")
 
 
 class Materials:
-    """`documents` by name, as far as they were asked for."""
+    """The materials that faces use; `documents` are the finished ones by name."""
 
     def __init__(self, library: dict[str, MtlMaterial], textures: Textures, has_uvs: bool, notes: Warnings) -> None:
         """`has_uvs`: whether the mesh has texture coordinates, without which no texture is used."""
@@ -28,7 +28,7 @@ class Materials:
         self.documents: dict[str, dict[str, Any]] = {}
 
     def add(self, name: str, place: str) -> str:
-        """The document's name for what `usemtl` calls `name`."""
+        """The document's name for the material that `usemtl` calls `name`."""
         material = self.library.get(name)
         if material is None and name:
             self.notes.add(place, f"the material {name[:80]!r} is not defined; a grey one is shown in its place")
@@ -80,7 +80,7 @@ class _Converter:
         return self.illum in MIRRORS and ks > 0 and kd <= DARK * ks and "map_kd" not in self.material.maps
 
     def _base_color(self, is_glass: bool) -> Any:
-        """Kd; of glass Tf, the transmission filter, where there is one: base_color tints what goes through."""
+        """Kd; for glass Tf, the transmission filter, where there is one, as base_color tints transmitted light."""
         if is_glass and max(self.material.color("tf", 0.0)) > 0:
             return _plain(self._fraction("tf", 0.0))
         return self._color("kd", "map_kd", 0.8)
@@ -118,7 +118,7 @@ class _Converter:
         return level
 
     def _ior(self) -> float:
-        """Ni; of many exporters 1, and of some 0, says that there is none."""
+        """Ni, or None where it is 1 or 0, by which exporters say that they have no value."""
         ior = self.material.number("ni", DEFAULT_IOR)
         if ior > MAX_IOR:
             self.notes.add(
@@ -129,7 +129,7 @@ class _Converter:
     def _roughness(self, is_sharp: bool) -> Any:
         """Pr, or the width of a highlight of exponent Ns: alpha^2 = 2 / (Ns + 2) [Walter et al. 2007, section 5.2].
 
-        What MTL traces rays for, glass and mirrors, is sharp, whatever the exponent of its highlight.
+        Glass and mirrors, for which MTL demands ray tracing, are sharp, whatever the exponent of their highlight.
         """
         if "pr" in self.material.numbers or "map_pr" in self.material.maps:
             return self._scalar("pr", "map_pr", 1.0)
@@ -141,7 +141,7 @@ class _Converter:
         return float((2 / (max(exponent, 0.0) + 2)) ** 0.25)
 
     def _layers(self) -> dict[str, Any]:
-        """Sheen, coat and anisotropy."""
+        """Set sheen, coat and anisotropy."""
         found: dict[str, Any] = {}
         sheen, coat = self._scalar("ps", "map_ps", 0.0), self._scalar("pc", "map_pc", 0.0)
         if sheen != 0:
@@ -206,7 +206,8 @@ class _Converter:
         return {"alpha": opacity} if opacity < 1 else {}
 
     def _color(self, keyword: str, mapped: str, default: float) -> Any:
-        """A colour within 0..1, or the texture that it multiplies; black, which would hide that, counts as 1."""
+        """A colour within 0..1, or the texture that it multiplies; black, which would hide the texture, counts as
+        1."""
         texture = self._texture(mapped)
         values = self._fraction(keyword, default if texture is None else 1.0)
         if texture is None:
@@ -248,7 +249,7 @@ class _Converter:
 
 
 def _plain(values: tuple[float, ...]) -> Any:
-    """A colour as a document has it: one number where all are the same."""
+    """A colour as a document writes it: one number where all are the same."""
     return values[0] if len(set(values)) == 1 else list(values)
 
 

@@ -1,4 +1,4 @@
-"""Material libraries (.mtl) as statements: numbers and maps by keyword, lower case, as exporters differ in that.
+"""Material libraries (.mtl) as statements: numbers and maps by keyword, in lower case, as exporters differ in case.
 
 The statements are those of Wavefront's Advanced Visualizer, and Pr, Pm, Ps, Pc, Pcr, aniso, anisor and norm, which
 Exocortex added and Blender writes.
@@ -13,7 +13,7 @@ from dataclasses import dataclass, field
 from service.assets.errors import ParseError
 from service.assets.scenes.warnings import Warnings
 
-MAX_BYTES = 16 << 20  # of a library; a thousand materials take 0.3 MiB
+MAX_BYTES = 16 << 20  # bytes of a library; a thousand materials take 0.3 MiB
 COLORS = {"kd", "ks", "ke", "tf"}
 SCALARS = {"ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr", "aniso", "anisor"}
 MAPS = {"map_kd", "map_ks", "map_ke", "map_d", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr", "norm", "map_bump"}
@@ -36,7 +36,7 @@ IGNORED = {
     "sharpness": "sharpness is not used: reflections are traced",
     "map_aat": "map_aat is not used: every edge is antialiased",
 }
-# How many words follow an option of a map; of `-o`, `-s` and `-t` one to three numbers.
+# The number of words that follow an option of a map; `-o`, `-s` and `-t` are followed by one to three numbers.
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
            "-texres": 1, "-type": 1}  # fmt: skip
 VECTORS = {"-o": 0.0, "-s": 1.0, "-t": 0.0}  # the value of a number that is not given
@@ -45,7 +45,7 @@ WORD = re.compile(r"\S+")
 
 @dataclass(frozen=True)
 class Map:
-    """A reference to an image, with its options' words or, of `-o`, `-s` and `-t`, their first two numbers."""
+    """A reference to an image, with the words of its options; of `-o`, `-s` and `-t` the first two numbers."""
 
     place: str  # FILE:LINE
     source: str  # the path of the library
@@ -56,7 +56,7 @@ class Map:
 
 @dataclass
 class MtlMaterial:
-    """`numbers` are finite: one of SCALARS, three of COLORS."""
+    """One material of a library. `numbers` are finite: one for SCALARS, three for COLORS."""
 
     name: str
     place: str
@@ -72,7 +72,8 @@ class MtlMaterial:
 
 
 def read_mtl(path: str, data: bytes, notes: Warnings) -> dict[str, MtlMaterial]:
-    """The materials of a library by name. What is not understood or not used is noted. Raises ParseError."""
+    """The materials of a library by name. There are warnings about unknown and unused statements. Raises
+    ParseError."""
     file = path.rpartition("/")[2]
     if len(data) > MAX_BYTES:
         raise ParseError(f"it has {len(data)} bytes; {MAX_BYTES} are allowed of a material library", file)
@@ -97,7 +98,7 @@ def read_mtl(path: str, data: bytes, notes: Warnings) -> dict[str, MtlMaterial]:
 
 
 def _statement(line: str) -> tuple[str, str]:
-    """The keyword in lower case, and what follows it; a comment begins with # wherever it stands."""
+    """The keyword in lower case, and the rest of the line up to a comment, which begins with # anywhere."""
     words = line.partition("#")[0].split(None, 1)
     if not words:
         return "", ""
@@ -125,7 +126,7 @@ def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, 
 
 
 def _numbers(keyword: str, rest: str) -> tuple[float, ...] | None:
-    """One number, or three of a colour, of which one alone is grey. None where they are not there or not finite."""
+    """One number, or the three of a colour; a single one is grey. None where they are missing or not finite."""
     words = rest.split()
     if keyword == "d" and words[:1] == ["-halo"]:
         words = words[1:]

@@ -1,4 +1,4 @@
-"""Where a reference from an OBJ file or a material library leads, within the folder of the model."""
+"""References from an OBJ file or a material library to other files in the model's folder."""
 
 from __future__ import annotations
 
@@ -9,12 +9,13 @@ DRIVE = re.compile(r"[A-Za-z]:")
 
 
 def is_absolute(reference: str) -> bool:
-    """Of Linux, Windows, or a network; such paths are from the machine of whoever made the file."""
+    """Whether a path is absolute on Linux, Windows or a network, as on the machine where the file was made."""
     return reference.startswith(("/", "\\")) or DRIVE.match(reference) is not None
 
 
 def located(source: str, reference: str) -> str:
-    """The path of what the file at `source` calls `reference`; of an absolute one a file of that name beside it.
+    """The path of the file that the file at `source` calls `reference`; for an absolute one that of its name beside
+    it.
 
     Both are relative to the model's folder, with `/` between their parts; the result may begin with `..`.
     """
@@ -25,6 +26,6 @@ def located(source: str, reference: str) -> str:
 
 
 def library_names(statement: str) -> list[str]:
-    """What `mtllib` may name: one file whose name has blanks in it, or else several files."""
+    """The names after `mtllib`: those of several files, or of one file whose name has blanks in it."""
     words = statement.split()
     return [statement, *words] if len(words) > 1 else words

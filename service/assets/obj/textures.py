@@ -28,7 +28,7 @@ BLUE = 0.15  # how far the mean blue of a normal map lies above red and green, a
 
 @dataclass
 class Textures:
-    """`documents` by name, as far as they were asked for."""
+    """The textures that materials use; `documents` are the finished ones by name."""
 
     archive: Archive
     files: PartFiles
@@ -39,7 +39,7 @@ class Textures:
     _found: dict[str, bytes | None] = field(default_factory=dict)  # images by path
 
     def use(self, found: Map) -> str | None:
-        """The name of the texture; None, and noted, where its image is missing or in an unsupported format."""
+        """The name of the texture; None, with a warning, where its image is missing or in an unsupported format."""
         path, image = self._image(found)
         if image is None:
             return None
@@ -61,17 +61,18 @@ class Textures:
         return self._names[key]
 
     def holds(self, found: Map) -> bool:
-        """Whether the image of a map can be used; if not, that is noted."""
+        """Whether the image of a map can be used; if not, there is a warning."""
         return self._image(found)[1] is not None
 
     def channel(self, found: Map, default: str) -> str:
-        """The channel that a number is read from: what -imfchan says, or `default`, but "r" without alpha."""
+        """The channel from which a number is read: that of -imfchan, or `default`, but "r" in an image without
+        alpha."""
         chosen = found.options.get("-imfchan", ("",))[0].lower() if found.options.get("-imfchan") else ""
         channel = CHANNELS.get(chosen, default)
         return "r" if channel == "a" and not self._has_alpha(found) else channel
 
     def is_normal_map(self, found: Map) -> bool:
-        """Whether the image under `bump` holds normals, as Blender writes them there, instead of heights."""
+        """Whether the image of `bump` contains normals, as Blender writes them, instead of heights."""
         from PIL import Image
 
         image = self._image(found)[1]

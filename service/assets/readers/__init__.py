@@ -5,7 +5,7 @@ obj_lines    the lines of an OBJ text by keyword, in blocks
 ply          PLY, text and binary
 stl          STL, through trimesh
 polygons     polygons -> triangles
-raw_mesh     what a reader found, and the checks that every mesh has to pass
+raw_mesh     the result of a reader, and the checks that every mesh has to pass
 mesh_checks  warnings about a mesh: triangles without area, repeated ones, holes
 image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
 """

@@ -29,7 +29,7 @@ NUMBER = re.compile(rb"[-+]?(?:\d+\.?\d*|\.\d+)(?:e[-+]?\d+)?")
 REC_709 = (0.64, 0.33, 0.30, 0.60, 0.15, 0.06, 0.3127, 0.3290)  # x, y of red, green, blue and white
 PNG_END = b"IEND\xaeB`\x82"
 HDR_SIZE = re.compile(rb"\n([-+])([XY]) +(\d{1,9}) +([-+])(?!\2)[XY] +(\d{1,9})\n")
-COLOUR = (("r", "g", "b"), ("red", "green", "blue"))  # channels' names, of whatever case
+COLOUR = (("r", "g", "b"), ("red", "green", "blue"))  # names of channels, in lower case
 ALPHA = ("a", "alpha")
 ORIENTATION = 0x0112  # the EXIF tag
 SRGB_NAMES = (b"sRGB", "sRGB".encode("utf-16-be"))  # in the description of a profile
@@ -53,7 +53,7 @@ def parse_image(format: str, data: bytes, limits: AssetLimits) -> ImageData:
 
 
 def _header(format: str, data: bytes) -> Iterator[str]:
-    """What the header of a file of floats says that is not followed."""
+    """Warnings about entries in the header of a file of floats that are not followed."""
     if format == "exr":
         given = exr_attributes(data).get("chromaticities", b"")
         if len(given) == 32 and np.abs(np.subtract(struct.unpack("<8f", given), REC_709)).max() > 0.01:
@@ -97,7 +97,8 @@ def _pillow(format: str, data: bytes, limits: AssetLimits) -> tuple[npt.NDArray[
 
 
 def _unfollowed(image: Any) -> Iterator[str]:
-    """What the file says beside its texels. Row 0 is v = 1, says the contract; sRGB or linear, says the texture."""
+    """Warnings about metadata that are not followed: row 0 is always v = 1, and the texture says whether it is
+    sRGB."""
     frames = getattr(image, "n_frames", 1)
     if frames > 1:
         yield f"it moves: the first of its {frames} frames is shown"
@@ -148,7 +149,7 @@ def _path(data: bytes) -> Iterator[str]:
 
 
 def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
-    """The size that the file claims, before a library sees it: that one only says that it can't read it."""
+    """Check the size that the file claims before a library reads it, whose error would not name the size."""
     if format == "hdr":
         header = HDR_SIZE.search(data[:65536])
         if header is None:

@@ -1,4 +1,4 @@
-"""What is odd about a mesh that can be rendered all the same, told to whoever made it."""
+"""Warnings about oddities of a mesh that can be rendered all the same."""
 
 from __future__ import annotations
 
@@ -8,15 +8,16 @@ import numpy.typing as npt
 from service.assets.types import Doubles, Indices
 
 FLAT = 4 * float(np.finfo(np.float32).eps)
-CHUNK = 1 << 14  # triangles at once: a million's float64 copies take a quarter of a gigabyte
-SHARE = 1 << 20  # triangles whose edges are looked at together: those of a million take a tenth of a gigabyte
+CHUNK = 1 << 14  # triangles at once: float64 copies of a million take 0.25 GB
+SHARE = 1 << 20  # triangles whose edges are sorted together: those of a million take 0.1 GB
 
 
 def mesh_warnings(vertices: Doubles, faces: Indices) -> list[str]:
-    """Triangles twice in a place, back to back or inside out; edges of more than two."""
+    """Warnings about repeated triangles, triangles back to back or inside out, and edges of more than two
+    triangles."""
     found: list[str] = []
     flat = _flat(vertices, faces)
-    if flat.any():  # packing tells of these
+    if flat.any():  # packing warns about these
         faces = faces[~flat]
     welded = _places(vertices).take(faces)
     count = len(vertices)
@@ -39,7 +40,7 @@ def mesh_warnings(vertices: Doubles, faces: Indices) -> list[str]:
 
 
 def _flat(vertices: Doubles, faces: Indices) -> npt.NDArray[np.bool_]:
-    """(m,) which triangles have no area to speak of: the sine of an angle below what float32 tells from 0."""
+    """(m,) which triangles have an angle whose sine float32 cannot distinguish from 0."""
     flat = np.empty(len(faces), bool)
     for at in range(0, len(faces), CHUNK):
         a, b, c = (vertices.take(faces[at : at + CHUNK, k], axis=0) for k in range(3))
@@ -55,7 +56,7 @@ def _squares(rows: Doubles) -> Doubles:
 
 
 def _places(vertices: Doubles) -> Indices:
-    """(n,) a number of each vertex's position, the same for the same: files repeat vertices along their seams."""
+    """(n,) a number for each vertex, equal for equal positions, as files repeat vertices along their seams."""
     bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # + 0.0: -0 becomes 0
     mixed = np.zeros(len(bits), np.uint64)
     for axis in range(3):  # two positions that mix to one number are as good as never: 1e-8 for a million
@@ -70,7 +71,7 @@ def _places(vertices: Doubles) -> Indices:
 
 
 def _repeated(faces: Indices, count: int) -> int:
-    """How many triangles have the corners of an earlier one, whichever way they face."""
+    """The number of triangles with the same corners as an earlier one, whichever way they face."""
     keys = np.empty(len(faces), np.uint64)
     for at in range(0, len(faces), CHUNK):
         a, b, c = faces[at : at + CHUNK].astype(np.uint64).T
@@ -82,7 +83,7 @@ def _repeated(faces: Indices, count: int) -> int:
 
 
 def _edges(faces: Indices, count: int) -> tuple[int, int, int]:
-    """How many edges have one triangle, more than two, and two that run along it the same way."""
+    """The numbers of edges with one triangle, with more than two, and with two in the same direction."""
     boundary, crowded, turned = 0, 0, 0
     shares = -(-len(faces) // SHARE)  # by the remainder of an end's number
     for share in range(shares):
@@ -109,7 +110,7 @@ def _edges(faces: Indices, count: int) -> tuple[int, int, int]:
 
 
 def _volume(vertices: Doubles, faces: Indices) -> float:
-    """Six times what a closed mesh encloses; negative where it faces inwards."""
+    """Six times the volume of a closed mesh; negative where it faces inwards."""
     middle, volume = vertices.mean(axis=0), 0.0
     for at in range(0, len(faces), CHUNK):
         a, b, c = (vertices[faces[at : at + CHUNK, k]] - middle for k in range(3))

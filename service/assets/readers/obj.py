@@ -1,7 +1,7 @@
 """Wavefront OBJ -> triangles, strictly. Runs in the parsing child.
 
-Our own, and not trimesh's: that one drops a face or a normal it cannot read in silence, keeps indices beyond the
-vertices, and reorders.
+This reader is our own. trimesh's silently drops faces and normals that it cannot read, accepts indices beyond the
+vertices, and reorders them.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ MOST_NAMED = 1 << 20
 
 @dataclass
 class Found:
-    """What the blocks read so far held. Corners count from 1, 0 being none; negative ones are resolved already."""
+    """The contents of the blocks read so far. Corners count from 1, 0 is none; negative ones are resolved already."""
 
     tables: dict[str, list[Numbers]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
     colors: list[Numbers] = field(default_factory=list)
@@ -46,7 +46,7 @@ class Found:
 
 @dataclass
 class MaterialMesh:
-    """An OBJ file with the materials that it names: triangle k wears `materials[of_triangle[k]]`."""
+    """An OBJ file with the materials that it names: triangle k has `materials[of_triangle[k]]`."""
 
     mesh: RawMesh
     materials: list[str]  # the first is that of faces before any `usemtl`: ""
@@ -55,12 +55,12 @@ class MaterialMesh:
 
 
 def read_obj(data: bytes | memoryview) -> RawMesh:
-    """Vertices as the file has them, or, where it gives more, one for each set of indices that a corner has."""
+    """The mesh of an OBJ file. Its vertices are the file's, or one for each distinct set of a corner's indices."""
     return _joined(_found(data, with_names=False))
 
 
 def read_obj_with_materials(data: bytes | memoryview) -> MaterialMesh:
-    """What `read_obj` reads, and which triangle wears which material."""
+    """The mesh of `read_obj`, with the material of each triangle."""
     found = _found(data, with_names=True)
     counts = np.concatenate(found.counts)
     numbers = {"": 0}
@@ -111,7 +111,7 @@ def _found(data: bytes | memoryview, with_names: bool) -> Found:
 
 
 def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces: Lines) -> None:
-    """Indices from 1 in the place of negative ones; `before`: the rows that preceded each face."""
+    """The indices with negative ones resolved to indices from 1; `before` is the number of rows before each face."""
     back = np.flatnonzero(index < 0)
     if len(back):
         row = np.repeat(np.arange(len(counts)), counts)[back]
@@ -217,9 +217,9 @@ def _vectors(found: Lines, keyword: str, width: int) -> tuple[Doubles, Doubles |
 
 
 def _corners(faces: Lines) -> tuple[Longs, Longs, Longs, Longs]:
-    """How many corners each face has, and each corner's v, vt and vn as written, 0 where absent.
+    """The number of corners of each face, and each corner's v, vt and vn as written, 0 where absent.
 
-    A corner is v, v/vt, v//vn or v/vt/vn: a number's place is told by the slashes before it in its corner.
+    A corner is v, v/vt, v//vn or v/vt/vn: the slashes before a number in its corner say what it is.
     """
     letters = np.frombuffer(faces.text, np.uint8)
     corners = starts_of_words(letters)

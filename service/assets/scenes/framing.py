@@ -11,12 +11,12 @@ from service.assets.types import Doubles
 
 Bounds = tuple[Doubles, Doubles]  # the least and the greatest coordinates (3,)
 FRAMED_VFOV = 35.0  # degrees
-FLAT = 0.15  # of the greatest extent: a wall is looked at from the front, a floor from above
+FLAT = 0.15  # share of the greatest extent below which a wall is seen from the front, a floor from above
 MARGIN = 1.06
 
 
 def framed(bounds: Bounds) -> dict[str, Any]:
-    """Everything in a square picture, seen from the front a little from the side and above."""
+    """A camera that shows everything in a square picture, from the front, a little from the side and from above."""
     low, high = bounds
     extent = high - low
     azimuth, elevation = 30.0, 15.0

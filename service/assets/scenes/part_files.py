@@ -1,4 +1,4 @@
-"""The meshes and images of a scene's file, as files of their own to which its document refers."""
+"""The meshes and images of a scene's file, as separate files to which its document refers."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from service.assets.types import ScenePart
 
 @dataclass
 class PartFiles:
-    """`kept[k]` is what the document calls "part:k"."""
+    """The parts of a scene; `kept[k]` is the one that the document calls "part:k"."""
 
     kept: list[ScenePart] = field(default_factory=list)
     _numbers: dict[bytes, int] = field(default_factory=dict)

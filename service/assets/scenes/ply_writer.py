@@ -1,4 +1,4 @@
-"""A mesh as a PLY file: what our own store keeps of each. The same triangles always give the same bytes."""
+"""A mesh as a PLY file, as the store keeps it. The same triangles always give the same bytes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def ply(
     colors: Numbers | None = None,
     tangents: Numbers | None = None,
 ) -> bytes:
-    """A binary, little-endian file of vertices (n, 3), triangles (m, 3) and what the vertices carry.
+    """A binary, little-endian file of vertices (n, 3), triangles (m, 3) and attributes of the vertices.
 
     `uvs` are at most two sets (n, 2), v pointing up; `colors` (n, 3 or 4) linear; `tangents` (n, 4).
     """

@@ -1,4 +1,4 @@
-"""What a file asks for and does not get: named with its place, never dropped in silence."""
+"""Warnings about features of a file that are not supported, with their places; none is dropped in silence."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 
 from service.assets.errors import ParseError
 
-MOST = 200  # different ones; a stranger's file may bring any number
+MOST = 200  # different warnings, as an untrusted file may cause any number
 LONGEST = 300  # characters of a pointer or a detail
 
 
 @dataclass
 class Warnings:
-    """Details in the order in which they were found. Each has the first of its places, and how many there are."""
+    """Details in the order in which they were found, each with its first place and the number of its places."""
 
     _places: dict[str, set[str]] = field(default_factory=dict)  # by detail
     _first: dict[str, str] = field(default_factory=dict)
@@ -30,7 +30,7 @@ class Warnings:
             self._unlisted += 1
 
     def leave_out(self, pointer: str, detail: str) -> None:
-        """As `add`; it says why something is not in the picture."""
+        """Add a warning that says why something is not in the picture."""
         self.add(pointer, detail)
         self._omissions[detail[:LONGEST]] = None
 
