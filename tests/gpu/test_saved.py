@@ -33,21 +33,23 @@ def saved(picture: Picture) -> tuple[Any, int]:
             return end.value, count
 
 
-@pytest.mark.parametrize("tiles", [0, 1])
-def test_it_goes_on_to_the_same_bits(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, tiles: int) -> None:
+@pytest.mark.parametrize(("samples", "tiles"), [(4, 0), (4, 1), (0, 1)])
+def test_it_goes_on_to_the_same_bits(
+    gpu: Renderer, monkeypatch: pytest.MonkeyPatch, samples: int, tiles: int
+) -> None:
     monkeypatch.setattr(pictures, "PIECE_BYTES", 5000)
     whole = picture(gpu, SCENE, 9)
-    half = picture(gpu, SCENE, 4)
+    half = picture(gpu, SCENE, samples)
     for _ in range(tiles):  # in the middle of a pass
         half._passes._begin_pass(9)
         half._passes.schedule.took((0, 0, 32, 32), 1, 1024.0)  # so dear that a tile is a part of the picture
         half._passes._slice()
-    state, steps = saved(half)
-    assert state.samples == 4 and steps > 3 * 32 * 32 * 16 // 5000
+    (state, steps), half_way = saved(half), half.under_way
+    assert state.samples == samples and steps > 3 * 32 * 32 * 16 // 5000
     half.release()
     again = gpu.picture(half.scene, half.settings)
     again.restore(state)
-    assert again.samples == 4 and again.noise() is not None
+    assert again.samples == samples and again.under_way == half_way and (again.noise() is not None) == (samples > 0)
     again.trace(60.0, 9)
     for aov in ("color", "variance", "albedo"):
         assert np.array_equal(again.read(aov), whole.read(aov))

@@ -150,7 +150,7 @@ def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
         return now - began
 
     monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
-    picture: Any = SimpleNamespace(samples=1, settings=RenderSettings(512, 512), state=[], save=slow)
+    picture: Any = SimpleNamespace(samples=0, under_way=(1, 0, 8), state=[], save=slow)
     kept = checkpoints.Checkpointer(1.0)
     assert pause_s(kept, 1.0) == 1.0
     saved(kept)
@@ -164,5 +164,7 @@ def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
     saved(kept)
     kept.hasten()
     assert pause_s(kept, 10_000.0) == 0.0
-    picture.samples = 0
-    assert not kept.due(picture, 10_000.0)
+    picture.under_way = (0, 0, 0)
+    assert not kept.due(picture, 10_000.0)  # nothing was traced
+    picture.samples = 1
+    assert kept.due(picture, 10_000.0)

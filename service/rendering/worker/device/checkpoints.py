@@ -48,7 +48,8 @@ class Checkpointer:
     def due(self, picture: Picture, elapsed_s: float) -> bool:
         """Whether the picture under way, which has taken that many seconds, is to be saved as it is now."""
         pause_s = max(self._every_s, min(REST * self._took_s, LONGEST_S), SHARE * elapsed_s)
-        return picture.samples > 0 and time.monotonic() >= self._ended_at + pause_s
+        begun = picture.samples > 0 or picture.under_way[0] > 0  # the first sample of a large picture takes seconds
+        return begun and time.monotonic() >= self._ended_at + pause_s
 
     def begin(self, picture: Picture) -> None:
         # One descriptor goes with the picture.
