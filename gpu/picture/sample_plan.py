@@ -27,9 +27,7 @@ _EXPONENT = (
 _NEAR = 0.7  # weight of an area itself; its neighbours share the rest, as few samples say little about one area
 _COUNTED = 1 << 24  # samples of a pixel: the greatest number that float32 counts to
 
-WORDS = np.dtype(
-    [("counts", np.uint32, CLASSES), ("weights", np.float32, CLASSES)]
-)  # of an area, as kept on the device
+WORDS = np.dtype([("counts", np.uint32, CLASSES), ("weights", np.float32, CLASSES)])  # words of an area on the device
 
 
 def pixels_of(width: int, height: int) -> np.ndarray:

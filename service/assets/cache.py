@@ -60,7 +60,7 @@ class ParsedCache:
             return sum(map(_bytes, self._kept.values()))
 
     def shrink(self, size: int) -> None:
-        """Free that many bytes, as far as there are any; what was asked for longest ago goes first."""
+        """Free that many bytes, or all that there are, beginning with the asset that was loaded longest ago."""
         with self._lock:
             while size > 0 and self._kept:
                 size -= _bytes(self._kept.popitem(last=False)[1])

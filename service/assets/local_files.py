@@ -118,7 +118,7 @@ def _exists(path: Path) -> bool:
 
 def _open(path: Path, ref: str) -> int:
     try:
-        # Neither a link put there meanwhile nor a pipe that nobody writes to.
+        # The open fails at a link that was put there meanwhile, and does not wait for a pipe without a writer.
         fd = os.open(path, os.O_RDONLY | os.O_CLOEXEC | os.O_NOFOLLOW | os.O_NONBLOCK)
     except OSError as error:
         what = "there is no such file" if error.errno == errno.ENOENT else os.strerror(error.errno or 0).lower()

@@ -58,10 +58,10 @@ class SceneFile:
 
     document: dict[str, Any]
     parts: list[ScenePart]
-    warnings: list[dict[str, Any]]  # what it asks for and does not get: [{pointer, detail, count?}]
+    warnings: list[dict[str, Any]]  # unsupported features: [{pointer, detail, count?}]
     triangles: int
     lit: bool
-    exposure: float | None = None  # in stops, that suits its lights; None: 0 does
+    exposure: float | None = None  # stops that suit its lights; None: 0 does
     aspect_ratio: float | None = None  # of its camera's picture, width over height
     bounds: list[list[float]] | None = None  # of its triangles where they stand: least and greatest x, y, z, m
 

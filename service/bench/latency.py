@@ -137,7 +137,7 @@ class Editor:
         self._stream.send(json.dumps({"type": kind, "generation": self._generation, **message}))
 
     def _first_frame(self) -> float:
-        """When the first frame of the present generation had come."""
+        """The time at which the first frame of the present generation came."""
         until = time.perf_counter() + PATIENCE_S
         while self._receive(until - time.perf_counter()) != self._generation:
             pass

@@ -11,7 +11,8 @@ TINY = 1e-12  # an error that the reference cannot tell from none
 
 
 def at_equal_time(rows: list[Row], samples: int) -> list[Row]:
-    """Of each variation the relMSE when the plain render has so many samples, over that of the plain render."""
+    """The relMSE of each variation after the time in which the plain render takes that many samples, and its ratio to
+    the plain render's."""
     plain = rows[0]["curve"]
     time = next(point["seconds"] for point in plain if point["samples"] == samples)
     own = interpolated(plain, time)

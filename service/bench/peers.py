@@ -26,7 +26,7 @@ from service.bench.peer_scenes import PeerCase
 MOMENTS_S = (1.0, 10.0)
 HERE = Path(__file__).parent
 VARIANT = "llvm_ad_rgb"
-TRIES = 3  # Cycles is told samples, not seconds: as often may it try to meet a moment
+TRIES = 3  # attempts to make Cycles, which takes a number of samples, render for a given time
 NAMES = {"sunbox": "Sunbox", "mitsuba": "Mitsuba", "cycles": "Cycles"}
 
 
@@ -51,7 +51,7 @@ class Course:
 def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
     """Machine, and a row for each scene. Raises OSError or CalledProcessError where a side cannot be run."""
     for python, module in ((options.mitsuba, "mitsuba"), (options.cycles, "bpy")):
-        if python:  # asked before our own reference takes its minutes
+        if python:  # checked before our own reference takes its minutes
             subprocess.run([python, "-c", f"import {module}"], check=True, stdout=subprocess.DEVNULL)
     rows = []
     with tempfile.TemporaryDirectory(prefix="sunbox-peers-") as folder:

@@ -173,7 +173,7 @@ def vanish(server: Server, tally: Tally, over: threading.Event, chance: random.R
             else:
                 silent.append(stream)
         while len(silent) > 3:
-            with suppress(OSError):  # the server had had enough of it
+            with suppress(OSError):  # the server has closed the connection
                 silent.pop(0).socket.socket.shutdown(socket.SHUT_RDWR)
         tally.count("vanished")
     for stream in silent:
@@ -182,7 +182,8 @@ def vanish(server: Server, tally: Tally, over: threading.Event, chance: random.R
 
 
 def share_alike(server: Server, tally: Tally) -> float | None:
-    """Jain's index of the samples that equal streams get, with nobody else there and nobody killed."""
+    """Jain's index of the samples that equal streams get, while no other client is there and no renderer is
+    killed."""
     document = scene(server, SCENES[0])
     streams: list[Stream] = []
     counts: list[int] = [0] * EQUALS

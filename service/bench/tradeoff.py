@@ -24,7 +24,7 @@ from service.pack import pack
 from service.quality import PRESETS
 from service.scene import parse_scene
 
-FULL = 512  # pixels a side, for which seconds are told
+FULL = 512  # pixels a side of the pictures whose seconds are reported
 EQUAL_SAMPLES = 64  # of the plain render: errors at equal time are at the time that it takes
 SEEDS = (1, 2)  # two pictures of each: half their squared difference is noise, what else they err is bias
 PPD = 67.0  # pixels per degree, for FLIP
@@ -93,7 +93,7 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
 
 
 class Bench:
-    """One scene: its reference, and the pictures that are held against it."""
+    """One scene: its reference, and the pictures that are compared with it."""
 
     def __init__(self, renderer: Renderer, case: Case, assets: TradeoffAssets, options: Options) -> None:
         self._renderer, self._options, self._name = renderer, options, case.name

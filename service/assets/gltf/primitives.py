@@ -32,7 +32,7 @@ class Primitive:
     joints: tuple[Array, ...] = ()  # (n, 4) each
     weights: tuple[Floats, ...] = ()
     tangents: Array | None = None  # (n, 4)
-    kept: Longs | None = None  # which of the file's vertices these are; None: all
+    kept: Longs | None = None  # the file's numbers of these vertices; None: all
 
     def detail(self) -> Iterator[tuple[str, Array]]:
         """The attributes of its vertices besides the position, by name."""

@@ -72,7 +72,7 @@ class Archive:
 
 
 def _check(entry: zipfile.ZipInfo) -> None:
-    """Refuses an entry that could lead out of a folder, or that takes more than inflating to read."""
+    """Raise ParseError for an entry that could lead out of a folder, or that cannot simply be inflated."""
     name = entry.orig_filename
     shown = repr(name[:100])
     if "\0" in name or "\\" in name:

@@ -20,7 +20,7 @@ from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import AssetLimits
 
-CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "r"}  # of -imfchan; luminance is any channel of a grey image
+CHANNELS = {"r": "r", "g": "g", "b": "b", "m": "a", "l": "r"}  # by -imfchan; any channel of a grey image is luminance
 FORMATS = "PNG, JPEG, WebP, EXR and Radiance HDR"
 SMALL = 64  # texels of a side are enough to tell a normal map from heights
 BLUE = 0.15  # how far the mean blue of a normal map lies above red and green, at least; of heights it is 0

@@ -77,7 +77,7 @@ class PackCache:
         return value
 
     def drop_oldest(self) -> int:
-        """Forget the part that was used longest ago, unless it is the only one; the bytes that it had."""
+        """Forget the part that was used longest ago, unless it is the only one. Returns its bytes."""
         with self._lock:
             if len(self._kept) < 2:
                 return 0

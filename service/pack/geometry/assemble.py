@@ -34,7 +34,7 @@ class _Tree:
 
     bvh: SceneBvh
     instances: np.ndarray  # layout.Instance
-    kinds: frozenset[ShapeKind]  # that are met through trees
+    kinds: frozenset[ShapeKind]  # kinds that rays find through trees
     large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
 
 
