@@ -184,6 +184,7 @@ const lobe = new LobePanel(find("lobe"), {
   acts: editor, schema, calls, titles, mean: (texture, reads) => textureThumbnails.mean(texture, reads), close: () => ui.set({ lobe: false }),
 });
 find("show-lobe").hidden = !lobe.isPossible;
+for (const near of ["pointerenter", "focus"]) find("show-lobe").addEventListener(near, () => lobe.prepare());
 
 const output = new Output(find("output"), {
   schema, acts: editor, order: () => ({ scene: editor.state.scene, settings: editor.state.settings }), view: () => page.view, complain, say,

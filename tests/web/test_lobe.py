@@ -326,6 +326,13 @@ def test_kernels_of_other_models_are_there_before_they_are_chosen(lobe: Editor) 
     assert lobe.complaints == []
 
 
+def test_a_hand_near_the_button_has_the_first_kernel_compiled(editor: Editor) -> None:
+    editor.settled()
+    with editor.page.expect_response(lambda response: response.url.endswith("/v1/bsdf")) as heard:
+        editor.page.hover("#show-lobe")
+    assert heard.value.ok and editor.page.is_hidden("#lobe")
+
+
 def test_an_old_plot_is_dimmed_until_the_new_one_is_there(lobe: Editor) -> None:
     page = lobe.page
     held: list[Route] = []

@@ -252,6 +252,12 @@ export class LobePanel {
     }
   }
 
+  // Before the panel opens, as a hand comes near its button: the kernel of its first plot is compiled meanwhile.
+  prepare() {
+    if (!this.root.hidden || !this.isPossible) return;
+    this.#warming.begin([{ material: this.#materials().materials.a, needs: this.#view.needs }], 0);
+  }
+
   // What may be asked for next: the other views of this material, and this view of other models.
   #warm(material) {
     const others = Object.keys(this.models).filter((type) => type !== material.type);

@@ -9,6 +9,7 @@ const JUMP = 0.02; // of the radius, between two neighbours of a curve
 const MOST_NEW = 60; // jumps that one refinement fills
 const ROUNDS = 3;
 const TABLE_STEP = 10; // degrees between the rows on the page
+const TICK_GAP = 40; // CSS pixels from the rim's number to the next one
 
 // f for light from -incidence, and where `byLobe` its parts [{name, f}]; the mirror images of that direction are asked
 // for at the end, as `delta` is of wo.
@@ -81,7 +82,8 @@ function draw(data, { incidence, isLog, channels, size }) {
       const [to, down] = at(angle, radius + 11);
       return text(to, down + 4, `${Math.abs(angle)}°`, { "text-anchor": Math.abs(to - x) < 4 ? "middle" : to > x ? "start" : "end" });
     }),
-    rings.map((value) => text(x + share(value, scale) * radius, y + 13, tickText(value), { "text-anchor": value === most ? "end" : "middle" })),
+    rings.filter((value) => value === most || (1 - share(value, scale)) * radius > TICK_GAP)
+      .map((value) => text(x + share(value, scale) * radius, y + 13, tickText(value), { "text-anchor": value === most ? "end" : "middle" })),
     text(x - radius, y + (isWhole ? -5 : 14), "f, 1/sr", { class: "axis" }));
   const surface = line(x - radius, y, x + radius, y, { class: "surface" });
   const mirror = incidence <= 90 ? line(x, y, ...at(incidence, radius), { class: "mirror" }) : null;

@@ -20,12 +20,12 @@ export class Warming {
   constructor(ask) { this.ask = ask; }
 
   // `wanted` are [{material, needs}] in the order of their need. What was begun before ends.
-  async begin(wanted) {
+  async begin(wanted, rest_ms = REST_MS) {
     const round = ++this.#round;
     for (const { material, needs } of wanted) {
       const key = `${material.type} ${needs}`;
       if (this.#done.has(key) || !(needs in QUESTIONS)) continue;
-      await new Promise((resolve) => { setTimeout(resolve, REST_MS); });
+      await new Promise((resolve) => { setTimeout(resolve, rest_ms); });
       if (round !== this.#round) return;
       this.#done.add(key);
       const [path, body] = QUESTIONS[needs];
