@@ -108,8 +108,9 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
     ),
     "editor-lobe": (
         (1280, 800), "dark",
-        [("click", "#material-presets [data-name=copper]", ""), ("key", "b", ""), ("key", "c", ""),
-         ("select", "#comparison [aria-label^=Turn]", "disney"), ("click", "#lobe [data-value=polar]", "")],
+        [("click", "#material-presets [data-name=velvet]", ""), ("key", "b", ""), ("key", "c", ""),
+         ("select", "#comparison [aria-label^=Turn]", "disney"), ("click", "#lobe [data-value=polar]", ""),
+         ("click", "#lobe >> text=By lobe", "")],
     ),
     "editor-scene": ((1280, 800), "light", [("click", "#tab-scene", ""), ("key", "h", ""), ("key", "4", "")]),
     "editor-render": (
