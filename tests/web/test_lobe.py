@@ -227,8 +227,16 @@ def test_images_are_replaced_and_that_is_said(lobe: Editor) -> None:
     paste(lobe, {"type": "diffuse", "albedo": 1})
     lobe.drop("#material-form [data-field=albedo]", {"halves.png": halves()})
     lobe.wait("the words", lambda: "the mean stands for that of albedo" in page.inner_text("#lobe"))
-    half = ((220 / 255 + 0.055) / 1.055) ** 2.4 / 2  # green on one side, none on the other
-    lobe.wait("its mean", lambda: table(lobe)[0]["f_g"] * math.pi == pytest.approx(half, rel=1e-3))
+    green, blue = (((byte / 255 + 0.055) / 1.055) ** 2.4 / 2 for byte in (220, 40))  # each on one side
+    largest = (0.7152 * green + 0.0722 * blue) / math.pi
+    said = re.compile(r"largest value ([\d.]+) per steradian")
+
+    def shown() -> float:
+        found = said.search(page.get_attribute("#lobe svg", "aria-label") or "")
+        return float(found[1]) if found else math.nan
+
+    lobe.wait("its mean", lambda: shown() == pytest.approx(largest, rel=0.006))
+    assert table(lobe)[0]["f_g"] * math.pi == pytest.approx(green, rel=1e-3)
 
 
 def test_means_are_of_the_values_and_not_of_a_small_picture(lobe: Editor, server: Server, tmp_path: Path) -> None:
