@@ -41,7 +41,8 @@ class Config(BaseSettings):
     api_key: Words = Field(
         default_factory=list,
         repr=False,
-        description="Keys, separated by commas, one of which `/v1/*` then asks for; renders belong to their key.",
+        description="Keys, separated by commas, one of which `/v1/*` then asks for; renders and saved "
+        "documents belong to their key.",
     )
     allowed_hosts: Words = Field(
         default_factory=list,
@@ -135,6 +136,9 @@ class Config(BaseSettings):
         description="Most renders that wait in line; a key with less than its share may add more.",
     )
     max_jobs: int = Field(2_000, ge=1, description="Most renders, running and waiting, of one key.")
+    max_key_documents: int | None = Field(
+        None, ge=1, description="Most bytes of the documents that one key has saved (default: no limit)."
+    )
     keep_renders: int = Field(2_000, ge=1, description="Most ended renders that are kept for each key.")
     keep_bytes: int = Field(4 * GIB, ge=1, description="Most bytes on the disk of the ended renders of all keys.")
     keep_packed: int = Field(

@@ -27,6 +27,7 @@ from service.migrations import VERSION
 from service.problems import ServiceError
 from service.scene.text import load_json
 
+OWNED = 3  # the version since which documents have owners
 PIECE = 1 << 20  # bytes that are hashed at a time
 
 
@@ -113,21 +114,25 @@ def _check_database(folder: Path, report: Report) -> None:
         for (said,) in database.execute("PRAGMA integrity_check(100)"):
             if said != "ok":
                 report.faults.append(f"{FILE}: {said}")
-        missing: set[tuple[str, str, str]] = set()
-        for kind, name, body in database.execute("SELECT kind, name, body FROM documents ORDER BY kind, name"):
+        missing: set[tuple[str, str, str, str]] = set()
+        owner = "owner" if version >= OWNED else "''"
+        rows = database.execute(f"SELECT kind, name, {owner}, body FROM documents ORDER BY kind, name, {owner}")
+        for kind, name, whose, body in rows:
             report.documents += 1
-            used = {asset for _, _, asset in _uses(database, kind, name)}
+            used = {asset for *_, asset in _uses(database, owner, kind, name, whose)}
             report.faults += [f"{kind}/{name}: {fault}" for fault in _document_faults(kind, body, used)]
-            missing |= {(kind, name, asset) for asset in used if not is_here(folder, asset)}
+            missing |= {(kind, name, whose, asset) for asset in used if not is_here(folder, asset)}
     if missing:
         with closing(reading(folder / FILE)) as database:  # again: documents and assets may have been deleted since
-            missing = {one for one in missing if one in _uses(database, *one[:2])}
-    for kind, name, asset in sorted(missing):
+            missing = {one for one in missing if one in _uses(database, owner, *one[:3])}
+    for kind, name, _, asset in sorted(missing):
         report.faults.append(f"{kind}/{name}: there is no asset {asset}")
 
 
-def _uses(database: sqlite3.Connection, kind: str, name: str) -> list[Any]:
-    return database.execute("SELECT kind, name, asset FROM uses WHERE kind = ? AND name = ?", (kind, name)).fetchall()
+def _uses(database: sqlite3.Connection, owner: str, *key: str) -> list[Any]:
+    """(kind, name, owner, asset) of the document with the first three; `owner` is the column that has the third."""
+    columns = f"kind, name, {owner}, asset FROM uses WHERE kind = ? AND name = ? AND {owner} = ?"
+    return database.execute(f"SELECT {columns}", key).fetchall()
 
 
 def _document_faults(kind: str, body: str, used: set[str]) -> Iterator[str]:

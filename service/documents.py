@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import hashlib
 import logging
+import sqlite3
 from collections.abc import Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -16,7 +18,7 @@ from service import recipe
 from service.assets import AssetStore
 from service.database import Database
 from service.disk_usage import Usage, expected
-from service.problems import FieldError, InvalidDocument, NotFound
+from service.problems import FieldError, Forbidden, InvalidDocument, NotFound, PreconditionFailed, TooLarge
 from service.quota import Quota
 from service.scene import Material, parse_scene
 from service.scene.base import MOST_MISTAKES
@@ -51,13 +53,43 @@ def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDo
     return CheckedDocument(dump_json(document), uses)
 
 
+def etag(body: bytes) -> str:
+    """The strong entity tag (RFC 9110) of a document as it is stored."""
+    return f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What must be true of the document that there is, by the headers If-Match and If-None-Match of RFC 9110."""
+
+    is_match: tuple[str, ...] | None = None  # one of these tags, or "*" for any document
+    is_none: tuple[str, ...] | None = None  # none of these tags, or "*" for no document
+
+    def check(self, body: bytes | None) -> None:
+        """`body`: the document, None where there is none. Raises PreconditionFailed."""
+        if self.is_match is not None and not _matches(self.is_match, body):
+            raise PreconditionFailed("Another document has this name by now, or none has: get it, and try again.")
+        if self.is_none is not None and _matches(self.is_none, body):
+            raise PreconditionFailed("A document of this name is there already.")
+
+
+ALWAYS = Condition()
+_OWN = "FROM documents WHERE kind = ? AND name = ? AND owner = ?"
+
+
+def _matches(tags: tuple[str, ...], body: bytes | None) -> bool:
+    return body is not None and ("*" in tags or etag(body) in tags)
+
+
 class Documents:
     """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails.
 
-    `quota` makes room for documents; without it there always is room.
+    `quota` makes room for documents; without it there always is room. `each`: most bytes of one owner's documents. An
+    owner is a text; "" has no such bound, and what it saves is shared by default.
     """
 
-    def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None) -> None:
+    def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None, each: int | None = None) -> None:
+        self._each = each
         self._database = Database(folder)
         self._assets = assets
         self._quota = quota
@@ -66,54 +98,91 @@ class Documents:
         """To be called once, before the server starts. Raises DamagedFile."""
         self._database.prepare()
 
-    def names(self, kind: str) -> list[dict[str, str]]:
-        """`[{name, title}]` in the order of the titles. Raises NotFound for an unknown kind."""
+    def names(self, kind: str, owner: str = "") -> list[dict[str, str]]:
+        """`[{name, title}]` of what this owner may read, in the order of the titles. Raises NotFound for an unknown
+        kind."""
         check_kind(kind)
         with self._database.open() as database:
-            rows = database.execute("SELECT name, title FROM documents WHERE kind = ? ORDER BY title, name", (kind,))
-            return [{"name": name, "title": title} for name, title in rows]
+            rows = database.execute(
+                "SELECT name, title FROM documents WHERE kind = ? AND (owner = ? OR shared) ORDER BY owner = ?",
+                (kind, owner, owner),
+            )
+            titles = dict(rows.fetchall())  # the owner's own come last, and count
+        return [{"name": name, "title": title} for title, name in sorted((titles[name], name) for name in titles)]
 
-    def get(self, kind: str, name: str) -> bytes:
-        """The bare document, as JSON. Raises NotFound."""
+    def get(self, kind: str, name: str, owner: str = "") -> bytes:
+        """The bare document, as JSON: the owner's own of that name, or else one that is shared. Raises NotFound."""
         check_kind(kind)
         with self._database.open() as database:
-            row = database.execute("SELECT body FROM documents WHERE kind = ? AND name = ?", (kind, name)).fetchone()
+            row = database.execute(
+                "SELECT body FROM documents WHERE kind = ? AND name = ? AND (owner = ? OR shared) "
+                "ORDER BY owner = ? DESC, rowid LIMIT 1",
+                (kind, name, owner, owner),
+            ).fetchone()
         if row is None:
             raise _missing(kind, name)
         text: str = row[0]
         return text.encode()
 
-    def put(self, kind: str, name: str, document: CheckedDocument, title: str | None = None) -> tuple[str, bool]:
-        """Save a document under a name; its title, and whether the name is new.
+    def put(
+        self,
+        kind: str,
+        name: str,
+        document: CheckedDocument,
+        title: str | None = None,
+        owner: str = "",
+        shared: bool | None = None,
+        condition: Condition = ALWAYS,
+    ) -> tuple[str, bool]:
+        """Save an owner's document under a name; its title, and whether the name is new.
 
-        Raises InvalidDocument, with pointers from the document's root, where an asset is missing.
+        `shared`: others may read it; None leaves that as it is, and a new one is its owner's alone. Raises
+        InvalidDocument, with pointers from the document's root, where an asset is missing, TooLarge where it is too
+        much for its owner, PreconditionFailed.
         """
         check_kind(kind)
         body, uses = document.body, list(dict.fromkeys(reference for _, reference in document.uses))
-        key = (kind, name)
+        key, size = (kind, name, owner), len(body.encode())
         # These assets stay while others make room, so that a refused document costs no asset.
         with self._quota.pinned(uses) if self._quota else nullcontext():
             self._find_assets(document, uses)
-            room = self._quota.room(expected([len(body.encode())])) if self._quota else nullcontext()
+            room = self._quota.room(expected([size])) if self._quota else nullcontext()
             with room, self._database.open() as database, database:
                 database.execute("BEGIN IMMEDIATE")
                 self._find_assets(document, uses)  # again: another process may have made room
-                old = database.execute("SELECT title FROM documents WHERE kind = ? AND name = ?", key).fetchone()
+                old = database.execute(f"SELECT title, shared, bytes, body {_OWN}", key).fetchone()
+                condition.check(None if old is None else old[3].encode())
+                self._check_share(database, owner, size - (old[2] if old else 0))
                 kept = title or (old[0] if old else name)
-                database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?)", (*key, kept, body))
-                database.execute("DELETE FROM uses WHERE kind = ? AND name = ?", key)
-                database.executemany("INSERT INTO uses VALUES (?, ?, ?)", [(asset, *key) for asset in uses])
-        log.info("document saved kind=%s name=%s bytes=%d", kind, name, len(body))
+                if shared is None:
+                    shared = bool(old[1]) if old else not owner
+                row = (*key, shared, kept, size, body)
+                database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
+                database.executemany("INSERT INTO uses VALUES (?, ?, ?, ?)", [(asset, *key) for asset in uses])
+        log.info("document saved kind=%s name=%s bytes=%d", kind, name, size)
         return kept, old is None
 
-    def delete(self, kind: str, name: str) -> None:
-        """Raises NotFound."""
+    def delete(self, kind: str, name: str, owner: str = "", condition: Condition = ALWAYS) -> None:
+        """Delete an owner's document, or else one that was saved before there were owners.
+
+        Raises NotFound, Forbidden for one that another owner shares, PreconditionFailed.
+        """
         check_kind(kind)
         with self._database.open() as database, database:
-            deleted = database.execute("DELETE FROM documents WHERE kind = ? AND name = ?", (kind, name)).rowcount
-            database.execute("DELETE FROM uses WHERE kind = ? AND name = ?", (kind, name))
-        if not deleted:
-            raise _missing(kind, name)
+            database.execute("BEGIN IMMEDIATE")
+            for key in dict.fromkeys(((kind, name, owner), (kind, name, ""))):
+                found = database.execute(f"SELECT body {_OWN}", key).fetchone()
+                if found is not None:
+                    break
+            else:
+                shared = "SELECT 1 FROM documents WHERE kind = ? AND name = ? AND shared"
+                if database.execute(shared, (kind, name)).fetchone():
+                    raise Forbidden("This document is shared by another key, which alone may delete it.")
+                raise _missing(kind, name)
+            condition.check(found[0].encode())
+            database.execute("DELETE FROM documents WHERE kind = ? AND name = ? AND owner = ?", key)
+            database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
         log.info("document deleted kind=%s name=%s", kind, name)
 
     @contextmanager
@@ -131,6 +200,17 @@ class Documents:
     def usage(self) -> Usage:
         """Of the database, whose unused pages don't count."""
         return self._database.usage()
+
+    def _check_share(self, database: sqlite3.Connection, owner: str, more: int) -> None:
+        """Raises TooLarge where an owner's documents would take too much with `more` bytes."""
+        if self._each is None or not owner or more <= 0:
+            return
+        (bytes,) = database.execute("SELECT total(bytes) FROM documents WHERE owner = ?", (owner,)).fetchone()
+        if bytes + more > self._each:
+            raise TooLarge(
+                f"With it your saved documents would take {int(bytes) + more} bytes; {self._each} are allowed "
+                "(SUNBOX_MAX_KEY_DOCUMENTS). Delete some first."
+            )
 
     def _find_assets(self, document: CheckedDocument, uses: list[str]) -> None:
         """Raises InvalidDocument where one of them is not here."""

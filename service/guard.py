@@ -48,10 +48,11 @@ HEADERS = {
 }
 PREFLIGHT = {
     "access-control-allow-methods": "GET, HEAD, POST, PUT, DELETE",
-    "access-control-allow-headers": "authorization, content-type, idempotency-key, x-request-id",
+    "access-control-allow-headers": "authorization, content-type, idempotency-key, if-match, if-none-match, "
+    "x-request-id",
     "access-control-max-age": "600",
 }
-EXPOSED = "link, location, retry-after, x-request-id"
+EXPOSED = "etag, link, location, retry-after, x-request-id"
 
 Refuse = Callable[[ServiceError], ASGIApp]
 

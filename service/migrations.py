@@ -60,5 +60,27 @@ MIGRATIONS = (
             ) WITHOUT ROWID""",
         ),
     ),
+    Migration(
+        "documents with owners",
+        (
+            "ALTER TABLE documents RENAME TO former",
+            # The body stands last: SQLite reads a row up to the last column that is asked for.
+            """CREATE TABLE documents (
+                kind TEXT NOT NULL, name TEXT NOT NULL, owner TEXT NOT NULL, shared INTEGER NOT NULL,
+                title TEXT NOT NULL, bytes INTEGER NOT NULL, body TEXT NOT NULL, PRIMARY KEY (kind, name, owner)
+            )""",
+            # Until now they belonged to all.
+            """INSERT INTO documents
+                SELECT kind, name, '', 1, title, length(CAST(body AS BLOB)), body FROM former ORDER BY rowid""",
+            "DROP TABLE former",
+            "ALTER TABLE uses RENAME TO former",
+            """CREATE TABLE uses (
+                asset TEXT NOT NULL, kind TEXT NOT NULL, name TEXT NOT NULL, owner TEXT NOT NULL,
+                PRIMARY KEY (asset, kind, name, owner)
+            ) WITHOUT ROWID""",
+            "INSERT INTO uses SELECT asset, kind, name, '' FROM former",
+            "DROP TABLE former",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

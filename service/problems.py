@@ -3,7 +3,7 @@
 ServiceError
     MalformedJson  InvalidDocument  AssetError            the body
     Unauthorized  Forbidden                               who asks
-    NotFound  Conflict  Gone                              what is asked for
+    NotFound  Conflict  PreconditionFailed  Gone                            what is asked for
     TooLarge  UnsupportedMedia  TimedOut                  how it is sent
     TooManyRequests  Unavailable  Internal                the service
 """
@@ -80,6 +80,10 @@ class Conflict(ServiceError):
     pass
 
 
+class PreconditionFailed(ServiceError):
+    pass
+
+
 class Gone(ServiceError):
     pass
 
@@ -140,6 +144,7 @@ ANSWERS: dict[type[ServiceError], Answer] = {
     Forbidden: Answer(403, "forbidden", "Forbidden"),
     NotFound: Answer(404, "not-found", "Not found"),
     Conflict: Answer(409, "conflict", "Not possible in this state"),
+    PreconditionFailed: Answer(412, "precondition-failed", "Precondition failed"),
     Gone: Answer(410, "gone", "Gone"),
     TimedOut: Answer(408, "timed-out", "Request took too long"),
     TooLarge: Answer(413, "too-large", "Too large"),

@@ -32,7 +32,7 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
     limit = Usage(config.data_quota, config.data_files)
     quota = Quota(config.data_dir, limit, lambda: documents.assets_in_use(), lambda: documents.usage() + beside())
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
-    documents = Documents(config.data_dir, assets, quota)
+    documents = Documents(config.data_dir, assets, quota, config.max_key_documents)
     return Storage(assets, documents, quota)
 
 

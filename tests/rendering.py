@@ -70,6 +70,7 @@ def render(gpu: Renderer, scene: dict[str, Any], samples: int = 64, aov: str = "
     made.scene.release()
     return values
 
+
 def assert_estimators_agree(gpu: Renderer, scene: dict[str, Any]) -> None:
     """That all estimators converge to the same picture of `scene`: in blocks of 4 x 4 pixels by their z-scores, and
     in the mean."""

@@ -46,8 +46,8 @@ const nameOf = (title) => title.replaceAll("/", "\u2215").replace(/^\.{1,2}$/, (
 const saved = (kind, name) => `documents/${kind}/${encodeURIComponent(nameOf(name))}`;
 export const listSaved = (kind) => get(`documents/${kind}`);
 export const fetchSaved = (kind, name) => get(saved(kind, name));
-export const save = (kind, title, document) =>
-  ask("PUT", `${saved(kind, title)}?${new URLSearchParams({ title })}`, json(document));
+export const save = (kind, title, document, query = {}) =>
+  ask("PUT", `${saved(kind, title)}?${new URLSearchParams({ title, ...query })}`, json(document));
 export const forget = (kind, name) => ask("DELETE", saved(kind, name));
 
 export const fetchAsset = async (id) => (await ask("GET", `assets/${id}`)).blob();

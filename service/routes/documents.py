@@ -5,13 +5,13 @@ from __future__ import annotations
 from functools import partial
 from typing import Annotated
 
-from fastapi import APIRouter, Path, Query, Request, Response
+from fastapi import APIRouter, Header, Path, Query, Request, Response
 
-from service.documents import LONGEST_NAME, CheckedDocument, check_kind
+from service.documents import LONGEST_NAME, CheckedDocument, Condition, check_kind, etag
 from service.downloads import PIECE
 from service.rendering.executors import saving
 from service.routes import answers
-from service.state import app_state, caller
+from service.state import app_state, caller, owner
 
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
 
@@ -34,40 +34,90 @@ Title = Annotated[
 ]
 
 
+Shared = Annotated[
+    bool | None,
+    Query(description="Others may read it, but not replace it. Left out: as before, and not shared where it is new."),
+]
+IfMatch = Annotated[str | None, Header(description="The `ETag` that the document must have, or `*`.")]
+IfNoneMatch = Annotated[str | None, Header(description="`*`: there must be no document of this name.")]
+
+
 @router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
 async def names(request: Request, kind: answers.DocumentKind) -> list[answers.Named]:
-    return [answers.Named(**entry) for entry in await saving(partial(app_state(request).documents.names, kind))]
+    """Of one's own documents and of those that others share; without keys of all."""
+    found = await saving(partial(app_state(request).documents.names, kind, owner(request)))
+    return [answers.Named(**entry) for entry in found]
 
 
 @router.get("/{kind}/{name}", summary="The bare document", responses=answers.DOCUMENT | answers.problems(404, 422))
-async def document(request: Request, kind: answers.DocumentKind, name: Name) -> Response:
+async def document(
+    request: Request, kind: answers.DocumentKind, name: Name, if_none_match: IfNoneMatch = None
+) -> Response:
+    """One's own, or else one that another key shares. Its `ETag` serves for a later `If-Match`."""
     own = app_state(request)
-    data = await saving(partial(own.documents.get, kind, name))
+
+    def read() -> tuple[bytes, str]:
+        data = own.documents.get(kind, name, owner(request))
+        return data, etag(data)
+
+    data, tag = await saving(read)
+    headers = {"etag": tag, "cache-control": "private, no-cache"}
+    if if_none_match is not None and {"*", tag} & set(_tags(if_none_match) or ()):
+        return Response(status_code=304, headers=headers)
     if len(data) <= PIECE:
-        return Response(data, media_type=JSON)
+        return Response(data, media_type=JSON, headers=headers)
     # From a file, or else it would stay in memory until it has been fetched.
-    return await own.downloads.answer(caller(request), data, JSON)
+    answer = await own.downloads.answer(caller(request), data, JSON)
+    answer.headers.update(headers)
+    return answer
 
 
 @router.put(
     "/{kind}/{name}",
     summary="Save a document",
-    description="The body is the bare document, and must be valid; a document of the same name is replaced.",
+    description="The body is the bare document, and must be valid; one's own document of the same name is replaced. "
+    "With keys a document is its key's, unless it is `shared`.",
     openapi_extra=answers.DOCUMENT_BODY,
-    responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 413, 415, 422),
+    responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 412, 413, 415, 422),
 )
 async def put(
-    request: Request, response: Response, kind: answers.DocumentKind, name: Name, title: Title = None
+    request: Request,
+    response: Response,
+    kind: answers.DocumentKind,
+    name: Name,
+    title: Title = None,
+    shared: Shared = None,
+    if_match: IfMatch = None,
+    if_none_match: IfNoneMatch = None,
 ) -> answers.Named:
     own = app_state(request)
     async with own.bodies.taken(request) as body:
         checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body, caller(request))
-    kept, new = await saving(partial(own.documents.put, kind, name, checked, title), caller(request))
+    condition = Condition(_tags(if_match), _tags(if_none_match))
+
+    def save() -> tuple[str, bool, str]:
+        kept, new = own.documents.put(kind, name, checked, title, owner(request), shared, condition)
+        return kept, new, etag(checked.body.encode())
+
+    kept, new, response.headers["etag"] = await saving(save, caller(request))
     if new:
         response.status_code = 201
     return answers.Named(name=name, title=kept)
 
 
-@router.delete("/{kind}/{name}", status_code=204, summary="Delete a document", responses=answers.problems(404, 422))
-async def delete(request: Request, kind: answers.DocumentKind, name: Name) -> None:
-    await saving(partial(app_state(request).documents.delete, kind, name))
+@router.delete(
+    "/{kind}/{name}",
+    status_code=204,
+    summary="Delete a document",
+    responses=answers.problems(403, 404, 412, 422),
+)
+async def delete(request: Request, kind: answers.DocumentKind, name: Name, if_match: IfMatch = None) -> None:
+    condition = Condition(_tags(if_match))
+    await saving(partial(app_state(request).documents.delete, kind, name, owner(request), condition))
+
+
+def _tags(header: str | None) -> tuple[str, ...] | None:
+    """The entity tags in a header, or `*`; weak ones as if they were strong, since ours never are weak."""
+    if header is None:
+        return None
+    return tuple(tag.strip().removeprefix("W/") for tag in header.split(","))

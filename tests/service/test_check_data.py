@@ -153,3 +153,10 @@ def test_a_backup_made_while_somebody_writes(kept: Storage, tmp_path: Path) -> N
     restored.documents.prepare()
     assert len(restored.documents.names("materials")) == 2
     restored.assets.close()
+
+
+def test_each_owner_s_document_is_looked_at(kept: Storage, tmp_path: Path) -> None:
+    kept.documents.put("scenes", "a", checked("scenes", SCENE), None, "anna")  # without a mesh
+    assert check(tmp_path).faults == []
+    change(tmp_path, "DELETE FROM uses WHERE owner = ''")
+    assert the_fault(tmp_path).startswith("scenes/a: the assets")

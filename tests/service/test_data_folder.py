@@ -19,6 +19,7 @@ import uvicorn
 
 from service import app, data_lock, database
 from service.config import Config
+from service.data_check import Report, check
 from service.data_lock import FolderInUse, holder, locked
 from service.database import FILE, Database
 from service.documents import checked
@@ -27,7 +28,8 @@ from service.problems import Unavailable
 from service.storage import Storage, storage
 
 # Folders as earlier versions of Sunbox left them: the database as `.dump` of SQLite's shell writes it, with a scene
-# and a material, and the asset that the scene uses. Version 0 is of revision 0409cd4, version 1 of ab88cfc.
+# and a material, and the asset that the scene uses. Version 0 is of revision 0409cd4, version 1 of ab88cfc,
+# version 2 of 366adc8.
 FOLDERS = Path(__file__).parent / "folders"
 VERSIONS = sorted(path.name for path in FOLDERS.iterdir())
 
@@ -63,7 +65,9 @@ def test_every_earlier_version_has_a_folder_here() -> None:
 
 
 def test_a_folder_of_an_earlier_version_opens(opened: Storage, tmp_path: Path) -> None:
+    assert check(tmp_path).faults == [] and "migrated" in check(tmp_path).notes[0]
     opened.documents.prepare()
+    assert check(tmp_path) == Report(documents=2, assets=1)
     assert opened.documents.names("scenes") == [{"name": "bunny", "title": "The bunny"}]
     assert opened.documents.names("materials") == [{"name": "grey", "title": "grey"}]
     scene = json.loads(opened.documents.get("scenes", "bunny"))

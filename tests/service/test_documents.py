@@ -20,14 +20,15 @@ import pytest
 import uvicorn
 from starlette.requests import Request
 
-from service import app, database
+from service import app, database, documents
 from service.assets import AssetStore
 from service.config import Config
 from service.database import DamagedFile
 from service.documents import Documents, checked
 from service.downloads import Downloads, FileAnswer
-from service.problems import Unavailable
+from service.problems import Forbidden, NotFound, TooLarge, Unavailable
 from service.routes.documents import document
+from tests.asset_files import OBJ
 from tests.service.test_rest import is_problem
 from tests.serving import SCENE, Server
 
@@ -241,3 +242,79 @@ def test_a_later_version_s_file_is_refused(saved: Documents, tmp_path: Path) -> 
         database.execute("PRAGMA user_version = 99")
     with pytest.raises(DamagedFile, match="newer version"):
         saved.prepare()
+
+
+def dim(albedo: float) -> documents.CheckedDocument:
+    return checked("materials", {"type": "diffuse", "albedo": albedo})
+
+
+def test_documents_belong_to_who_saved_them(saved: Documents, store: AssetStore) -> None:
+    saved.put("materials", "old", dim(0.1))  # before there were keys
+    for owner, albedo in (("anna", 0.2), ("bert", 0.3)):
+        saved.put("materials", "mine", dim(albedo), owner.title(), owner)
+    assert saved.names("materials", "anna") == [{"name": "mine", "title": "Anna"}, {"name": "old", "title": "old"}]
+    assert json.loads(saved.get("materials", "mine", "bert"))["albedo"] == 0.3
+    with pytest.raises(NotFound):
+        saved.get("materials", "mine", "carl")
+    saved.put("materials", "gift", dim(0.4), None, "anna", shared=True)
+    saved.put("materials", "gift", dim(0.5), None, "anna")  # as it was: shared
+    assert json.loads(saved.get("materials", "gift", "bert"))["albedo"] == 0.5
+    with pytest.raises(Forbidden):
+        saved.delete("materials", "gift", "bert")
+    saved.put("materials", "gift", dim(0.6), "Bert's", "bert")  # one of his own, which he sees in its place
+    assert {"name": "gift", "title": "Bert's"} in saved.names("materials", "bert")
+    assert json.loads(saved.get("materials", "gift", "anna"))["albedo"] == 0.5
+    saved.put("materials", "gift", dim(0.5), None, "anna", shared=False)
+    with pytest.raises(NotFound):
+        saved.get("materials", "gift", "carl")
+    with pytest.raises(NotFound):
+        saved.delete("materials", "mine", "carl")
+    saved.delete("materials", "old", "carl")
+    saved.delete("materials", "mine", "anna")
+    assert [entry["name"] for entry in saved.names("materials", "anna")] == ["gift"]
+    mesh = store.add(OBJ).id
+    saved.put("scenes", "a", checked("scenes", mesh_scene(mesh)), None, "anna")
+    saved.put("scenes", "a", checked("scenes", mesh_scene(mesh)), None, "bert")
+    saved.delete("scenes", "a", "anna")
+    with saved.assets_in_use() as used:
+        assert used == {mesh}  # the other one's
+
+
+def test_one_key_s_documents_have_a_bound(tmp_path: Path, store: AssetStore) -> None:
+    saved = Documents(tmp_path, store, each=2 * len(dim(0.5).body) + 5)
+    for name in "ab":
+        saved.put("materials", name, dim(0.5), None, "anna")
+    with pytest.raises(TooLarge, match="SUNBOX_MAX_KEY_DOCUMENTS"):
+        saved.put("materials", "c", dim(0.5), None, "anna")
+    saved.put("materials", "b", dim(0.6), None, "anna")  # in the place of as much
+    saved.put("materials", "c", dim(0.5), None, "bert")
+    for name in "abcd":
+        saved.put("materials", name, dim(0.5))  # without a key
+    saved.delete("materials", "a", "anna")
+    saved.put("materials", "c", dim(0.5), None, "anna")
+
+
+def test_a_document_is_replaced_only_if_it_is_the_expected_one(server: Server) -> None:
+    http, address = server.http, "/v1/documents/materials/tagged"
+    tags = []
+    for albedo, headers, status in (
+        (0.1, {"if-match": "*"}, 412),
+        (0.1, {"if-none-match": "*"}, 201),
+        (0.2, {"if-none-match": "*"}, 412),
+        (0.2, {"if-match": "*"}, 200),
+    ):
+        answer = http.put(address, json={**MATERIAL, "albedo": albedo}, headers=headers)
+        assert answer.status_code == status
+        tags += [answer.headers["etag"]] if status < 300 else []
+    first, second = tags
+    assert is_problem(http.put(address, json=MATERIAL, headers={"if-match": first}), 412)
+    got = http.get(address)
+    assert got.headers["etag"] == second and got.json()["albedo"] == 0.2
+    unchanged = http.get(address, headers={"if-none-match": f'"other", W/{second}'})
+    assert unchanged.status_code == 304 and not unchanged.content
+    assert http.get(address, headers={"if-none-match": first}).status_code == 200
+    assert http.put(address, json=MATERIAL, headers={"if-match": f"{first}, {second}"}).status_code == 200
+    assert is_problem(http.delete(address, headers={"if-match": second}), 412)
+    third = http.get(address).headers["etag"]
+    assert http.delete(address, headers={"if-match": third}).status_code == 204
+    assert is_problem(http.put(address, json=MATERIAL, headers={"if-match": third}), 412)

@@ -279,3 +279,14 @@ def test_who_sends_a_refused_body_hears_why() -> None:
     guard = Guard(taken, config=config, refuse=lambda error: PlainTextResponse(str(error), 413))
     asyncio.run(guard(scope, receive, send))
     assert happened == ["answered", "read", "read", "read", "read", "ended"]
+
+
+def test_saved_documents_are_their_key_s(http: httpx.Client) -> None:
+    address, grey = "/v1/documents/materials/grey", {"type": "diffuse", "albedo": 0.5}
+    assert http.put(address, json=grey, headers=ANNA).status_code == 201
+    assert is_problem(http.get(address, headers=BERT), 404)
+    assert http.get("/v1/documents/materials", headers=BERT).json() == []
+    assert http.put(address, json=grey, headers=ANNA, params={"shared": "true"}).status_code == 200
+    assert http.get(address, headers=BERT).json() == grey
+    assert is_problem(http.delete(address, headers=BERT), 403)
+    assert http.delete(address, headers=ANNA).status_code == 204
