@@ -33,6 +33,10 @@ class Renderers(Protocol):
     def process_id(self) -> int | None:
         """The process that renders; None while there is none."""
 
+    @property
+    def hopeless(self) -> bool:
+        """Whether all attempts to start a renderer failed, so that the next one is some time away."""
+
     def start(self) -> None:
         """Start the processes; they are ready some tenths of a second later."""
 

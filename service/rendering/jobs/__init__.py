@@ -7,6 +7,7 @@ ordered    what was asked for, and what became of it
 memory     what a render takes in memory
 retention  which ended renders make room
 recorder   writes what becomes of a render to the store
+waiting    waits for events
 reads      requests for a picture that the renderer has not answered yet
 status     the status of a render, as callers see it
 store      renders on the disk

@@ -26,7 +26,6 @@ from service.rendering.ipc.messages import (
     MeasureKernel,
     Progress,
     Progressed,
-    Read,
     Restore,
     Stop,
     TakeCheckpoint,
@@ -36,9 +35,10 @@ from service.rendering.ipc.messages import (
 from service.rendering.jobs.memory import RenderMemory
 from service.rendering.jobs.ordered import Ordered
 from service.rendering.jobs.reads import Reads
-from service.rendering.jobs.recorder import Recorder
+from service.rendering.jobs.recorder import Recorder, Writing
 from service.rendering.jobs.status import KernelQuestion, error_of, status
 from service.rendering.jobs.store.record import Order, Outcome, State
+from service.rendering.jobs.waiting import first_of, within
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import stop_rule
 
@@ -81,6 +81,7 @@ class Job(Ordered):
             self._memory.packed(packed)
             self._memory.check()
         self._over = asyncio.Event()  # finished, or the server ends
+        self._lost = asyncio.Event()  # nothing renders any more
         self._changed = asyncio.Event()
         self._renderers = renderers
         self._load = load
@@ -94,7 +95,7 @@ class Job(Ordered):
         self._least_samples = 0  # of the checkpoint that it goes on from: the renderer may report fewer before that
         self._reads = Reads()
         self._looking = 0  # how many wait for an image
-        self._ending: asyncio.Task[None] | None = None
+        self._ending: Writing | None = None
         self._sampled = asyncio.Event()  # cleared while there are no samples any more, the renderer having been lost
         self._sampled.set()
         if self.outcome.state in ("queued", "running"):
@@ -132,17 +133,17 @@ class Job(Ordered):
 
     async def run(self) -> None:
         """Take the render from queued to finished, however it ends; return early when the server ends."""
-        while not self._over.is_set():
-            try:
-                await self._begin()
-                break
-            except ServiceError as error:
-                if self.recorder is None or not isinstance(error, Unavailable):
-                    self._fail(error)
-                    break
-                log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
-                with contextlib.suppress(TimeoutError):
-                    await asyncio.wait_for(self._over.wait(), AGAIN_S)
+        try:
+            if self.recorder is not None:
+                self.outcome = await self.recorder.start(self.outcome)
+            while not await self._ended():
+                self.outcome = replace(self.outcome, state="queued")
+                await within(self._over, AGAIN_S)
+        except ServiceError as error:
+            self._fail(error)
+        except Exception:
+            log.exception("could not begin a render id=%s", self.id[:6])
+            self._fail(Internal("The server made a mistake; its log says which."))
         await self._over.wait()
 
     def cancel(self) -> None:
@@ -167,7 +168,7 @@ class Job(Ordered):
         """The server ends: have the last samples stored, and leave the render for the next start."""
         self._over.set()
         self._wake()
-        if self.recorder is not None and self.state == "running" and self.outcome.progress.samples and self._task:
+        if self.recorder is not None and self.state == "running" and self._task is not None:
             self.recorder.expect()
             self._renderers.send(TakeCheckpoint(self._task))
             await self.recorder.checkpointed()
@@ -198,8 +199,7 @@ class Job(Ordered):
                 self._renderers.send(MeasureKernel(self._task))
 
     async def settled(self, measured: bool) -> None:
-        """Return when the render is finished, with `measured` once its kernel has been measured too, or when the
-        server ends."""
+        """Return when the render is finished (`measured`: its kernel measured, too), or the server ends."""
         await self._over.wait()
         if measured and self.finished.is_set() and self.outcome.kernel is not None and self._task is not None:
             await self._kernel.answered.wait()
@@ -219,11 +219,10 @@ class Job(Ordered):
         self._looking += 1
         try:
             await self._bring_back()
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(self._sampled.wait(), PATIENCE_S)
+            await within(self._sampled, PATIENCE_S)
             if self._task is None:
                 raise self._error or Conflict("There is no sample yet.")
-            image = await self._reads.ask(view, self._send_read)
+            image = await self._reads.ask(view, self._task, self._renderers.send)
         finally:
             self._looking -= 1
         if image.pixels is None:
@@ -250,7 +249,7 @@ class Job(Ordered):
                 self._progressed(message.progress)
         elif isinstance(message, Checkpoint):
             if self.recorder is not None and not self.finished.is_set():
-                self.recorder.checkpoint(Restore(message.task, 1, message.saved, None, message.progress))
+                self.recorder.checkpoint(message)
         elif isinstance(message, Done):
             self._end(message)
         elif isinstance(message, Failed):
@@ -271,10 +270,25 @@ class Job(Ordered):
         self._memory.release()
         if shown or (self.recorder is not None and (self.recorder.whole or self._over.is_set())):
             self._reads.answer_all(Unavailable("The renderer was lost: ask again.", int(AGAIN_S)))
+        elif self.recorder is not None and self._renderers.hopeless and not self.finished.is_set():
+            self._lost.set()  # which was not its fault: it goes on when something renders again
         elif self.finished.is_set():
             self._forget(Gone(detail))
         else:
             self._fail(Internal(detail))
+
+    async def _ended(self) -> bool:
+        """Render; False: something is missing that may come back. Raises what loading the scene raises."""
+        self._lost.clear()
+        try:
+            await self._begin()
+        except Unavailable as error:
+            if self.recorder is None:
+                raise
+            log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
+            return self._over.is_set()
+        await first_of(self._over, self._lost)
+        return self._over.is_set()
 
     async def _begin(self) -> None:
         """Raises what loading the scene raises, and Unavailable where nothing renders."""
@@ -290,16 +304,14 @@ class Job(Ordered):
             self._memory.hold()
             self._task = task = self._renderers.open(self, "render", self.owner)
             restore = await self._checkpoint(task)
-            if self.recorder is not None and not self._over.is_set():
-                await self.recorder.note(replace(self.outcome, state="running"))
             await self._send_scene(task, packed, restore)
         if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
             self._renderers.send(Stop(task))
 
     async def _checkpoint(self, task: int) -> Restore | None:
-        if self.recorder is None or not self.recorder.store.has(self.id, "checkpoint"):
-            return None
-        restore = await self.recorder.store.read(self.id, "checkpoint", task)
+        restore = None
+        if self.recorder is not None and self.recorder.store.has(self.id, "checkpoint"):
+            restore = await self.recorder.store.read(self.id, "checkpoint", task)
         progress = Progress() if restore is None else restore.progress
         self.outcome, self._least_samples = replace(self.outcome, progress=progress), progress.samples
         return restore
@@ -317,22 +329,20 @@ class Job(Ordered):
             self._memory.hold()
             self._task = task = self._renderers.open(self, "render", self.owner)
             self._shown = True
-            restore = await recorder.store.read(self.id, kind, task)
-            if restore is None:
+            try:
+                restore = await recorder.store.read(self.id, kind, task)
+                if restore is None:
+                    raise Internal("The stored picture is damaged.")
+                await self._send_scene(task, packed, replace(restore, reason=restore.reason or "stopped"))
+            except BaseException:  # the client may go away meanwhile, too
                 self.release()
-                raise Internal("The stored picture is damaged.")
-            await self._send_scene(task, packed, replace(restore, reason=restore.reason or "stopped"))
+                raise
 
     async def _send_scene(self, task: int, packed: Packed, restore: Restore | None) -> None:
         settings = self.settings
-        stop, denoise = stop_rule(settings), settings.denoise
-        update = Update(task, 1, packed.arrays, settings.for_gpu(), stop, denoise=denoise)
+        update = Update(task, 1, packed.arrays, settings.for_gpu(), stop_rule(settings), denoise=settings.denoise)
         await self._renderers.send_scene(update, restore)
-        self._reads.ask_again(self._send_read)
-
-    def _send_read(self, serial: int, view: View) -> None:
-        if self._task is not None:
-            self._renderers.send(Read(self._task, serial, view))
+        self._reads.ask_again(task, self._renderers.send)
 
     def _progressed(self, progress: Progress) -> None:
         self.outcome = replace(self.outcome, progress=progress)
@@ -343,28 +353,24 @@ class Job(Ordered):
         self._progressed(done.progress)
         self._sampled.set()
         self.outcome = replace(self.outcome, reason=done.reason).warned(done.warnings)
-        saved = done.saved
-        picture = None if saved is None else Restore(done.task, 1, saved, done.reason, done.progress)
         if not self.finished.is_set():
             state: State = "cancelled" if done.reason == "stopped" else "done"
-            self._end_with(replace(self.outcome, state=state, ended_at=time.time()), picture)
+            self._end_with(replace(self.outcome, state=state, ended_at=time.time()), done)
         elif self.recorder is not None:
-            self._end_with(self.outcome, picture)
+            self._end_with(self.outcome, done)
 
-    def _end_with(self, outcome: Outcome, picture: Restore | None = None) -> None:
+    def _end_with(self, outcome: Outcome, done: Done | None = None) -> None:
         """Finish, where it is stored once that is on the disk."""
         if self.recorder is None:
             self.outcome = outcome
             self._finish()
         else:
-            self._ending = asyncio.create_task(self._record_end(self.recorder, self._ending, outcome, picture))
+            self._ending = asyncio.create_task(self._record_end(self.recorder, self._ending, outcome, done))
 
-    async def _record_end(
-        self, recorder: Recorder, before: asyncio.Task[None] | None, outcome: Outcome, picture: Restore | None
-    ) -> None:
+    async def _record_end(self, to: Recorder, before: Writing | None, outcome: Outcome, done: Done | None) -> None:
         if before is not None:
             await before
-        await recorder.end(outcome, picture)
+        await to.end(outcome, done)
         if not self.finished.is_set():
             self.outcome = outcome
             self._finish()

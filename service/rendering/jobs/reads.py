@@ -7,7 +7,7 @@ import itertools
 from collections.abc import Callable
 
 from service.problems import ServiceError
-from service.rendering.ipc.messages import Image, View
+from service.rendering.ipc.messages import Image, Read, View
 
 
 class Reads:
@@ -18,18 +18,18 @@ class Reads:
     def __bool__(self) -> bool:
         return bool(self._open)
 
-    async def ask(self, view: View, send: Callable[[int, View], None]) -> Image:
-        """The answer to what `send` sends. Raises the error that is answered."""
+    async def ask(self, view: View, task: int, send: Callable[[Read], None]) -> Image:
+        """The answer to a Read of the task. Raises the error that is answered."""
         serial = next(self._serials)
         future: asyncio.Future[Image] = asyncio.get_running_loop().create_future()
         self._open[serial] = view, future
-        send(serial, view)
+        send(Read(task, serial, view))
         return await future
 
-    def ask_again(self, send: Callable[[int, View], None]) -> None:
-        """Send what is open to another task."""
+    def ask_again(self, task: int, send: Callable[[Read], None]) -> None:
+        """Ask another task what is open."""
         for serial, (view, _) in list(self._open.items()):
-            send(serial, view)
+            send(Read(task, serial, view))
 
     def answer(self, serial: int, answer: Image | ServiceError) -> None:
         _, future = self._open.pop(serial, (None, None))

@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import logging
 from contextlib import suppress
+from dataclasses import replace
 
-from service.problems import ServiceError
-from service.rendering.ipc.messages import Restore
+from service.problems import Internal, ServiceError
+from service.rendering.ipc.messages import Checkpoint, Done, Restore
 from service.rendering.jobs.store.record import Outcome
 from service.rendering.jobs.store.store import RenderStore
 
 log = logging.getLogger(__name__)
+
+MOST_STARTS = 5  # of servers that ended before the first checkpoint: the render may be what ended them
 
 Writing = asyncio.Task[None]
 
@@ -29,9 +32,9 @@ class Recorder:
         self._written = asyncio.Event()  # set by the next checkpoint that is on the disk
         self._closed = False
 
-    def checkpoint(self, restore: Restore) -> None:
+    def checkpoint(self, checkpoint: Checkpoint) -> None:
         """Write a checkpoint as soon as the one before it is on the disk; if another one comes first, that one."""
-        self._checkpoint = restore
+        self._checkpoint = Restore(checkpoint.task, 1, checkpoint.saved, None, checkpoint.progress)
         if self._writing is None and not self._closed:
             self._writing = asyncio.get_running_loop().create_task(self._write_checkpoints())
 
@@ -44,23 +47,34 @@ class Recorder:
         if not self._closed:
             self._written.clear()
 
+    async def start(self, outcome: Outcome) -> Outcome:
+        """Write that this server begins to render it. Raises Internal where others ended again and again by then."""
+        if outcome.starts >= MOST_STARTS and not outcome.progress.elapsed_s:
+            raise Internal(f"The server ended {outcome.starts} times while this render was being prepared.")
+        started = replace(outcome, starts=outcome.starts + 1)
+        await self.note(replace(started, state="running"))
+        return started
+
     async def note(self, outcome: Outcome) -> None:
         """Write how far it is. Where that cannot be written, the next attempt counts."""
         try:
             await self.store.update(self.number, outcome)
-        except ServiceError as error:
+        except Exception as error:
             self._failed("state", error)
 
-    async def end(self, outcome: Outcome, picture: Restore | None) -> bool:
+    async def end(self, outcome: Outcome, done: Done | None) -> bool:
         """Write how it ended; whether that is on the disk. If not, the next start goes on from a checkpoint."""
         await self.close()
+        picture = None
+        if done is not None and done.saved is not None:
+            picture = Restore(done.task, 1, done.saved, done.reason, done.progress)
         try:
             if picture is not None:
                 await self.store.write(self.id, "picture", picture)
             await self.store.update(self.number, outcome)
             if picture is not None:
                 await self.store.delete(self.id, "checkpoint")
-        except ServiceError as error:
+        except Exception as error:  # whatever it is, the render ends
             self._failed("picture", error)
             return False
         self.whole = True
@@ -80,10 +94,13 @@ class Recorder:
             try:
                 await self.store.write(self.id, "checkpoint", restore)
                 self._written.set()
-            except ServiceError as error:
+            except Exception as error:
                 self._failed("checkpoint", error)
         self._writing = None
 
-    def _failed(self, what: str, error: ServiceError) -> None:
+    def _failed(self, what: str, error: Exception) -> None:
         self.store.failures += 1
-        log.warning("could not store the %s of a render id=%s error=%s", what, self.id[:6], error)
+        unexpected = not isinstance(error, ServiceError)
+        log.warning(
+            "could not store the %s of a render id=%s error=%s", what, self.id[:6], error, exc_info=unexpected
+        )

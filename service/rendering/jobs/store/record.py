@@ -48,6 +48,7 @@ class Outcome:
     kernel: dict[str, Any] | None = None
     problem: dict[str, Any] | None = None
     ended_at: float | None = None  # s since 1970
+    starts: int = 0  # how many servers began to render it
 
     def failed(self, error: ServiceError, ended_at: float) -> Outcome:
         return replace(self, state="failed", problem=problem(error), ended_at=ended_at)

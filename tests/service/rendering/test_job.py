@@ -1,0 +1,219 @@
+"""One stored render against a renderer that does as the test says."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from service.config import Config
+from service.pack import Packed, pack
+from service.problems import Conflict, Internal, Unavailable
+from service.quality import resolve
+from service.rendering.ipc.messages import (
+    Checkpoint,
+    Done,
+    Image,
+    Progress,
+    Progressed,
+    Read,
+    Restore,
+    SavedPicture,
+    Stop,
+    TakeCheckpoint,
+    Update,
+    View,
+)
+from service.rendering.jobs import job as jobs
+from service.rendering.jobs.job import Job
+from service.rendering.jobs.recorder import MOST_STARTS, Recorder
+from service.rendering.jobs.store.record import Order, Outcome
+from service.rendering.jobs.store.store import RenderStore
+from service.rendering.statistics import Statistics
+from service.scene import parse_scene, parse_settings
+from tests.documents import Shelf
+from tests.serving import SCENE
+
+SETTINGS = resolve(parse_settings({"width": 4, "height": 4, "max_samples": 8}, "", Config()))
+PACKED = pack(parse_scene(SCENE), Shelf())
+SAVED = SavedPicture(4, (0, 0, 0), [np.arange(64, dtype=np.uint8)])
+
+
+class Renderers:
+    """Notes what it is told."""
+
+    def __init__(self) -> None:
+        self.statistics = Statistics()
+        self.hopeless = False
+        self.opened, self.sent = 0, list[Any]()
+
+    def open(self, listener: Any, kind: str, client: str) -> int:
+        if self.hopeless:
+            raise Unavailable("nothing renders")
+        self.opened += 1
+        return self.opened
+
+    def drop(self, task: int) -> None:
+        self.sent.append(("drop", task))
+
+    def send(self, message: Any) -> None:
+        self.sent.append(message)
+
+    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
+        self.sent.append((update, restore))
+
+
+async def load(document: bytes) -> Packed:
+    return PACKED
+
+
+async def stored(renderers: Any, store: RenderStore, outcome: Outcome | None = None) -> Job:
+    order = Order("id", "", SETTINGS, bytes=8)
+    number = await store.insert(order, outcome or Outcome(), b"document", [])
+    job = Job(renderers, order, load, outcome=outcome)
+    job.recorder = Recorder(store, number, "id")
+    return job
+
+
+def scenario(test: Callable[[Any, RenderStore], Awaitable[None]], folder: Path) -> None:
+    asyncio.run(test(Renderers(), RenderStore(folder)))  # type: ignore[arg-type]
+
+
+async def until(condition: Callable[[], object]) -> None:
+    async with asyncio.timeout(10):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+def test_it_goes_on_from_its_checkpoint_when_something_renders_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(jobs, "AGAIN_S", 0.02)
+
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store)
+        running = asyncio.create_task(job.run())
+        await until(lambda: renderers.sent)
+        assert renderers.sent[0][1] is None
+        job.heard(Checkpoint(1, 1, Progress(4, None, 2.0), SAVED))
+        job.heard(Progressed(1, 1, Progress(6, None, 3.0)))
+        await until(lambda: store.has("id", "checkpoint"))
+        renderers.hopeless = True
+        job.lost("No renderer could be started.")
+        await until(lambda: job.state == "queued")
+        assert not job.finished.is_set()
+        renderers.hopeless = False
+        await until(lambda: renderers.opened == 2)
+        await until(lambda: isinstance(renderers.sent[-1], tuple) and renderers.sent[-1][1] is not None)
+        restore = renderers.sent[-1][1]
+        assert restore.task == 2 and restore.reason is None and restore.progress.samples == 4
+        job.heard(Progressed(2, 1, Progress(1, None, 0.1)))  # of the moment before it heard of the checkpoint
+        assert job.outcome.progress.samples == 4
+        job.heard(Done(2, 1, "max_samples", Progress(8, None, 5.0), [], SAVED))
+        await running
+        assert job.state == "done" and store.latest("id") == "picture"
+
+    scenario(test, tmp_path)
+
+
+def test_a_render_that_servers_do_not_survive_fails(tmp_path: Path) -> None:
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store, Outcome("running", starts=MOST_STARTS - 1))
+        running = asyncio.create_task(job.run())
+        await until(lambda: renderers.opened)
+        (left,) = RenderStore(tmp_path).load()
+        assert (left.outcome.state, left.outcome.starts) == ("running", MOST_STARTS)
+        await job.close()
+        await running
+        again = Job(renderers, left.order, load, outcome=left.outcome)
+        again.recorder = Recorder(store, left.number, "id")
+        await again.run()
+        await again.recorded()
+        assert again.state == "failed" and renderers.opened == 1
+        with pytest.raises(Internal, match="5 times"):
+            await again.image(View())
+        (failed,) = RenderStore(tmp_path).load()
+        assert failed.outcome.state == "failed" and isinstance(failed.outcome.error, Internal)
+
+    scenario(test, tmp_path)
+
+
+def test_an_unexpected_error_fails_the_one_render(tmp_path: Path) -> None:
+    async def broken(document: bytes) -> Packed:
+        raise MemoryError
+
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store)
+        job._load = broken
+        await asyncio.wait_for(job.run(), 10)
+        assert job.state == "failed"
+
+    scenario(test, tmp_path)
+
+
+def test_who_goes_away_while_a_picture_is_brought_back_leaves_it_to_others(tmp_path: Path) -> None:
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store, Outcome("done", "max_samples", Progress(4), ended_at=1.0))
+        assert job.recorder is not None
+        with pytest.raises(Conflict):
+            await job.image(View())
+        await store.write("id", "picture", Restore(1, 1, SAVED, "max_samples", Progress(4)))
+        waits, send_scene = asyncio.Event(), renderers.send_scene
+        renderers.send_scene = lambda update, restore: waits.wait()
+        impatient = asyncio.create_task(job.image(View()))
+        await until(lambda: renderers.opened == 1)
+        impatient.cancel()
+        await asyncio.gather(impatient, return_exceptions=True)
+        renderers.send_scene = send_scene
+        patient = asyncio.create_task(job.image(View()))
+        await until(lambda: renderers.sent and isinstance(renderers.sent[-1], Read))
+        read, (_, restore) = renderers.sent[-1], renderers.sent[-2]
+        assert read.task == restore.task == 2 and restore.reason == "max_samples"
+        job.heard(Image(2, read.serial, np.zeros((4, 4, 4)), Progress(4)))
+        assert (await patient)[1].samples == 4
+        job.recorder.whole = True
+        assert job.rest() and renderers.sent[-1] == ("drop", 2)
+
+    scenario(test, tmp_path)
+
+
+def test_the_end_of_the_server_waits_for_the_last_checkpoint(tmp_path: Path) -> None:
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store)
+        running = asyncio.create_task(job.run())
+        await until(lambda: renderers.sent)
+        job.outcome = Outcome("running", progress=Progress(1, None, 1.0))
+        closing = asyncio.create_task(job.close())
+        await until(lambda: isinstance(renderers.sent[-1], TakeCheckpoint))
+        await asyncio.sleep(0.05)
+        assert not closing.done()
+        job.heard(Checkpoint(1, 1, Progress(4, None, 2.0), SAVED))
+        await asyncio.wait_for(asyncio.gather(closing, running), 10)
+        job.lost("The server is shutting down.")
+        assert not job.finished.is_set()
+        (left,) = RenderStore(tmp_path).load()
+        assert left.outcome.state == "running" and left.outcome.progress.samples == 4
+
+    scenario(test, tmp_path)
+
+
+def test_what_is_cancelled_keeps_what_comes_after(tmp_path: Path) -> None:
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store)
+        running = asyncio.create_task(job.run())
+        await until(lambda: renderers.sent)
+        job.cancel()
+        await asyncio.gather(running, job.recorded())
+        assert isinstance(renderers.sent[-1], Stop)
+        assert RenderStore(tmp_path).load()[0].outcome.state == "cancelled"
+        job.heard(Done(1, 1, "stopped", Progress(4, None, 2.0), [], SAVED))
+        await job.recorded()
+        (left,) = RenderStore(tmp_path).load()
+        assert left.outcome.state == "cancelled" and left.outcome.progress.samples == 4
+        assert store.latest("id") == "picture" and job.recorder is not None and job.recorder.whole
+
+    scenario(test, tmp_path)
