@@ -67,7 +67,7 @@ class AppState:
         self.bsdf = BsdfQuestions(self.renderers)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
-        self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients)
+        self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients, self.config.max_key_clients)
 
     async def info(self) -> dict[str, Any]:
         """The answer of GET /v1/info. Waits for a renderer that is being started; null where there is none."""

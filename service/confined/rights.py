@@ -33,8 +33,9 @@ class Rights:
 
     @property
     def missing(self) -> list[str]:
-        """Names of what the kernel did not take."""
-        return [name for name, value in asdict(self).items() if not value]
+        """Names of what the kernel did not take. A network is no loss where no socket can be made."""
+        covered = {"no_network"} if self.seccomp else set()
+        return [name for name, value in asdict(self).items() if not value and name not in covered]
 
 
 def renounce(no_network: bool) -> Rights:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import secrets
+from collections import Counter
 
 from service.problems import NotFound, TooManyRequests
 from service.rendering.renderers import Renderers
@@ -30,7 +31,9 @@ class Session:
 
 
 class Sessions:
-    def __init__(self, renderers: Renderers, reader: RequestReader, most: int) -> None:
+    def __init__(self, renderers: Renderers, reader: RequestReader, most: int, each: int | None = None) -> None:
+        """`most` clients at a time, and `each` of one key; None: no such limit."""
+        self._each = each
         self._renderers = renderers
         self._reader = reader
         self._most = most
@@ -39,6 +42,11 @@ class Sessions:
     @property
     def attended(self) -> int:
         return sum(session.connections > 0 and not _is_second(session) for session in self._kept.values())
+
+    def _attended_by(self, owner: str) -> int:
+        return sum(
+            each.owner == owner and each.connections > 0 and not _is_second(each) for each in self._kept.values()
+        )
 
     @property
     def waiting(self) -> int:
@@ -59,8 +67,8 @@ class Sessions:
             raise NotFound("This session is gone: start anew.")
         first = self._first(beside, owner) if session is None else session.beside
         is_second = first is not None and first.connections > 0
-        if (session is None or not session.connections) and not is_second and self.attended >= self._most:
-            raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
+        if (session is None or not session.connections) and not is_second:
+            self._admit(owner)
         if session is None:
             session = Session(Stream(self._renderers, self._reader, owner), owner)
             session.beside = first
@@ -70,6 +78,15 @@ class Sessions:
             session.timer = None
         session.connections += 1
         return session
+
+    def _admit(self, owner: str) -> None:
+        if self.attended >= self._most:
+            raise TooManyRequests(f"{self._most} clients are connected, and no more are taken (SUNBOX_MAX_CLIENTS).")
+        if owner and self._each is not None and self._attended_by(owner) >= self._each:
+            detail = (
+                f"{self._each} clients with your key are connected, and no more are taken (SUNBOX_MAX_KEY_CLIENTS)."
+            )
+            raise TooManyRequests(detail)
 
     def _of(self, id: str | None, owner: str) -> Session | None:
         """The session of that id, if that key opened it."""
@@ -93,7 +110,11 @@ class Sessions:
         session.timer = asyncio.get_running_loop().call_later(KEPT_S, self._end, session)
         self._kept[session.id] = self._kept.pop(session.id)
         if self.waiting > self._most:  # clients that come and go all the time must not fill the renderer's memory
-            self._end(next(kept for kept in self._kept.values() if not kept.connections))
+            waiting = [kept for kept in self._kept.values() if not kept.connections]
+            owner = Counter(kept.owner for kept in waiting).most_common(1)[0][
+                0
+            ]  # and they cost their own key a session
+            self._end(next(kept for kept in waiting if kept.owner == owner))
 
     def close(self, reason: str) -> None:
         """End all streams; their clients are told that the server goes away."""

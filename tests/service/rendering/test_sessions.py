@@ -191,3 +191,28 @@ def test_too_many_clients_and_going_away(gpu: object, tmp_path_factory: pytest.T
     assert closed_with(second) == 1001
     assert server.process.wait(15) == 0 and time.monotonic() - began < 15
     server.http.close()
+
+
+def test_one_key_does_not_take_all_places() -> None:
+    """Neither those of clients that are connected, nor those of clients that may come back."""
+
+    async def test() -> None:
+        supervisor: Any = Supervisor()
+        supervisor.open = lambda listener, client="": 1
+        kept = Sessions(supervisor, READER, most=3, each=2)
+        annas = [kept.enter(None, owner="anna") for _ in range(2)]
+        with pytest.raises(TooManyRequests, match="SUNBOX_MAX_KEY_CLIENTS"):
+            kept.enter(None, owner="anna")
+        second = kept.enter(None, annas[0].id, "anna")  # beside the first, they count as one
+        bert = kept.enter(None, owner="bert")
+        with pytest.raises(TooManyRequests, match="SUNBOX_MAX_CLIENTS"):
+            kept.enter(None, owner="carl")
+        for session in (bert, second, *annas):
+            kept.leave(session)
+        for _ in range(5):  # Anna comes and goes
+            kept.leave(kept.enter(None, owner="anna"))
+        assert kept.enter(bert.id, owner="bert") is bert
+        others = Sessions(supervisor, READER, most=3, each=1)
+        assert len({others.enter(None).id for _ in range(3)}) == 3  # without keys each is its own client
+
+    asyncio.run(test())
