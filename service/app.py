@@ -233,6 +233,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     await own.renderers.close()
     await asyncio.to_thread(own.assets.close)
     own.bodies.close()
+    if own.renders.store is not None:
+        await own.renders.store.close()
 
 
 def _limits(config: Config) -> QueueLimits:

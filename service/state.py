@@ -93,6 +93,7 @@ class AppState:
             log.warning("renders will not outlive this server: the data folder cannot be written to")
             self.renders.store = None
             return
+        await store.open()
         self.renders.resume(await asyncio.to_thread(store.load), self._resumed)
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:

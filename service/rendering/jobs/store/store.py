@@ -10,7 +10,7 @@ import errno
 import logging
 import tempfile
 from collections.abc import Callable, Collection
-from contextlib import AbstractContextManager, nullcontext
+from contextlib import AbstractContextManager, nullcontext, suppress
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -66,6 +66,14 @@ class RenderStore:
         if self._files.has(id, "picture"):
             return render
         return replace(render, outcome=replace(outcome, progress=self._checkpointed(id)))
+
+    async def open(self) -> None:
+        """Be ready for many renders, until `close`."""
+        with suppress(Unavailable):  # the disk fails; each write tries again
+            await recording(self._rows.hold)
+
+    async def close(self) -> None:
+        await recording(self._rows.close)
 
     @property
     def pictures(self) -> Usage:
