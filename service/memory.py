@@ -23,6 +23,7 @@ SHARE = 0.5  # of the machine's memory: the rest is for the processes themselves
 RETRY_S = 5
 MIB = 2**20
 CGROUP = Path("/sys/fs/cgroup")
+OWN_GROUPS = Path("/proc/self/cgroup")
 
 
 @dataclass(frozen=True)
@@ -115,7 +116,22 @@ class _Holder:
 def machine_memory() -> int:
     """The bytes of the machine, or of the control group that this process is in, where these are fewer."""
     total = os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
-    for name in ("memory.max", "memory/memory.limit_in_bytes"):  # of versions 2 and 1
+    for file in _limits():
         with suppress(OSError, ValueError):  # no such file, or "max"
-            total = min(total, int((CGROUP / name).read_text()))
+            total = min(total, int(file.read_text()))
     return total
+
+
+def _limits() -> Iterator[Path]:
+    """Where limits of this process's control groups may stand [cgroups(7)]: its own, and those that it is within."""
+    try:
+        lines = OWN_GROUPS.read_text().splitlines()
+    except OSError:
+        return
+    for line in lines:
+        _, controllers, path = (*line.split(":", 2), "", "")[:3]
+        if path and controllers in ("", "memory"):  # of version 2, and of version 1
+            root, name = (CGROUP, "memory.max") if not controllers else (CGROUP / "memory", "memory.limit_in_bytes")
+            own = root / path.lstrip("/")
+            yield from (folder / name for folder in (own, *own.parents) if folder.is_relative_to(root))
+            yield root / name  # in a container the group's path may be that of the machine

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import gc
+import os
 import time
 from collections.abc import Callable, Iterator
 from pathlib import Path
@@ -95,18 +96,30 @@ def test_the_caches_can_be_shrunk() -> None:
 
 
 @pytest.mark.parametrize(
-    ("file", "text", "share"),
-    [("memory.max", "1000000", 1000000), ("memory.max", "max", None), ("memory/memory.limit_in_bytes", "9000", 9000)],
+    ("group", "files", "limit"),
+    [
+        ("0::/", {"memory.max": "1000000"}, 1000000),
+        ("0::/", {"memory.max": "max"}, None),
+        ("0::/system.slice/sunbox.service", {"system.slice/sunbox.service/memory.max": "5000"}, 5000),
+        ("0::/outer/inner", {"outer/inner/memory.max": "5000", "outer/memory.max": "4000"}, 4000),
+        ("0::/docker/abc", {"memory.max": "3000"}, 3000),  # seen from inside of it
+        ("0::/../other", {}, None),
+        ("7:memory:/lxc\n5:cpu:/lxc\n0::/", {"memory/lxc/memory.limit_in_bytes": "9000"}, 9000),
+        ("nonsense", {"memory.max": "1"}, None),
+    ],
 )
 def test_a_container_s_limit_counts(
-    file: str, text: str, share: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+    group: str, files: dict[str, str], limit: int | None, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr(memory, "CGROUP", tmp_path / "none")
+    monkeypatch.setattr(memory, "CGROUP", tmp_path / "groups")
+    monkeypatch.setattr(memory, "OWN_GROUPS", tmp_path / "own")
     machine = machine_memory()
-    monkeypatch.setattr(memory, "CGROUP", tmp_path)
-    (tmp_path / file).parent.mkdir(exist_ok=True)
-    (tmp_path / file).write_text(text)
-    assert machine_memory() == (share or machine)
+    assert machine == os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES")
+    (tmp_path / "own").write_text(group + "\n")
+    for name, text in files.items():
+        (tmp_path / "groups" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "groups" / name).write_text(text)
+    assert machine_memory() == (limit or machine)
     assert MemoryBudget().limit == machine_memory() // 2
 
 
