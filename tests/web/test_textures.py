@@ -164,7 +164,8 @@ def test_textures_are_used_again_and_checkers_made(editor: Editor) -> None:
     page.click(tile)
     page.click("[data-field=metallic] .image")
     page.click("dialog[open] .tile[value=checker]")
-    assert editor.text("[data-field=metallic] .beneath > summary").startswith("Checker")
+    summary = "[data-field=metallic] .beneath > summary"
+    editor.wait("the checker", lambda: editor.text(summary).startswith("Checker"))
     # Another one in the place of the first is chosen from its picture.
     page.click("[data-field=roughness] .texture .open")
     page.click("dialog[open] .tile[value='texture:checker']")
