@@ -30,6 +30,7 @@ migrations         its tables, as the ordered steps that made them
 data_lock          one server at a time on a data folder
 memory             one budget of memory for all work
 quota              room on the disk
+asset_shares       what the assets of one key take
 disk_usage         what files take on a disk: blocks and inodes
 garbage            the garbage collector, out of the way of large imports
 storage            what is kept in the data folder

@@ -83,6 +83,7 @@ def create_app(config: Config) -> FastAPI:
         Supervisor(Options(config.device, config.hang_s, config.gpu_memory, memory.limit, config.checkpoint_s)),
         kept.documents,
         kept.quota,
+        kept.shares,
         RenderQueue(_limits(config), store),
     )
     app = FastAPI(

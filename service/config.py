@@ -139,6 +139,12 @@ class Config(BaseSettings):
         description="Most renders that wait in line; a key with less than its share may add more.",
     )
     max_jobs: int = Field(2_000, ge=1, description="Most renders, running and waiting, of one key.")
+    max_key_assets: int | None = Field(
+        None,
+        ge=1,
+        description="Most bytes of the assets that one key has uploaded, of which those unused longest make room "
+        "(default: no limit).",
+    )
     max_key_documents: int | None = Field(
         None, ge=1, description="Most bytes of the documents that one key has saved (default: no limit)."
     )

@@ -82,5 +82,13 @@ MIGRATIONS = (
             "DROP TABLE former",
         ),
     ),
+    Migration(
+        "who uploaded which assets",
+        (
+            """CREATE TABLE asset_owners (
+                owner TEXT NOT NULL, asset TEXT NOT NULL, bytes INTEGER NOT NULL, PRIMARY KEY (owner, asset)
+            ) WITHOUT ROWID""",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

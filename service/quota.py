@@ -76,6 +76,24 @@ class Quota:
             with self._lock:
                 self._pinned -= Counter(ids)
 
+    def sizes(self, ids: Collection[str]) -> dict[str, int]:
+        """The bytes of those of the assets that are here."""
+        return {f"sha256:{hash}": held.usage.bytes for hash, held in self._files.held_of(ids).items()}
+
+    def evict(self, ids: Collection[str], size: int) -> list[str]:
+        """Delete assets among these that may go, the one unused longest first, until they had that many bytes."""
+        goes = []
+        with self._lock, self._in_use() as in_use, self._files.alone():
+            held = self._files.held_of(set(ids) - set(in_use) - self._pinned.keys())
+            for hash in sorted(held, key=lambda hash: held[hash].used):
+                if size <= 0:
+                    break
+                size -= held[hash].usage.bytes
+                self._files.delete(hash)
+                log.info("asset evicted id=sha256:%s bytes=%d", hash, held[hash].usage.bytes)
+                goes.append(f"sha256:{hash}")
+        return goes
+
     def used(self) -> Usage:
         return self._others() + self._files.usage()
 

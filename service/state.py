@@ -12,6 +12,7 @@ from typing import Any
 
 from starlette.requests import HTTPConnection
 
+from service.asset_shares import AssetShares
 from service.assets import AssetStore
 from service.bodies import Bodies
 from service.config import Config
@@ -50,6 +51,7 @@ class AppState:
     renderers: Renderers
     documents: Documents
     quota: Quota
+    shares: AssetShares
     renders: RenderQueue = field(default_factory=RenderQueue)
     traffic: Traffic = field(default_factory=Traffic)
     sessions: Sessions = field(init=False)

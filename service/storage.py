@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from service.asset_shares import AssetShares
 from service.assets import AssetStore
 from service.config import Config
 from service.disk_usage import Usage, usage
@@ -20,6 +21,7 @@ class Storage:
     assets: AssetStore
     documents: Documents
     quota: Quota
+    shares: AssetShares
 
 
 RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
@@ -33,7 +35,8 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
     quota = Quota(config.data_dir, limit, lambda: documents.assets_in_use(), lambda: documents.usage() + beside())
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota, config.max_key_documents)
-    return Storage(assets, documents, quota)
+    shares = AssetShares(config.data_dir, quota, config.max_key_assets)
+    return Storage(assets, documents, quota, shares)
 
 
 def _pictures(folder: Path) -> Usage:

@@ -28,7 +28,7 @@ LAYERS = [
     {"service.recipe"},
     {"service.quota", "service.migrations"},
     {"service.database", "service.data_lock"},
-    {"service.documents"},
+    {"service.documents", "service.asset_shares"},
     {"service.storage", "service.data_check"},
     {"service.pack"},
     {"service.logs", "service.log_output"},

@@ -16,7 +16,7 @@ import logging
 import os
 import re
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -125,6 +125,17 @@ class AssetFolder:
                     if not suffix:
                         one.used = found.st_mtime_ns
         return {hash: one for hash, one in held.items() if {hash, hash + RECORD} <= names or hash + DAMAGED in names}
+
+    def held_of(self, ids: Collection[str]) -> dict[str, Held]:
+        """What `held` says of these assets, as far as they are here and whole."""
+        found: dict[str, Held] = {}
+        for id in ids:
+            with suppress(FileNotFoundError):
+                stats = [self.file(id, suffix).stat() for suffix in ("", RECORD)]
+                one = Held(usage(stats[0]) + usage(stats[1]), stats[0].st_mtime_ns)
+                found[id.removeprefix("sha256:")] = one
+                one.usage += usage(self.file(id, SCENE).stat())
+        return found
 
     def clear(self) -> None:
         """Deletes what a crash left: files half written, bytes without their record, records without their bytes."""

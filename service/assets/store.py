@@ -87,10 +87,17 @@ class AssetStore:
             file.write(more)
             file.flush()
 
-    def add(self, data: Source, content_type: str | None = None, filename: str | None = None) -> AssetInfo:
+    def add(
+        self,
+        data: Source,
+        content_type: str | None = None,
+        filename: str | None = None,
+        room: Room | None = None,
+    ) -> AssetInfo:
         """Keeps the bytes, once they have been parsed; in the place of the same ones if these are damaged.
 
-        Raises UnsupportedMedia, AssetError, Unavailable, and what `room` raises.
+        `room` is entered in the place of the store's. Raises UnsupportedMedia, AssetError, Unavailable, and what
+        `room` raises.
         """
         id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
@@ -102,9 +109,9 @@ class AssetStore:
         if format is None:
             raise UnsupportedMedia(f"the format is not supported; supported are {FORMATS}")
         if KINDS[format] == "scene":
-            return self._import(id, format, data, new=True)[0]
+            return self._import(id, format, data, True, room)[0]
         info = self._described(id, format, data)
-        with self._room(expected((size, RECORD_BYTES))):
+        with (room or self._room)(expected((size, RECORD_BYTES))):
             self._store(info, data)
         return info
 
@@ -119,8 +126,13 @@ class AssetStore:
         imported = self._imported(id)
         if imported is None:  # nothing of it is lost: the file itself is still here
             with self.opened(id) as source:
-                imported = self._import(id, info.format, source, new=False)[1]
+                imported = self._import(id, info.format, source, False)[1]
         return imported
+
+    def parts(self, info: AssetInfo) -> list[str]:
+        """The ids of an asset and, of a scene, of the assets that it was taken apart into."""
+        imported = self._imported(info.id) if info.kind == "scene" else None
+        return [info.id, *(imported.references() if imported else ())]
 
     def read(self, id: str) -> bytes:
         """Raises NotFound."""
@@ -177,11 +189,13 @@ class AssetStore:
     def close(self) -> None:
         self.loader.close()
 
-    def _import(self, id: str, format: str, data: Source, new: bool) -> tuple[AssetInfo, Imported]:
+    def _import(
+        self, id: str, format: str, data: Source, new: bool, room: Room | None = None
+    ) -> tuple[AssetInfo, Imported]:
         with collector_paused():
-            return self._import_whole(id, format, data, new)
+            return self._import_whole(id, format, data, new, room or self._room)
 
-    def _import_whole(self, id: str, format: str, data: Source, new: bool) -> tuple[AssetInfo, Imported]:
+    def _import_whole(self, id: str, format: str, data: Source, new: bool, room: Room) -> tuple[AssetInfo, Imported]:
         """Stores the parts of a scene and its document, and the file itself where that is `new`."""
         try:
             file = self.loader.sandbox.parse_scene(format, handed(data))
@@ -191,7 +205,7 @@ class AssetStore:
         # References to the parts, which are about as long as a record, are added to the document.
         text = len(json.dumps(file.document)) + RECORD_BYTES * len(file.document["shapes"])
         parts = [stored for part in file.parts for stored in (len(part.data), RECORD_BYTES)]
-        with self._room(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
+        with room(expected([text, *parts, *((size, RECORD_BYTES) if new else ())])):
             imported = take_apart(file, self._keep)
             info = AssetInfo(
                 id, "scene", format, size, triangles=file.triangles, warnings=imported.warnings or None,

@@ -20,7 +20,7 @@ from service.downloads import FileAnswer
 from service.rendering.executors import storing
 from service.routes import answers
 from service.scene.text import dump_json
-from service.state import app_state, caller
+from service.state import app_state, caller, owner
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
@@ -39,14 +39,16 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     kind = request.headers.get("content-type")
-    own = app_state(request)
+    own, whose = app_state(request), owner(request)
     file = await asyncio.to_thread(own.assets.incoming)
     async for chunk in request.stream():
         await asyncio.to_thread(own.assets.receive, file, chunk)
 
     def add() -> AssetInfo:
         with file:  # here: a request that is cancelled does not wait for this thread
-            return own.assets.add(file, kind, filename)
+            info = own.assets.add(file, kind, filename, partial(own.shares.room, whose))
+        own.shares.uploaded(whose, own.assets.parts(info))
+        return info
 
     info = await storing(add, caller(request))
     return {name: value for name, value in asdict(info).items() if value is not None}

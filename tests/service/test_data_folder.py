@@ -29,7 +29,7 @@ from service.storage import Storage, storage
 
 # Folders as earlier versions of Sunbox left them: the database as `.dump` of SQLite's shell writes it, with a scene
 # and a material, and the asset that the scene uses. Version 0 is of revision 0409cd4, version 1 of ab88cfc,
-# version 2 of 366adc8.
+# version 2 of 366adc8, version 3 of 19a5ccc.
 FOLDERS = Path(__file__).parent / "folders"
 VERSIONS = sorted(path.name for path in FOLDERS.iterdir())
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import json
 import socket
+import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -39,6 +40,7 @@ def keyed(server: Server, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
         "SUNBOX_MAX_JOBS": "2",
         "SUNBOX_KEEP_RENDERS": "2",
         "SUNBOX_MAX_BODY": "4000",
+        "SUNBOX_MAX_KEY_ASSETS": "16384",
         "SUNBOX_BODY_TIMEOUT": "0.5",
         "SUNBOX_MAX_SECONDS": "5",
         "SUNBOX_ALLOWED_ORIGINS": "https://friend.example",
@@ -151,14 +153,14 @@ def test_a_body_that_stops_is_ended(keyed: Server) -> None:
 
 
 def test_the_disk_has_its_quota(tmp_path: Path) -> None:
-    served = Server(tmp_path, SUNBOX_DATA_QUOTA="40000")
+    served = Server(tmp_path, SUNBOX_DATA_QUOTA="200000")
 
     def post(size: int) -> httpx.Response:
         return served.http.post("/v1/assets", content=OBJ + b"#" * (size - len(OBJ)))
 
     try:
-        assert is_problem(post(45_000), 413)
-        first, second, third = (post(size) for size in (11_000, 11_100, 11_200))
+        assert is_problem(post(210_000), 413)
+        first, second, third = (post(size) for size in (60_000, 60_100, 60_200))
         assert {answer.status_code for answer in (first, second, third)} == {201}
         assert is_problem(served.http.get(f"/v1/assets/{first.json()['id']}"), 404)
         assert served.http.get(f"/v1/assets/{third.json()['id']}").status_code == 200
@@ -290,3 +292,14 @@ def test_saved_documents_are_their_key_s(http: httpx.Client) -> None:
     assert http.get(address, headers=BERT).json() == grey
     assert is_problem(http.delete(address, headers=BERT), 403)
     assert http.delete(address, headers=ANNA).status_code == 204
+
+
+def test_a_key_s_assets_have_a_bound(http: httpx.Client) -> None:
+    """Two small ones: the first makes room for the third, and the other key's stays."""
+    ids = [http.post("/v1/assets", content=OBJ + b"#" * n, headers=ANNA).json()["id"] for n in range(2)]
+    other = http.post("/v1/assets", content=OBJ + b"#" * 9, headers=BERT).json()["id"]
+    time.sleep(0.02)  # file systems write times in steps
+    assert http.get(f"/v1/assets/{ids[1]}", headers=ANNA).status_code == 200  # used last
+    ids.append(http.post("/v1/assets", content=OBJ + b"#" * 2, headers=ANNA).json()["id"])
+    found = [http.get(f"/v1/assets/{id}", headers=ANNA).status_code for id in (*ids, other)]
+    assert found == [404, 200, 200, 200]

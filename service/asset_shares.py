@@ -1,0 +1,87 @@
+"""What the assets of one key take: where that is too much, its own make room, those unused longest first."""
+
+from __future__ import annotations
+
+import threading
+from collections import Counter
+from collections.abc import Collection, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from service.database import Database
+from service.disk_usage import Usage
+from service.problems import TooLarge, Unavailable
+from service.quota import RETRY_S, Quota
+
+
+class AssetShares:
+    """For any number of threads; not for an event loop. An owner is a text; "" has no bound.
+
+    An asset that several owners uploaded counts for each of them, and goes only with the last one.
+    """
+
+    def __init__(self, folder: Path, quota: Quota, each: int | None) -> None:
+        self._database = Database(folder)
+        self._quota = quota
+        self._each = each  # bytes; None: no bound
+        self._lock = threading.Lock()
+        self._promised: Counter[str] = Counter()  # bytes that are being stored, by owner
+
+    @contextmanager
+    def room(self, owner: str, size: Usage) -> Iterator[None]:
+        """Room for an owner's upload, which is to be stored while it lasts.
+
+        Raises TooLarge for what could never be, Unavailable where too much must stay.
+        """
+        bounded = bool(owner) and self._each is not None
+        if bounded:
+            with self._lock:
+                self._make_room(owner, size.bytes)
+                self._promised[owner] += size.bytes
+        try:
+            with self._quota.room(size):
+                yield
+        finally:
+            if bounded:
+                with self._lock:
+                    self._promised[owner] -= size.bytes
+
+    def uploaded(self, owner: str, ids: Collection[str]) -> None:
+        """Note that an owner uploaded these assets, or a scene with these parts. Raises Unavailable."""
+        if not owner:
+            return
+        rows = [(owner, id, size) for id, size in self._quota.sizes(ids).items()]
+        with self._database.open() as database, database:
+            database.executemany("INSERT OR REPLACE INTO asset_owners VALUES (?, ?, ?)", rows)
+
+    def _make_room(self, owner: str, size: int) -> None:
+        assert self._each is not None
+        if size > self._each:
+            raise TooLarge(
+                f"{size} bytes are more than one key's assets may take: {self._each} (SUNBOX_MAX_KEY_ASSETS)"
+            )
+        if self._over(owner, size) <= 0:
+            return
+        with self._database.open() as database, database:
+            mine = [id for (id,) in database.execute("SELECT asset FROM asset_owners WHERE owner = ?", (owner,))]
+            others = "SELECT asset FROM asset_owners WHERE owner <> ?"
+            shared = {id for (id,) in database.execute(others, (owner,))}
+        self._forget(owner, set(mine) - self._quota.sizes(mine).keys())  # they made room for somebody
+        over = self._over(owner, size)
+        if over > 0:
+            self._forget(owner, self._quota.evict([id for id in mine if id not in shared], over))
+        if self._over(owner, size) > 0:
+            detail = "Your assets that saved documents and renders use take all that one key's may"
+            raise Unavailable(f"{detail} (SUNBOX_MAX_KEY_ASSETS).", RETRY_S)
+
+    def _over(self, owner: str, size: int) -> int:
+        """The bytes that are too many with `size` more."""
+        assert self._each is not None
+        with self._database.open() as database:
+            row = database.execute("SELECT total(bytes) FROM asset_owners WHERE owner = ?", (owner,)).fetchone()
+        return int(row[0]) + self._promised[owner] + size - self._each
+
+    def _forget(self, owner: str, ids: Collection[str]) -> None:
+        with self._database.open() as database, database:
+            gone = [(owner, id) for id in ids]
+            database.executemany("DELETE FROM asset_owners WHERE owner = ? AND asset = ?", gone)
