@@ -50,10 +50,12 @@ class Renderers:
         self.statistics = Statistics()
         self.hopeless = False
         self.opened, self.sent = 0, list[Any]()
+        self.clients = list[str]()
 
     def open(self, listener: Any, kind: str, client: str) -> int:
         if self.hopeless:
             raise Unavailable("nothing renders")
+        self.clients.append(client)
         self.opened += 1
         return self.opened
 
@@ -197,6 +199,20 @@ def test_the_end_of_the_server_waits_for_the_last_checkpoint(tmp_path: Path) -> 
         assert not job.finished.is_set()
         (left,) = RenderStore(tmp_path).load()
         assert left.outcome.state == "running" and left.outcome.progress.samples == 4
+
+    scenario(test, tmp_path)
+
+
+def test_its_key_is_its_client(tmp_path: Path) -> None:
+    """Without keys it is its own client: `open` gives a part to each task without a name."""
+
+    async def test(renderers: Any, store: RenderStore) -> None:
+        for owner in ("anna", ""):
+            job = Job(renderers, Order("id", owner, SETTINGS), load, b"document")
+            running = asyncio.create_task(job.run())
+            await until(lambda owner=owner: renderers.clients[-1:] == [owner])
+            job.cancel()
+            await running
 
     scenario(test, tmp_path)
 

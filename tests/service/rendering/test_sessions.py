@@ -136,6 +136,22 @@ def test_how_many_and_how_long(monkeypatch: pytest.MonkeyPatch) -> None:
     asyncio.run(test())
 
 
+def test_all_streams_of_a_key_share_its_part() -> None:
+    """Without keys each has its own; `renderers.open` gives one to a task without a client."""
+
+    async def test() -> None:
+        clients: list[str] = []
+        supervisor: Any = Supervisor()
+        supervisor.open = lambda listener, client="": clients.append(client) or len(clients)
+        kept = Sessions(supervisor, READER, most=4)
+        for owner in ("anna", "anna", "bert", ""):
+            kept.enter(None, owner=owner)
+        assert clients == ["anna", "anna", "bert", ""]
+        kept.close("the end")
+
+    asyncio.run(test())
+
+
 def test_two_variants_count_as_one_client() -> None:
     async def test() -> None:
         supervisor: Any = Supervisor()
