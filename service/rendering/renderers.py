@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any, Protocol
 
-from service.rendering.ipc.messages import FromRenderer, Restore, ToRenderer, Update
+from service.rendering.ipc.messages import FromRenderer, Restore, SavedPicture, ToRenderer, Update
 from service.rendering.statistics import Kind, Statistics
 
 
@@ -66,3 +67,6 @@ class Renderers(Protocol):
 
         `restore`: its picture as the server has it, which the task goes on from, or has ended with.
         """
+
+    def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        """A task's picture need not stay in memory: `read`, which is not for an event loop, gives it."""

@@ -83,7 +83,7 @@ class Job(Ordered):
         self._over = asyncio.Event()  # finished, or the server ends
         self._lost = asyncio.Event()  # nothing renders any more
         self._changed = asyncio.Event()
-        self._renderers = renderers
+        self.renderers = renderers
         self._load = load
         self._document = document
         self._packed = packed
@@ -153,7 +153,7 @@ class Job(Ordered):
         self._packed = None
         self.outcome = replace(self.outcome, state="cancelled", ended_at=time.time())
         if self._task is not None:
-            self._renderers.send(Stop(self._task))
+            self.renderers.send(Stop(self._task))
         self._finish()
         if self.recorder is not None:
             self._ending = asyncio.create_task(self.recorder.note(self.outcome))
@@ -170,14 +170,14 @@ class Job(Ordered):
         self._wake()
         if self.recorder is not None and self.state == "running" and self._task is not None:
             self.recorder.expect()
-            self._renderers.send(TakeCheckpoint(self._task))
+            self.renderers.send(TakeCheckpoint(self._task))
             await self.recorder.checkpointed()
         await self.recorded()
 
     def release(self) -> None:
         """Forget the picture in the renderer."""
         if self._task is not None:
-            self._renderers.drop(self._task)
+            self.renderers.drop(self._task)
             self._task, self._shown = None, False
         self._memory.release()
 
@@ -196,7 +196,7 @@ class Job(Ordered):
                 with contextlib.suppress(Conflict):
                     await self._bring_back()
             if self.outcome.kernel is not None and self._task is not None:
-                self._renderers.send(MeasureKernel(self._task))
+                self.renderers.send(MeasureKernel(self._task))
 
     async def settled(self, measured: bool) -> None:
         """Return when the render is finished (`measured`: its kernel measured, too), or the server ends."""
@@ -222,7 +222,7 @@ class Job(Ordered):
             await within(self._sampled, PATIENCE_S)
             if self._task is None:
                 raise self._error or Conflict("There is no sample yet.")
-            image = await self._reads.ask(view, self._task, self._renderers.send)
+            image = await self._reads.ask(view, self._task, self.renderers.send)
         finally:
             self._looking -= 1
         if image.pixels is None:
@@ -243,7 +243,7 @@ class Job(Ordered):
         elif isinstance(message, Loaded):
             self.outcome = self.outcome.loaded(message)
             if self._kernel.awaited and self._task is not None:
-                self._renderers.send(MeasureKernel(self._task))
+                self.renderers.send(MeasureKernel(self._task))
         elif isinstance(message, Progressed):
             if message.progress.samples >= self._least_samples:
                 self._progressed(message.progress)
@@ -270,7 +270,7 @@ class Job(Ordered):
         self._memory.release()
         if shown or (self.recorder is not None and (self.recorder.whole or self._over.is_set())):
             self._reads.answer_all(Unavailable("The renderer was lost: ask again.", int(AGAIN_S)))
-        elif self.recorder is not None and self._renderers.hopeless and not self.finished.is_set():
+        elif self.recorder is not None and self.renderers.hopeless and not self.finished.is_set():
             self._lost.set()  # which was not its fault: it goes on when something renders again
         elif self.finished.is_set():
             self._forget(Gone(detail))
@@ -302,11 +302,11 @@ class Job(Ordered):
             if self._over.is_set():
                 return
             self._memory.hold()
-            self._task = task = self._renderers.open(self, "render", self.owner)
+            self._task = task = self.renderers.open(self, "render", self.owner)
             restore = await self._checkpoint(task)
             await self._send_scene(task, packed, restore)
         if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
-            self._renderers.send(Stop(task))
+            self.renderers.send(Stop(task))
 
     async def _checkpoint(self, task: int) -> Restore | None:
         restore = None
@@ -327,7 +327,7 @@ class Job(Ordered):
             packed = await self._load(await self.document())
             self._memory.packed(packed)
             self._memory.hold()
-            self._task = task = self._renderers.open(self, "render", self.owner)
+            self._task = task = self.renderers.open(self, "render", self.owner)
             self._shown = True
             try:
                 restore = await recorder.store.read(self.id, kind, task)
@@ -341,8 +341,8 @@ class Job(Ordered):
     async def _send_scene(self, task: int, packed: Packed, restore: Restore | None) -> None:
         settings = self.settings
         update = Update(task, 1, packed.arrays, settings.for_gpu(), stop_rule(settings), denoise=settings.denoise)
-        await self._renderers.send_scene(update, restore)
-        self._reads.ask_again(task, self._renderers.send)
+        await self.renderers.send_scene(update, restore)
+        self._reads.ask_again(task, self.renderers.send)
 
     def _progressed(self, progress: Progress) -> None:
         self.outcome = replace(self.outcome, progress=progress)
@@ -384,7 +384,7 @@ class Job(Ordered):
         self._wake()
 
     def _fail(self, error: ServiceError) -> None:
-        self._renderers.statistics.errors[answer(error).type] += 1
+        self.renderers.statistics.errors[answer(error).type] += 1
         self._forget(error)
         self._end_with(self.outcome.failed(error, time.time()))
 

@@ -81,7 +81,8 @@ class RenderQueue:
                 continue
             job = make(each)
             job.number = self._number = each.number
-            job.recorder = Recorder(self.store, each.number, each.order.id, whole=each.outcome.state in ENDED)
+            whole = each.outcome.state in ENDED
+            job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers)
             self._jobs[job.id] = job
             if not job.finished.is_set():
                 self._waiting.add(job)
@@ -102,7 +103,7 @@ class RenderQueue:
         self.admit(job.owner)
         if listed and self.store is not None:
             job.number = await self._stored(job, uses, key)
-            job.recorder = Recorder(self.store, job.number, job.id)
+            job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers)
             job.forget_document()
         if listed:
             self._number = job.number = max(job.number, self._number + 1)

@@ -6,11 +6,14 @@ import asyncio
 import logging
 from contextlib import suppress
 from dataclasses import replace
+from functools import partial
 
 from service.problems import Internal, ServiceError
 from service.rendering.ipc.messages import Checkpoint, Done, Restore
+from service.rendering.jobs.store.pictures import Kind
 from service.rendering.jobs.store.record import Outcome
 from service.rendering.jobs.store.store import RenderStore
+from service.rendering.renderers import Renderers
 
 log = logging.getLogger(__name__)
 
@@ -22,8 +25,12 @@ Writing = asyncio.Task[None]
 class Recorder:
     """For the event loop. `whole` says that everything about an ended render is on the disk."""
 
-    def __init__(self, store: RenderStore, number: int, id: str, whole: bool = False) -> None:
+    def __init__(
+        self, store: RenderStore, number: int, id: str, whole: bool = False, renderers: Renderers | None = None
+    ) -> None:
+        """`renderers` are told where the pictures that they keep can be read from."""
         self.store = store
+        self._renderers = renderers
         self.number = number
         self.whole = whole
         self.id = id
@@ -74,6 +81,7 @@ class Recorder:
             await self.store.update(self.number, outcome)
             if picture is not None:
                 await self.store.delete(self.id, "checkpoint")
+                self._let_go("picture", picture)
         except Exception as error:  # whatever it is, the render ends
             self._failed("picture", error)
             return False
@@ -91,12 +99,22 @@ class Recorder:
     async def _write_checkpoints(self) -> None:
         while (restore := self._checkpoint) is not None:
             self._checkpoint = None
+            last = [restore]
             try:
                 await self.store.write(self.id, "checkpoint", restore)
                 self._written.set()
+                self._let_go("checkpoint", restore)
             except Exception as error:
                 self._failed("checkpoint", error)
+            del restore
+            await self.store.free(last)
         self._writing = None
+
+    def _let_go(self, kind: Kind, restore: Restore) -> None:
+        """The renderers' copy of a picture is read from the disk from now on."""
+        if self._renderers is not None:
+            read = partial(self.store.read_now, self.id, kind, restore.task)
+            self._renderers.stored(restore.task, restore.saved, read)
 
     def _failed(self, what: str, error: Exception) -> None:
         self.store.failures += 1

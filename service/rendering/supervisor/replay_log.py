@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from service.rendering.ipc import channel
@@ -22,6 +23,7 @@ from service.rendering.ipc.messages import (
     Read,
     Restore,
     Resume,
+    SavedPicture,
     Settle,
     Stop,
     StopRule,
@@ -29,6 +31,9 @@ from service.rendering.ipc.messages import (
     Update,
     Want,
 )
+
+# A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
+Kept = Restore | Callable[[], Restore]
 
 STATES = 4  # that wait to be seen working; of more than these, the middle ones are passed over
 
@@ -50,8 +55,8 @@ class ReplayLog:
         self.reads: dict[int, Read] = {}  # not answered yet
         self.measure_kernel: MeasureKernel | None = None  # not answered yet
         self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
-        self.saved: Restore | None = None  # a finished picture
-        self._checkpoint: Restore | None = None  # one under way
+        self.saved: Kept | None = None  # a finished picture
+        self._checkpoint: Kept | None = None  # one under way
         self._task = task
         self._states: list[_State] = []  # the last one that was seen to work, and those after it
         self._want: Want | None = None
@@ -60,9 +65,20 @@ class ReplayLog:
         self._stopped_at: Done | None = None
 
     @property
-    def kept(self) -> Restore | None:
+    def kept(self) -> Kept | None:
         """The picture as the server keeps it, if it does."""
         return self.saved or self._checkpoint
+
+    def stored(self, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        """A picture is on the disk, from where `read` gives it: it need not stay in memory."""
+        if isinstance(self.saved, Restore) and self.saved.saved is picture:
+            self.saved = read
+        elif isinstance(self._checkpoint, Restore) and self._checkpoint.saved is picture:
+            self._checkpoint = read
+
+    def forget(self) -> None:
+        """The picture under way that the server keeps can't be read: the render begins again."""
+        self._checkpoint = None
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
         self._push(_State(update.generation, channel.another(encoded), whole=True))

@@ -7,6 +7,7 @@ import itertools
 import logging
 import os
 import time
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from functools import partial
 from typing import Any
@@ -30,6 +31,7 @@ from service.rendering.ipc.messages import (
     Read,
     Ready,
     Restore,
+    SavedPicture,
     ToRenderer,
     Unable,
     Update,
@@ -183,6 +185,11 @@ class Supervisor:
         channel.discard(encoded)
         await self._bring_back(update.task, held)
 
+    def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        """A task's picture need not stay in memory: `read`, which is not for an event loop, gives it."""
+        if (held := self._tasks.get(task)) is not None:
+            held.record.stored(picture, read)
+
     def _send(self, message: ToRenderer) -> None:
         if self._process is not None:
             self._process.link.send(message)
@@ -214,12 +221,28 @@ class Supervisor:
 
     async def _bring_back(self, task: int, held: _Task) -> None:
         """Send the renderer a picture that it no longer has, to go on with or to be read."""
-        process = self._process
-        encoded = await tending(partial(channel.encode, held.record.kept))
+        process, kept = self._process, held.record.kept
+        try:
+            encoded = await tending(lambda: channel.encode(kept() if callable(kept) else kept))
+        except Exception as error:
+            return self._lose_picture(task, held, error)
         if held.resident or process is None or process is not self._process or task not in self._tasks:
             return channel.discard(encoded)
         held.resident = True
         self._tell_all(held.record, encoded)
+
+    def _lose_picture(self, task: int, held: _Task, error: Exception) -> None:
+        """The server's copy of a picture cannot be read: begin again what was under way."""
+        log.error("could not read a picture that was stored task=%d error=%s", task, error)
+        if held.resident or task not in self._tasks:
+            return
+        if held.record.saved is not None:
+            self.drop(task)
+            return held.listener.lost("The stored picture cannot be read.")
+        held.record.forget()
+        held.resident = True
+        self._tell_all(held.record)
+        held.listener.again()
 
     def _received(self, message: FromRenderer) -> None:
         if isinstance(message, Ready):

@@ -14,7 +14,18 @@ import pytest
 
 from gpu import Renderer, RenderSettings
 from service.rendering.ipc import channel
-from service.rendering.ipc.messages import Checkpoint, Done, Image, Progress, Progressed, Read, Stop, StopRule, Update
+from service.rendering.ipc.messages import (
+    Checkpoint,
+    Done,
+    Image,
+    Progress,
+    Progressed,
+    Read,
+    Restore,
+    Stop,
+    StopRule,
+    Update,
+)
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device import checkpoints
 from tests.gpu.test_precompile import LINEAR, arrays_of
@@ -74,6 +85,38 @@ def test_it_goes_on_to_the_same_bits(gpu: Renderer, adaptive: bool) -> None:
         assert np.array_equal(pixels, await picture(supervisor, task, ears))
 
     with_supervisor(test, checkpoint_s=0.05)
+
+
+@pytest.mark.parametrize("readable", [True, False])
+def test_what_was_stored_is_read_from_there(gpu: Renderer, readable: bool) -> None:
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor, ENDLESS)
+        checkpoint = await ears.next(Checkpoint)
+        reads = []
+
+        def read() -> Restore:
+            reads.append(checkpoint.progress.samples)
+            if not readable:
+                raise OSError("the disk is broken")
+            return Restore(task, 1, checkpoint.saved, None, checkpoint.progress)
+
+        supervisor.stored(task, checkpoint.saved, read)
+        pid = supervisor.process_id
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+        while supervisor.process_id == pid:
+            await asyncio.sleep(0.001)
+        while not ears.messages.empty() and not reads:
+            assert not isinstance(ears.messages.get_nowait(), Done)
+        if not readable:
+            assert await ears.next(str) == "again"
+        again = (await ears.next(Progressed)).progress
+        assert len(reads) == 1
+        assert again.samples >= checkpoint.progress.samples if readable else again.samples > 0
+        supervisor.send(Read(task, 1, LINEAR))
+        assert (await ears.next(Image)).pixels is not None
+
+    with_supervisor(test, checkpoint_s=2.0)
 
 
 def test_what_is_cancelled_meanwhile_stays_as_it_was(gpu: Renderer) -> None:

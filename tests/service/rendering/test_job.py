@@ -65,6 +65,9 @@ class Renderers:
     def send(self, message: Any) -> None:
         self.sent.append(message)
 
+    def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        self.sent.append(("stored", read()))
+
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
         self.sent.append((update, restore))
 
@@ -77,7 +80,7 @@ async def stored(renderers: Any, store: RenderStore, outcome: Outcome | None = N
     order = Order("id", "", SETTINGS, bytes=8)
     number = await store.insert(order, outcome or Outcome(), b"document", [])
     job = Job(renderers, order, load, outcome=outcome)
-    job.recorder = Recorder(store, number, "id")
+    job.recorder = Recorder(store, number, "id", renderers=renderers)
     return job
 
 
@@ -103,7 +106,8 @@ def test_it_goes_on_from_its_checkpoint_when_something_renders_again(
         assert renderers.sent[0][1] is None
         job.heard(Checkpoint(1, 1, Progress(4, None, 2.0), SAVED))
         job.heard(Progressed(1, 1, Progress(6, None, 3.0)))
-        await until(lambda: store.has("id", "checkpoint"))
+        await until(lambda: renderers.sent[-1][0] == "stored")
+        assert renderers.sent[-1][1].progress.samples == 4  # it is read from the disk, and leaves the memory
         renderers.hopeless = True
         job.lost("No renderer could be started.")
         await until(lambda: job.state == "queued")
