@@ -218,8 +218,8 @@ class Job(Ordered):
             raise self._error
         self._looking += 1
         try:
-            await self._bring_back()
             await within(self._sampled, PATIENCE_S)
+            await self._bring_back()  # last, as the render may go on at any moment, with another task
             if self._task is None:
                 raise self._error or Conflict("There is no sample yet.")
             image = await self._reads.ask(view, self._task, self.renderers.send)

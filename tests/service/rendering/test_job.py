@@ -187,6 +187,36 @@ def test_who_goes_away_while_a_picture_is_brought_back_leaves_it_to_others(tmp_p
     scenario(test, tmp_path)
 
 
+def test_a_look_at_a_checkpoint_outlives_the_render_going_on(tmp_path: Path) -> None:
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store, Outcome("running", progress=Progress(4, None, 2.0)))
+        await store.write("id", "checkpoint", Restore(1, 1, SAVED, None, Progress(4, None, 2.0)))
+        sends, send_scene = asyncio.Event(), renderers.send_scene
+
+        async def slow(update: Update, restore: Restore | None) -> None:
+            await sends.wait()
+            await send_scene(update, restore)
+
+        renderers.send_scene = slow
+        looking = [asyncio.create_task(job.image(View())) for _ in range(2)]
+        await until(lambda: renderers.opened == 1)
+        running = asyncio.create_task(job.run())
+        await until(lambda: job.outcome.starts)
+        await asyncio.sleep(0.05)  # it waits for its turn to load
+        sends.set()
+        await until(lambda: [each for each in renderers.sent if isinstance(each, Read) and each.task == 2][1:])
+        told = [each[0] if isinstance(each, tuple) else each for each in renderers.sent]
+        told = [type(each) for each in told if not isinstance(each, str) and each.task == 2]
+        assert told[0] is Update  # a renderer answers that there is nothing where it does not know the task yet
+        for read in [each for each in renderers.sent if isinstance(each, Read) and each.task == 2]:
+            job.heard(Image(2, read.serial, np.zeros((4, 4, 4)), Progress(4)))
+        assert [progress.samples for _, progress in await asyncio.gather(*looking)] == [4, 4]
+        job.cancel()
+        await running
+
+    scenario(test, tmp_path)
+
+
 def test_the_end_of_the_server_waits_for_the_last_checkpoint(tmp_path: Path) -> None:
     async def test(renderers: Any, store: RenderStore) -> None:
         job = await stored(renderers, store)
