@@ -99,6 +99,20 @@ def test_a_full_disk_leaves_the_picture_before(tmp_path: Path, monkeypatch: pyte
     run(test)
 
 
+@pytest.mark.parametrize(("number", "usable"), [(errno.EROFS, False), (errno.EACCES, False), (errno.ENOSPC, True)])
+def test_a_folder_that_cannot_be_written_to_is_seen(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, number: int, usable: bool
+) -> None:
+    """A full disk may have room later; without a folder renders end with the server."""
+    assert RenderStore(tmp_path / "new").usable()
+
+    def refuse(dir: Path) -> None:
+        raise OSError(number, os.strerror(number))
+
+    monkeypatch.setattr("tempfile.TemporaryFile", refuse)
+    assert RenderStore(tmp_path).usable() is usable
+
+
 def test_rows_come_back_in_their_order(tmp_path: Path) -> None:
     async def test() -> None:
         store = RenderStore(tmp_path)
