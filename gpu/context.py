@@ -82,16 +82,17 @@ def storage_block_bytes(context: Any) -> int:
 
 
 def describe(context: Any) -> dict[str, Any]:
-    """Renderer, version and vendor as the driver says them; `software`: it runs on the CPU; `memory`: its own, in
+    """Renderer, version and vendor as the driver says them; `software`: it runs on the CPU; `memory`: a GPU's own, in
     bytes, None where the driver does not say."""
     info = context.info
     renderer = str(info["GL_RENDERER"])
+    software = any(s in renderer.lower() for s in _SOFTWARE)
     return {
         "renderer": renderer,
         "version": str(info["GL_VERSION"]),
         "vendor": str(info["GL_VENDOR"]),
-        "software": any(s in renderer.lower() for s in _SOFTWARE),
-        "memory": _memory(context),
+        "software": software,
+        "memory": None if software else _memory(context),  # llvmpipe lists the extension and answers with anything
     }
 
 
@@ -101,7 +102,7 @@ def _memory(context: Any) -> int | None:
         return None
     kibibytes = ctypes.c_int(0)
     ctypes.CDLL(_opengl()).glGetIntegerv(DEDICATED_VIDEO_MEMORY, ctypes.byref(kibibytes))
-    return kibibytes.value * 1024 or None
+    return kibibytes.value * 1024 if kibibytes.value > 0 else None
 
 
 def _opengl() -> str | None:

@@ -141,10 +141,16 @@ def test_a_gpu_s_memory_is_asked_for(monkeypatch: pytest.MonkeyPatch) -> None:
 
         def glGetIntegerv(self, name: int, value: Any) -> None:
             assert name == context.DEDICATED_VIDEO_MEMORY
-            value._obj.value = 4096
+            value._obj.value = kibibytes
 
+    kibibytes = 4096
     monkeypatch.setattr("ctypes.CDLL", Library)
     assert context.describe(Context())["memory"] == 4 * MIB
+    kibibytes = -8
+    assert context.describe(Context())["memory"] is None
+    kibibytes = 4096
+    monkeypatch.setitem(Context.info, "GL_RENDERER", "llvmpipe (LLVM 15.0.6, 256 bits)")
+    assert context.describe(Context())["memory"] is None, "it lists the extension, and answers with anything"
     monkeypatch.setattr(Context, "extensions", frozenset())
     assert context.describe(Context())["memory"] is None
 
