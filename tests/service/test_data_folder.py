@@ -83,7 +83,7 @@ def test_a_folder_of_an_earlier_version_opens(opened: Storage, tmp_path: Path) -
 
 
 def test_many_may_open_an_old_folder_at_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
-    caplog.set_level(logging.INFO)
+    caplog.set_level(logging.INFO, "service")
     folder, names = earlier("0", tmp_path / "old"), []
 
     def look() -> None:

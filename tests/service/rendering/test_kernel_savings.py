@@ -44,7 +44,7 @@ class Elsewhere:
         self.told: Any = None
         self.there = False
 
-    def waits(self, key: KernelKey, told: Any, alone: bool = False) -> bool:
+    def waits(self, key: KernelKey, told: Any, alone: bool = False, client: str = "") -> bool:
         self.asked.append(key)
         self.told = told
         return not self.there

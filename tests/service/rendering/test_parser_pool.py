@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import signal
+import subprocess
 import threading
 from collections.abc import Iterator
 from pathlib import Path
@@ -82,7 +83,7 @@ def test_mistakes_are_told_as_in_the_service(
         assert beside.value.errors == within.value.errors
 
 
-def test_the_process_lives_on_and_has_no_key(pool: ParserPool) -> None:
+def test_the_process_lives_on(pool: ParserPool) -> None:
     pool.parse("request", written(REQUEST))
     before = children()
     assert len(before) == 1
@@ -90,7 +91,24 @@ def test_the_process_lives_on_and_has_no_key(pool: ParserPool) -> None:
         pool.parse("request", bytearray(b"{"))
     pool.parse("request", written(REQUEST))
     assert children() == before
-    assert b"SUNBOX_" not in Path(f"/proc/{before[0]}/environ").read_bytes()
+
+
+def test_the_process_has_no_key(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its environment is taken where it is given: from outside it cannot be read."""
+    monkeypatch.setenv("SUNBOX_API_KEY", "secret")
+    given: list[dict[str, str]] = []
+    start = subprocess.Popen
+
+    def started(*arguments: Any, env: dict[str, str], **more: Any) -> Any:
+        given.append(env)
+        return start(*arguments, env=env, **more)
+
+    monkeypatch.setattr(subprocess, "Popen", started)
+    pool = ParserPool(config(api_key=["secret"]))
+    pool.parse("request", written(REQUEST))
+    pool.close()
+    assert given and "PATH" in given[0]
+    assert not any(name.startswith("SUNBOX_") or "secret" in value for name, value in given[0].items())
 
 
 def test_what_would_take_too_much_memory_is_not_begun() -> None:
