@@ -167,7 +167,9 @@ class _Body:
         left_s = FREE_S + self.received / LEAST_RATE - self._waited_s
         began = time.monotonic()
         try:
-            message = await asyncio.wait_for(self._receive(), min(self._guard.body_timeout, left_s))
+            # Not wait_for: Python 3.11's loses a cancellation that comes together with the message.
+            async with asyncio.timeout(min(self._guard.body_timeout, left_s)):
+                message = await self._receive()
         except TimeoutError:
             self._ended = True
             if left_s < self._guard.body_timeout:
@@ -211,7 +213,8 @@ def _lingering(send: Send, receive: Receive) -> Callable[[Message], Awaitable[No
         with suppress(TimeoutError):
             async with asyncio.timeout(LINGER_S):
                 while True:
-                    heard = await asyncio.wait_for(receive(), SILENT_S)
+                    async with asyncio.timeout(SILENT_S):
+                        heard = await receive()
                     if heard["type"] == "http.disconnect" or not heard.get("more_body", False):
                         break
         await send({"type": "http.response.body"})

@@ -8,6 +8,7 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -19,7 +20,8 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from service.config import Config, ConfigError, load_config
-from service.guard import Guard
+from service.downloads import disconnected
+from service.guard import Guard, _Body
 from service.keys import Keys
 from service.problems import Unauthorized
 from service.routes.errors import respond
@@ -303,3 +305,25 @@ def test_a_key_s_assets_have_a_bound(http: httpx.Client) -> None:
     ids.append(http.post("/v1/assets", content=OBJ + b"#" * 2, headers=ANNA).json()["id"])
     found = [http.get(f"/v1/assets/{id}", headers=ANNA).status_code for id in (*ids, other)]
     assert found == [404, 200, 200, 200]
+
+
+@pytest.mark.parametrize("steps", range(6))
+def test_who_stops_listening_is_let_go_at_any_moment(steps: int) -> None:
+    """An answer that is ready at once ends the watch on its client just as the body's last message arrives."""
+
+    async def run() -> None:
+        messages = [{"type": "http.request", "body": b"", "more_body": False}]
+
+        async def receive() -> Any:
+            return messages.pop() if messages else await asyncio.sleep(3600)
+
+        guard: Any = SimpleNamespace(body_timeout=30.0, take=lambda received, more: None)
+        body = _Body(guard, receive)
+        listening = asyncio.create_task(disconnected(body.receive))
+        for _ in range(steps):
+            await asyncio.sleep(0)
+        listening.cancel()
+        done, _ = await asyncio.wait({listening}, timeout=1)
+        assert done
+
+    asyncio.run(run())
