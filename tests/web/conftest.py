@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import os
 import shutil
 import socket
@@ -168,13 +169,14 @@ class Editor:
 
     def drop(self, selector: str, files: dict[str, bytes]) -> None:
         """As when files are let go over an element, in its middle."""
-        contents = {name: list(data) for name, data in files.items()}
+        contents = {name: base64.b64encode(data).decode() for name, data in files.items()}
         self.page.evaluate(
             """([selector, contents]) => {
                 const target = document.querySelector(selector);
                 const dataTransfer = new DataTransfer();
-                for (const [name, bytes] of Object.entries(contents)) {
-                    dataTransfer.items.add(new File([new Uint8Array(bytes)], name));
+                for (const [name, text] of Object.entries(contents)) {
+                    const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
+                    dataTransfer.items.add(new File([bytes], name));
                 }
                 const { left, top, width, height } = target.getBoundingClientRect();
                 const at = { clientX: left + width / 2, clientY: top + height / 2 };
