@@ -7,6 +7,7 @@ import re
 import sys
 import threading
 import time
+import warnings
 from collections.abc import Callable, Iterable, MutableMapping
 from datetime import UTC, datetime
 from secrets import token_urlsafe
@@ -70,6 +71,8 @@ def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str
     for room in ROOMS:
         logging.getLogger(room).setLevel(least)
     logging.captureWarnings(True)
+    # FastAPI silences this one while it reads a route's parameters, by a means that another thread can undo.
+    warnings.filterwarnings("ignore", "The 'alias' attribute with value")
     sys.excepthook = _uncaught
     threading.excepthook = lambda told: _uncaught(told.exc_type, told.exc_value, told.exc_traceback)
 
