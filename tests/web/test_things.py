@@ -123,6 +123,7 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
     page, things = editor.page, editor.page.locator("#outline-list [data-thing^='/shapes/']")
     editor.tab("scene")
     editor.drop("#stage", {"sail.glb": model()})
+    page.wait_for_selector("dialog[open]")
     page.keyboard.press("Escape")
     editor.wait("the end of the question", lambda: page.locator("dialog[open]").count() == 0)
     assert things.count() == 2 and page.is_disabled("#undo"), "nothing was done"
