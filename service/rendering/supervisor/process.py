@@ -13,7 +13,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, Protocol
 
 from service import logs
 from service.cpu_time import RunnableTime
@@ -28,6 +28,49 @@ KILLS = {-signal.SIGKILL, -signal.SIGTERM}
 Cause = Literal["killed", "crashed", "hung", "stopped", "out of memory"]
 
 log = logging.getLogger(__name__)
+
+
+class Link(Protocol):
+    """The server's end of the way to a renderer. Nothing waits: what cannot be sent yet stays in line."""
+
+    def send(self, message: object) -> None: ...
+
+    def send_encoded(self, message: channel.Encoded) -> None:
+        """Send what `channel.encode` gave; its descriptors are the link's from now on."""
+
+    def close(self) -> None: ...
+
+
+class RendererProcess(Protocol):
+    """What a supervisor asks of the process that renders, on whichever machine that runs."""
+
+    began: float  # by time.monotonic
+    ready: bool  # set by the supervisor, as `unable`
+    unable: bool  # to render, as it says itself
+
+    @property
+    def link(self) -> Link: ...
+
+    @property
+    def task(self) -> int:
+        """The task that was worked on when last heard of; 0: none."""
+
+    @property
+    def lived_s(self) -> float: ...
+
+    @property
+    def id(self) -> int: ...
+
+    def watch(self, excused: bool = False) -> None:
+        """Look after it, now and then; `excused`: the server was late, which is not the renderer's fault."""
+
+    async def end(self, patience_s: float) -> Cause:
+        """Let it end within that time or kill it; why it died."""
+
+
+# Starts a renderer: calls the first with each of its messages, and the second once when it is lost. The number is the
+# end of a pipe, whose other end the server holds as long as it lives; None: there is none.
+Start = Callable[[Callable[[Any], None], Callable[[], None], int | None], RendererProcess]
 
 
 @dataclass(frozen=True)
@@ -64,6 +107,10 @@ class Process:
     @property
     def lived_s(self) -> float:
         return time.monotonic() - self.began
+
+    @property
+    def task(self) -> int:
+        return self.heartbeat.task
 
     @property
     def id(self) -> int:

@@ -39,7 +39,7 @@ from service.rendering.ipc.messages import (
 )
 from service.rendering.renderers import Listener
 from service.rendering.statistics import Kind, Statistics
-from service.rendering.supervisor.process import Cause, Options, Process
+from service.rendering.supervisor.process import Cause, Options, Process, RendererProcess, Start
 from service.rendering.supervisor.replay_log import ReplayLog
 
 TRIES = 3  # starts in a row that end before rendering; then there is no renderer, and the reason is given
@@ -70,13 +70,15 @@ class _Task:
 class Supervisor:
     """Fulfils `Renderers` with one process."""
 
-    def __init__(self, options: Options | None = None) -> None:
+    def __init__(self, options: Options | None = None, start: Start | None = None) -> None:
+        """`start` starts the process, which is one of this machine by default."""
         self.statistics = Statistics()
         self._options = options or Options()
+        self._start: Start = start or partial(Process, self._options)
         self._tasks: dict[int, _Task] = {}
         self._numbers = itertools.count(1)
         self._ready: asyncio.Future[dict[str, Any]] | None = None
-        self._process: Process | None = None
+        self._process: RendererProcess | None = None
         self._lost_at: float | None = None
         self._failures = self._shots = 0  # in a row, to start; through others
         self._rendered = False  # there was one
@@ -202,7 +204,8 @@ class Supervisor:
 
     def _begin(self) -> None:
         lifeline = None if self._lifeline is None else self._lifeline[0]
-        self._process = process = Process(self._options, self._received, lambda: self._lose(process), lifeline)
+        process: RendererProcess = self._start(self._received, lambda: self._lose(process), lifeline)
+        self._process = process
         for task, held in self._tasks.items():
             self._not_measured(held, "The renderer was lost before it could answer: ask again.")
             held.resident = held.record.kept is None
@@ -321,7 +324,7 @@ class Supervisor:
             if self._process is not None:
                 self._process.watch(excused=late)
 
-    def _lose(self, process: Process) -> None:
+    def _lose(self, process: RendererProcess) -> None:
         """Replace a renderer whose end of the channel is closed."""
         if self._closed or process is not self._process:
             return
@@ -332,7 +335,7 @@ class Supervisor:
             self._ready = asyncio.get_running_loop().create_future()
         self._do(self._replace(process))
 
-    async def _replace(self, process: Process) -> None:
+    async def _replace(self, process: RendererProcess) -> None:
         cause = await process.end(LAST_WORDS_S)
         if not process.ready:
             by_others = (
@@ -359,9 +362,9 @@ class Supervisor:
         after_kill_s = min(BETWEEN_TRIES_S * self._shots, AFTER_KILLS_S) - lived_s
         return max(BETWEEN_TRIES_S * self._failures, after_kill_s, 0.0)
 
-    def _blame(self, process: Process, cause: Cause) -> None:
+    def _blame(self, process: RendererProcess, cause: Cause) -> None:
         """Count the loss against the task that was worked on, unless the renderer was ended from outside."""
-        task = process.heartbeat.task
+        task = process.task
         held = self._tasks.get(task)
         if held is None or cause in BY_OTHERS:
             return
