@@ -136,11 +136,11 @@ class Adaptive:
         old = self._rates[lines]
         self._rates[lines] = np.where(old == 0, rate, np.maximum(rate, 0.7 * old + 0.3 * rate))
 
-    def pass_samples(self, samples: int) -> int:
-        """The mean number of samples that a pixel gets in the next pass."""
+    def pass_samples(self, samples: int, sharers: int) -> int:
+        """The mean number of samples that a pixel gets in the next pass, where `sharers` pictures take turns."""
         if samples == 0 or self.cost_s == 0:
             return 1
-        return max(1, usual_pass(self._picture, self.cost_s, samples))
+        return max(1, usual_pass(self._picture, self.cost_s, samples, sharers))
 
     def bind(self) -> None:
         self._counts.bind_to_storage_buffer(int(Slot.NORMAL))

@@ -76,14 +76,14 @@ class Passes:
         if self._pass_samples:
             self._begin_schedule()
 
-    def trace(self, budget_s: float, max_samples: int) -> float:
+    def trace(self, budget_s: float, max_samples: int, sharers: int = 1) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
         took."""
         start = time.perf_counter()
         self._dispatcher.bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
-                self._begin_pass(max_samples)
+                self._begin_pass(max_samples, sharers)
             self._slice()
             if time.perf_counter() - start >= budget_s:
                 break
@@ -130,12 +130,12 @@ class Passes:
         d.context.finish()
         self.compile_ms += (time.perf_counter() - start) * 1e3
 
-    def _begin_pass(self, max_samples: int) -> None:
+    def _begin_pass(self, max_samples: int, sharers: int = 1) -> None:
         schedule = self.schedule
         schedule.decide(self.samples, self._main)
         stops = (stop for stop in (noise_meter.FROM, *schedule.stops) if stop > self.samples)
         end = min([max_samples, *stops])
-        self._pass_samples = min(schedule.pass_samples(self.samples), end - self.samples)
+        self._pass_samples = min(schedule.pass_samples(self.samples, sharers), end - self.samples)
         self._begin_schedule()
 
     def _begin_schedule(self) -> None:

@@ -134,11 +134,15 @@ class Picture:
             buffer.write(data)
         self._passes.restore(saved.samples, saved.under_way)
 
-    def trace(self, budget_s: float, max_samples: int) -> float:
+    def trace(self, budget_s: float, max_samples: int, sharers: int = 1) -> float:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
-        took."""
+        took.
+
+        `sharers` pictures, this one included, take turns on the device: the more there are, the fewer samples are in
+        a pass, so that nobody waits long for the next. It changes no bit.
+        """
         contexts.use(self.context)
-        return self._passes.trace(budget_s, max_samples)
+        return self._passes.trace(budget_s, max_samples, sharers)
 
     def _need_samples(self) -> None:
         contexts.use(self.context)

@@ -48,8 +48,9 @@ class Schedule(Protocol):
     def decide(self, samples: int, main: dict[Slot, Any]) -> None:
         """Look at the accumulators, before the pass that begins at `samples`."""
 
-    def pass_samples(self, samples: int) -> int:
-        """The mean number of samples that a pixel gets in the pass that begins at `samples`."""
+    def pass_samples(self, samples: int, sharers: int) -> int:
+        """The mean number of samples that a pixel gets in the pass that begins at `samples`, where `sharers` pictures
+        take turns."""
 
     def begin(self, before: int, after: int, most: int) -> None:
         """Begin a pass from `before` samples to `after`; an invocation takes at most `most`."""

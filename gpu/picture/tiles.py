@@ -19,6 +19,9 @@ PASS_S = 0.2  # seconds of a pass, once there are some samples
 # Samples per pass, at least, as soon as there are twice as many: to begin and end an invocation, which fetches and
 # stores 48 bytes of sums, costs llvmpipe a third of a sample of a simple scene.
 LEAST_A_PASS = 4
+# Seconds in which all that share the device get a pass each, and so a new picture, if they can: their passes get
+# shorter, down to one sample. A picture that is alone always gets LEAST_A_PASS.
+ROUND_S = 2.0
 MAX_SAMPLES_A_PASS = 256
 LOOP_TURNS = 65_535  # turns of all loops of an invocation together, after which llvmpipe ends them
 BAND = 16  # rows
@@ -73,12 +76,12 @@ class Tiles:
         bands = self._rates[y // self._band : -(-(y + height) // self._band)]
         bands[:] = np.where(bands == 0, rate, np.maximum(rate, 0.7 * bands + 0.3 * rate))
 
-    def pass_samples(self, samples: int) -> int:
+    def pass_samples(self, samples: int, sharers: int = 1) -> int:
         """The samples of every pixel to take in the pass after `samples`, so that the smallest tile fits a slice."""
         if samples == 0 or self.cost_s == 0:
             return 1
         fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
-        return max(1, min(fits, usual_pass(self.size, self.cost_s, samples), self._most_samples))
+        return max(1, min(fits, usual_pass(self.size, self.cost_s, samples, sharers), self._most_samples))
 
     def begin(self, before: int, after: int, most: int) -> None:
         self._before, self.chunk = before, after - before
@@ -112,11 +115,14 @@ class Tiles:
         pass
 
 
-def usual_pass(size: tuple[int, int], cost_s: float, samples: int) -> int:
+def usual_pass(size: tuple[int, int], cost_s: float, samples: int, sharers: int = 1) -> int:
     """The samples of every pixel to take in the pass after `samples`, each at `cost_s` seconds: as many as take
-    PASS_S or LEAST_A_PASS, but fewer at the beginning of a picture, so that it changes often."""
+    PASS_S or LEAST_A_PASS, but fewer at the beginning of a picture, so that it changes often, and where so many
+    pictures (`sharers`) take turns that their passes would take more than ROUND_S together."""
     width, height = size
-    return min(samples, max(int(PASS_S / (cost_s * width * height)), min(LEAST_A_PASS, samples // 2)))
+    sample_s, fair_s = cost_s * width * height, ROUND_S / sharers
+    least = LEAST_A_PASS if sharers == 1 else max(1, min(LEAST_A_PASS, int(fair_s / sample_s)))
+    return min(samples, max(int(min(PASS_S, fair_s) / sample_s), min(least, samples // 2)))
 
 
 def samples_at_once(max_bounces: int, shapes: int, nodes: int) -> int:

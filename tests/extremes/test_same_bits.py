@@ -19,17 +19,18 @@ from tests.rendering import document
 from tests.serving import Server
 from tests.serving import client as opened
 
-CUTS = {  # seconds a slice, seconds a pass, samples a pass at most, seconds between two looks at it
-    "whole": (9.0, 9.0, 256, 600.0),
-    "sample by sample": (9.0, 1e-9, 1, 600.0),
-    "in small tiles": (1e-6, 9.0, 64, 600.0),
-    "stopped after every tile": (1e-5, 1e-2, 3, 0.0),
+CUTS = {  # seconds a slice, seconds a pass, samples a pass at most, seconds between two looks at it, sharers
+    "whole": (9.0, 9.0, 256, 600.0, 1),
+    "sample by sample": (9.0, 1e-9, 1, 600.0, 1),
+    "in small tiles": (1e-6, 9.0, 64, 600.0, 1),
+    "stopped after every tile": (1e-5, 1e-2, 3, 0.0, 1),
+    "among many": (1e-3, 9.0, 256, 600.0, 1000),
 }
 SAMPLES = 48
 
 
 def _bits(gpu: Renderer, cut: str, monkeypatch: pytest.MonkeyPatch, **settings: Any) -> list[np.ndarray]:
-    slice_s, pass_s, most, budget = CUTS[cut]
+    slice_s, pass_s, most, budget, sharers = CUTS[cut]
     for name, value in (("SLICE_S", slice_s), ("PASS_S", pass_s), ("MAX_SAMPLES_A_PASS", most)):
         monkeypatch.setattr(cutting, name, value)
     monkeypatch.setattr("gpu.picture.passes.MAX_SAMPLES_A_PASS", most)
@@ -38,7 +39,7 @@ def _bits(gpu: Renderer, cut: str, monkeypatch: pytest.MonkeyPatch, **settings: 
     defaults = {"width": 40, "height": 24, "max_bounces": 4, "seed": 7}
     made = gpu.picture(loaded, RenderSettings(**{**defaults, **settings}))
     while made.samples < SAMPLES:
-        made.trace(budget, SAMPLES)
+        made.trace(budget, SAMPLES, sharers)
     out = [made.read(aov) for aov in ("color", "variance")] + [np.float64(made.noise() or 0)]
     made.release()
     loaded.release()
@@ -64,8 +65,8 @@ def test_another_client_does_not_show(gpu: Renderer, monkeypatch: pytest.MonkeyP
     noise = gpu.picture(other, RenderSettings(33, 17))
     trace = type(noise).trace
 
-    def turns(self: Any, budget_s: float, max_samples: int) -> float:
-        took = trace(self, budget_s, max_samples)
+    def turns(self: Any, budget_s: float, max_samples: int, sharers: int) -> float:
+        took = trace(self, budget_s, max_samples, sharers)
         if self is not noise:
             trace(noise, 0.0, noise.samples + 1)
         return took

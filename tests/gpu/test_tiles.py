@@ -7,7 +7,7 @@ import pytest
 
 from gpu import Renderer
 from gpu import context as contexts
-from gpu.picture.tiles import BAND, LEAST_A_PASS, SLICE_S, Tiles
+from gpu.picture.tiles import BAND, LEAST_A_PASS, ROUND_S, SLICE_S, Tiles
 from tests.extremes.scenes import everything
 from tests.rendering import picture
 
@@ -56,6 +56,18 @@ def test_large_pictures_get_several_samples_a_pass_as_small_ones_do(size: int) -
     assert passes[:2] == [1, 1]
     assert min(passes[8:]) >= LEAST_A_PASS
     assert all(each <= max(1, samples) for samples, each in enumerate(passes))
+
+
+@pytest.mark.parametrize("size", [64, 256, 512, 1024])
+@pytest.mark.parametrize("sharers", [2, 4, 32, 500])
+def test_passes_of_those_who_share_come_round_soon(size: int, sharers: int) -> None:
+    """Each gets a pass within ROUND_S, unless passes of one sample take longer; none is shorter than it must be."""
+    tiles, sample_s = Tiles(size, size, 1 << 30), 2e-7 * size * size
+    tiles.took((0, 0, size, size), 1, sample_s)
+    taken = tiles.pass_samples(1000, sharers)
+    assert taken == 1 or taken * sample_s * sharers <= ROUND_S
+    assert taken >= min(LEAST_A_PASS, int(0.99 * ROUND_S / (sample_s * sharers)))
+    assert taken <= tiles.pass_samples(1000, 1)
 
 
 def test_paths_that_may_be_long_begin_with_small_tiles() -> None:

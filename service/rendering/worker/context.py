@@ -35,3 +35,5 @@ class WorkerContext:
     # and a Checkpoint every `checkpoint_s` seconds bring the picture of a render to the server.
     forget: Callable[[int], None] | None = None
     checkpoint_s: float = inf
+    # The number of equal shares that the device is parted into for a task of a client.
+    sharers: Callable[[str], int] = lambda client: 1

@@ -76,6 +76,7 @@ class Loop:
             self._memory,
             self._forget,
             checkpoint_s,
+            self._scheduler.sharers,
         )
         self._foreseen = kernel_keys.bsdf_keys()  # to be compiled when nothing else is, so that no panel has to wait
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet

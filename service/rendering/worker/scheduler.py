@@ -38,6 +38,7 @@ class Scheduler:
         self._used_s: dict[str, float] = defaultdict(float)
         self._now_s = 0.0
         self._waiting: set[Hashable] = set()
+        self._ready: dict[str, int] = {}  # tasks, by client, at the last choice
 
     def choose(self, tasks: Collection[T]) -> T | None:
         ready: dict[str, list[T]] = defaultdict(list)
@@ -45,6 +46,7 @@ class Scheduler:
             if task.ready:
                 ready[task.client].append(task)
         self._level(ready)
+        self._ready = {client: len(tasks) for client, tasks in ready.items()}
         if not ready:
             return None
         self._now_s = min(self._used_s[client] for client in ready)
@@ -54,6 +56,10 @@ class Scheduler:
         client = min(eager or ready, key=lambda name: self._used_s[name])
         candidates = [task for task in ready[client] if task.unseen] if eager else ready[client]
         return min(candidates, key=lambda task: task.used_s)
+
+    def sharers(self, client: str) -> int:
+        """The number of equal shares into which the last choice parted the device, for a task of this client."""
+        return max(1, len(self._ready) * self._ready.get(client, 1))
 
     def charge(self, task: Turn, seconds: float) -> None:
         task.used_s += seconds

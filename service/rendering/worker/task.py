@@ -47,6 +47,7 @@ class Task:
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
         self._frames = FrameSource(context, number, client, self._residency, self._tracker, denoising, self._finish)
         self._ending = Ending(context, number, self._residency, self._tracker, self._frames, self.answer)
+        self._sharers = context.sharers
         self._updates = Updates(context, number, client, self._residency, self._tracker)
         self.savings = KernelSavings(context, number)
         self._scale = 1.0  # of what is traced
@@ -152,7 +153,8 @@ class Task:
         cap = 1 if self.unseen or scale < 1.0 else tracker.cap(residency)
         tracker.clock.start()
         before = picture.samples
-        picture.trace(FULL_S if self.unseen else SLICE_S, cap)
+        sharers = self._sharers(self.client) if tracker.interactive else 1  # nobody waits for a render's next pass
+        picture.trace(FULL_S if self.unseen else SLICE_S, cap, sharers)
         tracker.clock.lap()
         self.traced += (picture.samples - before) * picture.settings.width * picture.settings.height
         tracker.pixel_s = picture.cost_s or tracker.pixel_s

@@ -1,11 +1,10 @@
-"""The renderer's process: whose turn it is, when it is enough, and that nothing brings it down."""
+"""The renderer's process: when it is enough, and that nothing brings it down."""
 
 from __future__ import annotations
 
 import asyncio
 import time
 from collections.abc import Awaitable, Callable, Iterator
-from dataclasses import dataclass
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -38,66 +37,12 @@ from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
 from service.rendering.worker.loop import coalesced
 from service.rendering.worker.progress.stop_rules import late, reached
-from service.rendering.worker.scheduler import FIRST_FRAME_LEAD_S, Scheduler
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
 
 ENDLESS = StopRule()
 LINEAR = View(encoding="linear")
-
-
-@dataclass(eq=False)
-class Turn:
-    ready: bool = True
-    unseen: bool = False
-    used_s: float = 0.0
-    client: str = ""
-
-    def __post_init__(self) -> None:
-        self.client = self.client or str(id(self))
-
-
-def turns(tasks: list[Turn], count: int, slice_s: float = 0.02) -> list[int]:
-    """How often each had its turn."""
-    scheduler, had = Scheduler(), [0] * len(tasks)
-    for _ in range(count):
-        task = scheduler.choose(tasks)
-        assert task is not None
-        scheduler.charge(task, slice_s)
-        had[tasks.index(task)] += 1
-    return had
-
-
-def test_everyone_gets_the_same_time() -> None:
-    assert turns([Turn(), Turn(), Turn()], 300) == [100, 100, 100]
-    assert turns([Turn(), Turn(ready=False)], 10) == [10, 0]
-    assert Scheduler().choose([Turn(ready=False)]) is None
-
-
-def test_who_was_idle_saves_nothing_up() -> None:
-    scheduler, busy, late_comer = Scheduler(), Turn(), Turn(ready=False)
-    for _ in range(100):
-        assert scheduler.choose([busy, late_comer]) is busy
-        scheduler.charge(busy, 1.0)
-    late_comer.ready = True
-    had = 0
-    for _ in range(20):
-        task = scheduler.choose([busy, late_comer])
-        assert task is not None
-        scheduler.charge(task, 1.0)
-        had += task is late_comer
-    assert 9 <= had <= 11
-
-
-def test_a_first_frame_goes_first_but_starves_nobody() -> None:
-    newest, other = Turn(unseen=True), Turn()
-    scheduler = Scheduler()
-    assert scheduler.choose([newest, other]) is newest
-    scheduler.charge(newest, FIRST_FRAME_LEAD_S / 2)
-    assert scheduler.choose([newest, other]) is newest
-    had = turns([Turn(unseen=True), Turn()], 200)  # as when an edit follows an edit
-    assert had[1] > 80
 
 
 @pytest.mark.parametrize(
