@@ -57,9 +57,9 @@ def check(folder: Path) -> Report:
 def _check_assets(files: AssetFolder, report: Report) -> None:
     if not files.path.exists():
         return
-    with files.alone():  # an asset's files are renamed one after the other
+    with files.locked():  # an asset's files are renamed one after the other
         names = {path.name for path in files.path.iterdir() if path.is_file()}
-        known, counted = files.known_totals(), total(files.held())
+        known, counted = files.known_totals(), total(files.assets())
     if known is not None and known != counted:
         report.notes.append(f"assets: the totals say {known}, and there are {counted}; they are counted at a start")
     for name in sorted(names):

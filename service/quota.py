@@ -1,4 +1,4 @@
-"""Room on the disk: assets that were unused longest make room, never those that a saved document refers to."""
+"""Keeps the data folder within its quota: the assets unused for the longest time are deleted, never those in use."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ RETRY_S = 60
 class Quota:
     """Bounds the assets in `folder` together with what `others` beside them take.
 
-    `in_use` gives the ids of the assets that must stay; while its context lasts no other asset becomes one of them.
+    `in_use` is a context with the ids of the assets that must stay; no other asset comes into use while it lasts.
     """
 
     def __init__(
@@ -37,14 +37,14 @@ class Quota:
         self._in_use = in_use
         self._others = others
         self._lock = threading.Lock()
-        self._promised = Usage()  # what is being stored
+        self._promised = Usage()  # what is about to be stored
         self._pinned: Counter[str] = Counter()  # how many contexts keep each id
 
     @contextmanager
     def room(self, size: Usage) -> Iterator[None]:
-        """Room for `size` more, which is to be stored while the context lasts. Deletes assets for it.
+        """A context in which `size` more can be stored; assets are deleted for it.
 
-        Raises TooLarge for what could never be, Unavailable where too much must stay; nothing is deleted then.
+        Raises TooLarge for what could never fit, Unavailable where too much must stay; nothing is deleted then.
         """
         if size.bytes > self._limit.bytes:
             most = self._limit.bytes
@@ -67,7 +67,7 @@ class Quota:
 
     @contextmanager
     def pinned(self, ids: Collection[str]) -> Iterator[None]:
-        """Keep these assets, as far as they are there, while the context lasts."""
+        """A context in which these assets are not deleted."""
         with self._lock:
             self._pinned.update(ids)
         try:
@@ -77,20 +77,21 @@ class Quota:
                 self._pinned -= Counter(ids)
 
     def sizes(self, ids: Collection[str]) -> dict[str, int]:
-        """The bytes of those of the assets that are here."""
-        return {f"sha256:{hash}": held.usage.bytes for hash, held in self._files.held_of(ids).items()}
+        """The bytes of each of these assets that exists."""
+        return {f"sha256:{hash}": asset.usage.bytes for hash, asset in self._files.assets_of(ids).items()}
 
     def evict(self, ids: Collection[str], size: int) -> list[str]:
-        """Delete assets among these that may go, the one unused longest first, until they had that many bytes."""
+        """Delete those of these assets that are not in use, those unused longest first, until `size` bytes are free.
+        Returns the ids of the deleted ones."""
         goes = []
-        with self._lock, self._in_use() as in_use, self._files.alone():
-            held = self._files.held_of(set(ids) - set(in_use) - self._pinned.keys())
-            for hash in sorted(held, key=lambda hash: held[hash].used):
+        with self._lock, self._in_use() as in_use, self._files.locked():
+            assets = self._files.assets_of(set(ids) - set(in_use) - self._pinned.keys())
+            for hash in sorted(assets, key=lambda hash: assets[hash].used):
                 if size <= 0:
                     break
-                size -= held[hash].usage.bytes
+                size -= assets[hash].usage.bytes
                 self._files.delete(hash)
-                log.info("asset evicted id=sha256:%s bytes=%d", hash, held[hash].usage.bytes)
+                log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)
                 goes.append(f"sha256:{hash}")
         return goes
 
@@ -98,7 +99,7 @@ class Quota:
         return self._others() + self._files.usage()
 
     def clear(self) -> None:
-        """Delete what a crash left, and count what is here."""
+        """Delete the leftovers of a crash, and count the assets."""
         self._files.clear()
         try:
             self._files.recount()
@@ -110,15 +111,15 @@ class Quota:
         if not self.used().exceeds(most):
             return
         self._files.clear()
-        with self._in_use() as in_use, self._files.alone():
-            held = self._files.count()
-            left = self._others() + total(held)
+        with self._in_use() as in_use, self._files.locked():
+            assets = self._files.count()
+            left = self._others() + total(assets)
             stays = {id.removeprefix("sha256:") for id in (*in_use, *self._pinned)}
             goes = []
-            for hash in sorted(held.keys() - stays, key=lambda hash: held[hash].used):
+            for hash in sorted(assets.keys() - stays, key=lambda hash: assets[hash].used):
                 if not left.exceeds(most):
                     break
-                left -= held[hash].usage
+                left -= assets[hash].usage
                 goes.append(hash)
             if left.exceeds(most):
                 name = "SUNBOX_DATA_QUOTA" if left.bytes > most.bytes else "SUNBOX_DATA_FILES"
@@ -126,4 +127,4 @@ class Quota:
                 raise Unavailable(detail, RETRY_S)
             for hash in goes:
                 self._files.delete(hash)
-                log.info("asset evicted id=sha256:%s bytes=%d", hash, held[hash].usage.bytes)
+                log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)

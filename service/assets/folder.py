@@ -1,12 +1,12 @@
-"""The folder of the assets' files: each is written whole or not at all, and what a crash leaves is cleared away.
+"""The folder of the assets' files: each file is written whole or not at all; leftovers of a crash are deleted.
 
     HASH              an asset's bytes, named by their SHA-256
     HASH.json         its record: what `POST /v1/assets` answered
     HASH.scene.json   the document that a glTF file was imported as
-    HASH.damaged      bytes that no longer have this hash, kept for whoever looks into it until room is needed
+    HASH.damaged      bytes that no longer have this hash; they stay, for an inspection, until room is needed
     .*.tmp            a file that is being written, locked by its writer: one without a lock is left from a crash
 
-An asset is there when its bytes and its record are. Nothing is ever changed in place.
+An asset exists when both its bytes and its record exist. No file is ever changed in place.
 """
 
 from __future__ import annotations
@@ -33,8 +33,8 @@ RECORD, SCENE, DAMAGED, PART = ".json", ".scene.json", ".damaged", ".tmp"
 
 
 @dataclass
-class Held:
-    """What one asset takes on the disk. `used` is when it was last read, in ns since 1970; 0 of damaged bytes."""
+class StoredAsset:
+    """One asset on the disk: what its files take, and when it was last read (ns since 1970; 0 for damaged bytes)."""
 
     usage: Usage = field(default_factory=Usage)
     used: int = 0
@@ -51,18 +51,19 @@ class AssetFolder:
         return self.path / (id.removeprefix("sha256:") + suffix)
 
     def nameless(self) -> BinaryIO:
-        """A file without a name, gone when it is closed. Raises OSError."""
+        """A file without a name, which the system deletes when it is closed. Raises OSError."""
         self.path.mkdir(parents=True, exist_ok=True)
         return tempfile.TemporaryFile(dir=self.path)
 
     def put(self, id: str, files: dict[str, Source], lasting: bool = True) -> int:
-        """Stores files of an asset, by suffix, each in the place of what was there; their time of change in ns.
+        """Store files of an asset, by suffix; each replaces an earlier one. Returns the first one's time of change
+        in ns since 1970.
 
-        `lasting`: they are on the disk when this returns, also if the power fails next. Raises OSError.
+        With `lasting` the files survive a loss of power from the return on. Raises OSError.
         """
         with ExitStack() as stack:
             written = {suffix: stack.enter_context(self._written(data, lasting)) for suffix, data in files.items()}
-            with self.alone(), self._totals.change() as change:
+            with self.locked(), self._totals.change() as change:
                 for suffix, path in written.items():
                     change.replaces(self.file(id, suffix))
                     os.replace(path, self.file(id, suffix))
@@ -74,8 +75,8 @@ class AssetFolder:
         return changed
 
     def set_aside(self, id: str, file: BinaryIO) -> None:
-        """Takes an asset out of use whose bytes, open in `file`, don't have its hash. Raises OSError."""
-        with self.alone(), suppress(FileNotFoundError):
+        """Rename an asset's bytes, open in `file`, to `.damaged`: they no longer have its hash. Raises OSError."""
+        with self.locked(), suppress(FileNotFoundError):
             if os.path.samestat(os.fstat(file.fileno()), self.file(id).stat()):  # else it was replaced just now
                 with self._totals.change() as change:
                     change.remove(self.file(id, RECORD))
@@ -83,36 +84,36 @@ class AssetFolder:
                     os.replace(self.file(id), self.file(id, DAMAGED))
 
     def delete(self, id: str) -> None:
-        """Within `alone`. The record goes first: there is never one without its bytes."""
+        """Delete an asset's files. The caller has the lock. The record goes first: no record is without bytes."""
         with self._totals.change() as change:
             for suffix in (RECORD, SCENE, DAMAGED, ""):
                 change.remove(self.file(id, suffix))
 
     def usage(self) -> Usage:
-        """Of all assets; leftovers of a crash don't count. Raises OSError."""
+        """What all assets take together; leftovers of a crash are not counted. Raises OSError."""
         known = self._totals.read()
         if known is None:
             if not self.path.exists():
                 return Usage()
-            with self.alone():
+            with self.locked():
                 known = self._totals.read()
                 if known is None:
                     known = total(self.count())
         return known
 
     def known_totals(self) -> Usage | None:
-        """What `usage` says without counting; None where nobody knows."""
+        """The totals as they are stored; None where they have to be counted first."""
         return self._totals.read()
 
-    def count(self) -> dict[str, Held]:
-        """What `held` says, of which the totals are made anew. Within `alone`."""
-        held = self.held()
-        self._totals.write(total(held))
-        return held
+    def count(self) -> dict[str, StoredAsset]:
+        """Count all assets and store the totals; the assets by hash. The caller has the lock."""
+        assets = self.assets()
+        self._totals.write(total(assets))
+        return assets
 
-    def held(self) -> dict[str, Held]:
-        """What is here of each asset, by hash; leftovers of a crash are not."""
-        held: dict[str, Held] = {}
+    def assets(self) -> dict[str, StoredAsset]:
+        """All assets by hash, without the leftovers of a crash."""
+        assets: dict[str, StoredAsset] = {}
         names = set()
         for entry in self._entries():
             with suppress(FileNotFoundError):
@@ -120,28 +121,30 @@ class AssetFolder:
                 if hash:
                     found = entry.stat(follow_symlinks=False)
                     names.add(entry.name)
-                    one = held.setdefault(hash, Held())
+                    one = assets.setdefault(hash, StoredAsset())
                     one.usage += usage(found)
                     if not suffix:
                         one.used = found.st_mtime_ns
-        return {hash: one for hash, one in held.items() if {hash, hash + RECORD} <= names or hash + DAMAGED in names}
+        return {
+            hash: one for hash, one in assets.items() if {hash, hash + RECORD} <= names or hash + DAMAGED in names
+        }
 
-    def held_of(self, ids: Collection[str]) -> dict[str, Held]:
-        """What `held` says of these assets, as far as they are here and whole."""
-        found: dict[str, Held] = {}
+    def assets_of(self, ids: Collection[str]) -> dict[str, StoredAsset]:
+        """Those of these assets that exist, by hash."""
+        found: dict[str, StoredAsset] = {}
         for id in ids:
             with suppress(FileNotFoundError):
                 stats = [self.file(id, suffix).stat() for suffix in ("", RECORD)]
-                one = Held(usage(stats[0]) + usage(stats[1]), stats[0].st_mtime_ns)
+                one = StoredAsset(usage(stats[0]) + usage(stats[1]), stats[0].st_mtime_ns)
                 found[id.removeprefix("sha256:")] = one
                 one.usage += usage(self.file(id, SCENE).stat())
         return found
 
     def clear(self) -> None:
-        """Deletes what a crash left: files half written, bytes without their record, records without their bytes."""
+        """Delete the leftovers of a crash: half-written files, bytes without a record, records without bytes."""
         deleted = 0
         try:
-            with self.alone() if self.path.exists() else nullcontext():
+            with self.locked() if self.path.exists() else nullcontext():
                 names = {entry.name for entry in self._entries()}
                 for name in names:
                     hash, suffix = split(name)
@@ -151,19 +154,19 @@ class AssetFolder:
                     elif name.startswith(".") and name.endswith(PART):
                         deleted += _deleted_unless_written(self.path / name)
         except OSError as error:
-            log.warning("could not clear away what a crash left folder=%s error=%s", self.path, error)
+            log.warning("could not delete the leftovers of a crash folder=%s error=%s", self.path, error)
         if deleted:
-            log.info("cleared away what a crash left files=%d", deleted)
+            log.info("deleted the leftovers of a crash files=%d", deleted)
 
     def recount(self) -> None:
-        """Make the totals anew, as somebody may have copied or deleted files by hand. Raises OSError."""
+        """Count the totals again, as somebody may have copied or deleted files by hand. Raises OSError."""
         if self.path.exists():
-            with self.alone():
+            with self.locked():
                 self.count()
 
     @contextmanager
-    def alone(self) -> Iterator[None]:
-        """While it lasts nobody else puts assets here or takes any away; never for long. Raises OSError."""
+    def locked(self) -> Iterator[None]:
+        """The lock under which assets are added and deleted; it is never taken for long. Raises OSError."""
         self.path.mkdir(parents=True, exist_ok=True)
         fd = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -180,7 +183,7 @@ class AssetFolder:
 
     @contextmanager
     def _written(self, data: Source, lasting: bool) -> Iterator[Path]:
-        """A file with `data` to be renamed, locked while it lasts; deleted if it still has its name in the end."""
+        """A temporary file with `data`, locked until the context ends. It is deleted then, unless it was renamed."""
         self.path.mkdir(parents=True, exist_ok=True)
         with ExitStack() as stack:
             while True:
@@ -188,7 +191,7 @@ class AssetFolder:
                 file = stack.enter_context(open(fd, "wb"))
                 stack.callback(Path(name).unlink, missing_ok=True)
                 _lock(fd)
-                if os.fstat(fd).st_nlink:  # or else `clear` came before the lock
+                if os.fstat(fd).st_nlink:  # otherwise `clear` deleted it before it was locked
                     break
             write(data, file)
             file.flush()
@@ -197,7 +200,7 @@ class AssetFolder:
             yield Path(name)
 
     def _sync(self) -> None:
-        """Has the disk know the files' names."""
+        """Write the folder itself to the disk, and with it the names of its files."""
         fd = os.open(self.path, os.O_RDONLY | os.O_DIRECTORY)
         try:
             os.fsync(fd)
@@ -205,25 +208,25 @@ class AssetFolder:
             os.close(fd)
 
 
-def total(held: dict[str, Held]) -> Usage:
-    return sum((one.usage for one in held.values()), Usage())
+def total(assets: dict[str, StoredAsset]) -> Usage:
+    return sum((one.usage for one in assets.values()), Usage())
 
 
 def split(name: str) -> tuple[str, str]:
-    """The hash that a file's name begins with, "" where it is none of an asset's, and the rest."""
+    """The hash that a file's name begins with, and its suffix; "" and the name where the file is not an asset's."""
     hash, dot, rest = name.partition(".")
     known = HASH.fullmatch(hash) and dot + rest in ("", RECORD, SCENE, DAMAGED)
     return (hash, dot + rest) if known else ("", name)
 
 
 def _lock(fd: int) -> None:
-    """Waits. A network's file system may know no locks; there only one server at a time should use the folder."""
+    """Lock a file; waits. Some network file systems have no locks: there the folder is for one server."""
     with suppress(OSError):
         fcntl.flock(fd, fcntl.LOCK_EX)
 
 
 def _deleted_unless_written(path: Path) -> bool:
-    """Unlinks a file that nobody has locked. Its writer looks for that as soon as it has the lock."""
+    """Delete a temporary file that no writer has locked; whether it was. A writer that locks it later sees that."""
     with suppress(FileNotFoundError):
         fd = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
         try:

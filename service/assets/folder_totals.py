@@ -1,7 +1,7 @@
 """What an asset folder takes on the disk, kept up to date with each change instead of counted again.
 
-The totals stand in a file beside the folder, for all processes that use it. The file says so while a change is under
-way: after a crash in the middle of one, whoever comes next counts.
+The totals are in a file beside the folder, for all processes that use it. The file is marked while a change is under
+way: after a crash in the middle of one, the next reader finds no totals and counts.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ MAGIC = b"SBX1"
 
 
 class FolderTotals:
-    """All but `read` are to be called under the folder's lock."""
+    """All methods but `read` need the folder's lock."""
 
     def __init__(self, path: Path) -> None:
         self._path = path
 
     def read(self) -> Usage | None:
-        """None where nobody knows: nothing was counted yet, or a change is under way."""
+        """The totals; None where nothing was counted yet, or a change is under way."""
         try:
             magic, changing, size, files = TOTALS.unpack(self._path.read_bytes())
         except (OSError, struct.error):
@@ -33,7 +33,7 @@ class FolderTotals:
         return Usage(size, files) if magic == MAGIC and not changing else None
 
     def write(self, total: Usage | None) -> None:
-        """None: nobody knows until it is counted. Where the disk fails, nobody knows either."""
+        """Store the totals; None marks them as unknown, as does a failure of the disk."""
         known = total or Usage()
         try:
             file = os.open(self._path, os.O_WRONLY | os.O_CREAT | os.O_CLOEXEC, 0o644)
@@ -47,7 +47,7 @@ class FolderTotals:
 
     @contextmanager
     def change(self) -> Iterator[Change]:
-        """Files are added and removed while it lasts; nobody knows the totals where it raises."""
+        """A context in which files are added and removed. The totals stay unknown where it raises."""
         before = self.read()
         change = Change()
         self.write(None)
@@ -57,21 +57,21 @@ class FolderTotals:
 
 
 class Change:
-    """What files that come and go make of the totals."""
+    """Adds up what files that are added and removed change of the totals."""
 
     def __init__(self) -> None:
         self.difference = Usage()
 
     def added(self, path: Path) -> None:
-        """Raises FileNotFoundError."""
+        """Count a file that was added. Raises FileNotFoundError."""
         self.difference += usage(path.lstat())
 
     def replaces(self, path: Path) -> None:
-        """To be called before a file takes this place, or goes; nothing may be there."""
+        """Subtract the file of this name, if there is one: it is about to be replaced or deleted."""
         with suppress(FileNotFoundError):
             self.difference -= usage(path.lstat())
 
     def remove(self, path: Path) -> None:
-        """Deletes a file, where it is there."""
+        """Delete a file, if it exists."""
         self.replaces(path)
         path.unlink(missing_ok=True)

@@ -1,4 +1,4 @@
-"""Whether the bytes on the disk are still those that their name, a hash, says: looked at once, not at every load."""
+"""Checks that the bytes on the disk still have the hash that names them: once a process, not at every load."""
 
 from __future__ import annotations
 
@@ -21,18 +21,18 @@ class Integrity:
     def __init__(self, files: AssetFolder) -> None:
         self._files = files
         self._lock = threading.Lock()
-        self._sound: dict[str, int] = {}  # assets that had their hash, and their files' time of change then, in ns
+        self._sound: dict[str, int] = {}  # time of change (ns) of the files that were found sound, by asset
 
     def stored(self, id: str, changed: int) -> None:
-        """To be called with what `AssetFolder.put` returned for bytes that have just been hashed."""
+        """Note that bytes were just stored that had been hashed; `changed` is what `AssetFolder.put` returned."""
         with self._lock:
             self._sound[id] = changed
 
     def open(self, id: str, again: bool = False) -> BinaryIO | None:
-        """An asset's file, which now counts as used; None where it went just now, to make room.
+        """An asset's file, whose time of use is now; None where it was just deleted to make room.
 
-        It is hashed, which takes 0.2 s for 256 MiB, when this process first opens it, when it has changed since, and
-        where `again` asks for it. Raises NotFound where it is damaged: it is then set aside.
+        It is hashed (0.2 s for 256 MiB) when this process opens it for the first time, when it has changed since, and
+        with `again`. Raises NotFound where it is damaged; the file is then renamed.
         """
         try:
             file = self._files.file(id).open("rb")
@@ -60,8 +60,8 @@ class Integrity:
             log.error("could not read an asset id=%s error=%s", id, error)
             sound = False
         if not sound:
-            log.error("set an asset aside whose bytes are damaged id=%s", id)
-            with suppress(OSError):  # where the folder may only be read it stays, and is refused again
+            log.error("the bytes of an asset are damaged; they were set aside id=%s", id)
+            with suppress(OSError):  # in a read-only folder the file stays, and is refused again
                 self._files.set_aside(id, file)
             raise damaged(id)
         file.seek(0)
@@ -70,7 +70,7 @@ class Integrity:
 
     def _touch(self, id: str, file: BinaryIO) -> None:
         with suppress(OSError):
-            os.utime(file.fileno())  # what was used longest ago makes room first
+            os.utime(file.fileno())  # the assets that were used longest ago are deleted first
         self._sound[id] = os.fstat(file.fileno()).st_mtime_ns
 
 

@@ -1,4 +1,4 @@
-"""The assets people uploaded, named by the hash of their bytes, in a folder that survives a restart."""
+"""Uploaded assets, named by the hash of their bytes, in a folder that survives a restart."""
 
 import hashlib
 import json
@@ -38,7 +38,7 @@ Room = Callable[[Usage], AbstractContextManager[None]]
 
 
 class HasLimits(Protocol):
-    """As much of the configuration as concerns assets."""
+    """The part of the configuration that concerns assets."""
 
     @property
     def max_triangles(self) -> int: ...
@@ -59,8 +59,8 @@ class HasLimits(Protocol):
 class AssetStore:
     """For any number of threads, and for several processes on one folder.
 
-    `builtin` gives assets that are there without having been uploaded, by id; it is called when one is first missed.
-    `room` is entered with what files will take first, left at the end, and raises where that is too much.
+    `builtin` returns assets, by id, that nobody needs to upload; it is called when one of them is first asked for.
+    `room` is a context around storing files: it is given what they will take, and raises where that is too much.
     """
 
     def __init__(
@@ -77,12 +77,12 @@ class AssetStore:
         self._room = room
 
     def incoming(self) -> BinaryIO:
-        """A file without a name, for an upload; gone when it is closed. Raises Unavailable."""
+        """A file without a name for an upload, deleted when it is closed. Raises Unavailable."""
         with self._storing("new"):
             return self._files.nameless()
 
     def receive(self, file: BinaryIO, more: bytes) -> None:
-        """Raises Unavailable where the disk takes no more."""
+        """Append to an upload. Raises Unavailable where the disk is full."""
         with self._storing("new"):
             file.write(more)
             file.flush()
@@ -94,9 +94,9 @@ class AssetStore:
         filename: str | None = None,
         room: Room | None = None,
     ) -> AssetInfo:
-        """Keeps the bytes, once they have been parsed; in the place of the same ones if these are damaged.
+        """Parse the bytes, and store them; they replace damaged ones of the same id.
 
-        `room` is entered in the place of the store's. Raises UnsupportedMedia, AssetError, Unavailable, and what
+        `room` is used instead of the store's own. Raises UnsupportedMedia, AssetError, Unavailable, and what
         `room` raises.
         """
         id, size = "sha256:" + digest(data), length(data)
@@ -124,24 +124,24 @@ class AssetStore:
         if info.kind != "scene":
             raise NotFound(f"{id[:100]} is not a scene but {'an image' if info.kind == 'image' else 'a mesh'}")
         imported = self._imported(id)
-        if imported is None:  # nothing of it is lost: the file itself is still here
+        if imported is None:  # the file itself still exists: import it again
             with self.opened(id) as source:
                 imported = self._import(id, info.format, source, False)[1]
         return imported
 
     def parts(self, info: AssetInfo) -> list[str]:
-        """The ids of an asset and, of a scene, of the assets that it was taken apart into."""
+        """The id of an asset and, for a scene, those of the assets that it was imported as."""
         imported = self._imported(info.id) if info.kind == "scene" else None
         return [info.id, *(imported.references() if imported else ())]
 
     def read(self, id: str) -> bytes:
-        """Raises NotFound."""
+        """An asset's bytes. Raises NotFound."""
         with self.opened(id) as source:
             return source if isinstance(source, bytes) else source.read()
 
     @contextmanager
     def opened(self, id: str, again: bool = False) -> Iterator[bytes | BinaryIO]:
-        """An asset's bytes, checked as `Integrity.open` says. Raises NotFound, also where they are damaged."""
+        """An asset's bytes, checked as `Integrity.open` does. Raises NotFound, for damaged bytes as well."""
         file = self._integrity.open(id, again) if self._known(id) is not None else None
         if file is None:
             yield self._builtin_bytes(id)
@@ -163,7 +163,7 @@ class AssetStore:
         return None
 
     def info(self, id: str) -> AssetInfo:
-        """Raises NotFound."""
+        """The record of an asset. Raises NotFound."""
         known = self._known(id)
         if known:
             return known
@@ -171,15 +171,15 @@ class AssetStore:
         return self._described(id, _format(data), data)
 
     def mesh(self, ref: str) -> MeshData:
-        """Raises AssetError."""
+        """A mesh by its reference. Raises AssetError."""
         return as_mesh(self._load(ref), ref)
 
     def image(self, ref: str) -> ImageData:
-        """Raises AssetError."""
+        """An image by its reference. Raises AssetError."""
         return as_image(self._load(ref), ref)
 
     def warm(self) -> None:
-        """Makes the first file as quick as the later ones; does not wait."""
+        """Start a parsing process with its libraries, without waiting, so that a first file is parsed at once."""
         self.loader.sandbox.warm()
 
     def rights(self) -> Rights:
@@ -196,7 +196,7 @@ class AssetStore:
             return self._import_whole(id, format, data, new, room or self._room)
 
     def _import_whole(self, id: str, format: str, data: Source, new: bool, room: Room) -> tuple[AssetInfo, Imported]:
-        """Stores the parts of a scene and its document, and the file itself where that is `new`."""
+        """Store the parts of a scene and its document, and the file itself if it is `new`."""
         try:
             file = self.loader.sandbox.parse_scene(format, handed(data))
         except ParseError as error:
@@ -221,8 +221,8 @@ class AssetStore:
     def _keep(self, part: ScenePart) -> str:
         """The id of a part of a scene, stored as an asset of its own.
 
-        Without waiting for the disk, 15 ms a part: a scene has thousands, and can be imported again. Raises
-        AssetError, UnsupportedMedia, Unavailable.
+        It does not wait for the disk, which takes 15 ms a part: scenes have thousands, and can be imported again.
+        Raises AssetError, UnsupportedMedia, Unavailable.
         """
         id = "sha256:" + hashlib.sha256(part.data).hexdigest()
         if self._is_sound(id):
@@ -238,12 +238,14 @@ class AssetStore:
         return id
 
     def _imported(self, id: str, again: bool = False) -> Imported | None:
-        """What a scene was imported as; None where not all of it is here any more. `again`: as of `opened`."""
+        """The document that a scene was imported as; None where some of it is missing. `again` as for `opened`."""
         try:
             imported = Imported.read(self._files.file(id, SCENE).read_bytes())
         except (OSError, ValueError):
             return None
-        sound = [self._is_sound(reference, again) for reference in imported.references()]  # finds all that is damaged
+        sound = [
+            self._is_sound(reference, again) for reference in imported.references()
+        ]  # of all of them, so that all that is damaged is found
         return imported if all(sound) else None
 
     def _store(self, info: AssetInfo, data: Source, scene: Imported | None = None, lasting: bool = True) -> None:
@@ -285,11 +287,11 @@ class AssetStore:
             raise refused(f"the {format.upper()} file", error) from None
 
     def _described(self, id: str, format: str, data: Source) -> AssetInfo:
-        """Of a mesh or an image. Raises AssetError."""
+        """The record of a mesh or an image. Raises AssetError."""
         return describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data)))
 
     def _is_whole(self, info: AssetInfo) -> bool:
-        """Whether nothing that was stored of an asset is damaged or gone, the parts of a scene included."""
+        """Whether all that was stored of an asset is intact, with the parts of a scene."""
         if not self._is_sound(info.id, again=True):
             return False
         return info.kind != "scene" or self._imported(info.id, again=True) is not None
@@ -302,14 +304,14 @@ class AssetStore:
             return False
 
     def _known(self, id: str) -> AssetInfo | None:
-        """What stands beside the bytes: it is written last, so that it vouches for them."""
+        """The record beside the bytes; it is written last, so that the bytes are complete where it exists."""
         if not ID.fullmatch(id):
             return None
         try:
             info = AssetInfo(**json.loads(self._files.file(id, RECORD).read_bytes()))
             if self._files.file(id).stat().st_size != info.bytes:
-                return None  # the power failed before the disk had it all
-            return replace(info, kind=KINDS[info.format])  # an older version took glTF for a mesh
+                return None  # the power failed before all of it was on the disk
+            return replace(info, kind=KINDS[info.format])  # an older version recorded glTF files as meshes
         except (OSError, ValueError, TypeError, KeyError):
             return None
 
@@ -335,5 +337,5 @@ def _limits(config: HasLimits | None) -> AssetLimits:
 
 
 def _format(data: bytes) -> str:
-    """Of one of our own assets: its bytes tell."""
+    """The format of a built-in asset, by its bytes."""
     return sniff(data) or "obj"

@@ -54,7 +54,7 @@ def test_an_owner_s_own_assets_make_room(shared: Storage, tmp_path: Path) -> Non
 
 def test_what_made_room_for_others_counts_no_longer(shared: Storage, tmp_path: Path) -> None:
     mine = [upload(shared, tmp_path, "anna", number) for number in range(4)]
-    with shared.quota._files.alone():
+    with shared.quota._files.locked():
         shared.quota._files.delete(mine[2])
     mine.append(upload(shared, tmp_path, "anna", 5))
     assert here(shared, mine) == [True, True, False, True, True]

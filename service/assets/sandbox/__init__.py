@@ -1,4 +1,4 @@
-"""Files of strangers are parsed in a child process, within bounds of memory and time.
+"""Uploaded files are parsed in a child process, within limits of memory and time.
 
 sandbox     the parent's side: starts the child, hands it a file, takes its arrays
 child       the child's side: `python -m service.assets.sandbox.child`

@@ -1,8 +1,8 @@
-"""The process that parses strangers' files: `python -m service.assets.sandbox.child FD`, with a socket to the parent.
+"""The process that parses uploaded files: `python -m service.assets.sandbox.child FD`, with a socket to the parent.
 
-One request after the other: a format and a file come in, arrays in sealed memory go out. It ends when the parent
-does, and is killed where a file takes too much time; memory that a file must not take is refused to it. Before the
-first file it gives up all rights that it does not need, and says which ones.
+It answers requests one by one: a format and a file come in, arrays in sealed memory go out. It ends when the parent
+does; it is killed when a file takes too much time, and its allocations fail when a file takes too much memory. Before
+the first file it gives up all rights that it does not need, and sends the parent their list.
 """
 
 import errno
@@ -90,7 +90,7 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
 
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
-    """`whole`: of a file that is a scene not its triangles only."""
+    """With `whole` a scene file is read with its materials, lights and camera, else only its triangles."""
     from service.assets.gltf.importer import read_scene
     from service.assets.obj.importer import read_obj_scene
     from service.assets.readers.image import SIGNATURES, parse_image
@@ -101,7 +101,7 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshDa
         raise ParseError("the file is empty")
     if format in SIGNATURES:
         return parse_image(format, os.pread(source, size, 0), limits)
-    # Mapped and not read: the file is in memory already.
+    # The file is in memory already: it is mapped, not copied.
     data = memoryview(mmap.mmap(source, size, access=mmap.ACCESS_READ))
     if not whole:
         return parse_mesh(format, data, limits)
@@ -111,9 +111,9 @@ def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshDa
 def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Pieces], dict[str, Any]]:
     if isinstance(parsed, SceneFile):
         parts = [(len(p.data), p.pointer, p.vertices, p.triangles) for p in parsed.parts]
-        told = json.dumps(vars(parsed) | {"parts": parts}).encode()
+        facts = json.dumps(vars(parsed) | {"parts": parts}).encode()
         files = [np.frombuffer(part.data, np.uint8) for part in parsed.parts]
-        return {"scene": [np.frombuffer(told, np.uint8)], "files": files}, {}
+        return {"scene": [np.frombuffer(facts, np.uint8)], "files": files}, {}
     if isinstance(parsed, ImageData):
         return {"pixels": [parsed.pixels]}, {"warnings": list(parsed.warnings)}
     arrays: dict[str, Pieces] = {

@@ -1,4 +1,4 @@
-"""Mesh files -> arrays that the rest may trust: finite, in range, bounded. Runs in the parsing child."""
+"""Mesh files -> arrays that are finite, in range and of bounded size. Runs in the parsing process."""
 
 from collections.abc import Callable
 

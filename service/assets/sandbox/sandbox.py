@@ -186,11 +186,11 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
 
 
 def _scene(text: Array, files: Array) -> SceneFile:
-    told, view, parts, at = json.loads(text.tobytes()), files.data, [], 0
-    for size, pointer, vertices, triangles in told["parts"]:
+    facts, view, parts, at = json.loads(text.tobytes()), files.data, [], 0
+    for size, pointer, vertices, triangles in facts["parts"]:
         parts.append(ScenePart(view[at : at + size], str(pointer), vertices, triangles))
         at += size
     return SceneFile(
-        told["document"], parts, told["warnings"], int(told["triangles"]), bool(told["lit"]), told["exposure"],
-        told["aspect_ratio"], told["bounds"],
+        facts["document"], parts, facts["warnings"], int(facts["triangles"]), bool(facts["lit"]), facts["exposure"],
+        facts["aspect_ratio"], facts["bounds"],
     )  # fmt: skip
