@@ -61,6 +61,12 @@ class SavedPicture:
     samples: int
     under_way: tuple[int, int, int]  # samples of the pass, row and column of its next tile
     buffers: list[np.ndarray]
+    driver: str = ""  # whose bits these are: only with an equal one they are gone on with; "": nobody knows
+
+
+def driver_of(info: Mapping[str, Any]) -> str:
+    """The driver and its version by what `gpu.Renderer.info` says: with equal ones a picture has equal bits."""
+    return f"{info.get('renderer', '')} {info.get('version', '')}".strip()
 
 
 # --- to the renderer ---
@@ -206,6 +212,10 @@ class EvaluateBsdf:
 class Ready:
     info: dict[str, Any]  # of the GL implementation
 
+    @property
+    def driver(self) -> str:
+        return driver_of(self.info)
+
 
 @dataclass(frozen=True)
 class Unable:
@@ -322,6 +332,13 @@ class Evicted:
 
 
 @dataclass(frozen=True)
+class Discarded:
+    """A Restore of a picture under way did not fit, as another driver or version had saved it: it begins again."""
+
+    task: int
+
+
+@dataclass(frozen=True)
 class Usage:
     """GPU seconds by task and samples of pixels since the last Usage, and what the device stores now."""
 
@@ -363,10 +380,8 @@ ToRenderer = (
     | MeasureKernel
     | EvaluateBsdf
 )
-FromRenderer = (
-    Ready
-    | Unable
-    | Usage
+Heard = (  # of a renderer that has started
+    Usage
     | Loaded
     | Frame
     | Image
@@ -376,5 +391,7 @@ FromRenderer = (
     | KernelMeasured
     | Evaluated
     | Evicted
+    | Discarded
     | Failed
 )
+FromRenderer = Ready | Unable | Heard

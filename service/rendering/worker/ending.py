@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING
 
-from service.rendering.ipc.messages import Checkpoint, Done, Progressed, Reason
+from service.rendering.ipc.messages import Checkpoint, Done, Progressed, Reason, driver_of
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.checkpoints import Checkpointer
 from service.rendering.worker.device.residency import Residency
@@ -36,6 +36,7 @@ class Ending:
         self._number, self._send = number, context.send
         self._residency, self._tracker, self._frames = residency, tracker, frames
         self._answer = answer
+        self._driver = driver_of(context.renderer.info)
         self._server_keeps = context.forget is not None
         self.checkpoints = Checkpointer(context.checkpoint_s)
         self._reported = 0.0
@@ -58,7 +59,9 @@ class Ending:
             self._say_done(saved)
         elif saved is not None:
             progress = self._tracker.progress(self._residency)
-            self._send(Checkpoint(self._number, self._tracker.generation, progress, sent_picture(saved)))
+            self._send(
+                Checkpoint(self._number, self._tracker.generation, progress, sent_picture(saved, self._driver))
+            )
         return True
 
     def end_if_reached(self) -> bool:
@@ -96,7 +99,7 @@ class Ending:
         assert reason is not None
         self._answer()
         progress = self._tracker.progress(self._residency)
-        sent = None if saved is None else sent_picture(saved)
+        sent = None if saved is None else sent_picture(saved, self._driver)
         self._send(Done(self._number, self._tracker.generation, reason, progress, self.warnings, sent))
 
     @property

@@ -22,6 +22,6 @@ def saved_picture(sent: SavedPicture, settings: RenderSettings) -> Saved:
     return Saved(settings, sent.samples, sent.under_way, sent.buffers)
 
 
-def sent_picture(saved: Saved) -> SavedPicture:
+def sent_picture(saved: Saved, driver: str) -> SavedPicture:
     """The picture for a message."""
-    return SavedPicture(saved.samples, saved.under_way, saved.buffers)
+    return SavedPicture(saved.samples, saved.under_way, saved.buffers, driver)

@@ -7,7 +7,7 @@ import time
 from enum import Enum
 
 from gpu import GpuError, OutOfMemory, RenderSettings, SceneTooLarge
-from service.rendering.ipc.messages import Failed, Loaded, Read, Restore, Update, Want
+from service.rendering.ipc.messages import Discarded, Failed, Loaded, Read, Restore, Update, Want, driver_of
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.residency import Residency
 from service.rendering.worker.device.resolution_ladder import FULL_S
@@ -41,7 +41,8 @@ class Task:
         self.attempted = 0  # the generation of the last update
         self.used_s = 0.0
         self.traced = 0  # samples of pixels
-        renderer, self._send, self._forget = context.renderer, context.send, context.forget
+        self._renderer = renderer = context.renderer
+        self._send, self._forget = context.send, context.forget
         self._residency = Residency(renderer, context.memory, self, self._part)
         self._tracker = ProgressTracker(renderer)
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
@@ -227,8 +228,11 @@ class Task:
         if self._residency.loaded is None:
             return
         tracker, full, saved = self._tracker, self._residency.full, restore.saved
-        if [buffer.size for buffer in full.state] != [buffer.nbytes for buffer in saved.buffers]:
-            log.warning("another version saved this picture, which begins again task=%d", self.number)
+        others = restore.reason is None and saved.driver not in ("", driver_of(self._renderer.info))
+        if others or [buffer.size for buffer in full.state] != [buffer.nbytes for buffer in saved.buffers]:
+            log.warning("another driver or version saved this picture, which begins again task=%d", self.number)
+            if restore.reason is None:
+                self._send(Discarded(self.number))
             return
         full.restore(saved_picture(saved, full.settings))
         tracker.reason, self._frames.scale = restore.reason, 1.0

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from service.cpu_time import RunnableTime
 from service.rendering.ipc import channel
+from service.rendering.ipc.messages import driver_of
 from service.rendering.worker.helpers.process import HelperProcess
 
 if TYPE_CHECKING:
@@ -60,7 +61,7 @@ class CompileClient:
         """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop; `spare`: in time
         that nobody else wants, however long that takes; `lifeline`: its process ends with the server, and when the
         renderer is killed goes on with what it compiles, for the next one."""
-        self._driver = f"{info['renderer']} {info['version']}"
+        self._driver = driver_of(info)
         self._crowded = crowded
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
         given += ["--spare"] if spare else []
