@@ -40,8 +40,8 @@ from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.jobs.retention import Retention
 from service.rendering.jobs.store.store import RenderStore
 from service.rendering.requests.request_reader import RequestReader
-from service.rendering.supervisor.process import Options
-from service.rendering.supervisor.supervisor import Supervisor
+from service.rendering.supervisor.devices import seats
+from service.rendering.supervisor.pool import Pool
 from service.routes import assets, bsdf, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
@@ -80,7 +80,7 @@ def create_app(config: Config) -> FastAPI:
         config,
         kept.assets,
         RequestReader(config, kept.assets, memory),
-        Supervisor(Options(config.device, config.hang_s, config.gpu_memory, memory.limit, config.checkpoint_s)),
+        Pool(seats(config, memory.limit)),
         kept.documents,
         kept.quota,
         kept.shares,
@@ -221,8 +221,7 @@ class _Server(uvicorn.Server):
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own: AppState = app.state.sunbox
-    if own.renderers.process_id is None:
-        own.renderers.start()
+    own.renderers.start()
     own.assets.warm()
     asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
     await own.resume_renders()

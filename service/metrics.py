@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import socket
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from service.problems import Unavailable
-from service.rendering.statistics import Distribution, Statistics
+from service.rendering.renderers import Member
+from service.rendering.statistics import ClientStatistics, Distribution, Statistics
 
 if TYPE_CHECKING:
     from prometheus_client.core import Metric
@@ -36,14 +38,14 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
 
     class Sunbox(Collector):
         def collect(self) -> Iterator[Metric]:
-            seen = state.renderers.statistics
+            members = state.renderers.members
             yield from _about(state.renderers.info or {})
             yield from _requests(traffic)
-            yield from _work(seen)
-            yield from _kernels(seen)
-            yield from _failures(seen)
+            yield from _work(state.renderers.statistics, members)
+            yield from _kernels(members)
+            yield from _failures(state.renderers.statistics, members)
             yield from _clients(state)
-            yield from _memory(state)
+            yield from _memory(state, members)
             yield from _disk(state)
 
     return Sunbox()
@@ -65,30 +67,39 @@ def _requests(traffic: Traffic) -> Iterator[Metric]:
     yield _histogram("request_seconds", "From a request to its answer's end.", traffic.seconds)
 
 
-def _work(seen: Statistics) -> Iterator[Metric]:
-    yield _counter("frames", "Frames sent on streams.", seen.frames)
-    yield _counter("frame_bytes", "Bytes of these frames.", seen.frame_bytes)
-    yield _counter("samples", "Samples of pixels that were traced.", seen.samples)
-    yield _histogram("first_frame_seconds", "From a stream's update to its first frame.", seen.first_frame_s)
-    used = {(kind,): seconds for kind, seconds in seen.gpu_s.items()}
-    yield _counters("gpu_seconds", "GPU time, by whose work it was.", ("client",), used)
+def _work(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[Metric]:
+    yield _counter("frames", "Frames sent on streams.", clients.frames)
+    yield _counter("frame_bytes", "Bytes of these frames.", clients.frame_bytes)
+    yield _histogram("first_frame_seconds", "From a stream's update to its first frame.", clients.first_frame_s)
+    samples = _each(members, lambda seen: seen.samples)
+    yield _counters("samples", "Samples of pixels that were traced.", ("renderer",), samples)
+    used = _each_of(members, lambda seen: seen.gpu_s)
+    yield _counters("gpu_seconds", "GPU time, by whose work it was.", ("renderer", "client"), used)
 
 
-def _kernels(seen: Statistics) -> Iterator[Metric]:
-    yield _histogram("compile_seconds", "Compiling kernels that were not in memory.", seen.compile_s)
-    yield _counter("kernel_cache_hits", "Loads whose kernel was in memory.", seen.kernels_found)
-    yield _gauge("kernels", "Compiled kernels in the renderer's memory.", seen.kernels)
-    evicted = "Kernels that made room for others or were long unused."
-    yield _counter("kernels_evicted", evicted, seen.kernels_evicted)
-    yield _histogram("setup_seconds", "Uploading a scene and compiling for it.", seen.setup_s)
+def _kernels(members: Sequence[Member]) -> Iterator[Metric]:
+    compiled = {member.place.id: member.statistics.compile_s for member in members}
+    yield _histograms("compile_seconds", "Compiling kernels that were not in memory.", "renderer", compiled)
+    found = _each(members, lambda seen: seen.kernels_found)
+    yield _counters("kernel_cache_hits", "Loads whose kernel was in memory.", ("renderer",), found)
+    kernels = {id: float(count) for (id,), count in _each(members, lambda seen: seen.kernels).items()}
+    yield _gauges("kernels", "Compiled kernels in a renderer's memory.", "renderer", kernels)
+    evicted = _each(members, lambda seen: seen.kernels_evicted)
+    yield _counters(
+        "kernels_evicted", "Kernels that made room for others or were long unused.", ("renderer",), evicted
+    )
+    setup = {member.place.id: member.statistics.setup_s for member in members}
+    yield _histograms("setup_seconds", "Uploading a scene and compiling for it.", "renderer", setup)
 
 
-def _failures(seen: Statistics) -> Iterator[Metric]:
-    restarts = {(reason,): float(count) for reason, count in seen.restarts.items()}
-    yield _counters("renderer_restarts", "Renderers lost, by how.", ("reason",), restarts)
-    yield _counter("checkpoints", "Renders under way that were saved, to go on later.", seen.checkpoints)
-    yield _histogram("recovery_seconds", "From a renderer's loss to the next one.", seen.recovery_s)
-    errors = {(kind,): float(count) for kind, count in seen.errors.items()}
+def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[Metric]:
+    restarts = _each_of(members, lambda seen: seen.restarts)
+    yield _counters("renderer_restarts", "Renderers lost, by how.", ("renderer", "reason"), restarts)
+    checkpoints = _each(members, lambda seen: seen.checkpoints)
+    yield _counters("checkpoints", "Renders under way that were saved, to go on later.", ("renderer",), checkpoints)
+    recovery = {member.place.id: member.statistics.recovery_s for member in members}
+    yield _histograms("recovery_seconds", "From a renderer's loss to the next one.", "renderer", recovery)
+    errors = {(kind,): float(count) for kind, count in clients.errors.items()}
     yield _counters("errors", "Errors on streams and of failed renders, by problem.", ("type",), errors)
 
 
@@ -104,13 +115,16 @@ def _clients(state: AppState) -> Iterator[Metric]:
     yield _gauges("streams", "Streams with a client, and those whose client may come back.", "state", sessions)
 
 
-def _memory(state: AppState) -> Iterator[Metric]:
-    seen = state.renderers.statistics
-    yield _gauge("renderer_tasks", "Pictures that the renderer stores.", seen.tasks)
-    yield _gauge("gpu_bytes", "GPU memory that they take.", seen.gpu_bytes)
+def _memory(state: AppState, members: Sequence[Member]) -> Iterator[Metric]:
+    tasks = {member.place.id: float(member.statistics.tasks) for member in members}
+    yield _gauges("renderer_tasks", "Pictures that a renderer stores.", "renderer", tasks)
+    stored = {member.place.id: float(member.statistics.gpu_bytes) for member in members}
+    yield _gauges("gpu_bytes", "GPU memory that they take.", "renderer", stored)
     yield _gauges("memory_bytes", "Memory of SUNBOX_MEMORY, by what is in it.", "owner", state.memory.used())
     yield _gauge("memory_limit_bytes", "Most of it (SUNBOX_MEMORY).", state.memory.limit)
-    yield _gauge("renderer_resident_bytes", "Memory of the renderer's process.", _resident(state))
+    here = socket.gethostname()
+    resident = {each.place.id: float(_resident(each.process_id)) for each in members if each.place.host == here}
+    yield _gauges("renderer_resident_bytes", "Memory of a renderer's process.", "renderer", resident)
 
 
 def _disk(state: AppState) -> Iterator[Metric]:
@@ -157,14 +171,40 @@ def _gauges(name: str, help: str, label: str, values: Mapping[str, float]) -> Me
 def _histogram(name: str, help: str, values: Distribution) -> Metric:
     from prometheus_client.core import HistogramMetricFamily
 
+    return HistogramMetricFamily(f"sunbox_{name}", help, buckets=_buckets(values), sum_value=values.total)
+
+
+def _histograms(name: str, help: str, label: str, values: Mapping[str, Distribution]) -> Metric:
+    from prometheus_client.core import HistogramMetricFamily
+
+    family = HistogramMetricFamily(f"sunbox_{name}", help, labels=(label,))
+    for key, value in values.items():
+        family.add_metric((key,), _buckets(value), value.total)
+    return family
+
+
+def _buckets(values: Distribution) -> list[tuple[str, float]]:
     buckets = [(f"{bound:g}", float(count)) for bound, count in values.cumulative()]
-    buckets.append(("+Inf", values.count))
-    return HistogramMetricFamily(f"sunbox_{name}", help, buckets=buckets, sum_value=values.total)
+    return [*buckets, ("+Inf", values.count)]
 
 
-def _resident(state: AppState) -> int:
+def _each(members: Sequence[Member], value: Callable[[Statistics], float]) -> dict[tuple[str], float]:
+    """By renderer."""
+    return {(member.place.id,): float(value(member.statistics)) for member in members}
+
+
+def _each_of(
+    members: Sequence[Member], values: Callable[[Statistics], Mapping[Any, float]]
+) -> dict[tuple[str, str], float]:
+    """By renderer, and by what the renderer's own are by."""
+    return {
+        (member.place.id, key): float(value) for member in members for key, value in values(member.statistics).items()
+    }
+
+
+def _resident(process_id: int | None) -> int:
     try:
-        with open(f"/proc/{state.renderers.process_id}/statm") as sizes:
+        with open(f"/proc/{process_id}/statm") as sizes:
             return int(sizes.read().split()[1]) * PAGE
     except (OSError, ValueError, IndexError):
         return 0

@@ -29,7 +29,7 @@ from service.rendering.executors import packing
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.queue import RenderQueue
 from service.rendering.jobs.store.record import Order, Outcome, StoredRender
-from service.rendering.renderers import Renderers
+from service.rendering.renderers import Member, Renderers
 from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.sessions import Sessions
@@ -80,6 +80,7 @@ class AppState:
         return {
             "version": metadata.version("sunbox"),
             "renderer": renderer,
+            "renderers": [_told(each) for each in self.renderers.members],
             "sandbox": asdict(await asyncio.to_thread(self.assets.rights)),
             "memory": {"limit": self.memory.limit, "used": self.memory.used()},
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
@@ -125,11 +126,16 @@ class AppState:
 
     async def farewell(self) -> None:
         """Tell all clients that the server ends, so that requests are answered; renders go on at the next start."""
+        self.renderers.drain()
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S
         await self.renders.close()
         while self.sessions.attended and time.monotonic() < until:
             await asyncio.sleep(0.01)
+
+
+def _told(member: Member) -> dict[str, str | None]:
+    return {**asdict(member.place), "driver": member.driver, "state": member.state}
 
 
 def app_state(connection: HTTPConnection) -> AppState:

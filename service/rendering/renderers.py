@@ -1,12 +1,16 @@
-"""What the server asks of its renderers: one supervised process today, a pool behind the same protocol later."""
+"""What the server asks of its renderers, whether there is one supervised process or a pool of them."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, Protocol
+import socket
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import Any, Literal, Protocol
 
 from service.rendering.ipc.messages import FromRenderer, Restore, SavedPicture, ToRenderer, Update
-from service.rendering.statistics import Kind, Statistics
+from service.rendering.statistics import ClientStatistics, Kind, Statistics
+
+State = Literal["starting", "ready", "lost", "draining"]
 
 
 class Listener(Protocol):
@@ -21,31 +25,60 @@ class Listener(Protocol):
         """There is no renderer for this task any more."""
 
 
+@dataclass(frozen=True)
+class Place:
+    """Which renderer it is, and where it is."""
+
+    id: str = "0"
+    device: str = "0"  # as in SUNBOX_DEVICES
+    host: str = field(default_factory=socket.gethostname)
+
+
+@dataclass(frozen=True)
+class Member:
+    """One renderer, for those who look at the service from outside."""
+
+    place: Place
+    state: State
+    driver: str | None  # and its version; two renderers with equal ones give equal bits. None: not known yet
+    process_id: int | None  # on its host; None while there is none
+    statistics: Statistics
+
+
 class Renderers(Protocol):
     """For the event loop. Tasks are numbered; what a lost renderer had is begun again elsewhere."""
 
-    statistics: Statistics
+    @property
+    def statistics(self) -> ClientStatistics:
+        """What clients were given, to be counted by whoever gives it to them."""
+
+    @property
+    def members(self) -> Sequence[Member]:
+        """Each renderer as it is now, in the order of their ids."""
 
     @property
     def info(self) -> dict[str, Any] | None:
-        """The device that renders; None while nothing can."""
+        """The device that renders, of several the first; None while nothing can."""
 
     @property
     def process_id(self) -> int | None:
-        """The process that renders; None while there is none."""
+        """The process that renders, of several the first; None while there is none."""
 
     @property
     def hopeless(self) -> bool:
-        """Whether all attempts to start a renderer failed, so that the next one is some time away."""
+        """Whether all attempts to start any renderer failed, so that the next one is some time away."""
 
     def start(self) -> None:
-        """Start the processes; they are ready some tenths of a second later."""
+        """Start the processes, where that has not been done; they are ready some tenths of a second later."""
+
+    def drain(self) -> None:
+        """Take no new tasks from now on, as the server is about to end; those that are there go on."""
 
     async def close(self) -> None:
         """End them, after what they are at."""
 
     async def ready(self, timeout_s: float) -> dict[str, Any]:
-        """The device that renders, as soon as it does. Raises Unavailable with the reason why nothing does."""
+        """The device that renders, as soon as one does. Raises Unavailable with the reason why nothing does."""
 
     async def able(self, timeout_s: float) -> None:
         """Return when something renders, or did and is being replaced: then work can be taken. Raises Unavailable."""

@@ -39,7 +39,19 @@ class Distribution:
 
 
 @dataclass
-class Statistics:
+class ClientStatistics:
+    """What clients were given, whichever renderer it came from."""
+
+    first_frame_s: Distribution = field(default_factory=Distribution)  # from an update to its first frame
+    frames: int = 0
+    frame_bytes: int = 0
+    errors: Counter[str] = field(default_factory=Counter)  # told on streams and of failed renders, by problem type
+
+
+@dataclass
+class Statistics(ClientStatistics):
+    """One renderer's, which may be the only one, and then its clients' too."""
+
     restarts: Counter[str] = field(default_factory=Counter)  # of the renderer: by process.Cause
     recovery_s: Distribution = field(default_factory=Distribution)  # from a renderer's loss to the next one ready
     checkpoints: int = 0  # of renders, against such losses
@@ -49,10 +61,6 @@ class Statistics:
     compile_s: Distribution = field(default_factory=Distribution)  # kernels that were not in memory
     kernels_found: int = 0  # ... and loads that found theirs there
     setup_s: Distribution = field(default_factory=Distribution)  # uploading and compiling, a load
-    first_frame_s: Distribution = field(default_factory=Distribution)  # from an update to its first frame
-    frames: int = 0
-    frame_bytes: int = 0
-    errors: Counter[str] = field(default_factory=Counter)  # told on streams and of failed renders, by problem type
     tasks: int = 0  # that the renderer holds
     gpu_bytes: int = 0  # what they hold there
     kernels: int = 0  # compiled ones, there

@@ -48,18 +48,18 @@ def test_metrics_tell_what_happens(server: Server) -> None:
         'sunbox_requests_total{method="POST",route="/v1/render",status="200"}',
         "sunbox_frames_total",
         "sunbox_frame_bytes_total",
-        "sunbox_samples_total",
+        'sunbox_samples_total{renderer="0"}',
         "sunbox_first_frame_seconds_count",
-        'sunbox_gpu_seconds_total{client="stream"}',
-        'sunbox_gpu_seconds_total{client="render"}',
-        "sunbox_setup_seconds_count",
+        'sunbox_gpu_seconds_total{client="stream",renderer="0"}',
+        'sunbox_gpu_seconds_total{client="render",renderer="0"}',
+        'sunbox_setup_seconds_count{renderer="0"}',
         "sunbox_request_seconds_count",
     ):
         wait_until(lambda name=name: metrics(server)[name] > before.get(name, 0))
     now = metrics(server)
-    assert now["sunbox_renderer_up"] == 1 and now["sunbox_renderer_resident_bytes"] > 1e7
+    assert now["sunbox_renderer_up"] == 1 and now['sunbox_renderer_resident_bytes{renderer="0"}'] > 1e7
     assert now["process_resident_memory_bytes"] > 1e7 and now["sunbox_data_quota_bytes"] > 1e9
-    assert now["sunbox_samples_total"] - before["sunbox_samples_total"] >= 2 * 8 * 32 * 24
+    assert now['sunbox_samples_total{renderer="0"}'] - before['sunbox_samples_total{renderer="0"}'] >= 2 * 8 * 32 * 24
     names = {re.split(r"[{ ]", name)[0] for name in now}
     assert {"sunbox_kernel_cache_hits_total", "sunbox_renders", "sunbox_gpu_bytes", "sunbox_info"} <= names
 

@@ -57,6 +57,7 @@ class ReplayLog:
         self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
         self.saved: Kept | None = None  # a finished picture
         self._checkpoint: Kept | None = None  # one under way
+        self._driver = ""
         self._task = task
         self._states: list[_State] = []  # the last one that was seen to work, and those after it
         self._want: Want | None = None
@@ -68,6 +69,16 @@ class ReplayLog:
     def kept(self) -> Kept | None:
         """The picture as the server keeps it, if it does."""
         return self.saved or self._checkpoint
+
+    @property
+    def away(self) -> bool:
+        """Whether it is a stream's that nobody attends."""
+        return isinstance(self._paused, Pause) and self._paused.away
+
+    @property
+    def driver(self) -> str:
+        """The driver whose bits the kept picture under way has; "" where there is none, or nobody knows."""
+        return "" if self._checkpoint is None else self._driver
 
     def stored(self, picture: SavedPicture, read: Callable[[], Restore]) -> None:
         """A picture is on the disk, from where `read` gives it: it need not stay in memory."""
@@ -86,7 +97,7 @@ class ReplayLog:
     def restored(self, restore: Restore) -> None:
         """The server had this picture already: the render goes on from it, or has ended with it."""
         if restore.reason is None:
-            self._checkpoint = restore
+            self._checkpoint, self._driver = restore, restore.saved.driver
         else:
             self.saved = restore
 
@@ -121,12 +132,13 @@ class ReplayLog:
             self._works(message.generation)
         if isinstance(message, Checkpoint):
             self._checkpoint = Restore(message.task, message.generation, message.saved, None, message.progress)
+            self._driver = message.saved.driver
         if isinstance(message, Frame) and self._want is not None and self._want.serial == message.serial:
             self._want = None
         return self._done(message) if isinstance(message, Done) else message
 
-    def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
-        """What to tell a new renderer, in order; the encoded ones are whoever's sends them. `kept`: encoded."""
+    def scenes(self) -> list[Encoded | ToRenderer]:
+        """What gives another renderer the same scenes, in order; the encoded ones are whoever's sends them."""
         out: list[Encoded | ToRenderer] = []
         for number, state in enumerate(self._states):
             if number:  # joined with the one before, that would be lost with it
@@ -134,6 +146,11 @@ class ReplayLog:
             out.append(channel.another(state.scene))
             if state.since is not None:
                 out.append(state.since)
+        return out
+
+    def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
+        """What to tell a new renderer, in order; the encoded ones are whoever's sends them. `kept`: encoded."""
+        out = self.scenes()
         if kept is not None:
             out.append(kept)
         asked: list[ToRenderer] = [*self.reads.values()]

@@ -12,7 +12,7 @@ import pytest
 from gpu import Renderer
 from service.problems import Unavailable
 from service.rendering.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
-from service.rendering.supervisor import supervisor as supervisors
+from service.rendering.supervisor import restarts
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
 from tests.gpu.test_precompile import arrays_of
@@ -43,7 +43,7 @@ def niceness(pid: int | None) -> set[int]:
 
 def test_who_kills_it_before_it_can_start_never_wins(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """Four times the three that may fail by themselves, and more than were once allowed."""
-    monkeypatch.setattr(supervisors, "AFTER_KILLS_S", 0.0)
+    monkeypatch.setattr(restarts, "AFTER_KILLS_S", 0.0)
 
     async def test(supervisor: Supervisor) -> None:
         ears = Ears()
@@ -58,12 +58,12 @@ def test_who_kills_it_before_it_can_start_never_wins(gpu: Renderer, monkeypatch:
     with_supervisor(test)
 
 
-def test_renderers_that_are_killed_at_once_are_not_begun_all_the_time(gpu: Renderer) -> None:
-    supervisor = Supervisor()
-    supervisor._shots = 3
-    assert supervisor._pause_s(0.1) == pytest.approx(1.4) and supervisor._pause_s(2.0) == 0.0
-    supervisor._shots = 1000
-    assert supervisor._pause_s(0.0) == supervisors.AFTER_KILLS_S and supervisor._pause_s(8.0) == 0.0
+def test_renderers_that_are_killed_at_once_are_not_begun_all_the_time() -> None:
+    killed = restarts.Restarts()
+    killed.shots = 3
+    assert killed.pause_s(0.1) == pytest.approx(1.4) and killed.pause_s(2.0) == 0.0
+    killed.shots = 1000
+    assert killed.pause_s(0.0) == restarts.AFTER_KILLS_S and killed.pause_s(8.0) == 0.0
 
 
 def test_what_was_asked_while_there_was_none_is_answered(gpu: Renderer) -> None:
@@ -124,8 +124,8 @@ def test_a_renderer_that_makes_a_mistake_is_not_one_that_was_killed(gpu: Rendere
 
     async def test(supervisor: Supervisor) -> None:
         pid = supervisor.process_id
-        assert supervisor._process is not None
-        supervisor._process.link.send("no message")
+        assert supervisor._keeper.process is not None
+        supervisor._keeper.process.link.send("no message")
         while supervisor.process_id in (pid, None):
             await asyncio.sleep(0.001)
         assert dict(supervisor.statistics.restarts) == {"crashed": 1}

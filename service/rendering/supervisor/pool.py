@@ -1,0 +1,191 @@
+"""Several renderers behind one door: which of them gets a task, and who goes on with the tasks of a lost one."""
+
+from __future__ import annotations
+
+import asyncio
+import itertools
+import logging
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from functools import partial
+from typing import Any
+
+from service.problems import Unavailable
+from service.rendering.ipc.messages import Restore, SavedPicture, ToRenderer, Update
+from service.rendering.renderers import Listener, Member, Place
+from service.rendering.statistics import ClientStatistics, Kind
+from service.rendering.supervisor.process import Options, Start
+from service.rendering.supervisor.supervisor import Supervisor
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class Seat:
+    """Where a renderer of the pool runs, and how its process is started: one of this machine by default."""
+
+    place: Place = field(default_factory=Place)
+    options: Options = field(default_factory=Options)
+    start: Start | None = None
+
+
+class Pool:
+    """Fulfils `Renderers` with a supervisor for each seat.
+
+    A task stays with its renderer for life, through the losses of the process too. Where there is no hope for that
+    one, its tasks move to others; it is tried again all the time, and gets new tasks when it is back.
+    """
+
+    def __init__(self, seats: Sequence[Seat]) -> None:
+        self.statistics = ClientStatistics()
+        numbers = itertools.count(1)
+        self._supervisors = [Supervisor(seat.options, seat.start, seat.place, numbers) for seat in seats]
+        self._homes: dict[int, Supervisor] = {}  # by task
+        self._stirred = asyncio.Event()  # set, and replaced, when a renderer is ready or lost
+        for supervisor in self._supervisors:
+            supervisor.changed = partial(self._changed, supervisor)
+            supervisor.ended = self._forget
+
+    def start(self) -> None:
+        for supervisor in self._supervisors:
+            supervisor.start()
+
+    def drain(self) -> None:
+        for supervisor in self._supervisors:
+            supervisor.drain()
+        self._stir()
+
+    async def close(self) -> None:
+        self.drain()
+        await asyncio.gather(*(supervisor.close() for supervisor in self._supervisors))
+
+    @property
+    def members(self) -> list[Member]:
+        return [member for supervisor in self._supervisors for member in supervisor.members]
+
+    @property
+    def info(self) -> dict[str, Any] | None:
+        return next((info for each in self._supervisors if (info := each.info) is not None), None)
+
+    @property
+    def process_id(self) -> int | None:
+        return next((id for each in self._supervisors if (id := each.process_id) is not None), None)
+
+    @property
+    def hopeless(self) -> bool:
+        return all(supervisor.hopeless for supervisor in self._supervisors)
+
+    async def ready(self, timeout_s: float) -> dict[str, Any]:
+        try:
+            async with asyncio.timeout(timeout_s):
+                while True:
+                    able = any(supervisor.takes_tasks for supervisor in self._supervisors)
+                    if not able:
+                        raise Unavailable(self._detail)
+                    if (info := self.info) is not None:
+                        return info
+                    await self._stirred.wait()
+        except TimeoutError:
+            raise Unavailable("The renderer is starting.") from None
+
+    async def able(self, timeout_s: float) -> None:
+        if not any(supervisor.replaces for supervisor in self._supervisors):
+            await self.ready(timeout_s)
+
+    def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
+        home = self._best(_load(kind, client))
+        if home is None:
+            raise Unavailable(self._detail)
+        task = home.open(listener, kind, client)
+        self._homes[task] = home
+        return task
+
+    def drop(self, task: int) -> None:
+        if (home := self._homes.get(task)) is not None:
+            home.drop(task)
+
+    def send(self, message: ToRenderer) -> None:
+        if (home := self._homes.get(message.task)) is not None:
+            home.send(message)
+
+    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
+        if restore is not None and restore.reason is None:
+            self._move_to_driver(update.task, restore.saved.driver)
+        # It may move to another renderer while the scene is encoded.
+        while (home := self._homes.get(update.task)) is not None:
+            if await home.sent_scene(update, restore):
+                break
+
+    def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        if (home := self._homes.get(task)) is not None:
+            home.stored(task, picture, read)
+
+    @property
+    def _detail(self) -> str:
+        """Why nothing renders, as each renderer says it, and once where all say the same."""
+        return " ".join(dict.fromkeys(supervisor.detail for supervisor in self._supervisors))
+
+    def _best(self, load: Callable[[Supervisor], tuple[int, ...]], driver: str = "") -> Supervisor | None:
+        """The renderer with the least load, of those with that driver, if any, and of those that render just now.
+
+        None where there is none.
+        """
+        able = [supervisor for supervisor in self._supervisors if supervisor.takes_tasks]
+        return min(
+            able,
+            key=lambda each: (bool(driver) and each.driver != driver, each.info is None, load(each)),
+            default=None,
+        )
+
+    def _changed(self, supervisor: Supervisor) -> None:
+        if supervisor.hopeless:
+            self._move_all(supervisor)
+        self._stir()
+
+    def _move_all(self, lost: Supervisor) -> None:
+        """Have others go on with the tasks of a renderer that is not expected back, as far as there are others."""
+        moved = 0
+        for number, task in list(lost.tasks.items()):
+            home = self._best(_load(task.kind, task.client), task.record.driver)
+            if home is None:
+                break
+            self._move(number, home)
+            moved += 1
+        if moved:
+            log.warning("moved the tasks of a lost renderer to others renderer=%s tasks=%d", lost.place.id, moved)
+
+    def _move_to_driver(self, number: int, driver: str) -> None:
+        """Move a task of which nothing has been sent yet to a renderer that can go on with its picture."""
+        home = self._homes.get(number)
+        if home is None or not driver or home.driver == driver:
+            return
+        task = home.tasks[number]
+        best = self._best(_load(task.kind, task.client), driver)
+        if best is not None and best is not home and best.driver == driver:
+            self._move(number, best)
+
+    def _move(self, number: int, home: Supervisor) -> None:
+        task = self._homes[number].give_up(number)
+        self._homes[number] = home
+        home.take_over(number, task)
+
+    def _forget(self, task: int) -> None:
+        self._homes.pop(task, None)
+
+    def _stir(self) -> None:
+        self._stirred.set()
+        self._stirred = asyncio.Event()
+
+
+def _load(kind: Kind, client: str) -> Callable[[Supervisor], tuple[int, ...]]:
+    """How busy a renderer is for another task of that kind: the less, the better for it."""
+
+    def load(supervisor: Supervisor) -> tuple[int, ...]:
+        active = [task for task in supervisor.tasks.values() if task.active]
+        if kind == "render":
+            return sum(task.kind == "render" for task in active), len(active)
+        # What a client's other tasks need is likely to be there already: kernels, above all.
+        own = sum(bool(client) and task.client == client for task in supervisor.tasks.values())
+        return len(active), -own
+
+    return load

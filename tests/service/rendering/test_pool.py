@@ -1,0 +1,394 @@
+"""Several renderers behind one door: where tasks go, and who goes on with those of a renderer that is lost."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any
+
+import numpy as np
+import pytest
+
+from gpu import Renderer
+from service.problems import Unavailable
+from service.rendering.ipc import channel
+from service.rendering.ipc.messages import (
+    Checkpoint,
+    Done,
+    Frame,
+    Image,
+    Loaded,
+    Pause,
+    Progress,
+    Read,
+    Ready,
+    Restore,
+    Resume,
+    SavedPicture,
+    StopRule,
+    Unable,
+    Update,
+    View,
+    Want,
+)
+from service.rendering.renderers import Place
+from service.rendering.supervisor import restarts
+from service.rendering.supervisor.pool import Pool, Seat
+from service.rendering.supervisor.process import Options, Process
+from tests.gpu.test_precompile import arrays_of
+from tests.service.rendering.test_worker import LINEAR, Ears, settings
+
+ENDLESS = 1 << 24
+
+
+class Fake:
+    """A renderer's process that renders nothing: it notes what it is told, and says what a test has it say."""
+
+    def __init__(self, driver: str, received: Callable[[Any], None], lost: Callable[[], None], lifeline: Any) -> None:
+        self.began = self.lived_s = 0.0
+        self.ready = self.unable = False
+        self.task, self.id = 0, 4711
+        self.link, self.told = self, list[Any]()
+        self.say, self.lose = received, lost
+        able = driver != ""
+        word = Ready({"renderer": driver, "version": ""}) if able else Unable("There is no such device.")
+        asyncio.get_running_loop().call_soon(received, word)
+        if not able:
+            asyncio.get_running_loop().call_soon(lost)
+
+    def send(self, message: Any) -> None:
+        self.told.append(message)
+
+    def send_encoded(self, message: channel.Encoded) -> None:
+        self.told.append(channel.decode(*message))
+
+    def heard(self, kind: Any) -> list[int]:
+        """The tasks of the messages of that kind, in order."""
+        return [message.task for message in self.told if isinstance(message, kind)]
+
+    def close(self) -> None: ...
+
+    def watch(self, excused: bool = False) -> None: ...
+
+    async def end(self, patience_s: float) -> Any:
+        return "crashed"
+
+
+class Fakes:
+    """A pool of fakes. `drivers` may be changed: a process that is begun then has that one; "" is unable to begin."""
+
+    def __init__(self, *drivers: str) -> None:
+        self.drivers, self.processes = list(drivers), dict[int, Fake]()
+        self.pool = Pool([Seat(Place(str(i), str(i)), start=partial(self._start, i)) for i in range(len(drivers))])
+
+    def _start(self, number: int, *given: Any) -> Any:
+        self.processes[number] = Fake(self.drivers[number], *given)
+        return self.processes[number]
+
+    def home(self, task: int) -> str:
+        return self.pool._homes[task].place.id
+
+    def homes(self, *tasks: int) -> str:
+        return "".join(self.home(task) for task in tasks)
+
+    async def until(self, *states: str) -> None:
+        async with asyncio.timeout(10):
+            while [member.state for member in self.pool.members] != list(states):
+                await asyncio.sleep(0.001)
+
+
+def with_fakes(test: Callable[[Fakes], Awaitable[None]], *drivers: str) -> None:
+    async def run() -> None:
+        fakes = Fakes(*drivers)
+        fakes.pool.start()
+        try:
+            await test(fakes)
+        finally:
+            await fakes.pool.close()
+
+    asyncio.run(run())
+
+
+@pytest.fixture
+def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(restarts, "BETWEEN_TRIES_S", 0.0)
+    monkeypatch.setattr(restarts, "HOPELESS_S", 0.05)
+
+
+def test_streams_go_where_the_fewest_are_attended() -> None:
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        await fakes.until("ready", "ready", "ready")
+        streams = [pool.open(Ears()) for _ in range(6)]
+        assert fakes.homes(*streams) == "012012" and len(set(streams)) == 6
+        pool.send(Pause(streams[1], away=True))
+        assert fakes.home(pool.open(Ears())) == "1"
+        pool.send(Resume(streams[1]))
+        pool.send(Pause(streams[2]))  # its client looks at it all the same
+        pool.drop(streams[3])
+        assert fakes.home(pool.open(Ears())) == "0"
+        assert fakes.processes[1].heard(Pause) == [streams[1]]
+
+    with_fakes(test, "a", "a", "a")
+
+
+def test_among_equals_a_stream_goes_where_its_client_is() -> None:
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        await fakes.until("ready", "ready")
+        assert fakes.homes(pool.open(Ears(), client="ann"), pool.open(Ears(), client="bob")) == "01"
+        assert fakes.homes(pool.open(Ears(), client="bob"), pool.open(Ears(), client="bob")) == "10"
+
+    with_fakes(test, "a", "a")
+
+
+def test_renders_go_where_the_fewest_renders_are() -> None:
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        await fakes.until("ready", "ready")
+        streams = [pool.open(Ears()) for _ in range(3)]
+        assert fakes.homes(*streams) == "010"
+        renders = [pool.open(Ears(), "render", "ann") for _ in range(3)]
+        assert fakes.homes(*renders) == "101"
+        done = Done(renders[0], 1, "max_samples", Progress(4), [], SavedPicture(4, (0, 0, 0), []))
+        fakes.processes[1].say(done)  # what has ended takes no time any more
+        assert fakes.home(pool.open(Ears(), "render")) == "1"
+        assert fakes.homes(pool.open(Ears(), "bsdf"), pool.open(Ears(), "server")) == "01"
+
+    with_fakes(test, "a", "a")
+
+
+def test_a_loss_keeps_nobody_from_the_others() -> None:
+    async def test(fakes: Fakes) -> None:
+        pool, ears = fakes.pool, Ears()
+        await fakes.until("ready", "ready")
+        mine, other = pool.open(ears), pool.open(Ears())
+        assert fakes.homes(mine, other) == "01"
+        pool.drop(other)
+        fakes.processes[0].lose()
+        await fakes.until("lost", "ready")
+        await pool.able(0)
+        assert (await pool.ready(0))["renderer"] == "b" == pool.info["renderer"] and not pool.hopeless
+        assert fakes.homes(*(pool.open(Ears()) for _ in range(3))) == "111"
+        await fakes.until("ready", "ready")
+        assert fakes.home(mine) == "0" and await ears.next(str) == "again"
+        assert pool.info["renderer"] == "a" and fakes.home(pool.open(Ears())) == "0"
+        crashed = [dict(member.statistics.restarts) for member in pool.members]
+        assert crashed == [{"crashed": 1}, {}]
+
+    with_fakes(test, "a", "b")
+
+
+def test_tasks_of_a_hopeless_one_go_on_elsewhere(impatient: None) -> None:
+    async def test(fakes: Fakes) -> None:
+        pool, ears = fakes.pool, [Ears() for _ in range(3)]
+        await fakes.until("ready", "ready", "ready")
+        picture = SavedPicture(4, (0, 0, 0), [np.arange(8, dtype=np.uint8)], "gpu")
+        tasks = [pool.open(each, "render") for each in ears]
+        for task in tasks:
+            await pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8), StopRule(9)))
+        pool.send(Read(tasks[2], 1, LINEAR))
+        fakes.processes[2].say(Checkpoint(tasks[2], 1, Progress(4), picture))
+        fakes.drivers[2] = ""
+        fakes.processes[2].lose()
+        await fakes.until("ready", "ready", "lost")
+        while fakes.home(tasks[2]) == "2":
+            await asyncio.sleep(0.001)
+        assert fakes.homes(*tasks) == "011"  # the one with the driver that can go on with the picture
+        while len(fakes.processes[1].heard(Read)) == 0:
+            await asyncio.sleep(0.001)
+        told = [message for message in fakes.processes[1].told if message.task == tasks[2]]
+        assert [type(message) for message in told] == [Update, Restore, Read]
+        assert told[1].saved.samples == 4 and told[1].saved.driver == "gpu" and told[0].client == str(tasks[2])
+        assert pool.members[2].state == "lost" and not pool.hopeless and ears[2].messages.qsize() == 1
+        assert {fakes.home(pool.open(Ears(), "render")) for _ in range(4)} == {"0", "1"}
+        pool.drop(tasks[2])
+        assert fakes.processes[1].told[-1].task == tasks[2] and tasks[2] not in pool._homes
+        fakes.drivers[2] = "other"
+        await fakes.until("ready", "ready", "ready")
+        assert fakes.home(pool.open(Ears(), "render")) == "2" and pool.members[2].driver == "other"
+
+    with_fakes(test, "other", "gpu", "gpu")
+
+
+def test_without_any_renderer_tasks_are_lost_until_one_is_back(impatient: None) -> None:
+    async def test(fakes: Fakes) -> None:
+        pool, ears = fakes.pool, Ears()
+        await fakes.until("ready", "ready")
+        task = pool.open(ears)
+        fakes.drivers[:] = ["", ""]
+        for process in list(fakes.processes.values()):
+            process.lose()
+        while await ears.next(str) != "There is no such device.":
+            pass
+        assert pool.hopeless and pool.info is None and not pool._homes
+        with pytest.raises(Unavailable, match="no such device"):
+            pool.open(Ears())
+        with pytest.raises(Unavailable, match=r"^There is no such device\.$"):
+            await pool.ready(5)
+        with pytest.raises(Unavailable):
+            await pool.able(0)
+        pool.send(Want(task, 1, View()))  # of a task that is gone
+        pool.drop(task)
+        fakes.drivers[1] = "a"
+        await fakes.until("lost", "ready")
+        assert fakes.home(pool.open(Ears())) == "1" and not pool.hopeless
+
+    with_fakes(test, "a", "a")
+
+
+def test_a_scene_that_meets_a_move_arrives_once(impatient: None) -> None:
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        await fakes.until("ready", "ready")
+        task = pool.open(Ears())
+        sending = asyncio.create_task(pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8))))
+        await asyncio.sleep(0)  # it is being encoded now
+        pool._move(task, pool._supervisors[1])
+        await sending
+        assert fakes.processes[0].heard(Update) == [] and fakes.processes[1].heard(Update) == [task]
+
+    with_fakes(test, "a", "a")
+
+
+def test_a_stored_picture_goes_to_a_renderer_of_its_driver() -> None:
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        await fakes.until("ready", "ready")
+        for driver, reason, home in (("b", None, "1"), ("c", None, "0"), ("b", "max_samples", "0"), ("", None, "0")):
+            task = pool.open(Ears(), "render")
+            saved = SavedPicture(4, (0, 0, 0), [], driver)
+            await pool.send_scene(
+                Update(task, 1, arrays_of("plain"), settings(8)), Restore(task, 1, saved, reason, Progress(4))
+            )
+            process = fakes.processes[int(home)]
+            assert fakes.home(task) == home and process.heard(Restore)[-1] == process.heard(Update)[-1] == task
+            pool.drop(task)
+
+    with_fakes(test, "a", "b")
+
+
+def test_who_waits_gets_the_first_that_is_ready_and_nothing_at_the_end() -> None:
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        assert [member.state for member in pool.members] == ["starting", "starting"]
+        with pytest.raises(Unavailable, match="starting"):
+            await pool.ready(0)
+        assert (await pool.ready(5))["renderer"] == "a"
+        pool.drain()
+        assert [member.state for member in pool.members] == ["draining", "draining"]
+        for refused in (pool.ready(5), pool.able(5)):
+            with pytest.raises(Unavailable, match=r"^The server is shutting down\.$"):
+                await refused
+        with pytest.raises(Unavailable, match="shutting down"):
+            pool.open(Ears())
+
+    with_fakes(test, "a", "a")
+    with pytest.raises(Unavailable, match="not been started"):
+        asyncio.run(Fakes("a").pool.ready(0))
+
+
+def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> None:
+    """Real ones: each has a stream and a render; one is killed, and later cannot begin any more."""
+    broken = False
+
+    def start(*given: Any) -> Process:
+        return Process(Options(device=99) if broken else Options(checkpoint_s=0.1), *given)
+
+    async def rendering(pool: Pool, ears: Ears, samples: int) -> int:
+        task = pool.open(ears, "render")
+        size = settings(96, seed=4)
+        await pool.send_scene(Update(task, 1, arrays_of("plain"), size, StopRule(samples)))
+        return task
+
+    async def picture(pool: Pool, task: int, ears: Ears) -> Any:
+        pool.send(Read(task, 1, LINEAR))
+        return np.array((await ears.next(Image)).pixels)
+
+    async def test() -> None:
+        nonlocal broken
+        pool = Pool([Seat(Place("0")), Seat(Place("1"), start=start)])
+        pool.start()
+        try:
+            await pool.ready(60)
+            streams, looking = [], [Ears(), Ears()]
+            for ears in looking:
+                streams.append(pool.open(ears))
+                size = settings(64)
+                await pool.send_scene(Update(streams[-1], 1, arrays_of("plain"), size, interactive=True))
+                await ears.next(Loaded)
+            assert {pool._homes[stream].place.id for stream in streams} == {"0", "1"}
+            away = next(stream for stream in streams if pool._homes[stream].place.id == "1")
+            ears = looking[streams.index(away)]
+
+            async def frame(serial: int) -> Frame:
+                pool.send(Want(away, serial, View(), anyway=True))
+                return await ears.next(Frame)
+
+            assert (await frame(1)).generation == 1
+            first, second = [member.process_id for member in pool.members]
+            assert first is not None and second is not None
+            os.kill(second, signal.SIGKILL)
+            assert (await frame(2)).generation == 1 and pool._homes[away].place.id == "1"
+            assert [member.process_id == id for member, id in zip(pool.members, (first, second), strict=True)] == [
+                True,
+                False,
+            ]
+
+            hearing = [Ears(), Ears()]
+            renders = [await rendering(pool, each, ENDLESS) for each in hearing]
+            mine = next(i for i, render in enumerate(renders) if pool._homes[render].place.id == "1")
+            pool.drop(renders[1 - mine])
+            saved = (await hearing[mine].next(Checkpoint)).progress.samples
+            broken = True
+            moved = pool.members[1].process_id
+            assert moved is not None
+            os.kill(moved, signal.SIGKILL)
+            pool.send(Update(renders[mine], 2, stop=StopRule(saved + 40), base=1))
+            done = await hearing[mine].next(Done)
+            assert done.progress.samples == saved + 40 and pool._homes[renders[mine]].place.id == "0"
+            assert (await frame(3)).generation == 1 and pool._homes[away].place.id == "0"
+            assert pool.members[1].state == "lost" and not pool.hopeless
+            alone = Ears()
+            whole = await rendering(pool, alone, saved + 40)
+            await alone.next(Done)
+            bits = [await picture(pool, renders[mine], hearing[mine]), await picture(pool, whole, alone)]
+            assert np.array_equal(*bits)
+        finally:
+            await pool.close()
+        assert all(member.process_id is None for member in pool.members)
+
+    asyncio.run(test())
+
+
+def test_a_picture_of_another_driver_begins_again(gpu: Renderer) -> None:
+    async def test() -> None:
+        pool = Pool([Seat(options=Options(checkpoint_s=0.05))])
+        pool.start()
+        try:
+            await pool.ready(60)
+            first, update = Ears(), Update(0, 1, arrays_of("plain"), settings(64), StopRule(ENDLESS))
+            task = pool.open(first, "render")
+            await pool.send_scene(Update(task, 1, update.scene, update.settings, update.stop))
+            saved = await first.next(Checkpoint)
+            pool.drop(task)
+            assert saved.saved.driver == pool.members[0].driver
+            for driver, begins in ((saved.saved.driver, []), ("another", ["again"])):
+                ears, stop = Ears(), StopRule(saved.progress.samples + 4)
+                task = pool.open(ears, "render")
+                picture = SavedPicture(saved.saved.samples, saved.saved.under_way, saved.saved.buffers, driver)
+                await pool.send_scene(
+                    Update(task, 1, update.scene, update.settings, stop),
+                    Restore(task, 1, picture, None, Progress(saved.progress.samples, None, 1000.0)),
+                )
+                done = await ears.next(Done | str)
+                again = [done] if isinstance(done, str) else []
+                done = done if isinstance(done, Done) else await ears.next(Done)
+                assert again == begins and (done.progress.elapsed_s > 1000) is (not begins)
+        finally:
+            await pool.close()
+
+    asyncio.run(test())
