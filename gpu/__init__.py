@@ -24,6 +24,7 @@ analysis    measurements of a scene at hand; public
 from gpu.analysis.path_truncation import bounced_paths, missing_light
 from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, TextureArrays, apply_edit
 from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfTerms, BsdfValues
+from gpu.context import devices, software_device
 from gpu.device.scene import Scene
 from gpu.errors import (
     CompileError,
@@ -73,7 +74,9 @@ __all__ = [
     "WrongThread",
     "apply_edit",
     "bounced_paths",
+    "devices",
     "missing_light",
     "picture_bytes",
     "scene_bytes",
+    "software_device",
 ]

@@ -40,7 +40,7 @@ from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.jobs.retention import Retention
 from service.rendering.jobs.store.store import RenderStore
 from service.rendering.requests.request_reader import RequestReader
-from service.rendering.supervisor.devices import seats
+from service.rendering.supervisor.devices import missing_device, seats
 from service.rendering.supervisor.pool import Pool
 from service.routes import assets, bsdf, documents, info, renders, stream
 from service.routes import presets as preset_routes
@@ -115,6 +115,9 @@ def run(config: Config) -> int:
     sys.setswitchinterval(SWITCH_S)
     if unknown := unknown_variables():
         log.warning("these variables are no settings and change nothing names=%s", ",".join(unknown))
+    if (reason := missing_device(config)) is not None:
+        log.error("did not start reason=%s", reason)
+        return 1
     most = min(config.max_connections, _take_descriptors() // 2)  # files, scenes and images take others
     try:
         listener = listen(config.host, config.port)

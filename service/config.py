@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, field_validator, model_validator
+from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 1 GiB
@@ -16,6 +16,9 @@ MIB, GIB = 2**20, 2**30
 LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota", "data_files")  # how the names of limits begin
 
 HOST = re.compile(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")  # a name, an IPv4 or an IPv6 address
+
+LLVMPIPE = "llvmpipe:"  # before the number of renderers, in SUNBOX_DEVICES
+NUMBER = re.compile(r"[0-9]{1,6}")
 
 Words = Annotated[list[str], NoDecode]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -64,6 +67,11 @@ class Config(BaseSettings):
     )
     data_files: int = Field(1_000_000, ge=1, description="Most files that they take, two for an asset.")
     device: int | None = Field(None, ge=0, description="Number of the EGL device to render on (default: the first).")
+    devices: Words = Field(
+        default_factory=list,
+        description="Renderers, a process each: numbers of EGL devices, separated by commas, or `llvmpipe:N` for N "
+        "that divide the processor's cores (default: one, on `SUNBOX_DEVICE`).",
+    )
     require_gpu: bool = Field(False, description="Refuse to start on a software renderer.")
     log_format: Literal["console", "json"] = Field(
         "console", description="`console` for people, or `json`: one object a line."
@@ -100,8 +108,8 @@ class Config(BaseSettings):
     gpu_memory: int | None = Field(
         None,
         ge=1,
-        description="Most bytes of scenes and pictures on the device (default: 80 % of a GPU's, where its driver "
-        "tells; `SUNBOX_MEMORY` for a software renderer).",
+        description="Most bytes of scenes and pictures on each device; the renderers of `llvmpipe:N` divide them "
+        "(default: 80 % of a GPU's, where its driver tells; `SUNBOX_MEMORY` for software renderers).",
     )
     hang_s: Seconds = Field(
         10.0,
@@ -162,6 +170,11 @@ class Config(BaseSettings):
         """The limits that a caller may meet, by name; None: no such limit."""
         return {name: getattr(self, name) for name in type(self).model_fields if name.startswith(LIMITS)}
 
+    @property
+    def software_renderers(self) -> int:
+        """How many renderers on the processor SUNBOX_DEVICES asks for."""
+        return int(self.devices[0].removeprefix(LLVMPIPE)) if self.devices and ":" in self.devices[0] else 0
+
     @model_validator(mode="before")
     @classmethod
     def _given(cls, values: dict[str, Any]) -> dict[str, Any]:
@@ -171,7 +184,7 @@ class Config(BaseSettings):
         """
         return {name: value for name, value in values.items() if value != "" or name == "api_key"}
 
-    @field_validator("allowed_hosts", "allowed_origins", "api_key", mode="before")
+    @field_validator("allowed_hosts", "allowed_origins", "api_key", "devices", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
@@ -189,6 +202,25 @@ class Config(BaseSettings):
                 raise ValueError(f"{host!r} is no host name; write it without scheme, port and path")
         return [host.strip("[]").lower() for host in hosts]
 
+    @field_validator("devices")
+    @classmethod
+    def _devices(cls, devices: list[str], info: ValidationInfo) -> list[str]:
+        if devices and info.data.get("device") is not None:
+            raise ValueError("cannot be set together with SUNBOX_DEVICE; keep one of the two")
+        if len(devices) == 1 and devices[0].startswith(LLVMPIPE):
+            count, most = devices[0].removeprefix(LLVMPIPE), cores()
+            if not NUMBER.fullmatch(count) or not 1 <= int(count) <= most:
+                wrong = f"{devices[0]!r} is not possible"
+                raise ValueError(f"{wrong}: the number after {LLVMPIPE} is from 1 to {most}, as there are cores")
+            return [f"{LLVMPIPE}{int(count)}"]
+        for device in devices:
+            if not NUMBER.fullmatch(device):
+                raise ValueError(f"{device!r} is no device; write numbers of EGL devices, or {LLVMPIPE}N alone")
+        numbers = [str(int(device)) for device in devices]
+        if twice := [number for number in numbers if numbers.count(number) > 1]:
+            raise ValueError(f"device {twice[0]} is named twice; each has one renderer")
+        return numbers
+
     @field_validator("api_key")
     @classmethod
     def _usable(cls, keys: list[str]) -> list[str]:
@@ -200,6 +232,11 @@ class Config(BaseSettings):
             if not all("!" <= letter <= "~" for letter in key):
                 raise ValueError("a key is of printable ASCII characters without blanks, or no header could hold it")
         return keys
+
+
+def cores() -> int:
+    """How many cores this process may use."""
+    return len(os.sched_getaffinity(0))
 
 
 def load_config(**given: Any) -> Config:

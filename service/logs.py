@@ -77,6 +77,11 @@ def configure(form: str, level: str, queued: bool = False, secrets: Iterable[str
     threading.excepthook = lambda told: _uncaught(told.exc_type, told.exc_value, told.exc_traceback)
 
 
+def always(**fields: str) -> None:
+    """Add these fields to every line that the calling thread logs from now on."""
+    structlog.contextvars.bind_contextvars(**fields)
+
+
 def level() -> int:
     """The level from which our own loggers write."""
     return logging.getLogger(ROOMS[0]).getEffectiveLevel()

@@ -52,7 +52,11 @@ async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) ->
     try:
         packed = await packing(lambda: reader.pack(reader.scene(document)))
         settings = await packing(partial(reader.settings, WARM_UP_SETTINGS))
-        await first_frame(renderers, packed, settings.for_gpu())
+        # As many at a time as there are renderers: each gets one, as each one makes it busier than the others.
+        frames = [first_frame(renderers, packed, settings.for_gpu()) for _ in renderers.members]
+        for error in await asyncio.gather(*frames, return_exceptions=True):
+            if isinstance(error, BaseException):
+                raise error
     except ServiceError as error:
         log.warning("did not warm up error=%s", error)
         return

@@ -101,7 +101,8 @@ def test_logs_for_machines(server: Server, tmp_path: Path) -> None:
     (answered,) = (line for line in lines if line.get("request") == "mine" and line["event"] == "answered")
     assert (answered["method"], answered["path"], answered["status"]) == ("POST", "/v1/render", 200)
     assert answered["ms"] > 0 and answered["level"] == "info" and answered["timestamp"].endswith("Z")
-    assert any(line["logger"] == "gpu.context" and line["renderer"] for line in lines), "of the renderer's process"
+    created = [line for line in lines if line["logger"] == "gpu.context"]  # by the renderer's process
+    assert [line["renderer"] for line in created] == ["0"] and created[0]["driver"]
     assert "very-secret" not in text
 
 

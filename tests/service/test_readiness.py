@@ -25,9 +25,10 @@ READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: igno
 
 
 class StandIn:
-    """Renderers of one device, which answers a wish for a frame with `answer(listener, task)`."""
+    """Two renderers of one device, which answers a wish for a frame with `answer(listener, task)`."""
 
     process_id = 1
+    members = ("one", "another")
 
     def __init__(self, answer: Callable[[Listener, int], None], software: bool = False) -> None:
         self.statistics, self.info = Statistics(), {"renderer": "stand-in", "software": software}
@@ -39,8 +40,9 @@ class StandIn:
         return self.info
 
     def open(self, listener: Listener, kind: Kind = "stream", client: str = "") -> int:
-        self.open_tasks[7] = listener
-        return 7
+        task = 7 + len(self.open_tasks)
+        self.open_tasks[task] = listener
+        return task
 
     def drop(self, task: int) -> None:
         del self.open_tasks[task]
@@ -120,5 +122,5 @@ def test_warming_up_leaves_no_task_and_raises_nothing(
     caplog.set_level(logging.INFO, logger=warm_up.__module__)
     renderers = StandIn(answer)
     asyncio.run(warm_up(renderers, READER, readiness.SCENE))
-    assert renderers.frames == 1 and not renderers.open_tasks
+    assert renderers.frames == len(renderers.members) and not renderers.open_tasks
     assert [record.message for record in caplog.records if record.message.startswith(logged)]

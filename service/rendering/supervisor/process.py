@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import logging
 import os
 import signal
@@ -11,18 +12,19 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from service import logs
 from service.cpu_time import RunnableTime
-from service.rendering.executors import tending
 from service.rendering.ipc import channel, heartbeat
 
 ROOT = Path(__file__).parents[3]
 TURNS = 10  # how many times as long as the last one a piece of work may take, beyond the patience
 STARTING_S = 60.0  # it imports, finds a driver and asks for a context before it can beat
+# How many threads a process may have: of llvmpipe, of Open Image Denoise, and of what numpy and numba may load.
+THREADS = ("LP_NUM_THREADS", "OIDN_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "NUMBA_NUM_THREADS")
+POLL_S = 0.01  # between two looks whether a process has ended
 KILLS = {-signal.SIGKILL, -signal.SIGTERM}
 
 Cause = Literal["killed", "crashed", "hung", "stopped", "out of memory"]
@@ -76,6 +78,9 @@ Start = Callable[[Callable[[Any], None], Callable[[], None], int | None], Render
 @dataclass(frozen=True)
 class Options:
     device: int | None = None
+    software: bool = False  # on the processor, which then need not be the first device
+    cores: int | None = None  # for its threads, and for those of its helpers; None: all
+    name: str = "0"  # in its log
     patience_s: float = 10.0  # without progress
     memory: int | None = None  # bytes that may be held on the device; None: the worker decides
     host_memory: int | None = None  # the same where that is the machine's memory
@@ -125,13 +130,14 @@ class Process:
         limit_s += 0.0 if self.ready else STARTING_S
         if silent_s > limit_s and self._condemned is None:
             self._condemned = "stopped" if _is_stopped(self.id) else "hung"
-            log.error("renderer %s silent_s=%.1f task=%d", self._condemned, silent_s, self.heartbeat.task)
+            line = "renderer %s renderer=%s silent_s=%.1f task=%d"
+            log.error(line, self._condemned, self._options.name, silent_s, self.heartbeat.task)
             self._process.kill()
 
     async def end(self, patience_s: float) -> Cause:
         """Let it end within that time or kill it; why it died. The heartbeat still names its last task."""
         self.link.close()
-        code = await tending(partial(_reap, self._process, patience_s))
+        code = await _reap(self._process, patience_s)
         self.heartbeat.read()
         self.heartbeat.close()
         if self._condemned is not None:
@@ -177,6 +183,7 @@ def _spawn(
     command = [sys.executable, "-m", "service.rendering.worker", str(end.fileno()), str(heartbeat_descriptor)]
     command += ["--server", str(os.getpid()), "--log-level", str(logs.level())]
     command += ["--checkpoint", str(options.checkpoint_s)]
+    command += ["--name", options.name, *(["--software"] if options.software else [])]
     command += [] if options.device is None else ["--device", str(options.device)]
     command += [] if options.memory is None else ["--memory", str(options.memory)]
     command += [] if options.host_memory is None else ["--host-memory", str(options.host_memory)]
@@ -185,6 +192,7 @@ def _spawn(
     # stdout is the command line's, who may be read by a script that waits for its end.
     return subprocess.Popen(
         command,
+        env=os.environ | ({} if options.cores is None else dict.fromkeys(THREADS, str(options.cores))),
         pass_fds=[end.fileno(), heartbeat_descriptor, *([] if lifeline is None else [lifeline])],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
@@ -193,14 +201,15 @@ def _spawn(
     )
 
 
-def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | None:
-    """Its exit code; None where it had to be killed."""
-    try:
-        return process.wait(patience_s)
-    except subprocess.TimeoutExpired:
-        process.kill()
-        process.wait()
-        return None
+async def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | None:
+    """Its exit code; None where it had to be killed. No thread waits: many processes may end at once."""
+    until, killed = time.monotonic() + patience_s, False
+    while process.poll() is None:
+        if not killed and time.monotonic() >= until:
+            process.kill()
+            killed = True
+        await asyncio.sleep(POLL_S)
+    return None if killed else process.returncode
 
 
 def _is_stopped(pid: int) -> bool:

@@ -63,9 +63,9 @@ class Supervisor:
         numbers: Iterator[int] | None = None,
     ) -> None:
         """`start` starts the process, by default one of this machine; the tasks get their `numbers` from there."""
-        options = options or Options()
         self.statistics = Statistics()
         self.place = place or Place()
+        options = replace(options or Options(), name=self.place.id)
         self.changed: Callable[[], None] = lambda: None
         self.ended: Callable[[int], None] = lambda task: None
         self.stray: Callable[[Heard], None] = lambda message: None

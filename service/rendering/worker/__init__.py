@@ -3,6 +3,7 @@
 `python -m service.rendering.worker DESCRIPTOR` with one end of `channel.pair()`.
 
 __main__        the process: its options, its device, its end
+list_devices    a program that prints EGL's devices
 loop            takes the newest messages, chooses whose turn it is, traces a slice, publishes
 scheduler       whose turn it is
 task            one client's picture, from its first update to its end

@@ -32,6 +32,8 @@ def main() -> int:
     parser.add_argument("--host-memory", type=int, help="the same where the device's memory is the machine's")
     parser.add_argument("--checkpoint", type=float, required=True, help="seconds between two of a render")
     parser.add_argument("--device", type=int)
+    parser.add_argument("--software", action="store_true", help="on the processor, whatever its device's number is")
+    parser.add_argument("--name", default="0", help="the renderer's id, for the log")
     parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
     parser.add_argument("--log-level", type=int, default=logging.WARNING)
     parser.add_argument("--server", type=int, required=True, help="its process id")
@@ -41,6 +43,7 @@ def main() -> int:
         return 0
     _offer_itself()
     logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
+    logs.always(renderer=arguments.name)
     try:
         code = _serve(socket.socket(fileno=arguments.descriptor), arguments)
     except channel.Closed:
@@ -55,12 +58,13 @@ def main() -> int:
 
 
 def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
-    from gpu import GpuError, Renderer, denoise
+    from gpu import GpuError, Renderer, denoise, software_device
     from service.rendering.worker.device.memory import UNLIMITED, default_limit
     from service.rendering.worker.loop import Loop
 
     try:
-        renderer = Renderer(arguments.device)
+        device = software_device() if arguments.software else arguments.device
+        renderer = Renderer(device)
     except GpuError as error:
         channel.send(end, Unable(str(error)))
         return 1
@@ -69,13 +73,13 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     limit = arguments.memory or default_limit(renderer.info, arguments.host_memory)
     told = {"denoiser": denoise.version(), "memory_limit": None if limit == UNLIMITED else limit}
     channel.send(end, Ready({**renderer.info, **told}))
-    log.info("started renderer=%s", renderer.info.get("renderer"))
+    log.info("started driver=%s", renderer.info.get("renderer"))
     if renderer.info["software"] and (closed := closed_gpus(DEVICES)):
         log.warning(
             "the processor renders, as this user may not use the GPU device=%s group=%s", closed[0], closed[0].group()
         )
     heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
-    Loop(end, renderer, heartbeat, limit, arguments.device, arguments.checkpoint, lifeline).run()
+    Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline).run()
     return 0
 
 

@@ -1,0 +1,143 @@
+"""SUNBOX_DEVICES: which renderers there are, what each gets of the machine, and what ends the start."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from gpu import Renderer, devices, software_device
+from service import config as configs
+from service.config import Config, ConfigError, load_config
+from service.rendering.supervisor import devices as seating
+from service.rendering.supervisor.devices import missing_device, seats
+from service.rendering.supervisor.process import THREADS
+from tests.serving import SCENE, Server
+
+GPU, PROCESSOR = {"name": "/dev/dri/card0", "software": False}, {"name": "software", "software": True}
+
+
+@pytest.fixture
+def five_cores(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(configs, "cores", lambda: 5)
+    monkeypatch.setattr(seating, "cores", lambda: 5)
+
+
+def test_one_renderer_where_nothing_is_said() -> None:
+    (seat,) = seats(Config(device=3, gpu_memory=7), 1000)
+    assert (seat.place.id, seat.place.device, seat.options.device, seat.options.software) == ("0", "3", 3, False)
+    assert (seat.options.memory, seat.options.host_memory, seat.options.cores) == (7, 1000, None)
+
+
+def test_a_renderer_for_each_device() -> None:
+    first, second = seats(load_config(devices=" 2, 00", gpu_memory=7), 1000)
+    assert (first.place.id, first.place.device, first.options.device) == ("0", "2", 2)
+    assert (second.place.id, second.place.device, second.options.device) == ("1", "0", 0)
+    assert first.options.memory == 7, "each has a memory of its own"
+    assert first.options.host_memory == 500, "and where the processor is one of them, its share of the machine's"
+
+
+def test_renderers_on_the_processor_divide_it(five_cores: None) -> None:
+    found = seats(load_config(devices="llvmpipe:3", gpu_memory=600), 1000)
+    assert [seat.place.id for seat in found] == ["0", "1", "2"]
+    assert [seat.options.cores for seat in found] == [2, 2, 1]
+    assert {seat.place.device for seat in found} == {"llvmpipe"} and all(seat.options.software for seat in found)
+    assert {(seat.options.memory, seat.options.host_memory) for seat in found} == {(200, 333)}
+
+
+@pytest.mark.parametrize(
+    ("value", "told"),
+    [
+        ("gpu", "'gpu' is no device; write numbers"),
+        ("0,llvmpipe:2", "'llvmpipe:2' is no device; .* llvmpipe:N alone"),
+        ("llvmpipe", "'llvmpipe' is no device"),
+        ("0,", "'' is no device"),
+        ("-1", "'-1' is no device"),
+        ("0,1,00", "device 0 is named twice"),
+        ("llvmpipe:0", "from 1 to 5, as there are cores"),
+        ("llvmpipe:6", "from 1 to 5, as there are cores"),
+        ("llvmpipe:two", "from 1 to 5, as there are cores"),
+    ],
+)
+def test_what_is_no_device_is_named(value: str, told: str, five_cores: None, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_DEVICES", value)
+    with pytest.raises(ConfigError, match=rf"^SUNBOX_DEVICES: .*{told}"):
+        load_config()
+
+
+def test_one_device_or_several(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_DEVICE", "0")
+    monkeypatch.setenv("SUNBOX_DEVICES", "0,1")
+    with pytest.raises(ConfigError, match=r"^SUNBOX_DEVICES: cannot be set .* with SUNBOX_DEVICE; keep one"):
+        load_config()
+    monkeypatch.setenv("SUNBOX_DEVICES", "")
+    assert load_config().devices == [] and load_config().software_renderers == 0
+
+
+@pytest.mark.parametrize(
+    ("value", "gpus_only", "listed", "told"),
+    [
+        ("0,2", False, [GPU, PROCESSOR], "there is no EGL device 2; EGL has 0 (/dev/dri/card0), 1 (software)"),
+        ("0", False, [], "there is no EGL device 0; EGL has none at all"),
+        ("0,1", True, [GPU, PROCESSOR], "SUNBOX_REQUIRE_GPU forbids"),
+        ("llvmpipe:1", True, [PROCESSOR], "SUNBOX_REQUIRE_GPU forbids"),
+        ("llvmpipe:1", False, [GPU], "llvmpipe is not installed; EGL has 0 (/dev/dri/card0)"),
+        ("0,1", False, [GPU, PROCESSOR], None),
+        ("0", True, [GPU, PROCESSOR], None),
+        ("llvmpipe:1", False, [GPU, PROCESSOR], None),
+    ],
+)
+def test_devices_that_are_not_there(value: str, gpus_only: bool, listed: list[Any], told: str | None) -> None:
+    reason = seating._missing(load_config(devices=value, require_gpu=gpus_only), listed)
+    assert reason is None if told is None else reason is not None and "SUNBOX_DEVICES" in reason and told in reason
+
+
+def test_egl_lists_its_devices(gpu: Renderer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    found = devices()
+    assert found[software_device()].software
+    assert missing_device(Config()) is None and missing_device(load_config(devices="0")) is None
+    names = ", ".join(f"{i} ({device.name})" for i, device in enumerate(found))
+    environment = {**os.environ, "SUNBOX_DEVICES": "0,99", "SUNBOX_DATA_DIR": str(tmp_path)}
+    command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
+    answer = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    assert answer.returncode == 1 and answer.stdout == "" and "Traceback" not in answer.stderr
+    assert f"SUNBOX_DEVICES: there is no EGL device 99; EGL has {names}" in answer.stderr
+    monkeypatch.setattr(seating, "LISTING", "service.no_such_module")
+    assert "could not be listed" in (missing_device(load_config(devices="0")) or "")
+
+
+def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
+    """It says which they are; each has one core, and so has what it starts; both end with it."""
+    if configs.cores() < 2:
+        pytest.skip("there is one core")
+    server = Server(tmp_path, SUNBOX_DEVICES="llvmpipe:2")
+    server.wait()
+    workers = [pid for pid in server.children() if b"rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    share = str(configs.cores() // 2)
+    for worker in workers:
+        given = dict(line.split("=", 1) for line in Path(f"/proc/{worker}/environ").read_text().split("\0") if line)
+        assert int(given["LP_NUM_THREADS"]) - int(share) in (0, 1)
+        assert len({given[name] for name in THREADS}) == 1
+        threads = [(path / "comm").read_text() for path in Path(f"/proc/{worker}/task").iterdir()]
+        assert sum(name.startswith("llvmpipe-") for name in threads) == int(given["LP_NUM_THREADS"])
+    found = server.http.get("/v1/info").json()
+    assert [(each["id"], each["device"]) for each in found["renderers"]] == [("0", "llvmpipe"), ("1", "llvmpipe")]
+    assert {each["state"] for each in found["renderers"]} <= {"ready", "starting"}
+    assert found["renderer"]["memory_limit"] == found["memory"]["limit"] // 2
+    driver = f"{found['renderer']['renderer']} {found['renderer']['version']}"
+    assert driver in {each["driver"] for each in found["renderers"]}
+    settings = {"width": 32, "height": 24, "max_samples": 4}
+    assert server.http.post("/v1/render", json={"scene": SCENE, "settings": settings}).status_code == 200
+    metrics = server.http.get("/metrics").text
+    for renderer in "01":
+        assert f'sunbox_renderer_resident_bytes{{renderer="{renderer}"}} ' in metrics
+    endless = settings | {"max_samples": 1 << 24}
+    for _ in range(2):
+        assert server.http.post("/v1/renders", json={"scene": SCENE, "settings": endless}).status_code == 202
+    assert server.stop() == 0 and len(workers) == 2
+    assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
+    assert "renderer=1" in server.log.read_text()
