@@ -119,6 +119,20 @@ class Channel:
         if len(self._waiting) == 1:
             self._writable()
 
+    @property
+    def backlog(self) -> int:
+        """How many messages wait to be sent."""
+        return len(self._waiting)
+
+    def pause_reading(self) -> None:
+        """Leave messages where they are: the other end waits, once the socket is full."""
+        if self._end.fileno() >= 0:
+            self._loop.remove_reader(self._end)
+
+    def resume_reading(self) -> None:
+        if self._end.fileno() >= 0:
+            self._loop.add_reader(self._end, self._readable)
+
     def close(self) -> None:
         if self._end.fileno() < 0:
             return

@@ -1,0 +1,124 @@
+"""The server's side: joins a cluster through the gateway, and starts renderers there."""
+
+from __future__ import annotations
+
+import importlib.util
+import logging
+import os
+import socket
+import subprocess
+import sys
+from contextlib import suppress
+from dataclasses import dataclass, replace
+from functools import partial
+from typing import Any
+
+from service import logs
+from service.rendering.cluster import control
+from service.rendering.cluster.control import Join, Joined, Open, Refused
+from service.rendering.cluster.joining import INSTALL, CannotJoin
+from service.rendering.cluster.process import ClusterProcess
+from service.rendering.executors import tending
+from service.rendering.supervisor.process import ROOT, Start
+
+JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself after half of that
+FAREWELL_S = 10.0  # for the gateway to end the actors, and a cluster of its own
+SECRETS = ("SUNBOX_API_KEY",)  # that no process of a cluster needs
+
+# Nothing is reported to Ray's makers. Actors begin at the server's own priority, as renderers of this machine do.
+RAY = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0"}
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class _Gateway:
+    process: subprocess.Popen[bytes]
+    control: socket.socket
+
+
+class Cluster:
+    """A Ray cluster, joined when it is made. When the gateway is lost, with it or alone, the next renderer starts it
+    again."""
+
+    def __init__(self, address: str, renderers: int | None, gpu: bool, options: dict[str, Any]) -> None:
+        """`options`: of a renderer's process, on whichever node. Raises CannotJoin; waits for some seconds."""
+        if importlib.util.find_spec("ray") is None:
+            raise CannotJoin(INSTALL)
+        self._join = Join(address, renderers, gpu, options)
+        self._gateway: _Gateway | None = _start(self._join)
+        try:
+            self.joined = _answered(self._gateway)
+        except CannotJoin:
+            self._end(1.0)
+            raise
+        self._join = replace(self._join, renderers=self.joined.renderers)
+        if not self.joined.local:  # it stays with the same one, also where `auto` would find another
+            self._join = replace(self._join, address=self.joined.address)
+
+    def starter(self, number: int) -> Start:
+        """What starts a supervisor's renderer; `number` counts the renderers from 0."""
+        return partial(ClusterProcess, partial(self._carry, number))
+
+    def _carry(self, number: int, end: socket.socket) -> int:
+        """Have the gateway carry the messages of a renderer; `end` is of its channel. The gateway's process id."""
+        if self._gateway is not None:
+            with suppress(OSError):
+                return self._ask(self._gateway, number, end)
+            self._end(0.0)
+        self._gateway = _start(self._join)
+        return self._ask(self._gateway, number, end)
+
+    async def close(self) -> None:
+        await tending(partial(self._end, FAREWELL_S))
+
+    def _ask(self, gateway: _Gateway, number: int, end: socket.socket) -> int:
+        control.send(gateway.control, Open(number), end.fileno())
+        return gateway.process.pid
+
+    def _end(self, patience_s: float) -> None:
+        gateway, self._gateway = self._gateway, None
+        if gateway is None:
+            return
+        gateway.control.close()
+        try:
+            gateway.process.wait(patience_s)
+        except subprocess.TimeoutExpired:
+            gateway.process.kill()
+            gateway.process.wait()
+
+
+def _start(ask: Join) -> _Gateway:
+    ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
+    environment = {name: value for name, value in os.environ.items() if name not in SECRETS}
+    command = [sys.executable, "-m", "service.rendering.cluster.gateway", str(theirs.fileno())]
+    with theirs:
+        process = subprocess.Popen(
+            [*command, "--log-level", str(logs.level())],
+            pass_fds=[theirs.fileno()],
+            cwd=ROOT,
+            env={**RAY, **environment},
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            process_group=0,
+        )
+    control.send(ours, ask)
+    return _Gateway(process, ours)
+
+
+def _answered(gateway: _Gateway) -> Joined:
+    gateway.control.settimeout(JOIN_S)
+    try:
+        received = control.receive(gateway.control)
+    except TimeoutError:
+        raise CannotJoin(
+            f"SUNBOX_RAY: the process that joins the Ray cluster gave no answer in {JOIN_S:g} s"
+        ) from None
+    gateway.control.settimeout(1.0)  # a few bytes now and then: only one that hangs has no room for them
+    if received is None:
+        raise CannotJoin("SUNBOX_RAY: the process that joins the Ray cluster ended at once; the log says more")
+    message = received[0]
+    if isinstance(message, Refused):
+        raise CannotJoin(message.detail)
+    assert isinstance(message, Joined)
+    return message

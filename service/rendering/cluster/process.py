@@ -1,0 +1,62 @@
+"""One renderer of the cluster as its supervisor sees it."""
+
+from __future__ import annotations
+
+import socket
+import time
+from collections.abc import Callable
+from typing import Any, cast
+
+from service.rendering.cluster.control import Ended, Waiting
+from service.rendering.ipc import channel
+from service.rendering.supervisor.process import Cause
+
+
+class ClusterProcess:
+    """Fulfils `RendererProcess`: the gateway has the other end of its channel, and carries messages to an actor.
+
+    The actor watches over the renderer's process and says why it ended; Ray watches over the actor and its node.
+    """
+
+    def __init__(
+        self,
+        carry: Callable[[socket.socket], int],
+        received: Callable[[Any], None],
+        lost: Callable[[], None],
+        lifeline: int | None = None,
+    ) -> None:
+        """`carry` has the gateway carry the messages of a socket, and returns the gateway's process id."""
+        self.began = time.monotonic()
+        self.ready = False
+        self.unable = False
+        self.waiting = ""
+        self._received, self._ended = received, Ended("node lost")
+        ours, theirs = channel.pair()
+        try:
+            self.id = carry(theirs)
+        finally:
+            theirs.close()
+        self.link = channel.Channel(ours, self._heard, lost)
+
+    @property
+    def lived_s(self) -> float:
+        return time.monotonic() - self.began
+
+    @property
+    def task(self) -> int:
+        return self._ended.task
+
+    def watch(self, excused: bool = False) -> None:
+        """Nothing to do here: the actor watches."""
+
+    async def end(self, patience_s: float) -> Cause:
+        self.link.close()
+        return cast(Cause, self._ended.cause)
+
+    def _heard(self, message: Any) -> None:
+        if isinstance(message, Ended):
+            self._ended = message
+        elif isinstance(message, Waiting):
+            self.waiting = message.detail
+        else:
+            self._received(message)
