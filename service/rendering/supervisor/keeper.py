@@ -14,12 +14,13 @@ from service.rendering.ipc import channel
 from service.rendering.ipc.messages import FromRenderer, Heard, Ready, ToRenderer, Unable
 from service.rendering.renderers import State
 from service.rendering.statistics import Statistics
-from service.rendering.supervisor.process import Cause, RendererProcess, Start
+from service.rendering.supervisor.process import Cause, RendererProcess, Start, Waiting
 from service.rendering.supervisor.restarts import Restarts
 
 LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
 WATCH_S = 0.5
 FAREWELL_S = 3.0  # for the renderer to end by itself; one slice on a slow machine, or a compilation
+STARTING = "The renderer is starting."
 CLOSING = "The server is shutting down."
 
 log = logging.getLogger(__name__)
@@ -28,7 +29,7 @@ log = logging.getLogger(__name__)
 class Keeper:
     """For the event loop. `heard` is called with the process's messages; `began` when another process has been begun;
     `lost` with one that was lost, and why; `hopeless` when the next attempt is some time away; `changed` whenever
-    the process is ready or lost, or there is no hope for it.
+    the process is ready or lost, or has to wait, or there is no hope for it.
     """
 
     def __init__(self, id: str, start: Start, patience_s: float, statistics: Statistics) -> None:
@@ -39,6 +40,7 @@ class Keeper:
         self.hopeless: Callable[[], None] = lambda: None
         self.changed: Callable[[], None] = lambda: None
         self.detail = "The renderer has not been started."  # why there is none, where there is none
+        self.waiting = ""  # what it waits for, where there is no place for the process
         self.driver: str | None = None  # of the process that was ready last; None: there was none
         self.process: RendererProcess | None = None
         self.restarts = Restarts()
@@ -101,7 +103,7 @@ class Keeper:
         try:
             return await asyncio.wait_for(asyncio.shield(self._ready), timeout_s)
         except TimeoutError:
-            raise Unavailable("The renderer is starting.") from None
+            raise Unavailable(self.waiting or STARTING) from None
 
     def send(self, message: ToRenderer) -> None:
         """Nothing happens where there is no process; it is told later what it needs."""
@@ -126,9 +128,11 @@ class Keeper:
         self.process = process
         self.began()
 
-    def _received(self, message: FromRenderer) -> None:
+    def _received(self, message: FromRenderer | Waiting) -> None:
         if isinstance(message, Ready):
             self._is_ready(message)
+        elif isinstance(message, Waiting):
+            self._waits(message)
         elif isinstance(message, Unable):
             self.detail = message.detail
             if self.process is not None:
@@ -137,9 +141,15 @@ class Keeper:
         else:
             self.heard(message)
 
+    def _waits(self, message: Waiting) -> None:
+        if message.detail != self.waiting:
+            log.warning("a renderer waits renderer=%s reason=%s", self._id, message.detail)
+        self.waiting = message.detail
+        self.changed()
+
     def _is_ready(self, message: Ready) -> None:
         assert self.process is not None
-        self.process.ready, self.driver = True, message.driver
+        self.process.ready, self.driver, self.waiting = True, message.driver, ""
         self.restarts.succeeded()
         seconds = time.monotonic() - self.process.began
         log.info("renderer ready renderer=%s driver=%s seconds=%.2f", self._id, self.driver, seconds)

@@ -14,6 +14,7 @@ from service.problems import Unavailable
 from service.rendering.ipc.messages import Restore, SavedPicture, ToRenderer, Update
 from service.rendering.renderers import Listener, Member, Place
 from service.rendering.statistics import ClientStatistics, Kind
+from service.rendering.supervisor.keeper import STARTING
 from service.rendering.supervisor.process import Options, Start
 from service.rendering.supervisor.supervisor import Supervisor
 
@@ -86,7 +87,8 @@ class Pool:
                         return info
                     await self._stirred.wait()
         except TimeoutError:
-            raise Unavailable("The renderer is starting.") from None
+            waiting = dict.fromkeys(each.waiting for each in self._supervisors if each.waiting)
+            raise Unavailable(" ".join(waiting) or STARTING) from None
 
     async def able(self, timeout_s: float) -> None:
         if not any(supervisor.replaces for supervisor in self._supervisors):
@@ -138,7 +140,7 @@ class Pool:
         )
 
     def _changed(self, supervisor: Supervisor) -> None:
-        if supervisor.hopeless:
+        if supervisor.hopeless or supervisor.waiting:
             self._move_all(supervisor)
         self._stir()
 
@@ -147,7 +149,7 @@ class Pool:
         moved = 0
         for number, task in list(lost.tasks.items()):
             home = self._best(_load(task.kind, task.client), task.record.driver)
-            if home is None:
+            if home is None or (lost.waiting and home.info is None):
                 break
             self._move(number, home)
             moved += 1

@@ -43,6 +43,13 @@ class Link(Protocol):
     def close(self) -> None: ...
 
 
+@dataclass(frozen=True)
+class Waiting:
+    """Says, in place of a renderer that has no place to begin at, what it waits for."""
+
+    detail: str
+
+
 class RendererProcess(Protocol):
     """What a supervisor asks of the process that renders, on whichever machine that runs."""
 

@@ -110,6 +110,11 @@ class Supervisor:
         return self._keeper.detail
 
     @property
+    def waiting(self) -> str:
+        """What the renderer waits for, where there is no place for it; it takes tasks, which wait with it."""
+        return self._keeper.waiting
+
+    @property
     def driver(self) -> str | None:
         """The driver and its version, of the process that was ready last; None: there was none."""
         return self._keeper.driver
