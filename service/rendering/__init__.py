@@ -6,6 +6,7 @@ streams      scenes that are edited while they are watched
 bsdf         questions about the BSDF of one material
 renderers    what the server asks of its renderers, as a protocol
 supervisor   the renderer's process, kept alive
+cluster      renderers on the hosts of a Ray cluster, behind the same supervisor
 statistics   counters and distributions, for /metrics
 ipc          what both processes say to each other
 worker       the renderer's process itself: the only room here that imports `gpu`

@@ -40,13 +40,16 @@ class Renderer:
     async def begin(self, options: dict[str, Any], threads: int | None) -> None:
         """Start a renderer, in place of the last one; `threads`: the node's processors that it has for rendering."""
         await self.end(0.0)
-        self._outgoing.clear()
+        self._news.set()  # for a call that still waits for what the last one says
+        self._outgoing, self._news, self._paused = deque(), asyncio.Event(), False
         self._lifeline = self._lifeline or os.pipe()
         gpu = _gpu()
         share = 1.0 if threads is None else min(1.0, threads / (os.cpu_count() or 1))
         memory = int(MemoryBudget().limit * share)
         given = Options(**options, device=gpu, host_memory=memory)
-        process = Process(given, self._received, lambda: self._lose(process), self._lifeline[0])
+        process = Process(
+            given, lambda message: self._received(process, message), lambda: self._lose(process), self._lifeline[0]
+        )
         self._process = process
         self._do(self._watch(process, min(WATCH_S, given.patience_s / 4)))
 
@@ -69,15 +72,16 @@ class Renderer:
 
     async def hear(self) -> list[FromRenderer | Ended]:
         """What the renderer has said since the last call, as soon as there is something; nothing after a while."""
-        if not self._outgoing:
-            self._news.clear()
+        outgoing, news = self._outgoing, self._news
+        if not outgoing:
+            news.clear()
             try:
-                await asyncio.wait_for(self._news.wait(), SILENCE_S)
+                await asyncio.wait_for(news.wait(), SILENCE_S)
             except TimeoutError:
                 return []
-        heard = list(self._outgoing)
-        self._outgoing.clear()
-        if self._paused and self._process is not None:
+        heard = list(outgoing)
+        outgoing.clear()
+        if outgoing is self._outgoing and self._paused and self._process is not None:
             self._paused = False
             self._process.link.resume_reading()
         return heard
@@ -88,24 +92,26 @@ class Renderer:
         if process is not None:
             await process.end(patience_s)
 
-    def _received(self, message: FromRenderer) -> None:
+    def _received(self, process: Process, message: FromRenderer) -> None:
+        if process is not self._process:
+            return
         if isinstance(message, Ready):
-            message = Ready({**message.info, "host": socket.gethostname()})
+            message = replace(message, info={**message.info, "host": socket.gethostname()})
         self._outgoing.append(message)
         self._news.set()
-        if len(self._outgoing) >= MOST_WAITING and self._process is not None and not self._paused:
+        if len(self._outgoing) >= MOST_WAITING and not self._paused:
             self._paused = True
-            self._process.link.pause_reading()
+            process.link.pause_reading()
 
     def _lose(self, process: Process) -> None:
         if process is self._process:
             self._process = None
-            self._do(self._bury(process))
+            self._do(self._bury(process, self._outgoing, self._news))
 
-    async def _bury(self, process: Process) -> None:
+    async def _bury(self, process: Process, outgoing: deque[FromRenderer | Ended], news: asyncio.Event) -> None:
         cause = await process.end(LAST_WORDS_S)
-        self._outgoing.append(Ended(cause, process.task))
-        self._news.set()
+        outgoing.append(Ended(cause, process.task))
+        news.set()
 
     async def _watch(self, process: Process, pause_s: float) -> None:
         loop = asyncio.get_running_loop()

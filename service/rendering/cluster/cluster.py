@@ -21,7 +21,7 @@ from service.rendering.cluster.process import ClusterProcess
 from service.rendering.executors import tending
 from service.rendering.supervisor.process import ROOT, Start
 
-JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself after half of that
+JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself much earlier
 FAREWELL_S = 10.0  # for the gateway to end the actors, and a cluster of its own
 SECRETS = ("SUNBOX_API_KEY",)  # that no process of a cluster needs
 
@@ -41,11 +41,11 @@ class Cluster:
     """A Ray cluster, joined when it is made. When the gateway is lost, with it or alone, the next renderer starts it
     again."""
 
-    def __init__(self, address: str, renderers: int | None, gpu: bool, options: dict[str, Any]) -> None:
+    def __init__(self, address: str, renderers: int | None, gpu: bool, options: dict[str, Any], **join: Any) -> None:
         """`options`: of a renderer's process, on whichever node. Raises CannotJoin; waits for some seconds."""
         if importlib.util.find_spec("ray") is None:
             raise CannotJoin(INSTALL)
-        self._join = Join(address, renderers, gpu, options)
+        self._join = Join(address, renderers, gpu, options, **join)
         self._gateway: _Gateway | None = _start(self._join)
         try:
             self.joined = _answered(self._gateway)

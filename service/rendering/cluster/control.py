@@ -18,6 +18,7 @@ class Join:
     renderers: int | None  # SUNBOX_RAY_RENDERERS
     gpu: bool  # SUNBOX_REQUIRE_GPU
     options: dict[str, Any]  # of a renderer's process: the fields of Options that are for any node
+    patience_s: float = 20.0  # for a head that accepts connections and does not answer; Ray itself waits two minutes
 
 
 @dataclass(frozen=True)
@@ -45,13 +46,6 @@ class Open:
 
 
 # --- on a renderer's own channel, to its process object in the server ---
-
-
-@dataclass(frozen=True)
-class Waiting:
-    """Why the renderer has not begun yet."""
-
-    detail: str
 
 
 @dataclass(frozen=True)

@@ -21,14 +21,15 @@ from service import logs
 from service.rendering.cluster import control
 from service.rendering.cluster.actor import Renderer
 from service.rendering.cluster.carriage import Scenes
-from service.rendering.cluster.control import Join, Joined, Open, Refused, Waiting
+from service.rendering.cluster.control import Join, Joined, Open, Refused
 from service.rendering.cluster.joining import CannotJoin, join
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described
 from service.rendering.ipc import channel
+from service.rendering.supervisor.process import Waiting
 
-JOIN_S = 20.0  # Ray waits two minutes for a head that accepts connections and does not answer
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
+SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
 FAREWELL_S = 5.0  # for renderers to end by themselves
 
 log = logging.getLogger("service.rendering.cluster.gateway")  # __name__ is __main__ here
@@ -87,7 +88,8 @@ class Gateway:
         message, descriptor = received
         if isinstance(message, Open) and descriptor is not None:
             lane = Lane(message.number, socket.socket(fileno=descriptor), self)
-            running = asyncio.get_running_loop().create_task(lane.run())
+            before = [running for running, other in self._lanes.items() if other.number == lane.number]
+            running = asyncio.get_running_loop().create_task(_after(before, lane))
             self._lanes[running] = lane
             running.add_done_callback(self._finished)
 
@@ -107,6 +109,13 @@ class Gateway:
                         lane.leave()
 
 
+async def _after(before: list[asyncio.Task[None]], lane: Lane) -> None:
+    """Run a lane once those have ended that had its actor."""
+    if before:
+        await asyncio.wait(before)
+    await lane.run()
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m service.rendering.cluster.gateway")
     parser.add_argument("descriptor", type=int)
@@ -122,7 +131,7 @@ def main() -> int:
     if received is None:
         return 0
     ask: Join = received[0]
-    refusal = threading.Timer(JOIN_S, _refuse, [end, f"SUNBOX_RAY: no answer from the Ray cluster in {JOIN_S:g} s"])
+    refusal = threading.Timer(ask.patience_s, _refuse, [end, SILENT.format(ask.address, ask.patience_s)])
     refusal.daemon = True
     refusal.start()
     try:

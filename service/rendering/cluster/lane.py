@@ -12,9 +12,10 @@ from typing import Any, Protocol
 
 from service.rendering.cluster.carriage import LARGE, Scenes, size, stored
 from service.rendering.cluster.code import difference
-from service.rendering.cluster.control import Ended, Waiting
+from service.rendering.cluster.control import Ended
 from service.rendering.ipc import channel
 from service.rendering.ipc.messages import Drop, FromRenderer, TakeCheckpoint, ToRenderer, Unable, Update
+from service.rendering.supervisor.process import Waiting
 
 SILENCE_S = 30.0  # without an answer from an actor, which gives one every 5 s, until it is given up
 PLACING_S = 2.0  # that Ray may take to place an actor before the reason is asked for; then between two times

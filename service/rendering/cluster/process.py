@@ -7,7 +7,7 @@ import time
 from collections.abc import Callable
 from typing import Any, cast
 
-from service.rendering.cluster.control import Ended, Waiting
+from service.rendering.cluster.control import Ended
 from service.rendering.ipc import channel
 from service.rendering.supervisor.process import Cause
 
@@ -29,7 +29,6 @@ class ClusterProcess:
         self.began = time.monotonic()
         self.ready = False
         self.unable = False
-        self.waiting = ""
         self._received, self._ended = received, Ended("node lost")
         ours, theirs = channel.pair()
         try:
@@ -56,7 +55,5 @@ class ClusterProcess:
     def _heard(self, message: Any) -> None:
         if isinstance(message, Ended):
             self._ended = message
-        elif isinstance(message, Waiting):
-            self.waiting = message.detail
         else:
             self._received(message)

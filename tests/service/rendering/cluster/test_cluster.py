@@ -1,0 +1,92 @@
+"""Renderers as Ray actors, two of them on a real Ray: the same bits as here, also when one of them is lost."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Awaitable, Callable, Iterator
+
+import numpy as np
+import pytest
+
+from gpu import Renderer
+from service.rendering.cluster.cluster import Cluster
+from service.rendering.ipc.messages import Checkpoint, Done, Image, Read, StopRule, Update
+from service.rendering.supervisor.pool import Pool
+from service.rendering.supervisor.supervisor import Supervisor
+from tests.gpu.test_precompile import LINEAR, arrays_of
+from tests.service.rendering.cluster.clusters import OPTIONS, descendants, kill, until, with_pool
+from tests.service.rendering.test_worker import Ears, settings
+from tests.supervisors import with_supervisor
+
+pytest.importorskip("ray", reason="Ray is not installed: pip install 'sunbox[ray]'")
+
+SAMPLES = 400
+ENDLESS = 1 << 24
+
+Run = Callable[[Callable[[Pool], Awaitable[None]]], None]
+
+
+@pytest.fixture(scope="module")
+def run(gpu: Renderer) -> Iterator[Run]:
+    """Runs a test with two actors, which all tests of this file share."""
+    with asyncio.Runner() as runner:
+        cluster = Cluster("auto", 2, False, OPTIONS)
+        assert cluster.joined.local and cluster.joined.renderers == 2
+        yield lambda test: runner.run(with_pool(cluster, test))
+        runner.run(cluster.close())
+
+
+@pytest.fixture(scope="module")
+def expected(gpu: Renderer) -> np.ndarray:
+    """The picture of a renderer of this machine."""
+    found = []
+
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor)
+        await ears.next(Done)
+        found.append(await picture(supervisor, task, ears))
+
+    with_supervisor(test)
+    return found[0]
+
+
+async def begun(renderers: Pool | Supervisor, samples: int = SAMPLES) -> tuple[int, Ears]:
+    ears = Ears()
+    task = renderers.open(ears, "render")
+    await renderers.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4), StopRule(samples)))
+    return task, ears
+
+
+async def picture(renderers: Pool | Supervisor, task: int, ears: Ears) -> np.ndarray:
+    renderers.send(Read(task, 1, LINEAR))
+    return np.array((await ears.next(Image)).pixels)
+
+
+def restarts(pool: Pool, cause: str) -> int:
+    return sum(member.statistics.restarts[cause] for member in pool.members)
+
+
+def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
+    async def test(pool: Pool) -> None:
+        await until(lambda: all(member.state == "ready" for member in pool.members))
+        for task, ears in [await begun(pool), await begun(pool)]:
+            assert (await ears.next(Done)).saved is not None
+            assert np.array_equal(expected, await picture(pool, task, ears))
+
+    run(test)
+
+
+@pytest.mark.parametrize(("word", "cause"), [("rendering.worker", "killed"), ("ray::Renderer", "node lost")])
+def test_a_render_goes_on_where_its_renderer_is_killed(run: Run, expected: np.ndarray, word: str, cause: str) -> None:
+    async def test(pool: Pool) -> None:
+        assert pool.process_id is not None
+        task, ears = await begun(pool, ENDLESS)
+        await ears.next(Checkpoint)
+        for pid in descendants(pool.process_id, word):
+            kill(pid)
+        await until(lambda: restarts(pool, cause) == 2)
+        pool.send(Update(task, 2, stop=StopRule(SAMPLES), base=1))
+        assert (await ears.next(Done)).progress.samples == SAMPLES
+        assert np.array_equal(expected, await picture(pool, task, ears))
+
+    run(test)
