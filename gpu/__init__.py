@@ -36,6 +36,7 @@ from gpu.errors import (
     WrongThread,
 )
 from gpu.footprint import picture_bytes, scene_bytes
+from gpu.picture.blocks import Band, border_after
 from gpu.picture.picture import Picture
 from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
@@ -50,6 +51,7 @@ __all__ = [
     "FIRST_HIT_AOVS",
     "SAMPLERS",
     "TONE_MAPS",
+    "Band",
     "BsdfAlbedo",
     "BsdfEvaluator",
     "BsdfTerms",
@@ -73,6 +75,7 @@ __all__ = [
     "TextureArrays",
     "WrongThread",
     "apply_edit",
+    "border_after",
     "bounced_paths",
     "devices",
     "missing_light",

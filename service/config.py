@@ -10,7 +10,7 @@ from typing import Annotated, Any, Literal
 from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
-MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 1 GiB
+MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 2 GiB
 MIB, GIB = 2**20, 2**30
 
 LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota", "data_files")  # how the names of limits begin

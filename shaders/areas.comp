@@ -1,7 +1,7 @@
 // Entry: for each area of 8 x 8 pixels and each class of its rows (gpu/picture/sample_plan.py), the variance of a
 // sample's luminance, summed over the pixels, and the number of samples that they have. The rows of the moments are
 // bound from the first row of an area on.
-#include "layout.glsl"
+#include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "luminance_variance.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };

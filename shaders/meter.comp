@@ -1,13 +1,10 @@
 // Entry: reductions of the accumulators, of which a part is bound, for the noise meter. METER_WEIGH 1 estimates the
 // error of each block of pixels from its own samples and its neighbours'; 0 computes sums over all pixels, and the
 // values of the metered pixels.
-#include "layout.glsl"
+#include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "luminance_variance.glsl"
-layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
-
-// The variance of the luminance times n - 1, of n samples.
-float meter_variance(uint slot) { return luminance_variance(moments[slot].rgb); }
+#include "accumulators.glsl"
 
 #if METER_WEIGH
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };
@@ -23,23 +20,20 @@ void main() {
     uint y = low.y;
     do {
         uint x = low.x;
-        do sum += meter_variance(y * size.x + x);
+        do sum += luminance_variance(moments[y * size.x + x].rgb); // times n - 1, of n samples, all in the total
         while (++x < high.x);
     } while (++y < high.y);
     weights[b.y * blocks.x + b.x] = sum / float((high.x - low.x) * (high.y - low.y));
 }
 #else
-layout(std430, binding = SLOT_SUM) readonly buffer sum_buffer { vec4 sums[]; };
-layout(std430, binding = SLOT_COMPENSATION) readonly buffer place_buffer { vec4 places[]; };
+layout(std430, binding = SLOT_NORMAL) readonly buffer place_buffer { vec4 places[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 results[]; };
 uniform uint first; // pixel of the bound part
 uniform uint count; // of its pixels
 uniform uint width; // of the picture
 uniform uint lines; // of METER_LINE invocations
 
-float meter_luminance(uint slot) {
-    return dot(sums[slot].rgb, LUMINANCE) / max(moments[slot].w, 1.0);
-}
+float meter_luminance(Accumulated all) { return dot(all.sum.rgb, LUMINANCE) / max(all.moments.w, 1.0); }
 
 void main() {
     uvec2 g = gl_GlobalInvocationID.xy;
@@ -48,13 +42,14 @@ void main() {
     vec4 result = vec4(0.0); // luminance, its variance, both summed; and the metered pixel's, where it is bound
     if (k < count) {
         do {
-            float n = moments[k].w;
-            result.xy += vec2(meter_luminance(k), n > 1.0 ? meter_variance(k) / (n * (n - 1.0)) : 0.0);
+            Accumulated all = accumulators_load(k);
+            float n = all.moments.w, variance = luminance_variance(all.moments.rgb);
+            result.xy += vec2(meter_luminance(all), n > 1.0 ? variance / (n * (n - 1.0)) : 0.0);
             k += uint(METER_LINE) * lines;
         } while (k < count);
     }
     uint pixel = uint(places[i].y) * width + uint(places[i].x) - first;
-    if (pixel < count) result.z = meter_luminance(pixel);
+    if (pixel < count) result.z = meter_luminance(accumulators_load(pixel));
     results[i] = result;
 }
 #endif

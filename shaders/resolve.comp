@@ -1,15 +1,14 @@
-// Entry: turns the accumulator into an exposed, tone-mapped, sRGB-encoded picture with straight alpha.
-#include "layout.glsl"
+// Entry: turns the accumulators into an exposed, tone-mapped, sRGB-encoded picture with straight alpha.
+#include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "constants.glsl"
+#include "accumulators.glsl"
 #include "tonemap/linear.glsl"
 #include "tonemap/exponential.glsl"
 #include "tonemap/reinhard.glsl"
 #include "tonemap/aces.glsl"
 #include "tonemap/agx.glsl"
 #include "tonemap/pbr_neutral.glsl"
-layout(std430, binding = SLOT_SUM) readonly buffer sum_buffer { vec4 sums[]; };
-layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 #if OUTPUT_FLOAT
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 pixels[]; };
 #else
@@ -26,9 +25,9 @@ void main() {
     uvec2 g = gl_GlobalInvocationID.xy;
     uint slot = g.y * uint(LINE) + g.x;
     if (slot >= count) return;
-    vec4 sum = sums[slot];
-    float n = moments[slot].w;
-    vec4 mean = n > 0.0 ? sum / n : vec4(0.0);
+    Accumulated all = accumulators_load(slot);
+    float n = all.moments.w;
+    vec4 mean = n > 0.0 ? all.sum / n : vec4(0.0);
     vec3 c = mean.a > 0.0 ? mean.rgb / mean.a : vec3(0.0);
     c = min(c * exposure, vec3(1e37)); // a picture of 1e20 lifted by 60 stops stays finite
     c = resolve_srgb(clamp(TONE_MAP(c), 0.0, 1.0));

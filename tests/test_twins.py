@@ -16,10 +16,12 @@ from tests.documents import packed
 
 def test_the_server_counts_a_picture_s_bytes_as_the_renderer_takes_them() -> None:
     """The server counts the denoised picture as well, and a copy of it that is on its way: a vec4 a pixel each."""
-    settings = RenderSettings(1920, 1080, adaptive=True)
+    settings = RenderSettings(1920, 1080)
     pixels = settings.width * settings.height
     taken = (footprint.picture_bytes(settings, guided=True) - footprint.PICTURE_BYTES) / pixels
-    assert taken - 1 + 2 * 16 == memory.PICTURE_BYTES  # a byte of the plan is below what the server counts
+    assert taken + 2 * 16 == memory.PICTURE_BYTES
+    assert footprint.picture_bytes(RenderSettings(1920, 1080, adaptive=True)) < footprint.picture_bytes(settings)
+    assert memory.SAVED_BYTES == footprint.TOTAL_BYTES + footprint.BLOCK_BYTES
 
 
 def test_gltf_files_have_the_ranges_of_scenes() -> None:

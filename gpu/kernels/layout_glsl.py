@@ -1,11 +1,12 @@
-"""Records as GLSL: structs, buffers with their loaders, constants. Shaders include it as `layout.glsl`."""
+"""Records as GLSL: structs, buffers with their loaders, constants. Shaders include it as `layout.glsl`. Those that
+read no scene include the constants alone, `layout_constants.glsl`: drivers count the buffers that are declared."""
 
 from __future__ import annotations
 
 from gpu import layout
 from gpu.kernels import instances_glsl, microfacets_glsl, textures_glsl
 from gpu.layout import Frame, LightKind, MaterialModel, ShapeKind, bindings
-from gpu.layout.bindings import Slot
+from gpu.layout.bindings import BlockSlot, Slot
 from gpu.layout.record import Record
 from gpu.tables import energy
 
@@ -96,11 +97,13 @@ def _picker(name: str, record: type[Record]) -> str:
 }}"""
 
 
-def _constants() -> str:
+def constants() -> str:
+    """The text of `layout_constants.glsl`, with which that of `layout.glsl` begins."""
     out = []
     for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", MaterialModel)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
     out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
+    out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
     out += [f"#define FRAME_BLOCK {bindings.FRAME_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
     for name in (
@@ -143,7 +146,7 @@ def text() -> str:
     loaders = [_loader(name, r, slot) for name, (r, slot) in layout.BUFFERS.items()]
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
-    parts = [_constants(), *structs, *loaders, nodes, _frame(), instances_glsl.text(), textures_glsl.text()]
+    parts = [constants(), *structs, *loaders, nodes, _frame(), instances_glsl.text(), textures_glsl.text()]
     parts.append(microfacets_glsl.text())
     return "\n".join(parts) + "\n"
 

@@ -19,6 +19,8 @@ _WHERE = re.compile(r"(\d+)[:(](\d+)")
 def _read(name: str, folders: Sequence[Path]) -> str:
     if name == "layout.glsl":
         return layout_glsl.text()
+    if name == "layout_constants.glsl":
+        return layout_glsl.constants() + "\n"
     for folder in folders:
         if (folder / name).is_file():
             return (folder / name).read_text()

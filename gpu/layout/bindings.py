@@ -26,6 +26,14 @@ class Slot(IntEnum):
     OUTPUT = 15
 
 
+class BlockSlot(IntEnum):
+    """Binding points of the accumulators of a block of samples, in kernels that read no scene."""
+
+    SUM = 0
+    COMPENSATION = 1
+    MOMENTS = 2
+
+
 FRAME_BLOCK = 0  # binding points of uniform blocks
 FILTER_BLOCK = 1
 # Binding points, as uniform blocks, of the buffers whose NAME_COUNT kernels are compiled for, where it is above 0.

@@ -30,7 +30,7 @@ class Adaptive:
         self.max_bounces = max_bounces
         self._caution = max(1.0, max_bounces / USUAL_BOUNCES)
         self.cost_s = 0.0  # per sample of a pixel; 0: unknown
-        self.rounds = self.chunk = 1  # of the pass under way; samples of an invocation
+        self.rounds = self.chunk = 1  # of the pass under way: how often it comes to an area; samples of an invocation
         self.stops: tuple[int, ...] = DECISIONS
         self._pixels = pixels_of(*size)
         self._rates = np.zeros(len(self._pixels))  # the same as cost_s, by row of areas
@@ -156,7 +156,10 @@ class Adaptive:
         part = 0, top, width, min(height, AREA * (int(y[-1]) + 1)) - top
         return Dispatch(part, tile[:2], (tile[3], 1), 0, self.chunk, (tile[3], 1))
 
-    def meter_samples(self, since: int) -> tuple[int, int]:
+    def meter_rounds(self, since: int) -> int:
+        return self.rounds
+
+    def meter_samples(self, since: int, turn: int) -> tuple[int, int]:
         return 0, self.chunk
 
     def release(self) -> None:

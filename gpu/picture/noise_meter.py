@@ -24,9 +24,13 @@ from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout import LUMINANCE, METER_REPLICATES
 from gpu.layout.bindings import Slot
+from gpu.picture import blocks
+from gpu.picture.accumulators import Accumulators
 from gpu.picture.schedule import work_groups
 
-FROM = 8  # samples of each pixel at which the meter starts; before, the variance of the samples must do
+FROM = (
+    blocks.FIRST
+)  # samples of each pixel, all in the total, at which the meter starts; before, their variance must do
 LINE = 64  # metered pixels in a row of their buffers
 _PIXELS, _FEWEST = 2048, 256  # metered pixels; in small pictures a quarter of all, but at least the second number
 _EVEN = 0.5  # share of the metered pixels that is drawn evenly
@@ -86,18 +90,18 @@ class NoiseMeter:
         weights = np.concatenate(parts)
         return weights if side > 1 else around(weights)
 
-    def noise(self, main: dict[Slot, Any], metered: bool, scale: float) -> float:
+    def noise(self, sums: Accumulators, metered: bool, scale: float) -> float:
         """Estimated RMSE of the picture's luminance over its mean; `metered`: the pixels were placed and sampled.
         Second moments are of radiance over `scale`."""
         pixels = self._size[0] * self._size[1]
-        totals, seen = self._sums(main)
+        totals, seen = self._totals(sums)
         mean = totals[0] / pixels
         if mean == 0:
             return 0.0
         if not metered:
             return float(np.sqrt(totals[1] / pixels) * scale / mean)
-        places, sums = (self._vectors(slot) for slot in (Slot.MOMENTS, Slot.SUM))
-        other = sums[:, :3].astype(float) @ _LUMINANCE / np.maximum(places[:, 3], 1)
+        places, values = (self._vectors(slot) for slot in (Slot.MOMENTS, Slot.SUM))
+        other = values[:, :3].astype(float) @ _LUMINANCE / np.maximum(places[:, 3], 1)
         return float(np.sqrt(squared_error(places[:, :3], seen / mean, other / mean) / pixels))
 
     def _kernel(self, weigh: int) -> Any:
@@ -106,19 +110,18 @@ class NoiseMeter:
     def _vectors(self, slot: Slot) -> np.ndarray:
         return np.frombuffer(self.buffers[slot].read(), np.float32).reshape(-1, 4)
 
-    def _sums(self, main: dict[Slot, Any]) -> tuple[np.ndarray, np.ndarray]:
+    def _totals(self, sums: Accumulators) -> tuple[np.ndarray, np.ndarray]:
         """Luminance and its variance, summed over the picture; and the luminance of each metered pixel."""
         width, height = self._size
         kernel = self._kernel(weigh=0)
         output = contexts.allocate(self._context, 16 * LINE * self.lines)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
-        self.buffers[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.COMPENSATION))
+        self.buffers[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.NORMAL))
         kernel["width"].value, kernel["lines"].value = width, self.lines
         totals, seen = np.zeros(2), np.zeros(LINE * self.lines)
         for first in range(0, width * height, self._most):
             count = min(self._most, width * height - first)
-            for slot in (Slot.SUM, Slot.MOMENTS):
-                main[slot].bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
+            sums.bind(kernel, first, count)
             kernel["first"].value, kernel["count"].value = first, count
             kernel.run(*work_groups(LINE, self.lines))
             results = np.frombuffer(output.read(), np.float32).reshape(-1, 4).astype(float)

@@ -1,6 +1,7 @@
 """Tracing a picture: passes of some samples for every pixel, cut into slices of bounded time.
 
 The cut follows the measured cost and never changes the picture: every pixel adds its samples one by one, in order.
+No pass crosses the border of a block of samples (see `blocks`), at which each pixel's block is merged into its total.
 """
 
 from __future__ import annotations
@@ -12,21 +13,24 @@ from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
-from gpu.picture import noise_meter
+from gpu.picture import blocks, noise_meter
+from gpu.picture.accumulators import Accumulators
 from gpu.picture.adaptive import Adaptive
+from gpu.picture.bands import BandTracer
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.schedule import Schedule, Tile, work_groups
 from gpu.picture.tiles import MAX_SAMPLES_A_PASS, Tiles, samples_at_once
 
+_MERGED = 1 << 18  # pixels that are merged in a slice: this takes llvmpipe some milliseconds
+
 
 class Passes:
-    """The progress of a picture. `main` are its accumulators; after each pass the meter's pixels are traced."""
+    """The progress of a picture, whose accumulators are `sums`. After each pass the meter's pixels are traced, and
+    after that which completes a block, the block is merged."""
 
-    def __init__(
-        self, dispatcher: Dispatcher, kernels: KernelCache, main: dict[Slot, Any], meter: NoiseMeter
-    ) -> None:
-        self._dispatcher, self._kernels, self._main, self._meter = dispatcher, kernels, main, meter
+    def __init__(self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter) -> None:
+        self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
         self._kernel: Any = None
         self._schedule: Schedule | None = None
         self.compile_ms = 0.0  # since the picture was made
@@ -35,7 +39,8 @@ class Passes:
     def _begin_again(self) -> None:
         self.samples = 0  # of every pixel; in the mean, where the schedule is adaptive
         self._pass_samples = 0  # of the pass under way; 0: none is
-        self._row, self._column = 0, 0  # where its next tile begins; rows beyond the schedule's are the meter's
+        # Where its next tile begins. Rows beyond the schedule's are the meter's; after them come the rows to merge.
+        self._row, self._column = 0, 0
 
     def reset(self) -> None:
         """Start at zero samples, with the scene and the settings as they are now. The accumulators are cleared."""
@@ -89,6 +94,33 @@ class Passes:
                 break
         return time.perf_counter() - start
 
+    def trace_band(self, tracer: BandTracer, budget_s: float) -> float:
+        """Trace a band into the block's accumulators for about `budget_s` seconds, at most to its end. Returns the
+        seconds that it took."""
+        start = time.perf_counter()
+        self._dispatcher.bind()
+        while not tracer.complete:
+            tile, first, samples = tracer.next(self._tiles, self._most_samples)
+            began = time.perf_counter()
+            self._trace(self._sums.block, tile, tile[:2], tile[2:], first, samples, work_groups(tile[2], tile[3]))
+            self._dispatcher.context.finish()
+            self._tiles.took(tile, samples, time.perf_counter() - began)
+            tracer.took(tile, self._dispatcher.settings.width)
+            if time.perf_counter() - start >= budget_s:
+                break
+        return time.perf_counter() - start
+
+    @property
+    def _tiles(self) -> Tiles:
+        assert isinstance(self.schedule, Tiles)
+        return self.schedule
+
+    def complete(self, end: int) -> None:
+        """Go on as after a pass up to `end` samples that has come to the end of the picture."""
+        self._pass_samples = end - self.samples
+        self._row, self._column = self.schedule.size[1], 0
+        self._begin_schedule()
+
     def release(self) -> None:
         if self._schedule is not None:
             self._schedule.release()
@@ -124,17 +156,24 @@ class Passes:
         start = time.perf_counter()
         d = self._dispatcher
         d.bind()
-        d.bind_part(self._main, (0, 0, 1, 1), 1)
+        d.bind_part(self._sums.total, (0, 0, 1, 1), 1)
         self.schedule.bind()
         d.run(self._kernel, d.frame((0, 0), (0, 0), 0, 1), (1, 1))
         d.context.finish()
         self.compile_ms += (time.perf_counter() - start) * 1e3
 
+    @property
+    def _parted(self) -> bool:
+        """Whether samples are summed in blocks."""
+        return not self._dispatcher.settings.adaptive
+
     def _begin_pass(self, max_samples: int, sharers: int = 1) -> None:
         schedule = self.schedule
-        schedule.decide(self.samples, self._main)
+        if self._parted and self.samples >= blocks.FIRST:
+            self._sums.open_block()
+        schedule.decide(self.samples, self._sums.total)
         stops = (stop for stop in (noise_meter.FROM, *schedule.stops) if stop > self.samples)
-        end = min([max_samples, *stops])
+        end = min([max_samples, blocks.stop_after(self.samples), *stops])
         self._pass_samples = min(schedule.pass_samples(self.samples, sharers), end - self.samples)
         self._begin_schedule()
 
@@ -142,43 +181,73 @@ class Passes:
         self.schedule.begin(self.samples, self.samples + self._pass_samples, self._most_samples)
 
     def _slice(self) -> None:
-        """Trace the next tile of the pass: of the picture, then of the meter."""
-        schedule = self.schedule
-        height, lines = schedule.size[1], self._meter.lines
-        metering = self._row >= height
-        row = (self._row - height) % lines if metering else self._row
-        tiles: Schedule = self._meter_tiles if metering else schedule
-        tile = tiles.tile(row, self._column, schedule.chunk)
-        start = time.perf_counter()
-        if metering:
-            self._trace_meter(tile)
+        """Trace the next tile of the pass, of the picture or of the meter, or merge some pixels of a block."""
+        height, after = self.schedule.size[1], self.samples + self._pass_samples
+        metered = height
+        if after >= noise_meter.FROM:
+            metered += self._meter.lines * self.schedule.meter_rounds(noise_meter.FROM)
+        if self._row < height:
+            self._trace_picture()
+        elif self._row < metered:
+            self._trace_meter()
         else:
-            self._trace_picture(tile)
-        self._dispatcher.context.finish()
-        tiles.took(tile, schedule.chunk, time.perf_counter() - start)
-        self._column = tile[0] + tile[2]
-        if self._column >= tiles.size[0]:
-            self._column, self._row = 0, self._row + tile[3]
-        after = self.samples + self._pass_samples
+            self._merge(self._row - metered)
         if self._row == height and self._column == 0 and self.samples < noise_meter.FROM <= after:
-            self._meter.place(self._main, self._dispatcher.settings.seed)
+            self._meter.place(self._sums.total, self._dispatcher.settings.seed)
             self._dispatcher.bind()
-        if self._row >= height + lines * schedule.rounds or (self._row >= height and after < noise_meter.FROM):
+        merges = self._sums.open and after == blocks.border_after(self.samples)
+        if self._row >= metered + (self._dispatcher.settings.height if merges else 0):
+            if merges:
+                self._sums.end_block()
             self._row = 0
             self.samples += self._pass_samples
             self._pass_samples = 0
 
-    def _trace_picture(self, tile: Tile) -> None:
+    def _trace_picture(self) -> None:
+        schedule = self.schedule
+        tile = schedule.tile(self._row, self._column, schedule.chunk)
+        start = time.perf_counter()
+        self._trace(self._sums.block if self._sums.open else self._sums.total, *schedule.dispatch(tile))
+        self._took(schedule, tile, schedule.chunk, start)
+
+    def _trace(
+        self, sums: dict[Slot, Any], part: Tile, origin: tuple[int, int], size: tuple[int, int], first: int,
+        samples: int, groups: tuple[int, int],
+    ) -> None:  # fmt: skip
         d = self._dispatcher
-        part, origin, size, first, samples, groups = self.schedule.dispatch(tile)
         frame = d.frame(origin, size, first, samples)
-        frame["slot_first"] = d.bind_part(self._main, part, d.settings.width)
+        frame["slot_first"] = d.bind_part(sums, part, d.settings.width)
         d.run(self._kernel, frame, groups)
 
-    def _trace_meter(self, tile: Tile) -> None:
-        d = self._dispatcher
-        self.schedule.bind()
-        frame = d.frame(tile[:2], tile[2:], *self.schedule.meter_samples(noise_meter.FROM))
+    def _trace_meter(self) -> None:
+        d, schedule = self._dispatcher, self.schedule
+        turn, row = divmod(self._row - schedule.size[1], self._meter.lines)
+        first, samples = schedule.meter_samples(noise_meter.FROM, turn)
+        tile = self._meter_tiles.tile(row, self._column, samples)
+        start = time.perf_counter()
+        schedule.bind()
+        frame = d.frame(tile[:2], tile[2:], first, samples)
         frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, noise_meter.LINE
         frame["slot_first"] = d.bind_part(self._meter.buffers, tile, noise_meter.LINE)
         d.run(self._kernel, frame, work_groups(tile[2], tile[3]))
+        self._took(self._meter_tiles, tile, samples, start)
+
+    def _took(self, tiles: Schedule, tile: Tile, samples: int, start: float) -> None:
+        """Wait for a tile that was begun at `start`, and go on to the next."""
+        self._dispatcher.context.finish()
+        tiles.took(tile, samples, time.perf_counter() - start)
+        self._advance(tile, tiles.size[0])
+
+    def _advance(self, tile: Tile, width: int) -> None:
+        self._column = tile[0] + tile[2]
+        if self._column >= width:
+            self._column, self._row = 0, self._row + tile[3]
+
+    def _merge(self, row: int) -> None:
+        settings, most = self._dispatcher.settings, min(_MERGED, self._dispatcher.most_pixels)
+        width = min(settings.width - self._column, most)
+        rows = min(max(1, most // settings.width), settings.height - row) if self._column == 0 else 1
+        tile = self._column, row, width, rows
+        self._sums.merge(row * settings.width + self._column, width * rows)
+        self._dispatcher.bind()
+        self._advance(tile, settings.width)

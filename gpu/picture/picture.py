@@ -13,13 +13,15 @@ from gpu import context as contexts
 from gpu.device.scene import Scene
 from gpu.errors import NothingRendered
 from gpu.kernels.cache import KernelCache
-from gpu.layout.bindings import Slot
-from gpu.picture import display, first_hit
+from gpu.picture import accumulators, blocks, display, first_hit
+from gpu.picture.accumulators import Accumulators
+from gpu.picture.bands import BandTracer, Sharing
+from gpu.picture.blocks import Band
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.passes import Passes
 from gpu.picture.readout import Readout
-from gpu.picture.saved import Saved
+from gpu.picture.saved import NO_BLOCK, Saved
 from gpu.settings import FIRST_HIT_AOVS, RenderSettings
 
 PIECE_BYTES = 16 << 20  # bytes of a saved buffer that one step reads, in some milliseconds
@@ -39,14 +41,15 @@ class Picture:
         self.context, self.scene, self.settings = context, scene, settings
         self.released = False
         size = settings.width, settings.height
-        self._main: dict[Slot, Any] = {}
         self._dispatcher = Dispatcher(context, frame, scene, settings)
         self._meter = NoiseMeter(context, kernels, size, self._dispatcher.most_pixels)
-        self._passes = Passes(self._dispatcher, kernels, self._main, self._meter)
-        self._readout = Readout(self._dispatcher, kernels, self._main, self._meter)
+        self._sums = Accumulators(self._dispatcher, kernels)
+        self._passes = Passes(self._dispatcher, kernels, self._sums, self._meter)
+        self._readout = Readout(self._dispatcher, kernels, self._sums, self._meter)
+        self._sharing: Sharing | None = None
+        self._lent: BandTracer | None = None
         try:
-            for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
-                self._main[slot] = contexts.allocate(self.context, 16 * size[0] * size[1])
+            self._sums.allocate()
             self._meter.allocate()
             self.reset()
         except Exception:
@@ -65,15 +68,32 @@ class Picture:
         contexts.use(self.context)
         self._dispatcher.configure(self.settings)
         self._passes.reset()
-        for buffer in self.state:
+        self._sums.reset()
+        self._sharing = self._lent = None
+        for buffer in self._beside:
             buffer.clear()
         self._readout.first_hit.clear()
 
     @property
-    def state(self) -> list[Any]:
-        """The buffers that samples are added to."""
+    def _beside(self) -> list[Any]:
+        """The buffers of its state beside the accumulators."""
         plan = self._passes.schedule.buffers
-        return [*self._main.values(), *self._meter.buffers.values(), self._dispatcher.counters, *plan]
+        return [*self._meter.buffers.values(), self._dispatcher.counters, *plan]
+
+    @property
+    def state(self) -> list[Any]:
+        """The buffers that samples are added to, without a block that is shared."""
+        return [*self._sums.total.values(), *self._beside, *self._sums.buffers]
+
+    @property
+    def state_sizes(self) -> list[int]:
+        """The bytes of what `save` reads."""
+        return [buffer.size for buffer in self.state] + [NO_BLOCK.nbytes] * self._says_no_block
+
+    @property
+    def _says_no_block(self) -> bool:
+        parted = not self.settings.adaptive
+        return parted and not self._sums.open and self.samples + self.under_way[0] > blocks.FIRST
 
     @property
     def samples(self) -> int:
@@ -84,6 +104,12 @@ class Picture:
     def under_way(self) -> tuple[int, int, int]:
         """The pass under way: its samples (0: there is none), row and column of the next tile."""
         return self._passes.under_way
+
+    @property
+    def at_border(self) -> bool:
+        """Whether it has 8, 16, 32, or a multiple of 64 samples, at which passes end however fast the device is, and
+        no pass or shared block is under way."""
+        return blocks.is_stop(self.samples) and not self.under_way[0] and self._sharing is None
 
     @property
     def compile_ms(self) -> float:
@@ -125,24 +151,133 @@ class Picture:
                 buffer.read_into(piece.data, piece.nbytes, offset=start)
                 yield
             out.append(data)
+        if self._says_no_block:
+            data = room(NO_BLOCK.nbytes)
+            data[:] = NO_BLOCK
+            out.append(data)
         return Saved(self.settings, self.samples, self.under_way, out)
 
+    def fits(self, saved: Saved, goes_on: bool = True) -> bool:
+        """Whether `saved` is of a picture of this size, and can be restored; with `goes_on`, so that more samples
+        lead to the same bits, which those of earlier versions do not."""
+        sizes, pixels = [data.nbytes for data in saved.buffers], self.settings.width * self.settings.height
+        even = [buffer.size for buffer in (*self._sums.total.values(), *self._beside)]
+        if sizes == even:
+            return self.settings.adaptive or not goes_on or saved.samples + saved.under_way[0] <= blocks.FIRST
+        parted = [NO_BLOCK.nbytes], [accumulators.PIXEL_BYTES * pixels] * len(accumulators.SLOTS)
+        return not self.settings.adaptive and sizes in [even + more for more in parted]
+
     def restore(self, saved: Saved) -> None:
-        """Go on where a picture of the same scene and settings was saved."""
+        """Go on where a picture of the same scene and settings was saved. Raises OutOfMemory."""
         contexts.use(self.context)
-        for buffer, data in zip(self.state, saved.buffers, strict=True):
+        self._sharing = self._lent = None
+        even = [*self._sums.total.values(), *self._beside]
+        more = saved.buffers[len(even) :]
+        self._sums.restore_block(more if len(more) > 1 else [])
+        for buffer, data in zip(even, saved.buffers[: len(even)], strict=True):
             buffer.write(data)
         self._passes.restore(saved.samples, saved.under_way)
 
     def trace(self, budget_s: float, max_samples: int, sharers: int = 1) -> float:
-        """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
-        took.
+        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; while it shares a block, the rows
+        of its own, whatever `max_samples` is. Returns the seconds that it took. Raises OutOfMemory, when the second
+        block begins.
 
         `sharers` pictures, this one included, take turns on the device: the more there are, the fewer samples are in
         a pass, so that nobody waits long for the next. It changes no bit.
         """
         contexts.use(self.context)
-        return self._passes.trace(budget_s, max_samples, sharers)
+        if self._sharing is None:
+            return self._passes.trace(budget_s, max_samples, sharers)
+        return self._passes.trace_band(self._sharing.own, budget_s) if self._sharing.own else 0.0
+
+    @property
+    def sharing(self) -> bool:
+        """Whether the samples of a block are traced here and elsewhere."""
+        return self._sharing is not None
+
+    @property
+    def own_done(self) -> bool:
+        """Whether the rows of its own have all their samples of the block that it shares."""
+        return self._sharing is None or self._sharing.own_done
+
+    def share(self, rows: int, end: int) -> None:
+        """Have `trace` add the samples up to `end` to rows [0, rows) only; the others come by `write_band` and
+        `trace_band`. Until `complete`, `samples` stays and nothing of them is seen, read or saved.
+
+        Raises ValueError where a pass is under way, and but for the beginning of a block; OutOfMemory.
+        """
+        contexts.use(self.context)
+        begins = self.samples == blocks.FIRST or (self.samples >= blocks.SIZE and self.samples % blocks.SIZE == 0)
+        if self.settings.adaptive or not begins or self._sums.open or self.under_way[0] or self._sharing is not None:
+            raise ValueError(f"no block begins at {self.samples} samples")
+        if not self.samples < end <= blocks.border_after(self.samples) or not 0 <= rows <= self.settings.height:
+            raise ValueError(f"{rows} rows up to {end} samples are no part of the block at {self.samples}")
+        self._sums.empty_block()
+        self._sharing, self._lent = Sharing(self.samples, end, rows), None
+
+    def complete(self) -> None:
+        """Take the shared block as the picture's: all rows have their samples. `trace` then traces the noise meter's
+        samples and merges the block, and then `samples` is its end. Raises ValueError where rows of its own lack
+        samples."""
+        sharing = self._sharing
+        if sharing is None or not sharing.own_done:
+            raise ValueError("no block is shared, or its own rows lack samples")
+        contexts.use(self.context)
+        self._sharing = self._lent = None
+        self._sums.open = True
+        self._passes.complete(sharing.end)
+
+    def unshare(self) -> None:
+        """Drop what was traced of the shared block, if there is one: the picture is as it was before `share`."""
+        if self._sharing is not None:
+            self._sharing = self._lent = None
+            self._sums.close()
+
+    def trace_band(self, band: Band, budget_s: float) -> bool:
+        """Trace a band for about `budget_s` seconds, from zero unless it is that of the last call; whether all of it
+        is there. A picture without samples takes any band, one that shares a block only what is not its own of that.
+
+        Raises ValueError for another one; OutOfMemory.
+        """
+        contexts.use(self.context)
+        self._check(band)
+        if self._lent is None or self._lent.band != band:
+            self._sums.allocate_block()
+            self._sums.clear_rows(band.top, band.rows)
+            self._lent = BandTracer(band)
+        self._passes.trace_band(self._lent, budget_s)
+        return self._lent.complete
+
+    def read_band(self, band: Band) -> np.ndarray:
+        """The accumulators of a complete band: (rows, width, 12) float32, sum, compensation and moments, whose last
+        number is the count of the samples. Raises ValueError where it is not complete."""
+        contexts.use(self.context)
+        if self._lent is None or self._lent.band != band or not self._lent.complete:
+            raise ValueError(f"{band} is not complete")
+        return self._sums.read_rows(band.top, band.rows)
+
+    def write_band(self, band: Band, values: np.ndarray) -> None:
+        """Write what `read_band` gave elsewhere. Raises ValueError for a band that is not of the shared block, and
+        values of another shape."""
+        contexts.use(self.context)
+        if self._sharing is None:
+            raise ValueError("no block is shared")
+        self._check(band)
+        if values.shape != (band.rows, self.settings.width, 4 * len(accumulators.SLOTS)):
+            raise ValueError(f"values of shape {values.shape} are not those of {band}")
+        lent = None if self._lent is None else self._lent.band
+        if lent is not None and lent.top < band.top + band.rows and band.top < lent.top + lent.rows:
+            self._lent = None
+        self._sums.write_rows(band.top, values)
+
+    def _check(self, band: Band) -> None:
+        if self.settings.adaptive or band.top + band.rows > self.settings.height:
+            raise ValueError(f"{band} is no part of this picture")
+        if self._sharing is not None:
+            self._sharing.check(band)
+        elif self.samples or self.under_way[0]:
+            raise ValueError("a picture with samples traces bands only of a block that it shares")
 
     def _need_samples(self) -> None:
         contexts.use(self.context)
@@ -206,7 +341,8 @@ class Picture:
     def release(self) -> None:
         """Give the device's memory back."""
         contexts.use(self.context)
-        for buffer in (*self._main.values(), *self._meter.buffers.values()):
+        self._sums.release()
+        for buffer in self._meter.buffers.values():
             buffer.release()
         self._readout.first_hit.release()
         self._passes.release()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -10,56 +12,67 @@ import numpy as np
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
 from gpu.picture import noise_meter
+from gpu.picture.accumulators import Accumulators
+from gpu.picture.blocks import Sums
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.resolve import resolve
 from gpu.picture.schedule import Tile, work_groups
 
+_PIECE = 1 << 16  # pixels, a megabyte of each accumulator
+
 
 class Readout:
-    """Reads the accumulators `main` and the meter's, and traces first hits when they are first read."""
+    """Reads the picture's sums and the meter's, and traces first hits when they are first read."""
 
-    def __init__(
-        self, dispatcher: Dispatcher, kernels: KernelCache, main: dict[Slot, Any], meter: NoiseMeter
-    ) -> None:
-        self._dispatcher, self._kernels, self._main, self._meter = dispatcher, kernels, main, meter
+    def __init__(self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter) -> None:
+        self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
         self._size = dispatcher.settings.width, dispatcher.settings.height
         self.first_hit = FirstHit(dispatcher.context, self._size)
 
-    def _vectors(self, slot: Slot) -> np.ndarray:
-        flat = np.frombuffer(self._main[slot].read(), np.float32)
-        return flat.reshape(self._size[1], self._size[0], 4)
+    def _pieces(self) -> Iterator[tuple[slice, Sums]]:
+        """All pixels, row by row, in pieces that stay in a processor's cache, and their sums."""
+        pixels = self._size[0] * self._size[1]
+        for first in range(0, pixels, _PIECE):
+            count = min(_PIECE, pixels - first)
+            yield slice(first, first + count), self._sums.read(first, count)
 
     def color(self) -> np.ndarray:
         """Mean radiance and alpha: (height, width, 4) float32."""
-        counts = np.maximum(self._vectors(Slot.MOMENTS)[..., 3:], 1)
-        mean: np.ndarray = self._vectors(Slot.SUM) / counts
-        return mean
+        mean = np.empty((self._size[0] * self._size[1], 4), np.float32)
+        for piece, sums in self._pieces():
+            np.divide(sums.sum, np.maximum(sums.moments[:, 3:], 1), out=mean[piece])
+        return mean.reshape(self._size[1], self._size[0], 4)
 
     def variance(self) -> np.ndarray:
         """Of each pixel's mean, as if its samples were independent: (height, width, 3) float32."""
-        moments = self._vectors(Slot.MOMENTS)
-        n = np.maximum(moments[..., 3:], 1)
-        scale = np.float32(self._dispatcher.scene.arrays.radiance_scale)
-        spread = np.where(n > 1, moments[..., :3] / np.maximum(n - 1, 1) / n, 0)
-        return np.minimum(spread.astype(np.float64) * float(scale) ** 2, 3e38).astype(np.float32)
+        out = np.empty((self._size[0] * self._size[1], 3), np.float32)
+        scale = float(np.float32(self._dispatcher.scene.arrays.radiance_scale))
+        for piece, sums in self._pieces():
+            n = np.maximum(sums.moments[:, 3:], 1)
+            spread = np.where(n > 1, sums.moments[:, :3] / np.maximum(n - 1, 1) / n, 0)
+            out[piece] = np.minimum(spread.astype(np.float64) * scale**2, 3e38)
+        return out.reshape(self._size[1], self._size[0], 3)
 
     def noise(self, samples: int) -> float | None:
         """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""
         if samples < 2:
             return None
         scale = float(self._dispatcher.scene.arrays.radiance_scale)
-        return self._meter.noise(self._main, samples >= noise_meter.FROM, scale)
+        return self._meter.noise(self._sums, samples >= noise_meter.FROM, scale)
 
     def display(self, exposure: float, tone_map: str, dtype: str, color: np.ndarray | None) -> np.ndarray:
         """Colour as `Picture.display` gives it."""
         d = self._dispatcher
         own: dict[Slot, Any] = {}
+        bind = self._sums.bind
         if color is not None:
             given = {Slot.SUM: color, Slot.MOMENTS: np.ones_like(color)}
             own = {slot: d.context.buffer(values.tobytes()) for slot, values in given.items()}
-        pixels = resolve(d.context, self._kernels, own or self._main, d.most_pixels, exposure, tone_map, dtype)
+            bind = partial(self._sums.bind_alone, own)
+        count = self._size[0] * self._size[1]
+        pixels = resolve(d.context, self._kernels, bind, count, d.most_pixels, exposure, tone_map, dtype)
         for buffer in own.values():
             buffer.release()
         return pixels.reshape(self._size[1], self._size[0], 4)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -24,23 +25,23 @@ def defines(tone_map: str, dtype: str) -> dict[str, object]:
 def resolve(
     context: Any,
     kernels: KernelCache,
-    sources: dict[Slot, Any],
+    bind: Callable[[Any, int, int], None],
+    pixels: int,
     most: int,
     exposure: float,
     tone_map: str,
     dtype: str,
 ) -> np.ndarray:
-    """(n, 4) exposed, tone-mapped, sRGB: uint8, or float32 with dtype "f4". `sources`: SUM, and MOMENTS for the
-    counts; no more than `most` pixels of them are bound at once."""
+    """(n, 4) exposed, tone-mapped, sRGB: uint8, or float32 with dtype "f4", of `pixels` pixels. `bind(kernel,
+    first, count)` binds the sums of some, no more than `most` at once."""
     floats = dtype == "f4"
     kernel = kernels.get("resolve.comp", defines(tone_map, dtype))
     kernel["exposure"].value = 2.0**exposure
-    pixels, parts = sources[Slot.SUM].size // 16, []
+    parts = []
     for first in range(0, pixels, most):
         count = min(most, pixels - first)
         output = contexts.allocate(context, (16 if floats else 4) * count)
-        for slot in (Slot.SUM, Slot.MOMENTS):
-            sources[slot].bind_to_storage_buffer(int(slot), offset=16 * first, size=16 * count)
+        bind(kernel, first, count)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
         kernel["count"].value = count
         kernel.run(*work_groups(_LINE, -(-count // _LINE)))

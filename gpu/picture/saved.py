@@ -8,10 +8,15 @@ import numpy as np
 
 from gpu.settings import RenderSettings
 
+# The last buffer of a picture that is parted into blocks of samples and has none under way. Pictures of versions that
+# did not part them have neither this nor a block.
+NO_BLOCK = np.zeros(1, np.uint8)
+
 
 @dataclass(frozen=True)
 class Saved:
-    """The state from which `Picture.restore` goes on to the same bits; `buffers` in the order of `Picture.state`."""
+    """The state from which `Picture.restore` goes on to the same bits; `buffers` in the order of `Picture.state`, and
+    NO_BLOCK after those of a picture of more than the first block."""
 
     settings: RenderSettings
     samples: int

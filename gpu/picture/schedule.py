@@ -33,7 +33,6 @@ class Schedule(Protocol):
 
     stops: tuple[int, ...]  # numbers of samples at which a pass must end
     chunk: int  # samples that an invocation of the pass under way takes
-    rounds: int  # how often the pass under way comes to a pixel, at most
     max_bounces: int
     cost_s: float  # seconds per sample of a pixel, as measured lately; 0: unknown
 
@@ -67,8 +66,11 @@ class Schedule(Protocol):
     def dispatch(self, tile: Tile) -> Dispatch:
         """The dispatch for a tile; it binds the schedule's own buffers."""
 
-    def meter_samples(self, since: int) -> tuple[int, int]:
-        """First sample and number of samples for the noise meter's pixels, which began at 0 and joined at `since`."""
+    def meter_rounds(self, since: int) -> int:
+        """How often the pass under way comes to the noise meter's pixels, which began at 0 and joined at `since`."""
+
+    def meter_samples(self, since: int, turn: int) -> tuple[int, int]:
+        """First sample and number of samples for these pixels in one of the rounds."""
 
     def resume(self, row: int, column: int) -> tuple[int, int]:
         """The tile from which a saved pass goes on, after `buffers` were written."""

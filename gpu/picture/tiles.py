@@ -23,11 +23,13 @@ LEAST_A_PASS = 4
 # shorter, down to one sample. A picture that is alone always gets LEAST_A_PASS.
 ROUND_S = 2.0
 MAX_SAMPLES_A_PASS = 256
+METER_ROUND = 8  # samples that an invocation for the noise meter takes at most, whose few pixels fill a slice so
 LOOP_TURNS = 65_535  # turns of all loops of an invocation together, after which llvmpipe ends them
 BAND = 16  # rows
 _LEAST = WORK_GROUP  # columns of a tile
 _LONG_BAND, _LONG_LEAST = 4, 16  # rows and columns where paths may be so long that 128 pixels take 0.1 s
 GUESS_S = 2e-7  # seconds for a sample of a pixel, before any was measured
+_LARGE = 64 * 64  # pixels of a tile that costs no more a pixel than a larger one
 USUAL_BOUNCES = 16  # with more, paths that come later may be that many times as long as those measured
 
 
@@ -47,7 +49,6 @@ class Tiles:
         self._rates = np.zeros(-(-height // self._band))  # s per sample of a pixel, by band; 0: unknown
         self.cost_s = 0.0  # the same of late; 0: unknown
         self.stops: tuple[int, ...] = ()
-        self.rounds = 1
         self._before, self.chunk = 0, 1  # the first sample of the pass under way, and how many it takes
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
@@ -83,6 +84,15 @@ class Tiles:
         fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
         return max(1, min(fits, usual_pass(self.size, self.cost_s, samples, sharers), self._most_samples))
 
+    def band_samples(self) -> int:
+        """The samples to take at once of a band of rows, which nobody sees before it is complete: as many as a slice
+        has time for in a large tile, as small ones cost more."""
+        if self.cost_s == 0:
+            return 1
+        fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
+        usual = max(LEAST_A_PASS, int(SLICE_S / (self.cost_s * _LARGE)))
+        return max(1, min(fits, usual, self._most_samples))
+
     def begin(self, before: int, after: int, most: int) -> None:
         self._before, self.chunk = before, after - before
 
@@ -90,9 +100,20 @@ class Tiles:
         groups = work_groups(tile[2], tile[3])
         return Dispatch(tile, tile[:2], tile[2:], self._before, self.chunk, groups)
 
-    def meter_samples(self, since: int) -> tuple[int, int]:
-        first = self._before if self._before >= since else 0
-        return first, self._before + self.chunk - first
+    def meter_rounds(self, since: int) -> int:
+        first = self._meter_first(since)
+        return -(-(self._before + self.chunk - first) // self._meter_round)
+
+    def meter_samples(self, since: int, turn: int) -> tuple[int, int]:
+        first = self._meter_first(since) + turn * self._meter_round
+        return first, min(self._meter_round, self._before + self.chunk - first)
+
+    def _meter_first(self, since: int) -> int:
+        return self._before if self._before >= since else 0
+
+    @property
+    def _meter_round(self) -> int:
+        return min(METER_ROUND, self._most_samples)
 
     def resume(self, row: int, column: int) -> tuple[int, int]:
         return row, column

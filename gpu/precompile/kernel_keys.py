@@ -16,7 +16,7 @@ from gpu.device.textures import BYTES, KINDS, bound_textures
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
-from gpu.picture import noise_meter, resolve
+from gpu.picture import accumulators, noise_meter, resolve
 from gpu.settings import TONE_MAPS, RenderSettings
 
 BsdfQuestion = Literal["values", "albedo", "terms"]
@@ -107,11 +107,12 @@ def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:
 
 
 def common_keys() -> list[KernelKey]:
-    """The keys of the kernels of any scene: those that show a picture, and those of the noise meter and
-    `adaptive`."""
+    """The keys of the kernels of any scene: those that show a picture, and those of the noise meter, of blocks and
+    of `adaptive`."""
     shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
     metered = [("meter.comp", noise_meter.defines(weigh)) for weigh in (0, 1)]
-    entries = [*shown, *metered, ("areas.comp", features.defines(frozenset()))]
+    summed = [("merge.comp", accumulators.defines()), ("areas.comp", features.defines(frozenset()))]
+    entries = [*shown, *metered, *summed]
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
 
 

@@ -28,7 +28,7 @@ SIZE: dict[str, Any] = {"width": 44, "height": 37, "max_bounces": 3, "filter": "
 
 def counts(made: Picture) -> np.ndarray:
     """(height, width): each pixel's samples."""
-    moments = np.frombuffer(made._main[Slot.MOMENTS].read(), np.float32)
+    moments = np.frombuffer(made._sums.total[Slot.MOMENTS].read(), np.float32)
     return moments.reshape(made.settings.height, made.settings.width, 4)[..., 3]
 
 

@@ -60,7 +60,7 @@ def test_it_goes_on_to_the_same_bits(
 
 def test_what_it_takes(gpu: Renderer) -> None:
     small, large = RenderSettings(64, 64), RenderSettings(512, 512)
-    assert picture_bytes(large) - picture_bytes(small) == 48 * (512 * 512 - 64 * 64)
+    assert picture_bytes(large) - picture_bytes(small) == 96 * (512 * 512 - 64 * 64)
     assert picture_bytes(large, guided=True) > picture_bytes(large)
     arrays = pack(parse_scene(SCENE), Images()).arrays
     assert scene_bytes(arrays) >= arrays.materials.nbytes + arrays.spheres.nbytes

@@ -247,7 +247,7 @@ def test_renders_wait_for_memory(tmp_path: Path) -> None:
         return int(server.http.get("/v1/info").json()["memory"]["used"]["pictures"])
 
     each = 500 * 500 * (PICTURE_BYTES + SAVED_BYTES)
-    with served(tmp_path, SUNBOX_MEMORY=str(64 * MIB)) as server:
+    with served(tmp_path, SUNBOX_MEMORY=str(96 * MIB)) as server:
         for route in ("/v1/renders", "/v1/render"):
             refused = server.http.post(route, json=body(1024, 1))
             assert refused.status_code == 413 and "SUNBOX_MEMORY" in refused.json()["detail"]

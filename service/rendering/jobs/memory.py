@@ -8,8 +8,10 @@ from service.problems import ServiceError
 from service.quality import ResolvedSettings
 from service.rendering.requests.request_reader import weight
 
-PICTURE_BYTES = 128  # a pixel's, in the renderer: three vec4, two more with the AOVs, the noise meter's, the denoised
-SAVED_BYTES = 48  # a pixel's, in the server: three vec4 of the last checkpoint, or of the finished picture
+# Bytes of a pixel in the renderer: three vec4 of the samples and three of a block of them, three of the AOVs, the
+# denoised picture, and a copy of it on its way.
+PICTURE_BYTES = 176
+SAVED_BYTES = 96  # of a pixel in the server: six vec4 of the last checkpoint; a finished picture may have only three
 COPIES = 2  # of a packed scene: the server's, with which another renderer could go on, and the renderer's
 
 

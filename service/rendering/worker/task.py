@@ -155,7 +155,8 @@ class Task:
         tracker.clock.start()
         before = picture.samples
         sharers = self._sharers(self.client) if tracker.interactive else 1  # nobody waits for a render's next pass
-        picture.trace(FULL_S if self.unseen else SLICE_S, cap, sharers)
+        budget_s = FULL_S if self.unseen else SLICE_S
+        residency.insist(lambda: picture.trace(budget_s, cap, sharers))  # the second block takes memory
         tracker.clock.lap()
         self.traced += (picture.samples - before) * picture.settings.width * picture.settings.height
         tracker.pixel_s = picture.cost_s or tracker.pixel_s
@@ -227,14 +228,15 @@ class Task:
         self.settle()
         if self._residency.loaded is None:
             return
-        tracker, full, saved = self._tracker, self._residency.full, restore.saved
-        others = restore.reason is None and saved.driver not in ("", driver_of(self._renderer.info))
-        if others or [buffer.size for buffer in full.state] != [buffer.nbytes for buffer in saved.buffers]:
+        tracker, full, sent = self._tracker, self._residency.full, restore.saved
+        saved = saved_picture(sent, full.settings)
+        others = restore.reason is None and sent.driver not in ("", driver_of(self._renderer.info))
+        if others or not full.fits(saved, goes_on=restore.reason is None):
             log.warning("another driver or version saved this picture, which begins again task=%d", self.number)
             if restore.reason is None:
                 self._send(Discarded(self.number))
             return
-        full.restore(saved_picture(saved, full.settings))
+        full.restore(saved)
         tracker.reason, self._frames.scale = restore.reason, 1.0
         tracker.clock.set(restore.progress.elapsed_s)
         tracker.meter.set(restore.progress.samples, restore.progress.noise)

@@ -193,7 +193,7 @@ def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
         return now - began
 
     monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
-    picture: Any = SimpleNamespace(samples=0, under_way=(1, 0, 8), state=[], save=slow)
+    picture: Any = SimpleNamespace(samples=0, under_way=(1, 0, 8), state_sizes=[], save=slow)
     kept = checkpoints.Checkpointer(1.0)
     assert pause_s(kept, 1.0) == 1.0
     saved(kept)

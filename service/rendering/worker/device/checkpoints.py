@@ -53,7 +53,7 @@ class Checkpointer:
 
     def begin(self, picture: Picture) -> None:
         # One descriptor goes with the picture.
-        arena = shared_memory.SharedArena(*(buffer.size for buffer in picture.state))
+        arena = shared_memory.SharedArena(*picture.state_sizes)
         self._steps = Steps(picture.save(lambda size: arena.room((size,), np.dtype(np.uint8))))
         self._took_s = 0.0
 

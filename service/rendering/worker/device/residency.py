@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
 from gpu import OutOfMemory, RenderSettings
 from service.rendering.ipc.messages import Update
@@ -15,6 +15,8 @@ from service.rendering.worker.payloads import updated_scene
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
+
+T = TypeVar("T")
 
 
 class Residency:
@@ -90,16 +92,17 @@ class Residency:
         """The result of `make`; where memory is short, idle tasks and then this one's own resources make room."""
         try:
             self.make_room(size)
-            return self._insist(make)
+            return self.insist(make)
         except OutOfMemory:
             if self.loaded is None or not whole:
                 raise
             self.offload()
             self.make_room(size)
-            return self._insist(make)
+            return self.insist(make)
 
-    def _insist(self, make: Callable[[], LoadedScene | None]) -> LoadedScene | None:
-        """Retry after evicting: the driver may have less memory than is allowed."""
+    def insist(self, make: Callable[[], T]) -> T:
+        """The result of `make`, which is tried again after evicting: the driver may have less memory than is
+        allowed."""
         while True:
             try:
                 return make()
@@ -112,7 +115,7 @@ class Residency:
         offloaded = self._offloaded
         if offloaded is not None and self.loaded is None:
             self.make_room(needed(offloaded.arrays, offloaded.settings))
-            self.loaded = self._insist(lambda: LoadedScene.back(self._renderer, offloaded))
+            self.loaded = self.insist(lambda: LoadedScene.back(self._renderer, offloaded))
             self._offloaded = None
 
     def offload(self) -> None:

@@ -1,0 +1,192 @@
+"""A picture's accumulators on the device: the total of whole blocks of samples, and the block under way."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from gpu import context as contexts
+from gpu.kernels import features
+from gpu.kernels.cache import KernelCache
+from gpu.layout.bindings import BlockSlot, Slot
+from gpu.picture.blocks import Sums, merged
+from gpu.picture.dispatcher import Dispatcher
+from gpu.picture.schedule import work_groups
+
+SLOTS = (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS)
+PIXEL_BYTES = 16  # of each accumulator
+_LINE = 1024  # pixels in a row of merge.comp's invocations
+
+
+def defines() -> dict[str, object]:
+    """The defines that merge.comp is compiled with."""
+    return features.defines(frozenset()) | {"LINE": _LINE}
+
+
+class Accumulators:
+    """Those of the total are there from `allocate` on; those of the block take memory when they are first needed."""
+
+    def __init__(self, dispatcher: Dispatcher, kernels: KernelCache) -> None:
+        self._dispatcher, self._kernels = dispatcher, kernels
+        self._context, settings = dispatcher.context, dispatcher.settings
+        self._size = settings.width, settings.height
+        self.total: dict[Slot, Any] = {}
+        self.block: dict[Slot, Any] = {}
+        self.open = False  # whether there is a block under way, which belongs to the picture
+        self._clean = False  # whether the block's buffers hold zeros
+        self._zero: Any = None  # one pixel, bound in the place of a block
+
+    def allocate(self) -> None:
+        self._zero = contexts.allocate(self._context, np.zeros(4, np.float32))
+        self._take(self.total)
+
+    def _take(self, buffers: dict[Slot, Any]) -> None:
+        try:
+            for slot in SLOTS:
+                buffers[slot] = contexts.allocate(self._context, PIXEL_BYTES * self._size[0] * self._size[1])
+        except Exception:
+            self._release(buffers)
+            raise
+
+    def reset(self) -> None:
+        """Begin again without samples. With `adaptive` there is never a block."""
+        for buffer in self.total.values():
+            buffer.clear()
+        self.close()
+        if self._dispatcher.settings.adaptive:
+            self._release(self.block)
+
+    def close(self) -> None:
+        """Drop the block."""
+        self.open = self._clean = False
+
+    def allocate_block(self) -> None:
+        """Have memory for a block, with whatever contents. Raises OutOfMemory, and is then as before."""
+        if not self.block:
+            self._take(self.block)
+            self._clean = False
+
+    def empty_block(self) -> None:
+        """Have a block that is not the picture's yet, and zero everywhere. Raises OutOfMemory."""
+        self.allocate_block()
+        if not self._clean:
+            for buffer in self.block.values():
+                buffer.clear()
+        self._clean = self.open = False
+
+    def open_block(self) -> None:
+        """Begin a block, unless one is under way. Raises OutOfMemory."""
+        if not self.open:
+            self.empty_block()
+            self.open = True
+
+    def restore_block(self, contents: list[np.ndarray]) -> None:
+        """Have this block, in the order of SLOTS; without contents, none. Raises OutOfMemory."""
+        if contents:
+            self.allocate_block()
+            for buffer, data in zip(self.block.values(), contents, strict=True):
+                buffer.write(data)
+        self._clean, self.open = False, bool(contents)
+
+    @property
+    def buffers(self) -> list[Any]:
+        """Those of the block under way."""
+        return list(self.block.values()) if self.open else []
+
+    @property
+    def moment_scale(self) -> float:
+        """Second moments are of radiance times this."""
+        return 1.0 / self._dispatcher.scene.arrays.radiance_scale
+
+    def merge(self, first: int, count: int) -> None:
+        """Merge the block's pixels [first, first + count), counted row by row, and clear them in the block."""
+        kernel = self._kernels.get("merge.comp", defines())
+        part = first, 0, count, 1
+        begins = self._dispatcher.bind_part(self.total, part, 0)
+        self._dispatcher.bind_part(_beside(self.block), part, 0)
+        kernel["first"].value, kernel["count"].value = first - begins, count
+        kernel["moment_scale"].value = self.moment_scale
+        kernel.run(*work_groups(_LINE, -(-count // _LINE)))
+        self._context.finish()
+
+    def end_block(self) -> None:
+        """Note that all of the block was merged."""
+        self.open, self._clean = False, True
+
+    def bind(self, kernel: Any, first: int, count: int) -> None:
+        """Bind these pixels for a kernel that includes `accumulators.glsl`."""
+        block = self.block if self.open else None
+        bind(kernel, self.total, block, self._zero, first, count, self.moment_scale)
+
+    def bind_alone(self, total: dict[Slot, Any], kernel: Any, first: int, count: int) -> None:
+        """The same of other sums, given as SUM and MOMENTS."""
+        bind(kernel, total, None, self._zero, first, count, self.moment_scale)
+
+    def read(self, first: int, count: int) -> Sums:
+        """The sums of pixels [first, first + count), the block's among them: each (count, 4) float32."""
+        total = Sums(*(self._vectors(buffer, first, count) for buffer in self.total.values()))
+        if not self.open:
+            return total
+        block = Sums(*(self._vectors(buffer, first, count) for buffer in self.block.values()))
+        return merged(total, block, self.moment_scale)
+
+    def _vectors(self, buffer: Any, first: int, count: int) -> np.ndarray:
+        data = buffer.read(PIXEL_BYTES * count, offset=PIXEL_BYTES * first)
+        return np.frombuffer(data, np.float32).reshape(count, 4)
+
+    def clear_rows(self, top: int, rows: int) -> None:
+        """Clear rows of the block."""
+        width = self._size[0]
+        for buffer in self.block.values():
+            buffer.clear(PIXEL_BYTES * width * rows, offset=PIXEL_BYTES * width * top)
+
+    def read_rows(self, top: int, rows: int) -> np.ndarray:
+        """Rows of the block: (rows, width, 12) float32, one accumulator after the other."""
+        width = self._size[0]
+        parts = [self._vectors(buffer, width * top, width * rows) for buffer in self.block.values()]
+        return np.concatenate(parts, axis=-1).reshape(rows, width, 4 * len(SLOTS))
+
+    def write_rows(self, top: int, values: np.ndarray) -> None:
+        """Write what `read_rows` gave."""
+        for k, buffer in enumerate(self.block.values()):
+            part = np.ascontiguousarray(values[..., 4 * k : 4 * k + 4], np.float32)
+            buffer.write(part, offset=PIXEL_BYTES * self._size[0] * top)
+
+    def release(self) -> None:
+        self._release(self.total)
+        self._release(self.block)
+        if self._zero is not None:
+            self._zero.release()
+
+    @staticmethod
+    def _release(buffers: dict[Slot, Any]) -> None:
+        for buffer in buffers.values():
+            buffer.release()
+        buffers.clear()
+
+
+def bind(
+    kernel: Any, total: dict[Slot, Any], block: dict[Slot, Any] | None, zero: Any, first: int, count: int,
+    moment_scale: float,
+) -> None:  # fmt: skip
+    """Bind pixels [first, first + count) for a kernel that includes `accumulators.glsl`; `zero` where there is no
+    buffer."""
+    for slot in SLOTS:
+        places = (int(slot), total.get(slot)), (int(_BESIDE[slot]), None if block is None else block[slot])
+        for place, buffer in places:
+            if buffer is None:
+                zero.bind_to_storage_buffer(place)
+            else:
+                buffer.bind_to_storage_buffer(place, offset=PIXEL_BYTES * first, size=PIXEL_BYTES * count)
+    for name, value in (("block_stride", int(block is not None)), ("moment_scale", moment_scale)):
+        uniform = kernel.get(name, None)  # a kernel that needs no moments has no scale of them
+        if uniform is not None:
+            uniform.value = value
+
+
+_BESIDE = dict(zip(SLOTS, BlockSlot, strict=True))
+
+
+def _beside(block: dict[Slot, Any]) -> dict[Any, Any]:
+    return {_BESIDE[slot]: buffer for slot, buffer in block.items()}
