@@ -1,10 +1,11 @@
-"""SUNBOX_DEVICES: which renderers there are, what each gets of the machine, and what ends the start."""
+"""SUNBOX_DEVICES: which renderers there are, what each gets of the machine and does not do twice, and what ends a start."""
 
 from __future__ import annotations
 
 import os
 import subprocess
 import sys
+import threading
 from pathlib import Path
 from typing import Any
 
@@ -13,9 +14,11 @@ import pytest
 from gpu import Renderer, devices, software_device
 from service import config as configs
 from service.config import Config, ConfigError, load_config
+from service.rendering.ipc import channel
 from service.rendering.supervisor import devices as seating
 from service.rendering.supervisor.devices import missing_device, seats
 from service.rendering.supervisor.process import THREADS
+from service.rendering.worker.helpers import compile_main
 from tests.serving import SCENE, Server
 
 GPU, PROCESSOR = {"name": "/dev/dri/card0", "software": False}, {"name": "software", "software": True}
@@ -141,3 +144,22 @@ def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
     assert server.stop() == 0 and len(workers) == 2
     assert not any(Path(f"/proc/{worker}").exists() for worker in workers)
     assert "renderer=1" in server.log.read_text()
+
+
+def test_spare_compilers_wait_for_each_other_and_nobody_for_them(tmp_path: Path) -> None:
+    """Those of several renderers have the same list: one of them compiles a kernel, and the others find it."""
+    record, done = tmp_path / "kernels" / "kernel", threading.Event()
+    mine, theirs = channel.pair()
+
+    def again() -> None:
+        with compile_main._alone(record, theirs, compile_main.SPARE_LOCK):
+            done.set()
+
+    with mine, theirs:
+        other = threading.Thread(target=again)
+        with compile_main._alone(record, theirs, compile_main.SPARE_LOCK):
+            other.start()
+            with compile_main._alone(record, theirs, compile_main.LOCK):
+                assert not done.wait(0.2)
+        other.join(10)
+        assert done.is_set()

@@ -15,7 +15,7 @@ import signal
 import socket
 import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext, suppress
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from service.rendering.ipc import channel
@@ -24,6 +24,7 @@ from service.rendering.worker.helpers.compile_client import Compiled, records
 from service.rendering.worker.helpers.lifeline import end_with, end_with_pipe, hung_up
 
 IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
+LOCK, SPARE_LOCK = ".lock", ".spare"  # endings of the files that are locked
 LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
 SPARE_IDLE_S = 5.0  # ... where kernels come seldom
 
@@ -55,8 +56,9 @@ def main() -> int:
                 key = channel.receive(end, wait=True)
                 record = records() / key.digest(arguments.driver)
                 try:
-                    # In spare time nobody may be made to wait: that can take as long as it likes.
-                    with nullcontext() if arguments.spare else _alone(record, end):
+                    # What compiles in spare time can take as long as it likes: only its like waits for it, that of
+                    # the other renderers, which all have the same list.
+                    with _alone(record, end, SPARE_LOCK if arguments.spare else LOCK):
                         compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(key))
                         if compiled.cached:
                             _record(record)
@@ -69,9 +71,9 @@ def main() -> int:
 
 
 @contextmanager
-def _alone(record: Path, end: socket.socket) -> Iterator[None]:
-    """Wait for a lock, so that no other process compiles the same kernel. Raises channel.Closed."""
-    path = record.with_suffix(".lock")
+def _alone(record: Path, end: socket.socket, lock_suffix: str) -> Iterator[None]:
+    """Wait for a lock, so that no other process of its kind compiles the same kernel. Raises channel.Closed."""
+    path = record.with_suffix(lock_suffix)
     try:
         record.parent.mkdir(parents=True, exist_ok=True)
         lock = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
