@@ -28,8 +28,8 @@ log = logging.getLogger(__name__)
 
 class Keeper:
     """For the event loop. `heard` is called with the process's messages; `began` when another process has been begun;
-    `lost` with one that was lost, and why; `hopeless` when the next attempt is some time away; `changed` whenever
-    the process is ready or lost, or has to wait, or there is no hope for it.
+    `lost` with one that was lost, and why; `hopeless` after that, when the next attempt is some time away; `changed`
+    whenever the process is ready or lost, or has to wait, or there is no hope for it.
     """
 
     def __init__(self, id: str, start: Start, patience_s: float, statistics: Statistics) -> None:
@@ -190,8 +190,8 @@ class Keeper:
         log.error(line, self._id, cause, process.lived_s, self.restarts.failures)
         self.lost(process, cause)
         if self.restarts.hopeless:
-            self.changed()
             self.hopeless()
+            self.changed()
             if self._ready is not None and not self._ready.done():
                 self._ready.set_exception(Unavailable(self.detail))
                 self._ready.exception()  # looked at: perhaps nobody waits, and asyncio would complain

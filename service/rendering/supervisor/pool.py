@@ -18,6 +18,8 @@ from service.rendering.supervisor.keeper import STARTING
 from service.rendering.supervisor.process import Options, Start
 from service.rendering.supervisor.supervisor import Supervisor
 
+QUESTIONS: tuple[Kind, ...] = ("bsdf", "server")
+
 log = logging.getLogger(__name__)
 
 
@@ -33,8 +35,9 @@ class Seat:
 class Pool:
     """Fulfils `Renderers` with a supervisor for each seat.
 
-    A task stays with its renderer for life, through the losses of the process too. Where there is no hope for that
-    one, its tasks move to others; it is tried again all the time, and gets new tasks when it is back.
+    A stream or a render stays with its renderer for life, through the losses of the process too. Where there is no
+    hope for that one, its tasks move to others; it is tried again all the time, and gets new tasks when it is back.
+    Questions, which take less time than a process takes to start, move at once.
     """
 
     def __init__(self, seats: Sequence[Seat]) -> None:
@@ -44,8 +47,8 @@ class Pool:
         self._homes: dict[int, Supervisor] = {}  # by task
         self._stirred = asyncio.Event()  # set, and replaced, when a renderer is ready or lost
         for supervisor in self._supervisors:
-            supervisor.changed = partial(self._changed, supervisor)
-            supervisor.ended = self._forget
+            supervisor.changed, supervisor.ended = self._changed, self._forget
+            supervisor.lost = partial(self._take_over_from, supervisor)
 
     def start(self) -> None:
         for supervisor in self._supervisors:
@@ -54,7 +57,7 @@ class Pool:
     def drain(self) -> None:
         for supervisor in self._supervisors:
             supervisor.drain()
-        self._stir()
+        self._changed()
 
     async def close(self) -> None:
         self.drain()
@@ -127,34 +130,41 @@ class Pool:
         """Why nothing renders, as each renderer says it, and once where all say the same."""
         return " ".join(dict.fromkeys(supervisor.detail for supervisor in self._supervisors))
 
-    def _best(self, load: Callable[[Supervisor], tuple[int, ...]], driver: str = "") -> Supervisor | None:
+    def _best(
+        self, load: Callable[[Supervisor], tuple[int, ...]], driver: str = "", other_than: Supervisor | None = None
+    ) -> Supervisor | None:
         """The renderer with the least load, of those with that driver, if any, and of those that render just now.
 
         None where there is none.
         """
-        able = [supervisor for supervisor in self._supervisors if supervisor.takes_tasks]
+        able = [each for each in self._supervisors if each.takes_tasks and each is not other_than]
         return min(
             able,
             key=lambda each: (bool(driver) and each.driver != driver, each.info is None, load(each)),
             default=None,
         )
 
-    def _changed(self, supervisor: Supervisor) -> None:
-        if supervisor.hopeless or supervisor.waiting:
-            self._move_all(supervisor)
-        self._stir()
+    def _changed(self) -> None:
+        for supervisor in self._supervisors:
+            if supervisor.waiting:
+                self._take_over_from(supervisor)
+        self._stirred.set()
+        self._stirred = asyncio.Event()
 
-    def _move_all(self, lost: Supervisor) -> None:
-        """Have others go on with the tasks of a renderer that is not expected back, as far as there are others."""
+    def _take_over_from(self, lost: Supervisor) -> None:
+        """Have others go on with tasks of a renderer that has no process just now, as far as there are others."""
         moved = 0
         for number, task in list(lost.tasks.items()):
-            home = self._best(_load(task.kind, task.client), task.record.driver)
-            if home is None or (lost.waiting and home.info is None):
-                break
-            self._move(number, home)
-            moved += 1
+            driver = task.record.driver
+            home = self._best(_load(task.kind, task.client), driver, other_than=lost)
+            if home is None or number not in lost.tasks:
+                continue
+            at_once = home.info is not None and driver in ("", home.driver)  # nothing of it is lost
+            if lost.hopeless or (at_once and (lost.waiting or task.kind in QUESTIONS)):
+                self._move(number, home)
+                moved += 1
         if moved:
-            log.warning("moved the tasks of a lost renderer to others renderer=%s tasks=%d", lost.place.id, moved)
+            log.info("moved tasks to other renderers renderer=%s tasks=%d", lost.place.id, moved)
 
     def _move_to_driver(self, number: int, driver: str) -> None:
         """Move a task of which nothing has been sent yet to a renderer that can go on with its picture."""
@@ -173,10 +183,6 @@ class Pool:
 
     def _forget(self, task: int) -> None:
         self._homes.pop(task, None)
-
-    def _stir(self) -> None:
-        self._stirred.set()
-        self._stirred = asyncio.Event()
 
 
 def _load(kind: Kind, client: str) -> Callable[[Supervisor], tuple[int, ...]]:

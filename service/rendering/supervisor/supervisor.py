@@ -51,8 +51,9 @@ class Supervisor:
     """Fulfils `Renderers` with one process.
 
     Whoever has several of them sets what they call, on the event loop: `changed` when the process is ready or lost,
-    and when there is no hope for it; `ended` with the number of a task that is there no more, for whatever reason;
-    `stray` with a message for a task that is another supervisor's, or nobody's any more.
+    and when there is no hope for it; `lost` when others may take over its tasks, none of which can still be blamed
+    for the loss; `ended` with the number of a task that is there no more, for whatever reason; `stray` with a message
+    for a task that is another supervisor's, or nobody's any more.
     """
 
     def __init__(
@@ -67,6 +68,7 @@ class Supervisor:
         self.place = place or Place()
         options = replace(options or Options(), name=self.place.id)
         self.changed: Callable[[], None] = lambda: None
+        self.lost: Callable[[], None] = lambda: None
         self.ended: Callable[[int], None] = lambda task: None
         self.stray: Callable[[Heard], None] = lambda message: None
         self._tasks: dict[int, Task] = {}
@@ -74,7 +76,7 @@ class Supervisor:
         self._keeper = keeper = Keeper(
             self.place.id, start or partial(Process, options), options.patience_s, self.statistics
         )
-        keeper.heard, keeper.began, keeper.lost = self._received, self._began, self._blame
+        keeper.heard, keeper.began, keeper.lost = self._received, self._began, self._lose
         keeper.changed, keeper.hopeless = lambda: self.changed(), lambda: self._fail_all(self.detail)
 
     def start(self) -> None:
@@ -323,6 +325,10 @@ class Supervisor:
             self.statistics.compile_s.add(loaded.compile_ms / 1e3)
         else:
             self.statistics.kernels_found += 1
+
+    def _lose(self, process: RendererProcess, cause: Cause) -> None:
+        self._blame(process, cause)
+        self.lost()
 
     def _blame(self, process: RendererProcess, cause: Cause) -> None:
         """Count the loss against the task that was worked on, unless the renderer was ended from outside."""

@@ -1,4 +1,4 @@
-"""SUNBOX_DEVICES: which renderers there are, what each gets of the machine and does not do twice, and what ends a start."""
+"""SUNBOX_DEVICES: which renderers there are, what each gets of the machine, and what ends the start."""
 
 from __future__ import annotations
 
