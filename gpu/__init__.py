@@ -36,7 +36,7 @@ from gpu.errors import (
     WrongThread,
 )
 from gpu.footprint import picture_bytes, scene_bytes
-from gpu.picture.blocks import Band, border_after
+from gpu.picture.blocks import Band, border_after, stop_after
 from gpu.picture.picture import Picture
 from gpu.picture.saved import Saved
 from gpu.precompile.kernel_keys import KernelKey
@@ -82,4 +82,5 @@ __all__ = [
     "picture_bytes",
     "scene_bytes",
     "software_device",
+    "stop_after",
 ]

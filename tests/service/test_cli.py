@@ -220,6 +220,24 @@ def test_target_noise_ends_a_render(gpu: Any, scene: Path, tmp_path: Path) -> No
     assert 0 < json.loads(stats.read_text())["noise"] <= 0.01
 
 
+def test_target_noise_ends_a_render_at_the_same_samples_however_fast_it_is(
+    gpu: Any, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """In turns of a slice and of many passes, and however rarely the noise is read in between."""
+    found = []
+    for turn_s, slice_s, pause in ((0.0, 1e-5, 0), (1.0, 0.1, 1000)):
+        monkeypatch.setattr("service.rendering.worker.task.SLICE_S", turn_s)
+        monkeypatch.setattr("gpu.picture.tiles.SLICE_S", slice_s)
+        monkeypatch.setattr("service.rendering.worker.progress.noise.PAUSE", pause)
+        out, stats = tmp_path / f"{pause}.npy", tmp_path / f"{pause}.json"
+        more = {"width": 64, "height": 64, "target_noise": 0.012, "sampler": "independent"}
+        size = [part for name, value in more.items() for part in ("--set", f"{name}={value}")]
+        assert main(["render", str(scene), "-o", str(out), "--stats", str(stats), *size]) == 0
+        ended = json.loads(stats.read_text())
+        found.append((np.load(out).tobytes(), ended["samples"], ended["noise"]))
+    assert found[0] == found[1] and found[0][1] % 64 == 0
+
+
 def test_interrupt_keeps_the_image_so_far(gpu: Any, scene: Path, tmp_path: Path) -> None:
     out, stats = tmp_path / "out.npy", tmp_path / "stats.json"
     command = [sys.executable, "-m", "service.cli", "render", str(scene), "-o", str(out), "--stats", str(stats)]

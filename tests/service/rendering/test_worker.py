@@ -7,6 +7,7 @@ import time
 from collections.abc import Awaitable, Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -36,7 +37,8 @@ from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
 from service.rendering.worker.loop import coalesced
-from service.rendering.worker.progress.stop_rules import late, reached
+from service.rendering.worker.progress.noise import NoiseReading
+from service.rendering.worker.progress.stop_rules import judged_after, judged_from, late, reached
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -59,6 +61,26 @@ LINEAR = View(encoding="linear")
 )
 def test_reached(stop: StopRule, samples: int, noise: float | None, expected: str | None) -> None:
     assert reached(stop, samples, noise) == expected
+
+
+def test_a_noise_that_was_reported_is_read_again_before_it_decides() -> None:
+    """A checkpoint's may be of fewer samples than the picture has."""
+    reading, picture = NoiseReading(), SimpleNamespace(samples=64, noise=lambda: 0.25)
+    reading.set(64, 0.5)
+    shown: Any = picture
+    assert reading.read(shown) == 0.5 and reading.read(shown, fresh=True) == 0.25 and reading.at == 64
+
+
+def test_noise_is_judged_at_numbers_that_depend_on_nothing() -> None:
+    """At most 16 in an octave, all of them borders of blocks of samples from 64 on."""
+    judged, samples = [], 0
+    while samples < 1 << 16:
+        samples = judged_after(samples)
+        judged.append(samples)
+        assert judged_from(samples) == judged_from(samples - 0.5) == samples
+    assert judged[:6] == [16, 32, 64, 128, 192, 256] and not any(n % 64 for n in judged[2:])
+    for octave in range(4, 16):
+        assert 1 <= sum(1 << octave <= n < 2 << octave for n in judged) <= 16
 
 
 @pytest.mark.parametrize(

@@ -6,6 +6,7 @@ import math
 
 from service.quality import TRUSTED_SAMPLES
 from service.rendering.ipc.messages import StopRule
+from service.rendering.worker.progress.stop_rules import judged_from
 
 GROWTH = 1.05  # of samples from one mark to the next: some hundred marks to a million
 # Of the samples before them, those to start from: at 8 the noise meter begins, which makes samples dearer in small
@@ -24,14 +25,12 @@ class EtaEstimate:
     def __init__(self) -> None:
         self._marks: list[tuple[int, float]] = [(0, 0.0)]  # complete samples and the seconds to them
         self._latest = self._marks[0]
-        self._pass_s = 0.0  # what the last pass took
         self._noises: list[tuple[int, float]] = []
         self._noise: tuple[int, float] | None = None
 
     def passed(self, samples: int, elapsed_s: float) -> None:
         """Note how many samples are complete now."""
         if samples > self._latest[0]:
-            self._pass_s = elapsed_s - self._latest[1]
             self._latest = samples, elapsed_s
             if samples >= GROWTH * self._marks[-1][0]:
                 self._marks.append(self._latest)
@@ -50,8 +49,7 @@ class EtaEstimate:
         if stop.max_samples is not None and self._latest[0]:
             totals.append(self._time_of(stop.max_samples))
         if stop.target_noise is not None and self._noise is not None and self._latest[0]:
-            # It is seen to be reached when the pass has ended that was under way.
-            totals.append(self._time_of(self._samples_to(stop.target_noise, *self._noise)) + self._pass_s)
+            totals.append(self._time_of(judged_from(self._samples_to(stop.target_noise, *self._noise))))
         return max(0.0, min(totals) - elapsed_s) if totals else None
 
     def _time_of(self, samples: float) -> float:
@@ -67,10 +65,10 @@ class EtaEstimate:
 
     def _samples_to(self, target: float, samples: int, noise: float) -> float:
         if noise <= target:
-            return float(max(TRUSTED_SAMPLES, samples))
+            return float(max(samples, self._latest[0]))
         level, power = self._line(samples, noise)
         wanted = samples * math.exp((level - math.log(target)) / power)
-        return max(float(TRUSTED_SAMPLES), wanted, (1 + LEAST_LEFT) * max(samples, self._latest[0]))
+        return max(wanted, (1 + LEAST_LEFT) * max(samples, self._latest[0]))
 
     def _line(self, samples: int, noise: float) -> tuple[float, float]:
         """The logarithm of the noise at a number of samples, and the power of these with which it falls."""

@@ -8,7 +8,14 @@ from service.rendering.ipc.messages import Progress, Reason, StopRule
 from service.rendering.worker.device.residency import Residency
 from service.rendering.worker.progress.eta import EtaEstimate
 from service.rendering.worker.progress.noise import NoiseReading
-from service.rendering.worker.progress.stop_rules import MAX_SAMPLES, Clock, late, reached
+from service.rendering.worker.progress.stop_rules import (
+    MAX_SAMPLES,
+    Clock,
+    judged_after,
+    judged_from,
+    late,
+    reached,
+)
 from service.rendering.worker.progress.truncated_light import TruncatedLight
 
 if TYPE_CHECKING:
@@ -50,8 +57,10 @@ class ProgressTracker:
     def cap(self, residency: Residency) -> int:
         """How many samples to aim at: all, or as many as fit into the time; every pixel ends with the same number."""
         limit, samples = self.stop.max_samples or MAX_SAMPLES, residency.full.samples
-        if residency.full.under_way[0] and reached(self.stop, samples, self.meter.noise) is not None:
+        if residency.full.under_way[0] and samples >= limit:
             return samples + residency.full.under_way[0]  # see `enough`
+        if self.stop.target_noise is not None:
+            limit = min(limit, judged_after(samples))
         if self.stop.time_limit is None:
             return limit
         left_s, sample_s = self.stop.time_limit - self.clock.now_s, self._sample_s(residency)
@@ -60,9 +69,11 @@ class ProgressTracker:
 
     def enough(self, residency: Residency) -> Reason | None:
         """The reason to end now; None to go on."""
-        noise = self.noise(residency) if self.stop.target_noise is not None else None
-        reason = reached(self.stop, residency.full.samples, noise)
-        if residency.full.under_way[0]:  # the pass is finished first, so that as many samples give the same picture
+        full, noise = residency.full, None
+        if self.stop.target_noise is not None and full.at_border and judged_from(full.samples) == full.samples:
+            noise = self.noise(residency, fresh=True)  # nothing that depends on when it was read last
+        reason = reached(self.stop, full.samples, noise)
+        if full.under_way[0]:  # the pass is finished first, so that as many samples give the same picture
             reason = None
         if reason is None and late(self.stop, self.clock.now_s, self._sample_s(residency), self.even):
             reason = "time_limit"

@@ -2,12 +2,17 @@
 
 from __future__ import annotations
 
+import math
 import time
 
+from gpu import stop_after
 from service.quality import TRUSTED_SAMPLES
 from service.rendering.ipc.messages import Reason, StopRule
 
 MAX_SAMPLES = 1 << 24  # of the contract: where float32 sums stop counting
+# Numbers of samples in an octave at which `target_noise` is judged, at most, as reading the noise takes time. From
+# 1024 samples on an octave has as many, and at most a sixteenth of a render's samples are more than it needs.
+_JUDGED_AN_OCTAVE = 16
 
 
 class Clock:
@@ -49,6 +54,20 @@ def reached(stop: StopRule, samples: int, noise: float | None) -> Reason | None:
     if stop.target_noise is not None and noise is not None and samples >= TRUSTED_SAMPLES:
         return "target_noise" if noise <= stop.target_noise else None
     return None
+
+
+def judged_after(samples: int) -> int:
+    """The first number of samples above this one at which `target_noise` is judged: 16, 32, or a multiple of 64. It
+    depends on nothing else, so that a render ends with the same samples however fast it goes."""
+    judged = stop_after(max(samples, TRUSTED_SAMPLES - 1))
+    octave = 1 << judged.bit_length() - 1
+    step = octave // _JUDGED_AN_OCTAVE
+    return -(-judged // step) * step
+
+
+def judged_from(samples: float) -> int:
+    """The same, but not below this number."""
+    return judged_after(math.ceil(samples) - 1)
 
 
 def late(stop: StopRule, now_s: float, sample_s: float, even: bool) -> bool:
