@@ -18,7 +18,7 @@ from pathlib import Path
 
 from service.bench import soak_clients as clients
 from service.bench import soak_page
-from service.bench.soak_server import Server, descriptors, resident
+from service.bench.soak_server import Server, descriptors, largest, resident
 from service.bench.soak_tally import Tally
 
 STREAMS, RENDERS = 4, 2
@@ -35,10 +35,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m service.bench.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--devices", help="SUNBOX_DEVICES of the server, such as llvmpipe:2")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="sunbox-soak-") as folder:
         tally = Tally()
-        server = Server(Path(folder))
+        server = Server(Path(folder), {"SUNBOX_DEVICES": arguments.devices} if arguments.devices else None)
         try:
             _run(server, tally, 60.0 * arguments.minutes, random.Random(arguments.seed))
             tally.jain = clients.share_alike(server, tally)
@@ -85,9 +86,9 @@ def _run(server: Server, tally: Tally, seconds: float, chance: random.Random) ->
 
 def _kill(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
     while not over.wait(chance.uniform(*KILL_EVERY_S)):
-        pid = server.renderer()
-        if pid is not None:
-            os.kill(pid, signal.SIGKILL)
+        pids = server.renderers()
+        if pids:
+            os.kill(chance.choice(pids), signal.SIGKILL)
             tally.kill()
 
 
@@ -95,9 +96,8 @@ def _watch(server: Server, tally: Tally, over: threading.Event, chance: random.R
     """Record memory and descriptors until the end."""
     began = time.monotonic()
     while not over.wait(WATCH_S):
-        pid = server.renderer()
         settled = time.monotonic() - began > SETTLED_S
-        tally.seen(resident(server.pid), resident(pid), descriptors(server), settled)
+        tally.seen(resident(server.pid), largest(server.renderers()), descriptors(server), settled)
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import os
 import random
+import signal
 import subprocess
 import sys
 import threading
@@ -27,6 +28,7 @@ SIDE, SAMPLES = 64, 32
 LONG_SIDE, LONG_SAMPLES = 512, 1500  # one that is under way at every restart
 COMPARED = 40  # pictures
 ORPHANS_S = 10.0  # within which the children of a killed server have to end
+KILL_EVERY_S = (2.0, 8.0)  # bounds on the life of a renderer, in seconds
 BETWEEN = 0.5, 1.5  # times the mean between two restarts
 LOOK_S = 5.0  # between two looks at how far the renders are
 STUCK_S = 120.0  # without any render that has got further
@@ -38,6 +40,7 @@ class Outcome:
     """What came of it; the names are those of the table's rows."""
 
     restarts: int = 0
+    kills: int = 0
     accepted: int = 0
     done: int = 0
     compared: int = 0
@@ -56,6 +59,7 @@ class Outcome:
         starts = sorted(self.starts_s)
         return [
             ("restarts of the server", str(self.restarts)),
+            ("renderers killed", str(self.kills)),
             ("kill to first answer, median / longest (s)", f"{starts[len(starts) // 2]:.1f} / {starts[-1]:.1f}"),
             ("renders accepted / done", f"{self.accepted} / {self.done}"),
             ("ids asked for right after a start", str(self.checked)),
@@ -67,8 +71,11 @@ class Outcome:
         ]
 
 
-def run(folder: Path, restarts: int, renders: int, seconds: float, chance: random.Random) -> Outcome:
-    """`renders` of them, while the server is restarted `restarts` times over about that many seconds."""
+def run(
+    folder: Path, restarts: int, renders: int, seconds: float, chance: random.Random, devices: str | None = None
+) -> Outcome:
+    """`renders` of them, while the server is restarted `restarts` times over about that many seconds. With `devices`
+    it has these renderers, which are killed one by one all the while; pictures are compared with one renderer's."""
     outcome = Outcome()
     settings = {
         "SUNBOX_MAX_JOBS": str(2 * renders + 10),
@@ -79,8 +86,13 @@ def run(folder: Path, restarts: int, renders: int, seconds: float, chance: rando
     data = folder / "data"
     data.mkdir()
     current = [_started(lambda: Server(data, settings))]
+    over = threading.Event()
     try:
         expected = [_picture(current[0], number) for number in range(DOCUMENTS)]
+        if devices is not None:
+            settings["SUNBOX_DEVICES"] = devices
+            killer = threading.Thread(target=_kill_renderers, args=(current, over, chance, outcome), daemon=True)
+            killer.start()
         ids: dict[int, str] = {}
         pipeline = threading.Thread(target=_hand_in, args=(current, renders, ids, outcome), daemon=True)
         pipeline.start()
@@ -89,6 +101,7 @@ def run(folder: Path, restarts: int, renders: int, seconds: float, chance: rando
             _restart(current, lambda: Server(data, settings), chance, outcome)
             _check(current[0], dict(ids), chance, outcome)
             sys.stderr.write(f"soak: {outcome.restarts} restarts, {len(ids)} renders accepted\n")
+        over.set()
         pipeline.join(STUCK_S + renders)
         outcome.accepted = len(ids)
         if pipeline.is_alive():
@@ -96,11 +109,20 @@ def run(folder: Path, restarts: int, renders: int, seconds: float, chance: rando
         _wait(current[0], ids, outcome)
         _compare(current[0], ids, expected, chance, outcome)
     finally:
+        over.set()
         code, left = current[0].stop()
         outcome.orphans += left
         if code:
             outcome.wrong.append(f"exit code {code}")
     return outcome
+
+
+def _kill_renderers(current: list[Server], over: threading.Event, chance: random.Random, outcome: Outcome) -> None:
+    while not over.wait(chance.uniform(*KILL_EVERY_S)):
+        if pids := current[0].renderers():
+            with suppress(ProcessLookupError):
+                os.kill(chance.choice(pids), signal.SIGKILL)
+                outcome.kills += 1
 
 
 def _order(number: int) -> dict[str, Any]:
@@ -312,10 +334,12 @@ def main() -> int:
     parser.add_argument("--renders", type=int, default=1000)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--devices", help="SUNBOX_DEVICES of the server, such as llvmpipe:2; they are killed, too")
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="sunbox-soak-") as folder:
         seconds = 60 * arguments.minutes
-        outcome = run(Path(folder), arguments.restarts, arguments.renders, seconds, random.Random(arguments.seed))
+        chance = random.Random(arguments.seed)
+        outcome = run(Path(folder), arguments.restarts, arguments.renders, seconds, chance, arguments.devices)
         fill_disk(Path(folder), outcome)
         jump_clock(Path(folder), outcome)
     rows = outcome.rows()

@@ -60,14 +60,14 @@ class Server:
         found = subprocess.run(["ps", "-o", "pid=", "--ppid", str(self.pid)], capture_output=True, text=True)
         return [int(pid) for pid in found.stdout.split()]
 
-    def renderer(self) -> int | None:
+    def renderers(self) -> list[int]:
+        """The processes that render."""
+        found = []
         for pid in self.children():
-            try:
+            with suppress(OSError):
                 if b"service.rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                    return pid
-            except OSError:
-                continue
-        return None
+                    found.append(pid)
+        return found
 
     def family(self) -> list[int]:
         """The server's process and all processes below it."""
@@ -94,7 +94,12 @@ class Server:
         return code, still_there(children, 1.0)
 
 
-def resident(pid: int | None) -> int:
+def largest(pids: list[int]) -> int:
+    """The most memory that one of these processes has."""
+    return max((resident(pid) for pid in pids), default=0)
+
+
+def resident(pid: int) -> int:
     try:
         return int(Path(f"/proc/{pid}/statm").read_text().split()[1]) * PAGE
     except (OSError, IndexError):

@@ -8,7 +8,7 @@ from collections import Counter
 from collections.abc import Sequence
 from statistics import median
 
-from service.bench.soak_server import Server, descriptors, resident
+from service.bench.soak_server import Server, descriptors, largest, resident
 
 MIB = 2**20
 
@@ -79,7 +79,7 @@ class Tally:
             self._page.append((heap, nodes))
 
     def end(self, server: Server) -> None:
-        self._ended = resident(server.pid), resident(server.renderer()), descriptors(server)
+        self._ended = resident(server.pid), largest(server.renderers()), descriptors(server)
 
     def good(self, growth: float, fair: float, page_growth: float) -> bool:
         early, late = _halves(self._memory, 0)

@@ -15,11 +15,11 @@ from service.commands import Failed
 from service.commands.progress import ProgressLine
 from service.quality import forecast
 from service.rendering.ipc import messages
+from service.rendering.ipc.kernel_messages import KernelMeasured
 from service.rendering.ipc.messages import (
     Done,
     FromRenderer,
     Image,
-    KernelMeasured,
     Loaded,
     Progress,
     Progressed,

@@ -89,6 +89,15 @@ class Renderers(Protocol):
         Tasks of one `client` share its part of the time; without a name each has its own.
         """
 
+    def divide(self, task: int, most: int | None) -> None:
+        """Let at most so many renderers trace the task together; None: all that are free.
+
+        Without it renders get all that are free, and other tasks one.
+        """
+
+    def tracing(self, task: int | None) -> int:
+        """How many renderers trace the task now."""
+
     def drop(self, task: int) -> None:
         """End a task; its listener hears no more."""
 

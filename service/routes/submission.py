@@ -92,7 +92,7 @@ def _status(own: AppState, stored: StoredRender) -> dict[str, Any]:
     try:
         return own.renders.get(stored.order.id, stored.order.owner).status()
     except ServiceError:
-        return status(stored.order, stored.outcome, UNASKED)
+        return status(stored.order, stored.outcome, UNASKED, renderers=0)
 
 
 def _turn(own: AppState, name: str, key: str) -> asyncio.Lock:

@@ -8,6 +8,8 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
+from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
+from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
 from service.views import DEFAULT_TONE_MAP, Encoding
 
 BsdfQuestion = Literal["values", "albedo", "terms"]
@@ -62,6 +64,9 @@ class SavedPicture:
     under_way: tuple[int, int, int]  # samples of the pass, row and column of its next tile
     buffers: list[np.ndarray]
     driver: str = ""  # whose bits these are: only with an equal one they are gone on with; "": nobody knows
+    # Bands that were done of blocks that were not merged yet: first sample, number of samples, first row, number of
+    # rows. Their values are the last ones of `buffers`.
+    bands: tuple[tuple[int, int, int, int], ...] = ()
 
 
 def driver_of(info: Mapping[str, Any]) -> str:
@@ -156,13 +161,6 @@ class Stop:
 
 @dataclass(frozen=True)
 class Drop:
-    task: int
-
-
-@dataclass(frozen=True)
-class MeasureKernel:
-    """Asks what the kernel of a render saves, to be measured when there is nothing else to do."""
-
     task: int
 
 
@@ -294,29 +292,6 @@ class Checkpoint:
 
 
 @dataclass(frozen=True)
-class KernelMeasured:
-    """How long a sample takes with a render's own kernel and with every feature on; or `detail` says why not."""
-
-    task: int
-    detail: str = ""
-    full_compile_ms: float | None = None
-    sample_s: float | None = None  # and pixel
-    full_sample_s: float | None = None
-
-    @property
-    def kernel(self) -> dict[str, Any]:
-        """What a render's status says of it."""
-        known = self.sample_s is not None and self.full_sample_s is not None and self.full_sample_s > 0
-        return {
-            "saving": 1 - (self.sample_s or 0.0) / (self.full_sample_s or 1.0) if known else None,
-            "saving_unknown": self.detail or None,
-            "sample_s": self.sample_s,
-            "full_sample_s": self.full_sample_s,
-            "full_compile_ms": self.full_compile_ms,
-        }
-
-
-@dataclass(frozen=True)
 class Evaluated:
     """The members of a gpu.BsdfValues, BsdfAlbedo or BsdfTerms, by name."""
 
@@ -379,6 +354,10 @@ ToRenderer = (
     | Restore
     | MeasureKernel
     | EvaluateBsdf
+    | Assist
+    | Assistants
+    | Lease
+    | LeaseDone
 )
 Heard = (  # of a renderer that has started
     Usage
@@ -393,5 +372,8 @@ Heard = (  # of a renderer that has started
     | Evicted
     | Discarded
     | Failed
+    | Lease
+    | LeaseDone
+    | LeaseFailed
 )
 FromRenderer = Ready | Unable | Heard

@@ -15,15 +15,14 @@ import numpy as np
 from service.memory import MemoryBudget
 from service.pack import Packed
 from service.problems import Conflict, Gone, Internal, ServiceError, Unavailable, answer
+from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
     Failed,
     FromRenderer,
     Image,
-    KernelMeasured,
     Loaded,
-    MeasureKernel,
     Progress,
     Progressed,
     Restore,
@@ -210,7 +209,7 @@ class Job(Ordered):
         return self.finished.is_set() or not self._over.is_set()
 
     def status(self) -> dict[str, Any]:
-        return status(self.order, self.outcome, self._kernel.known)
+        return status(self.order, self.outcome, self._kernel.known, self.renderers.tracing(self._task))
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
         """The picture so far. Raises Conflict before the first sample, and the render's own error where it failed."""

@@ -7,7 +7,9 @@ from typing import Any
 
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError
 from service.quality import forecast
-from service.rendering.ipc.messages import Failed, KernelMeasured
+from service.rendering.ipc.kernel_messages import KernelMeasured
+from service.rendering.ipc.leases import undivided
+from service.rendering.ipc.messages import Failed
 from service.rendering.jobs.store.record import Order, Outcome
 
 UNASKED = KernelMeasured(0, "Not measured yet: GET this render with ?saving=true, and wait=60 to wait for it.")
@@ -39,8 +41,8 @@ class KernelQuestion:
         self.answered.set()
 
 
-def status(order: Order, outcome: Outcome, kernel: KernelMeasured) -> dict[str, Any]:
-    """As JSON; `kernel` is what is known of the time that the render's kernel saves."""
+def status(order: Order, outcome: Outcome, kernel: KernelMeasured, renderers: int) -> dict[str, Any]:
+    """As JSON; `kernel` is what is known of the time that the kernel saves, `renderers` how many trace it."""
     progress = outcome.progress
     known: dict[str, Any] = {
         "id": order.id,
@@ -56,6 +58,8 @@ def status(order: Order, outcome: Outcome, kernel: KernelMeasured) -> dict[str, 
         "eta_s": None if outcome.state in ("cancelled", "failed") else progress.eta_s,
         "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
         "warnings": outcome.warnings,
+        "renderers": renderers,
+        "not_divided": undivided(order.settings.adaptive, order.settings.time_limit),
         "settings": order.settings.document(),
     }
     return known if outcome.problem is None else known | {"problem": outcome.problem}

@@ -60,6 +60,7 @@ class Start(Model):
     scene: Any
     settings: Any = Field(default_factory=dict)
     view: View | None = None
+    renderers: Annotated[int, Field(ge=1, description="Most renderers that trace it; more than there are: all.")] = 1
 
 
 class Update(Model):

@@ -215,8 +215,10 @@ class Stream:
         while True:
             try:
                 await self._tell(await self._executor.run(partial(self._live.take, message)), began)
-                if isinstance(message, protocol.Start) and message.view is not None:
-                    self._flow.look(message.view.over(self._flow.view))
+                if isinstance(message, protocol.Start):
+                    self._renderers.divide(self._task, message.renderers)
+                    if message.view is not None:
+                        self._flow.look(message.view.over(self._flow.view))
             except ServiceError as error:
                 self._refuse(error, message.generation)
             if not self._inbox or not isinstance(self._inbox[0].message, Edit):

@@ -11,9 +11,11 @@ from functools import partial
 from typing import Any
 
 from service.problems import Unavailable
+from service.rendering.ipc.channel import Encoded
 from service.rendering.ipc.messages import Restore, SavedPicture, ToRenderer, Update
 from service.rendering.renderers import Listener, Member, Place
 from service.rendering.statistics import ClientStatistics, Kind
+from service.rendering.supervisor.division import Division
 from service.rendering.supervisor.keeper import STARTING
 from service.rendering.supervisor.process import Options, Start
 from service.rendering.supervisor.supervisor import Supervisor
@@ -46,9 +48,13 @@ class Pool:
         self._supervisors = [Supervisor(seat.options, seat.start, seat.place, numbers) for seat in seats]
         self._homes: dict[int, Supervisor] = {}  # by task
         self._stirred = asyncio.Event()  # set, and replaced, when a renderer is ready or lost
-        for supervisor in self._supervisors:
+        self._division = Division([_Peer(supervisor) for supervisor in self._supervisors])
+        for number, supervisor in enumerate(self._supervisors):
             supervisor.changed, supervisor.ended = self._changed, self._forget
             supervisor.lost = partial(self._take_over_from, supervisor)
+            supervisor.handed = partial(self._division.handed, sender=number)
+            supervisor.noticed, supervisor.told = self._division.heard, self._division.told
+            supervisor.kind_of = self._kind_of
 
     def start(self) -> None:
         for supervisor in self._supervisors:
@@ -103,7 +109,14 @@ class Pool:
             raise Unavailable(self._detail)
         task = home.open(listener, kind, client)
         self._homes[task] = home
+        self._division.opened(task, self._supervisors.index(home), None if kind == "render" else 1)
         return task
+
+    def divide(self, task: int, most: int | None) -> None:
+        self._division.divide(task, most)
+
+    def tracing(self, task: int | None) -> int:
+        return 0 if task is None else self._division.renderers(task)
 
     def drop(self, task: int) -> None:
         if (home := self._homes.get(task)) is not None:
@@ -111,6 +124,7 @@ class Pool:
 
     def send(self, message: ToRenderer) -> None:
         if (home := self._homes.get(message.task)) is not None:
+            self._division.sent(message)
             home.send(message)
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
@@ -119,6 +133,7 @@ class Pool:
         # It may move to another renderer while the scene is encoded.
         while (home := self._homes.get(update.task)) is not None:
             if await home.sent_scene(update, restore):
+                self._division.scene_sent(update, ended=restore is not None and restore.reason is not None)
                 break
 
     def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
@@ -148,6 +163,7 @@ class Pool:
         for supervisor in self._supervisors:
             if supervisor.waiting:
                 self._take_over_from(supervisor)
+        self._division.assign()
         self._stirred.set()
         self._stirred = asyncio.Event()
 
@@ -180,9 +196,33 @@ class Pool:
         task = self._homes[number].give_up(number)
         self._homes[number] = home
         home.take_over(number, task)
+        self._division.moved(number, self._supervisors.index(home))
 
     def _forget(self, task: int) -> None:
         self._homes.pop(task, None)
+        self._division.dropped(task)
+
+    def _kind_of(self, task: int) -> Kind:
+        """Whose work a renderer does on a task that it assists."""
+        home = self._homes.get(task)
+        held = None if home is None else home.tasks.get(task)
+        return "server" if held is None else held.kind
+
+
+class _Peer:
+    """A supervisor as the division of tasks sees it."""
+
+    def __init__(self, supervisor: Supervisor) -> None:
+        self._supervisor = supervisor
+        self.relay, self.relay_encoded = supervisor.relay, supervisor.relay_encoded
+
+    @property
+    def driver(self) -> str | None:
+        return None if self._supervisor.info is None else self._supervisor.driver
+
+    def scene_of(self, task: int) -> list[Encoded | ToRenderer]:
+        held = self._supervisor.tasks.get(task)
+        return [] if held is None else held.record.scenes()
 
 
 def _load(kind: Kind, client: str) -> Callable[[Supervisor], tuple[int, ...]]:

@@ -7,17 +7,16 @@ from dataclasses import dataclass, replace
 
 from service.rendering.ipc import channel
 from service.rendering.ipc.channel import Encoded
+from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
     EvaluateBsdf,
     Failed,
     Frame,
-    FromRenderer,
+    Heard,
     Image,
-    KernelMeasured,
     Loaded,
-    MeasureKernel,
     Pause,
     Progressed,
     Read,
@@ -117,7 +116,7 @@ class ReplayLog:
         elif isinstance(message, Stop):
             self._stopped = True
 
-    def heard(self, message: FromRenderer) -> FromRenderer:
+    def heard(self, message: Heard) -> Heard:
         """Note what a message changes; the message as the task's listener is to get it."""
         if isinstance(message, Failed):
             if message.serial is not None:

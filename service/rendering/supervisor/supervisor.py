@@ -13,6 +13,8 @@ from typing import Any
 from service.problems import Unavailable
 from service.rendering.executors import sending, tending
 from service.rendering.ipc import channel
+from service.rendering.ipc.kernel_messages import MeasureKernel
+from service.rendering.ipc.leases import Lease, LeaseDone, LeaseFailed
 from service.rendering.ipc.messages import (
     Checkpoint,
     Discarded,
@@ -23,7 +25,6 @@ from service.rendering.ipc.messages import (
     Heard,
     Image,
     Loaded,
-    MeasureKernel,
     Progress,
     Progressed,
     Read,
@@ -53,7 +54,9 @@ class Supervisor:
     Whoever has several of them sets what they call, on the event loop: `changed` when the process is ready or lost,
     and when there is no hope for it; `lost` when others may take over its tasks, none of which can still be blamed
     for the loss; `ended` with the number of a task that is there no more, for whatever reason; `stray` with a message
-    for a task that is another supervisor's, or nobody's any more.
+    for a task that is another supervisor's, or nobody's any more; `handed` with leases and their results; `noticed`
+    with what a task's listener hears; `told` with the number of a task of which another process was told. `kind_of`
+    says whose another supervisor's task is.
     """
 
     def __init__(
@@ -71,6 +74,10 @@ class Supervisor:
         self.lost: Callable[[], None] = lambda: None
         self.ended: Callable[[int], None] = lambda task: None
         self.stray: Callable[[Heard], None] = lambda message: None
+        self.handed: Callable[[Lease | LeaseDone | LeaseFailed], None] = lambda message: None
+        self.noticed: Callable[[Heard], None] = lambda message: None
+        self.told: Callable[[int], None] = lambda task: None
+        self.kind_of: Callable[[int], Kind] = lambda task: "server"
         self._tasks: dict[int, Task] = {}
         self._numbers = numbers or itertools.count(1)
         self._keeper = keeper = Keeper(
@@ -176,6 +183,13 @@ class Supervisor:
         self._keeper.send(Drop(number))
         return task
 
+    def divide(self, task: int, most: int | None) -> None:
+        """There is one renderer."""
+
+    def tracing(self, task: int | None) -> int:
+        held = None if task is None else self._tasks.get(task)
+        return int(held is not None and held.active)
+
     def drop(self, task: int) -> None:
         if self._forget(task) is not None:
             self._keeper.send(Drop(task))
@@ -240,17 +254,18 @@ class Supervisor:
         task.not_measured("The renderer was lost before it could answer: ask again.")
         task.resident = task.record.kept is None
         if task.resident:
-            self._tell_all(task.record)
+            self._tell_all(number, task.record)
             task.listener.again()
         elif task.record.saved is None or task.record.reads:
             self._keeper.do(self._bring_back(number, task))
 
-    def _tell_all(self, record: ReplayLog, kept: channel.Encoded | None = None) -> None:
+    def _tell_all(self, number: int, record: ReplayLog, kept: channel.Encoded | None = None) -> None:
         for message in record.again(kept):
             if isinstance(message, tuple):
                 self._keeper.send_encoded(message)
             else:
                 self._keeper.send(message)
+        self.told(number)
 
     async def _bring_back(self, task: int, held: Task) -> None:
         """Send the renderer a picture that it no longer has, to go on with or to be read."""
@@ -262,7 +277,7 @@ class Supervisor:
         if held.resident or process is None or process is not self._keeper.process or task not in self._tasks:
             return channel.discard(encoded)
         held.resident = True
-        self._tell_all(held.record, encoded)
+        self._tell_all(task, held.record, encoded)
 
     def _lose_picture(self, task: int, held: Task, error: Exception) -> None:
         """The server's copy of a picture cannot be read: begin again what was under way."""
@@ -274,12 +289,14 @@ class Supervisor:
             return held.listener.lost("The stored picture cannot be read.")
         held.record.forget()
         held.resident = True
-        self._tell_all(held.record)
+        self._tell_all(task, held.record)
         held.listener.again()
 
     def _received(self, message: Heard) -> None:
         if isinstance(message, Usage):
             self._account(message)
+        elif isinstance(message, Lease | LeaseDone | LeaseFailed):
+            self.handed(message)
         elif (held := self._tasks.get(message.task)) is not None:
             self._hear(message, held)
         else:
@@ -306,7 +323,9 @@ class Supervisor:
             self.statistics.checkpoints += 1
         elif isinstance(message, Frame | Progressed | Done) and time.monotonic() - held.struck_at > FORGIVEN_S:
             held.strikes = 0
-        held.listener.heard(held.record.heard(message))
+        message = held.record.heard(message)
+        held.listener.heard(message)
+        self.noticed(message)
 
     def _account(self, usage: Usage) -> None:
         statistics = self.statistics
@@ -317,7 +336,7 @@ class Supervisor:
             held = self._tasks.get(task)
             if held is not None:
                 statistics.gpu_s_of[task] += seconds
-            statistics.gpu_s["server" if held is None else held.kind] += seconds
+            statistics.gpu_s[self.kind_of(task) if held is None else held.kind] += seconds
 
     def _count(self, loaded: Loaded) -> None:
         self.statistics.setup_s.add(loaded.setup_s)
@@ -334,8 +353,10 @@ class Supervisor:
         """Count the loss against the task that was worked on, unless the renderer was ended from outside."""
         task = process.task
         held = self._tasks.get(task)
-        if held is None or cause in BY_OTHERS:
+        if cause in BY_OTHERS:
             return
+        if held is None:
+            return self.handed(LeaseFailed(task, 0, f"the renderer {cause}"))
         held.strikes += 1
         held.struck_at = time.monotonic()
         log.warning("blamed a task for the loss of the renderer task=%d strikes=%d", task, held.strikes)

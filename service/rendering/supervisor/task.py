@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.rendering.ipc.messages import KernelMeasured
+from service.rendering.ipc.kernel_messages import KernelMeasured
 from service.rendering.renderers import Listener
 from service.rendering.statistics import Kind
 from service.rendering.supervisor.replay_log import ReplayLog

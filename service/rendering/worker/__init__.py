@@ -13,6 +13,7 @@ ending          how a render ends, and how its picture comes to the server
 context         what all tasks of a process share
 payloads        the payloads of messages by their types in gpu
 kernel_savings  what a scene's own kernel saves, measured on demand
+division        one picture on several renderers
 device          what a task has on the device
 progress        how far a picture is, and when it is finished
 view            what a client is shown

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
 
 from service.rendering.ipc.messages import Checkpoint, Done, Progressed, Reason, driver_of
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.checkpoints import Checkpointer
 from service.rendering.worker.device.residency import Residency
-from service.rendering.worker.payloads import sent_picture
+from service.rendering.worker.payloads import Result, sent_picture
 from service.rendering.worker.progress.progress import ProgressTracker
 from service.rendering.worker.view.frames import FrameSource
 
@@ -31,11 +31,14 @@ class Ending:
         tracker: ProgressTracker,
         frames: FrameSource,
         answer: Callable[[], bool],
+        bands: Callable[[], Sequence[Result]] = tuple,
     ) -> None:
-        """`answer` sends the frame that is wanted, which then comes before Done."""
+        """`answer` sends the frame that is wanted, which then comes before Done. `bands` gives what is done of blocks
+        that are not merged yet, as far as it is worth saving."""
         self._number, self._send = number, context.send
         self._residency, self._tracker, self._frames = residency, tracker, frames
-        self._answer = answer
+        self._answer, self._bands = answer, bands
+        self._saved_bands: Sequence[Result] = ()  # with the picture that is being saved
         self._driver = driver_of(context.renderer.info)
         self._server_keeps = context.forget is not None
         self.checkpoints = Checkpointer(context.checkpoint_s)
@@ -54,14 +57,14 @@ class Ending:
             if not self.kept or ended or not checkpoints.due(full, elapsed_s):
                 return False
             checkpoints.begin(full)
+            self._saved_bands = self._bands()
         saved = checkpoints.step()
         if saved is not None and self._tracker.reason is not None:
             self._say_done(saved)
         elif saved is not None:
             progress = self._tracker.progress(self._residency)
-            self._send(
-                Checkpoint(self._number, self._tracker.generation, progress, sent_picture(saved, self._driver))
-            )
+            picture, self._saved_bands = sent_picture(saved, self._driver, self._saved_bands), ()
+            self._send(Checkpoint(self._number, self._tracker.generation, progress, picture))
         return True
 
     def end_if_reached(self) -> bool:

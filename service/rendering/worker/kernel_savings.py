@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from gpu import GpuError, Steps
 from gpu.analysis.kernel_cost import full_kernel, kernel_cost_steps
-from service.rendering.ipc.messages import KernelMeasured
+from service.rendering.ipc.kernel_messages import KernelMeasured
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.helpers.kernel_wait import KernelWait
 

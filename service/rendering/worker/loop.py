@@ -13,13 +13,14 @@ from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
 from service.rendering.ipc import channel
 from service.rendering.ipc.heartbeat import Heartbeat
+from service.rendering.ipc.kernel_messages import MeasureKernel
+from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
 from service.rendering.ipc.messages import (
     Drop,
     EvaluateBsdf,
     Evicted,
     Failed,
     FromRenderer,
-    MeasureKernel,
     Pause,
     Read,
     Restore,
@@ -35,10 +36,13 @@ from service.rendering.ipc.messages import (
 from service.rendering.worker.bsdf_task import BsdfTask
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.memory import Memory
+from service.rendering.worker.division.assistant import Assistant
 from service.rendering.worker.helpers.compile_client import CompileClient
 from service.rendering.worker.helpers.denoise_client import DenoiseClient
 from service.rendering.worker.scheduler import Scheduler
 from service.rendering.worker.task import Task
+
+Turns = Task | Assistant | BsdfTask  # what has turns
 
 REPORT_S = 0.25  # between two accounts of the GPU time that was used
 COMPILING_S = 60.0  # no hang: some drivers take this long for a kernel with every feature
@@ -62,7 +66,8 @@ class Loop:
         self._heartbeat = heartbeat
         self._tasks: dict[int, Task] = {}
         self._questions: dict[int, BsdfTask] = {}
-        self._memory = Memory(memory_limit, self._tasks.values)
+        self._assistants: dict[int, Assistant] = {}  # of tasks whose home is elsewhere
+        self._memory = Memory(memory_limit, lambda: [*self._tasks.values(), *self._assistants.values()])
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
         self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline=lifeline)
@@ -106,8 +111,8 @@ class Loop:
             busy = self._foresee() or busy or self._measure_kernel()
 
     @property
-    def _everyone(self) -> list[Task | BsdfTask]:
-        return [*self._tasks.values(), *self._questions.values()]
+    def _everyone(self) -> list[Turns]:
+        return [*self._tasks.values(), *self._assistants.values(), *self._questions.values()]
 
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
@@ -115,6 +120,7 @@ class Loop:
             ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._spare.ends]
             waits = [self._compiler.left_s, self._spare.left_s, self._renderer.tidy()]
             waits.append(None if self._denoiser.late else self._denoiser.left_s)
+            waits += [task.left_s for task in self._tasks.values()]
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
         try:
             while True:
@@ -124,9 +130,7 @@ class Loop:
         except BlockingIOError:
             return
 
-    def _work(
-        self, task: Task | BsdfTask, work: Callable[[], object], read: Read | None = None, spare: bool = False
-    ) -> None:
+    def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None, spare: bool = False) -> None:
         """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
         in time that nobody wanted, which is not held against it."""
         began = time.perf_counter()
@@ -155,14 +159,14 @@ class Loop:
         return key is not None
 
     def _crowded(self) -> bool:
-        questions = sum(question.awaited for question in self._questions.values())
-        return sum(task.awaited for task in self._tasks.values()) + questions > 1
+        return sum(each.awaited for each in self._everyone) > 1
 
     def _account(self, at_once: bool) -> None:
         """Report the GPU time that was used, now and then, and at once before the loop sleeps."""
         now = time.monotonic()
         if self._used_s and (at_once or now - self._reported >= REPORT_S):
-            traced = sum(task.traced for task in self._tasks.values())
+            pictures: list[Task | Assistant] = [*self._tasks.values(), *self._assistants.values()]
+            traced = sum(each.traced for each in pictures)
             used = dict(self._used_s)
             self._renderer.tidy()
             kernels, evicted = self._renderer.kernels, self._renderer.kernels_evicted
@@ -173,8 +177,12 @@ class Loop:
             self._traced, self._reported = traced, now
 
     def _take(self, message: ToRenderer) -> None:
-        task = self._tasks.get(message.task)
-        if isinstance(message, Update):
+        task, assistant = self._tasks.get(message.task), self._assistants.get(message.task)
+        if isinstance(message, Assist):
+            self._assistants[message.task] = Assistant(self._context, message.task)
+        elif assistant is not None:
+            self._take_for(assistant, message)
+        elif isinstance(message, Update):
             if task is None:
                 task = Task(self._context, message.task, message.client)
                 self._tasks[message.task] = task
@@ -188,6 +196,10 @@ class Loop:
                 message, Read | MeasureKernel
             ):  # evicted, and the server had not heard of it when it sent this
                 self._send(Evicted(message.task))
+        elif isinstance(message, Assistants):
+            self._work(task, lambda: task.home.assist(message.ids))
+        elif isinstance(message, LeaseDone):
+            self._work(task, lambda: task.home.heard(message))
         elif isinstance(message, Want):
             task.look(message)
         elif isinstance(message, Read):
@@ -209,6 +221,16 @@ class Loop:
         elif isinstance(message, Drop):
             self._remove(task)
 
+    def _take_for(self, assistant: Assistant, message: ToRenderer) -> None:
+        if isinstance(message, Update):
+            assistant.update(message)
+        elif isinstance(message, Lease):
+            assistant.lease(message)
+        elif isinstance(message, Drop):
+            self._traced -= assistant.traced
+            del self._assistants[assistant.number]
+            assistant.release()
+
     def _forget(self, number: int) -> None:
         """The server has this finished picture, and brings it back when somebody asks for it."""
         self._remove(self._tasks[number])
@@ -219,7 +241,7 @@ class Loop:
         del self._tasks[task.number]
         task.release()
 
-    def _guard(self, task: Task | BsdfTask, work: Callable[[], object], read: Read | None = None) -> None:
+    def _guard(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
         try:
             work()
             return
@@ -233,6 +255,8 @@ class Loop:
             detail, refused = "The renderer made a mistake; its log says which.", False
         if read is None:
             task.fail()
+        if isinstance(task, Assistant):
+            return self._send(LeaseFailed(task.number, task.attempted, detail))
         self._send(Failed(task.number, task.attempted, detail, refused, read.serial if read else None))
 
     def _send(self, message: FromRenderer) -> None:

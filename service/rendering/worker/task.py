@@ -7,17 +7,21 @@ import time
 from enum import Enum
 
 from gpu import GpuError, OutOfMemory, RenderSettings, SceneTooLarge
+from service.rendering.ipc.leases import undivided
 from service.rendering.ipc.messages import Discarded, Failed, Loaded, Read, Restore, Update, Want, driver_of
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.residency import Residency
 from service.rendering.worker.device.resolution_ladder import FULL_S
+from service.rendering.worker.division.home import Home
 from service.rendering.worker.ending import Ending
 from service.rendering.worker.kernel_savings import KernelSavings
-from service.rendering.worker.payloads import saved_picture
+from service.rendering.worker.payloads import saved_bands, saved_picture
 from service.rendering.worker.progress.progress import ProgressTracker
 from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.denoise_policy import DenoisePolicy
 from service.rendering.worker.view.frames import SLICE_S, FrameSource
+
+WATCHED_FROM = 64  # samples: a picture that somebody watches, or whose noise is judged, is shared from there on
 
 log = logging.getLogger(__name__)
 
@@ -47,7 +51,10 @@ class Task:
         self._tracker = ProgressTracker(renderer)
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
         self._frames = FrameSource(context, number, client, self._residency, self._tracker, denoising, self._finish)
-        self._ending = Ending(context, number, self._residency, self._tracker, self._frames, self.answer)
+        self.home = Home(number, context.send)
+        self._ending = Ending(
+            context, number, self._residency, self._tracker, self._frames, self.answer, self.home.bands
+        )
         self._sharers = context.sharers
         self._updates = Updates(context, number, client, self._residency, self._tracker)
         self.savings = KernelSavings(context, number)
@@ -83,7 +90,12 @@ class Task:
             return self._updates.preview.due and not self._paused
         if phase in (Phase.UPDATING, Phase.SAVING) or self._frames.due:
             return True
-        return phase is Phase.TRACING and (self.unseen or not stands)
+        return phase is Phase.TRACING and (self.unseen or not stands) and not self._waiting
+
+    @property
+    def _waiting(self) -> bool:
+        """Whether there is nothing to trace or to save here before an assistant answers."""
+        return self.home.waiting and not self._ending.checkpoints.hastened
 
     @property
     def unseen(self) -> bool:
@@ -110,8 +122,13 @@ class Task:
     @property
     def idle(self) -> bool:
         """Whether its memory on the device may be taken."""
-        waited_for = self.ready or self._frames.awaited or self._frames.denoising.pending
+        waited_for = self.ready or self.home.waiting or self._frames.awaited or self._frames.denoising.pending
         return self._residency.loaded is not None and not waited_for
+
+    @property
+    def left_s(self) -> float | None:
+        """Seconds until it is ready by itself; None where it is not, or is already."""
+        return self.home.left_s if self.home.waiting else None
 
     @property
     def bytes(self) -> int:
@@ -154,9 +171,14 @@ class Task:
         cap = 1 if self.unseen or scale < 1.0 else tracker.cap(residency)
         tracker.clock.start()
         before = picture.samples
-        sharers = self._sharers(self.client) if tracker.interactive else 1  # nobody waits for a render's next pass
+        if scale == 1.0 and self._divides:
+            cap = self.home.cap(picture, cap, tracker.generation, self._divided_from, tracker.interactive)
         budget_s = FULL_S if self.unseen else SLICE_S
-        residency.insist(lambda: picture.trace(budget_s, cap, sharers))  # the second block takes memory
+        sharers = self._sharers(self.client) if tracker.interactive else 1  # nobody waits for a render's next pass
+        if picture.sharing:
+            self.home.trace(budget_s)
+        else:
+            residency.insist(lambda: picture.trace(budget_s, cap, sharers))  # the second block takes memory
         tracker.clock.lap()
         self.traced += (picture.samples - before) * picture.settings.width * picture.settings.height
         tracker.pixel_s = picture.cost_s or tracker.pixel_s
@@ -171,6 +193,19 @@ class Task:
             tracker.eta.passed(picture.samples, tracker.clock.elapsed_s)
             if not self._ending.end_if_reached():
                 self._ending.report()
+
+    @property
+    def _divides(self) -> bool:
+        """Whether parts of the picture may be traced elsewhere."""
+        settings, stop = self._residency.full.settings, self._tracker.stop
+        return undivided(settings.adaptive, stop.time_limit) is None
+
+    @property
+    def _divided_from(self) -> int:
+        """The first sample that may be shared. While somebody looks on, or noise is judged at borders inside of a
+        block, the first ones are traced here."""
+        alone = self._tracker.interactive or self._tracker.stop.target_noise is not None
+        return WATCHED_FROM if alone else 0
 
     def _apply(self, update: Update) -> None:
         """Apply the pending update; where it fails, report that and leave everything as it was."""
@@ -228,15 +263,16 @@ class Task:
         self.settle()
         if self._residency.loaded is None:
             return
-        tracker, full, sent = self._tracker, self._residency.full, restore.saved
-        saved = saved_picture(sent, full.settings)
-        others = restore.reason is None and sent.driver not in ("", driver_of(self._renderer.info))
+        tracker, full = self._tracker, self._residency.full
+        saved = saved_picture(restore.saved, full.settings)
+        others = restore.reason is None and restore.saved.driver not in ("", driver_of(self._renderer.info))
         if others or not full.fits(saved, goes_on=restore.reason is None):
             log.warning("another driver or version saved this picture, which begins again task=%d", self.number)
             if restore.reason is None:
                 self._send(Discarded(self.number))
             return
         full.restore(saved)
+        self.home.resume(saved_bands(restore.saved, full.settings))
         tracker.reason, self._frames.scale = restore.reason, 1.0
         tracker.clock.set(restore.progress.elapsed_s)
         tracker.meter.set(restore.progress.samples, restore.progress.noise)
@@ -270,10 +306,12 @@ class Task:
 
     def pause(self, away: bool = False) -> None:
         self._paused, self._away = True, away
+        self.home.pause(True)
         self._tracker.clock.pause()
 
     def resume(self) -> None:
         self._paused = self._away = False
+        self.home.pause(False)
 
     def stop(self) -> None:
         """Ends the render; an update that waits is applied first, unless the render has not even begun."""
@@ -292,6 +330,7 @@ class Task:
     def release(self) -> None:
         """Free the GPU's memory; the task can be loaded again."""
         self._ending.checkpoints.restart()
+        self.home.restart()
         self._updates.release()
         self._residency.release()
         self._frames.forget()
@@ -313,6 +352,7 @@ class Task:
     def _restart(self) -> None:
         self._frames.restart()
         self._tracker.restart()
+        self.home.restart()
         first = self._residency.loaded is not None and self._tracker.interactive
         self._scale = self._residency.ladder.first(self._tracker.pixel_s) if first else 1.0
         seen = self._updates.preview.shown(self.generation)

@@ -16,7 +16,8 @@ import pytest
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.kernels import features
 from service.cli import main
-from service.rendering.ipc.messages import Done, KernelMeasured, MeasureKernel, StopRule, Update
+from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
+from service.rendering.ipc.messages import Done, StopRule, Update
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.kernel_savings import NO_KERNEL, NO_PICTURE, KernelSavings

@@ -181,7 +181,7 @@ def test_tasks_of_a_hopeless_one_go_on_elsewhere(impatient: None) -> None:
     async def test(fakes: Fakes) -> None:
         pool, ears = fakes.pool, [Ears() for _ in range(3)]
         await fakes.until("ready", "ready", "ready")
-        picture = SavedPicture(4, (0, 0, 0), [np.arange(8, dtype=np.uint8)], "gpu")
+        picture = SavedPicture(4, (0, 0, 0), [np.arange(8, dtype=np.uint8)], driver="gpu")
         tasks = [pool.open(each, "render") for each in ears]
         for task in tasks:
             await pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8), StopRule(9)))
@@ -273,7 +273,7 @@ def test_a_stored_picture_goes_to_a_renderer_of_its_driver() -> None:
         await fakes.until("ready", "ready")
         for driver, reason, home in (("b", None, "1"), ("c", None, "0"), ("b", "max_samples", "0"), ("", None, "0")):
             task = pool.open(Ears(), "render")
-            saved = SavedPicture(4, (0, 0, 0), [], driver)
+            saved = SavedPicture(4, (0, 0, 0), [], driver=driver)
             await pool.send_scene(
                 Update(task, 1, arrays_of("plain"), settings(8)), Restore(task, 1, saved, reason, Progress(4))
             )

@@ -92,6 +92,7 @@ class PictureFiles:
             "progress": asdict(restore.progress),
             "samples": saved.samples,
             "under_way": saved.under_way,
+            "bands": saved.bands,
             "driver": saved.driver,
             "sizes": [part.nbytes for part in parts],
             "crc32": checksum,
@@ -127,7 +128,8 @@ class PictureFiles:
                 buffers.append(buffer)
         if checksum != head["crc32"]:
             raise DamagedPicture("its bytes are not those that were written")
-        saved = SavedPicture(head["samples"], tuple(head["under_way"]), buffers, head.get("driver", ""))
+        bands = tuple((first, count, top, rows) for first, count, top, rows in head.get("bands", ()))
+        saved = SavedPicture(head["samples"], tuple(head["under_way"]), buffers, head.get("driver", ""), bands)
         return Restore(task, 1, saved, head["reason"], progress_of(head["progress"]))
 
     def progress(self, id: str, kind: Kind) -> Progress:

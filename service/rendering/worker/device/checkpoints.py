@@ -41,6 +41,11 @@ class Checkpointer:
     def under_way(self) -> bool:
         return self._steps is not None
 
+    @property
+    def hastened(self) -> bool:
+        """Whether the next checkpoint is due now, whatever else there is to do."""
+        return self._ended_at == -math.inf
+
     def hasten(self) -> None:
         """Make the next checkpoint due now."""
         self._ended_at = -math.inf

@@ -1,0 +1,199 @@
+"""The home of a divided picture: gives out leases, traces its own bands, and merges blocks in ascending order."""
+
+from __future__ import annotations
+
+import itertools
+import secrets
+import time
+from collections.abc import Callable
+from typing import TYPE_CHECKING
+
+from gpu import border_after
+from service.rendering.ipc.leases import Lease, LeaseDone
+from service.rendering.ipc.messages import FromRenderer
+from service.rendering.worker.division.ledger import LEASE_S, Ledger
+from service.rendering.worker.payloads import Result
+
+if TYPE_CHECKING:
+    from gpu import Band, Picture
+
+EACH = 2  # leases that an assistant has at a time: the next one lies there when the first is done
+# Seconds that the home waits for a lease with nothing else to do, before it traces that band itself. An assistant may
+# have other clients; one that is lost is reported.
+OVERDUE_S = 6 * LEASE_S
+MOST_SAVED = 500  # bands with a checkpoint, whose first line names them
+WORTH_SAVING_S = 4.0  # of a block: as long as between two checkpoints
+GUESS_S = 2e-7  # a sample of a pixel, before any was measured
+
+
+class Home:
+    """The division of one task's picture. While nobody assists, the picture is traced as if it were not divided."""
+
+    def __init__(self, number: int, send: Callable[[FromRenderer], None]) -> None:
+        self._number, self._send = number, send
+        self._assistants: tuple[int, ...] = ()
+        self._paused = False
+        # Of a lost home's leases, results may still be under way: their numbers must mean nothing here.
+        self._numbers = itertools.count(secrets.randbits(60))
+        self.restart()
+
+    def restart(self) -> None:
+        """Forget everything that was leased: the picture is another one, or none."""
+        self._picture: Picture | None = None
+        self._ledger: Ledger | None = None
+        self._generation = 0
+        self._pixel_s = GUESS_S
+        self._since = 0  # the first sample that may be leased now
+        self._window = 0  # rows at the top of the current block that are traced here at one time
+        self._band: Band | None = None  # that is traced here
+        self._done: list[Result] = []  # bands of the current block
+        self._resumed: list[Result] = []  # that were saved, for when the ledger is made
+        self._began = 0.0  # when the current block was begun to be shared
+
+    def assist(self, ids: tuple[int, ...]) -> None:
+        """These renderers assist from now on; the leases of others are free again."""
+        for lost in set(self._assistants) - set(ids):
+            if self._ledger is not None:
+                self._ledger.lost(lost)
+        self._assistants = ids
+        self._give()
+
+    def pause(self, paused: bool) -> None:
+        """Give no leases while the task is paused."""
+        self._paused = paused
+        self._give()
+
+    @property
+    def waiting(self) -> bool:
+        """Whether nothing can be traced here before a lease comes back."""
+        ledger = self._ledger
+        if ledger is None or not self.sharing:
+            return False
+        busy = self._window or self._band is not None or ledger.complete
+        return not busy and not ledger.available and self.left_s > 0.0
+
+    @property
+    def left_s(self) -> float:
+        """Seconds until the home no longer waits for the oldest lease of the current block."""
+        oldest = None if self._ledger is None else self._ledger.oldest
+        return 0.0 if oldest is None else max(0.0, oldest[1].since + OVERDUE_S - time.monotonic())
+
+    def cap(self, picture: Picture, end: int, generation: int, since: int, progressive: bool) -> int:
+        """How many samples to aim at where the block under way is not shared: no more than the next border, where one
+        may be. To be asked before each slice, of a render that ends at `end` samples.
+
+        `since`: the first sample that may be shared. `progressive`: a person looks on, so that a block of which
+        nobody else has anything is traced here.
+        """
+        if picture.sharing:
+            current = None if self._ledger is None else self._ledger.current
+            if current is not None and current.end <= end:
+                return end
+            picture.unshare()  # the render ends earlier now
+            self.restart()
+        if picture is not self._picture or generation != self._generation:
+            self.resume(self._resumed)
+        if not self._assistants and self._ledger is None and not self._resumed:
+            return end
+        if self._ledger is None or self._ledger.end != end:
+            self._ledger = Ledger(picture.settings.width, picture.settings.height, end, self._numbers)
+            for band, values in self._resumed:
+                self._ledger.resume(band, values)
+            self._resumed = []
+        self._picture, self._generation = picture, generation
+        self._pixel_s = picture.cost_s or GUESS_S
+        border = border_after(picture.samples)
+        begins = border_after(picture.samples - 1) == picture.samples and not picture.under_way[0]
+        self._since = max(since, picture.samples if begins else border)
+        if begins and max(since, border_after(0)) <= picture.samples < end:
+            self._begin(picture, min(border, end), progressive)
+        self._give()
+        return min(border, end)
+
+    def _begin(self, picture: Picture, end: int, progressive: bool) -> None:
+        ledger = self._ledger
+        assert ledger is not None
+        parked = list(ledger.begin(picture.samples))
+        if ledger.untouched and (progressive or not self._assistants):
+            ledger.finished()
+            self._since = end
+            return
+        self._window = ledger.window() if progressive else 0
+        picture.share(self._window, end)
+        self._done, self._began = parked, time.monotonic()
+        for band, values in parked:
+            picture.write_band(band, values)
+
+    def trace(self, budget_s: float) -> None:
+        """Do a slice of the block that is shared."""
+        picture, ledger = self._picture, self._ledger
+        assert picture is not None and ledger is not None and ledger.current is not None
+        self._give()
+        if self._window:
+            picture.trace(budget_s, ledger.current.end)
+            if picture.own_done:
+                ledger.did(self._window)
+                self._window = 0
+        elif ledger.complete:
+            picture.complete()
+            self._since, self._done = ledger.current.end, []
+            ledger.finished()
+        else:
+            self._trace_band(picture, ledger, budget_s)
+
+    def _trace_band(self, picture: Picture, ledger: Ledger, budget_s: float) -> None:
+        if self._band is None:
+            if not ledger.available and self.left_s == 0.0 and ledger.oldest is not None:
+                ledger.take_back(ledger.oldest[0])
+            self._band = ledger.take(self._pixel_s, 1 + len(self._assistants))
+        if self._band is not None and picture.trace_band(self._band, budget_s):
+            ledger.did(self._band.rows)
+            self._done.append((self._band, picture.read_band(self._band)))
+            self._band = None
+
+    def heard(self, done: LeaseDone) -> None:
+        """Take a result; one that nobody waits for any more is dropped."""
+        picture, ledger = self._picture, self._ledger
+        if picture is None or ledger is None or done.generation != self._generation:
+            return
+        current = ledger.delivered(done.number, done.values)
+        if current is not None:
+            band, values = current
+            picture.write_band(band, values)
+            ledger.did(band.rows)
+            self._done.append(current)
+        self._give()
+
+    def bands(self) -> list[Result]:
+        """What is done of blocks that are not merged yet, for a checkpoint; nothing where the block under way has not
+        taken long, and little would be lost with it."""
+        if self._ledger is None or not self.sharing or time.monotonic() - self._began < WORTH_SAVING_S:
+            return []
+        return [*self._done, *self._ledger.parked][:MOST_SAVED]
+
+    def resume(self, bands: list[Result]) -> None:
+        """Go on with what was saved; the picture has just been restored."""
+        self.restart()
+        self._resumed = bands
+
+    @property
+    def sharing(self) -> bool:
+        """Whether the block under way is shared."""
+        return self._picture is not None and self._picture.sharing
+
+    def _give(self) -> None:
+        """Lease what is free to assistants with less than EACH leases, in turn."""
+        ledger = self._ledger
+        if ledger is None or self._paused:
+            return
+        for _ in range(EACH):
+            for assistant in self._assistants:
+                if ledger.count(assistant) >= EACH:
+                    continue
+                renderers, now = 1 + len(self._assistants), time.monotonic()
+                given = ledger.lease(assistant, self._since, self._pixel_s, renderers, now)
+                if given is None:
+                    return
+                number, band = given
+                place = band.first, band.count, band.top, band.rows
+                self._send(Lease(self._number, self._generation, number, assistant, *place))

@@ -1,0 +1,231 @@
+"""A divided picture: every band of every block is traced, written once and merged in order, whatever happens."""
+
+from __future__ import annotations
+
+import random
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from itertools import count
+from typing import Any, cast
+
+import numpy as np
+import pytest
+
+from gpu import Band, RenderSettings, border_after
+from service.rendering.ipc.leases import Lease, LeaseDone
+from service.rendering.worker.division.home import Home
+from service.rendering.worker.division.ledger import MOST_BYTES, PIXEL_BYTES, Ledger
+
+FIRST, SIZE = 8, 64  # samples: the first border, and the distance of the others
+WIDTH, HEIGHT = 512, 300
+
+
+@dataclass
+class _Picture:
+    """Counts the samples of each row, and complains of what would change a real picture's bits."""
+
+    samples: int = FIRST
+    sharing: bool = False
+    cost_s: float = 1e-7
+    settings: RenderSettings = field(default_factory=lambda: RenderSettings(WIDTH, HEIGHT))
+
+    def __post_init__(self) -> None:
+        self.block = np.zeros(HEIGHT, int)
+        self.own, self.end, self.at = 0, 0, 0
+        self.under_way = (0, 0, 0)  # samples: of a pass that merges
+
+    @property
+    def own_done(self) -> bool:
+        return bool((self.block[: self.own] == self.end - self.samples).all())
+
+    def share(self, rows: int, end: int) -> None:
+        assert border_after(self.samples - 1) == self.samples and not self.sharing and not self.under_way[0]
+        assert self.samples < end <= border_after(self.samples)
+        self.sharing, self.own, self.end = True, rows, end
+        self.block[:] = 0
+
+    def trace(self, budget_s: float, most: int) -> None:
+        if self.under_way[0]:
+            self.samples, self.under_way = self.end, (0, 0, 0)
+        elif not self.sharing:
+            self.samples = min(self.samples + 8, most, border_after(self.samples))
+        else:
+            self.block[: self.own] = np.minimum(self.block[: self.own] + 20, self.end - self.samples)
+
+    def trace_band(self, band: Band, budget_s: float) -> bool:
+        self.at += 1
+        if self.at % 3:
+            return False
+        self.write_band(band, np.zeros(0))
+        return True
+
+    def write_band(self, band: Band, values: Any) -> None:
+        rows = slice(band.top, band.top + band.rows)
+        assert self.sharing and band.first == self.samples and band.first + band.count == self.end
+        assert (self.block[rows] == 0).all(), "written twice, or traced here as well"
+        self.block[rows] = band.count
+
+    def read_band(self, band: Band) -> Any:
+        return np.zeros(0)
+
+    def unshare(self) -> None:
+        self.sharing = False
+
+    def complete(self) -> None:
+        assert (self.block == self.end - self.samples).all() and self.sharing
+        self.sharing, self.under_way = False, (self.end - self.samples, 0, 0)
+
+
+def _home(picture: _Picture, ids: tuple[int, ...]) -> tuple[Home, list[Lease]]:
+    leases: list[Lease] = []
+    home = Home(1, cast(Callable[[Any], None], leases.append))
+    home.assist(ids)
+    return home, leases
+
+
+def _turn(home: Home, picture: _Picture, end: int, progressive: bool = False) -> None:
+    cap = home.cap(cast(Any, picture), end, 1, FIRST, progressive)
+    if picture.sharing:
+        if not home.waiting:
+            home.trace(0.01)
+    else:
+        picture.trace(0.01, cap)
+
+
+@pytest.mark.parametrize("progressive", [False, True])
+@pytest.mark.parametrize("seed", range(8))
+def test_all_rows_come_once_and_in_order(seed: int, progressive: bool) -> None:
+    """Results in any order, doubled, of unknown leases; renderers that come and go."""
+    chance, picture, end = random.Random(seed), _Picture(), 300
+    home, leases = _home(picture, (7, 8))
+    had: list[Lease] = []
+    for _ in range(10_000):
+        if picture.samples == end:
+            break
+        _turn(home, picture, end, progressive)
+        if leases and chance.random() < 0.7:
+            lease = leases.pop(chance.randrange(len(leases)))
+            had.append(lease)
+            for each in (lease, chance.choice(had)):
+                home.heard(LeaseDone(1, chance.choice((1, 0)), each.number, np.zeros(0)))
+                home.heard(LeaseDone(1, 1, each.number, np.zeros(0)))
+        if chance.random() < 0.05:
+            ids = chance.choice([(7, 8), (7,), (), (9,)])
+            leases[:] = [lease for lease in leases if lease.assistant in ids]
+            home.assist(ids)
+    assert picture.samples == end
+
+
+def test_assistants_do_most_of_it_where_they_answer_at_once() -> None:
+    picture = _Picture()
+    home, leases = _home(picture, (1, 2, 3))
+    rows = 0
+    while picture.samples < 256:
+        _turn(home, picture, 256)
+        while leases:
+            rows += leases[0].rows * leases[0].count
+            home.heard(LeaseDone(1, 1, leases.pop(0).number, np.zeros(0)))
+    assert rows > 0.6 * HEIGHT * (256 - FIRST)
+
+
+def test_a_lease_that_never_comes_back_is_traced_at_home(monkeypatch: pytest.MonkeyPatch) -> None:
+    now = [0.0]
+    monkeypatch.setattr("service.rendering.worker.division.home.time.monotonic", lambda: now[0])
+    picture = _Picture()
+    home, leases = _home(picture, (1,))
+    for _ in range(1000):
+        _turn(home, picture, SIZE)
+    assert home.waiting and picture.samples == FIRST
+    assert 0 < home.left_s < 10
+    now[0] += home.left_s + 0.01
+    for _ in range(100):
+        _turn(home, picture, SIZE)
+        now[0] += 10
+    assert picture.samples == SIZE
+    home.heard(LeaseDone(1, 1, leases[0].number, np.zeros(0)))  # late, and dropped
+
+
+def test_while_somebody_looks_on_an_untouched_block_is_traced_at_once_here() -> None:
+    picture = _Picture(samples=SIZE)
+    home, leases = _home(picture, (1,))
+    _turn(home, picture, 1000, progressive=True)
+    assert not picture.sharing and picture.samples == SIZE + 8
+    assert {lease.first for lease in leases} == {2 * SIZE}
+
+
+def test_without_assistants_nothing_is_shared() -> None:
+    picture = _Picture()
+    home, leases = _home(picture, ())
+    assert home.cap(cast(Any, picture), 1000, 1, FIRST, False) == 1000
+    assert not picture.sharing and not leases
+
+
+def test_what_was_leased_before_an_edit_is_dropped() -> None:
+    picture = _Picture()
+    home, leases = _home(picture, (1,))
+    _turn(home, picture, 1000)
+    old = leases[0]
+    edited = _Picture()
+    home.cap(cast(Any, edited), 1000, 2, FIRST, False)
+    home.heard(LeaseDone(1, 1, old.number, np.zeros(0)))
+    home.heard(LeaseDone(1, 2, old.number, np.zeros(0)))
+    assert not edited.block.any()
+
+
+def test_a_render_that_is_to_end_earlier_does_not_go_past_its_end() -> None:
+    picture = _Picture(samples=SIZE)
+    home, leases = _home(picture, (1,))
+    _turn(home, picture, 1000)
+    assert picture.sharing
+    old = leases[0].number
+    for _ in range(100):
+        _turn(home, picture, 70)
+        for lease in leases[1:]:
+            home.heard(LeaseDone(1, 1, lease.number, np.zeros(0)))
+    assert picture.samples == 70
+    home.heard(LeaseDone(1, 1, old, np.zeros(0)))
+
+
+def test_what_was_done_of_a_long_block_is_saved_and_not_traced_again(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    now = [0.0]
+    monkeypatch.setattr("service.rendering.worker.division.home.time.monotonic", lambda: now[0])
+    picture = _Picture(samples=SIZE)
+    home, leases = _home(picture, (1,))
+    for _ in range(20):
+        _turn(home, picture, 1000)
+    assert not home.bands(), "a block that has just begun is not worth it"
+    later = [lease for lease in leases if lease.first > SIZE]
+    for lease in leases[:2] + later[:1]:
+        home.heard(LeaseDone(1, 1, lease.number, np.zeros(0)))
+    now[0] += 10
+    bands = home.bands()
+    assert bands and {band.first for band, _ in bands} <= {SIZE, 2 * SIZE}
+    again = _Picture(samples=SIZE)
+    second, _ = _home(again, ())
+    second.resume(bands)
+    _turn(second, again, 1000)
+    assert again.sharing
+    for band, _ in bands:
+        if band.first == SIZE:
+            assert (again.block[band.top : band.top + band.rows] == SIZE).all()
+    while again.samples < 3 * SIZE:  # the picture complains where rows come twice
+        _turn(second, again, 1000)
+
+
+def test_a_result_is_never_too_large() -> None:
+    for width in (1, 16, 4096, 16384, 65536):
+        ledger = Ledger(width, 4096, 1000, count(1))
+        given = ledger.lease(1, SIZE, 1e-12, 2, 0.0)
+        assert given is not None
+        assert given[1].rows * width * PIXEL_BYTES <= max(MOST_BYTES, width * PIXEL_BYTES)
+
+
+def test_what_waits_for_its_turn_has_a_bound() -> None:
+    ledger = Ledger(4096, 4096, 1 << 24, count(1))
+    ledger.begin(SIZE)
+    ledger.window()
+    while ledger.lease(1, SIZE, 1e-9, 2, 0.0) is not None:
+        pass
+    assert sum(lease.band.rows for lease in ledger.outstanding.values()) * 4096 * PIXEL_BYTES <= 256 << 20
