@@ -59,7 +59,8 @@ def test_two_renderers_and_a_loss_for_good(gpu: Renderer, impatient: None) -> No
         pool = Pool([Seat(Place("0")), Seat(Place("1"), start=start)])
         pool.start()
         try:
-            await pool.ready(60)
+            while not all(member.state == "ready" for member in pool.members):
+                await asyncio.sleep(0.02)
             streams, looking = [], [Ears(), Ears()]
             for ears in looking:
                 streams.append(pool.open(ears))
