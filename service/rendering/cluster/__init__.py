@@ -6,6 +6,7 @@ gone, and the server must not be harmed by that. Where an actor runs, when it is
 between hosts is up to Ray.
 
 cluster     the server's side: joins a cluster through the gateway, and starts renderers there
+pool        a pool of renderers that are all actors of one cluster
 process     one renderer of the cluster as its supervisor sees it
 control     what the server and the gateway say to each other beside the renderers' own messages
 gateway     the process that speaks to Ray

@@ -11,6 +11,7 @@ import sys
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 from service import logs
@@ -45,6 +46,7 @@ class Cluster:
         """`options`: of a renderer's process, on whichever node. Raises CannotJoin; waits for some seconds."""
         if importlib.util.find_spec("ray") is None:
             raise CannotJoin(INSTALL)
+        self.options = options
         self._join = Join(address, renderers, gpu, options, **join)
         self._gateway: _Gateway | None = _start(self._join)
         try:
@@ -97,13 +99,20 @@ def _start(ask: Join) -> _Gateway:
             [*command, "--log-level", str(logs.level())],
             pass_fds=[theirs.fileno()],
             cwd=ROOT,
-            env={**RAY, **environment},
+            env={**RAY, **_token_mode(), **environment},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             process_group=0,
         )
     control.send(ours, ask)
     return _Gateway(process, ours)
+
+
+def _token_mode() -> dict[str, str]:
+    """Ray's mode of authentication by the rule of `ray start`, which Ray does not apply to those who join a cluster:
+    where a token is there, it is used, unless RAY_AUTH_MODE says otherwise."""
+    named = any(name in os.environ for name in ("RAY_AUTH_TOKEN", "RAY_AUTH_TOKEN_PATH"))
+    return {"RAY_AUTH_MODE": "token"} if named or (Path.home() / ".ray" / "auth_token").exists() else {}
 
 
 def _answered(gateway: _Gateway) -> Joined:

@@ -14,6 +14,7 @@ import signal
 import socket
 import sys
 import threading
+from collections import deque
 from contextlib import suppress
 from typing import Any
 
@@ -31,6 +32,8 @@ from service.rendering.supervisor.process import Waiting
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
 FAREWELL_S = 5.0  # for renderers to end by themselves
+
+_written = deque[str](maxlen=1)  # by Ray, to stdout or stderr
 
 log = logging.getLogger("service.rendering.cluster.gateway")  # __name__ is __main__ here
 
@@ -142,6 +145,7 @@ def main() -> int:
         refusal.cancel()
     with suppress(OSError):
         control.send(end, joined)
+    _written.clear()
     log.info("joined address=%s renderers=%d", joined.address, joined.renderers)
     asyncio.run(Gateway(end, ask, joined).serve())
     _leave()
@@ -150,6 +154,7 @@ def main() -> int:
 
 def _refuse(end: socket.socket, detail: str) -> None:
     """Say why there is no cluster, to the server and to the renderers that it has asked for, and end this process."""
+    detail = "; Ray wrote: ".join([detail, *_written])
     with suppress(OSError):
         control.send(end, Refused(detail))
         end.settimeout(1.0)
@@ -197,6 +202,7 @@ def _keep_others_from_writing() -> None:
     def read() -> None:
         with open(reading, errors="replace") as lines:
             for line in lines:
+                _written.append(line.strip()[:300])
                 log.debug("Ray wrote: %s", line.strip())
 
     threading.Thread(target=read, name="ray-output", daemon=True).start()

@@ -122,7 +122,7 @@ class Lane:
         except RayError as error:
             log.error("Ray failed renderer=%d error=%s", self.number, _first_line(error))
             self._actors.restart(self.number)
-        return Ended("node lost")
+        return Ended("drained" if self._leaving else "node lost")
 
     async def _begun(self) -> Any:
         """The actor with a renderer that has just been started. Raises Unfit, RayActorError."""

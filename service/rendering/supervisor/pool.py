@@ -85,6 +85,11 @@ class Pool:
     def hopeless(self) -> bool:
         return all(supervisor.hopeless for supervisor in self._supervisors)
 
+    @property
+    def waiting(self) -> str:
+        """What renderers wait for, for which there is no place."""
+        return " ".join(dict.fromkeys(each.waiting for each in self._supervisors if each.waiting))
+
     async def ready(self, timeout_s: float) -> dict[str, Any]:
         try:
             async with asyncio.timeout(timeout_s):
@@ -96,8 +101,7 @@ class Pool:
                         return info
                     await self._stirred.wait()
         except TimeoutError:
-            waiting = dict.fromkeys(each.waiting for each in self._supervisors if each.waiting)
-            raise Unavailable(" ".join(waiting) or STARTING) from None
+            raise Unavailable(self.waiting or STARTING) from None
 
     async def able(self, timeout_s: float) -> None:
         if not any(supervisor.replaces for supervisor in self._supervisors):
