@@ -35,6 +35,8 @@ from service.guard import Guard, turning_away
 from service.logs import Requests
 from service.memory import MemoryBudget
 from service.problems import Unavailable
+from service.rendering.cluster.joining import CannotJoin
+from service.rendering.cluster.pool import cluster_pool
 from service.rendering.first_frame import warm_up
 from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.jobs.retention import Retention
@@ -80,7 +82,7 @@ def create_app(config: Config) -> FastAPI:
         config,
         kept.assets,
         RequestReader(config, kept.assets, memory),
-        Pool(seats(config, memory.limit)),
+        Pool(seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
         kept.documents,
         kept.quota,
         kept.shares,
@@ -130,13 +132,13 @@ def run(config: Config) -> int:
     try:
         with listener, locked(config.data_dir):
             return _serve(config, listener, most)
-    except (DamagedFile, FolderInUse) as error:
+    except (DamagedFile, FolderInUse, CannotJoin) as error:
         log.error("did not start reason=%s", error)
         return 1
 
 
 def _serve(config: Config, listener: socket.socket, most: int) -> int:
-    """With at most that many connections. Raises DamagedFile."""
+    """With at most that many connections. Raises DamagedFile, CannotJoin."""
     host, port = listener.getsockname()[:2]
     app = create_app(config)
     own: AppState = app.state.sunbox

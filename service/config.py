@@ -20,6 +20,8 @@ HOST = re.compile(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")  # a name, an IPv4 or
 LLVMPIPE = "llvmpipe:"  # before the number of renderers, in SUNBOX_DEVICES
 NUMBER = re.compile(r"[0-9]{1,6}")
 
+ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
+
 Words = Annotated[list[str], NoDecode]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -71,6 +73,15 @@ class Config(BaseSettings):
         default_factory=list,
         description="Renderers, a process each: numbers of EGL devices, separated by commas, or `llvmpipe:N` for N "
         "that divide the processor's cores (default: one, on `SUNBOX_DEVICE`).",
+    )
+    ray: str | None = Field(
+        None,
+        description="Have the nodes of a Ray cluster render: the `HOST:PORT` of its head, or `auto`, which is Ray's "
+        "own rule (`RAY_ADDRESS`, then a cluster that runs here, then a new one on this machine). Needs "
+        "`sunbox[ray]`.",
+    )
+    ray_renderers: int | None = Field(
+        None, ge=1, description="Renderers in the Ray cluster (default: one a GPU, without GPUs one a node)."
     )
     require_gpu: bool = Field(False, description="Refuse to start on a software renderer.")
     log_format: Literal["console", "json"] = Field(
@@ -201,6 +212,27 @@ class Config(BaseSettings):
             if not HOST.fullmatch(host):
                 raise ValueError(f"{host!r} is no host name; write it without scheme, port and path")
         return [host.strip("[]").lower() for host in hosts]
+
+    @field_validator("ray")
+    @classmethod
+    def _address(cls, ray: str | None, info: ValidationInfo) -> str | None:
+        for name in ("device", "devices"):
+            if info.data.get(name) not in (None, []):
+                raise ValueError(f"cannot be set together with SUNBOX_{name.upper()}; Ray gives renderers their GPUs")
+        if ray is not None and ray.startswith("ray://"):
+            raise ValueError(
+                "is not the address of Ray's client (ray://); run the server on a node, and write HOST:PORT"
+            )
+        if ray not in (None, "auto") and not ADDRESS.fullmatch(ray):
+            raise ValueError(f"{ray!r} is neither HOST:PORT nor auto")
+        return ray
+
+    @field_validator("ray_renderers")
+    @classmethod
+    def _in_a_cluster(cls, count: int | None, info: ValidationInfo) -> int | None:
+        if count is not None and info.data.get("ray", "") is None:
+            raise ValueError("says how many renderers a Ray cluster has; set SUNBOX_RAY, too")
+        return count
 
     @field_validator("devices")
     @classmethod

@@ -9,6 +9,7 @@ from collections import deque
 from dataclasses import replace
 from typing import Any
 
+from service.config import cores
 from service.memory import MemoryBudget
 from service.rendering.cluster.code import version
 from service.rendering.cluster.control import Ended
@@ -43,10 +44,9 @@ class Renderer:
         self._news.set()  # for a call that still waits for what the last one says
         self._outgoing, self._news, self._paused = deque(), asyncio.Event(), False
         self._lifeline = self._lifeline or os.pipe()
-        gpu = _gpu()
-        share = 1.0 if threads is None else min(1.0, threads / (os.cpu_count() or 1))
+        share = 1.0 if threads is None else min(1.0, threads / cores())
         memory = int(MemoryBudget().limit * share)
-        given = Options(**options, device=gpu, host_memory=memory)
+        given = Options(device=_gpu(), software=threads is not None, cores=threads, host_memory=memory, **options)
         process = Process(
             given, lambda message: self._received(process, message), lambda: self._lose(process), self._lifeline[0]
         )

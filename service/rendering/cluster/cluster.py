@@ -19,6 +19,7 @@ from service.rendering.cluster import control
 from service.rendering.cluster.control import Join, Joined, Open, Refused
 from service.rendering.cluster.joining import INSTALL, CannotJoin
 from service.rendering.cluster.process import ClusterProcess
+from service.rendering.cluster.renderers import described
 from service.rendering.executors import tending
 from service.rendering.supervisor.process import ROOT, Start
 
@@ -57,6 +58,11 @@ class Cluster:
         self._join = replace(self._join, renderers=self.joined.renderers)
         if not self.joined.local:  # it stays with the same one, also where `auto` would find another
             self._join = replace(self._join, address=self.joined.address)
+
+    @property
+    def device(self) -> str:
+        """What a renderer has of its node, as /v1/info says it."""
+        return described(self.joined.resources)
 
     def starter(self, number: int) -> Start:
         """What starts a supervisor's renderer; `number` counts the renderers from 0."""

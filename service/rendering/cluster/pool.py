@@ -16,7 +16,7 @@ class ClusterPool(Pool):
         self._cluster = cluster
         options = Options(patience_s=cluster.options["patience_s"])
         numbers = range(cluster.joined.renderers)
-        super().__init__([Seat(Place(str(n), "ray", ""), options, cluster.starter(n)) for n in numbers])
+        super().__init__([Seat(Place(str(n), cluster.device, ""), options, cluster.starter(n)) for n in numbers])
 
     async def close(self) -> None:
         await super().close()

@@ -130,7 +130,9 @@ class Supervisor:
 
     @property
     def members(self) -> list[Member]:
-        return [Member(self.place, self._keeper.state, self.driver, self.process_id, self.statistics)]
+        known = self.info or {}  # a node of a cluster says where it is
+        place = replace(self.place, host=known["host"]) if "host" in known else self.place
+        return [Member(place, self._keeper.state, self.driver, self.process_id, self.statistics)]
 
     @property
     def tasks(self) -> Mapping[int, Task]:
