@@ -72,7 +72,9 @@ class Gateway:
             self._handles[number] = made.remote()
         return self._handles[number]
 
-    def placing(self) -> str:
+    def placing(self, number: int) -> str:
+        if _address(self._handles[number]).get("IPAddress"):
+            return ""
         needed = described(self._joined.resources)
         return f"The Ray cluster at {self._joined.address} has no node with {needed} free for a renderer."
 
@@ -108,7 +110,8 @@ class Gateway:
             with suppress(Exception):
                 draining = await asyncio.to_thread(_draining)
                 for lane in list(self._lanes.values()) if draining else ():
-                    if await asyncio.to_thread(_node, self._handles[lane.number]) in draining:
+                    address = await asyncio.to_thread(_address, self._handles[lane.number])
+                    if address.get("NodeID") in draining:
                         lane.leave()
 
 
@@ -185,11 +188,12 @@ def _draining() -> set[str]:
     return set(state.get_draining_nodes())
 
 
-def _node(handle: Any) -> str:
-    """The id of the node that an actor is on; "" where it is on none."""
+def _address(handle: Any) -> dict[str, Any]:
+    """Where an actor is: NodeID, and IPAddress, which is empty as long as Ray has no process for it."""
     from ray._private.state import actors
 
-    return str(actors(handle._actor_id.hex()).get("Address", {}).get("NodeID", ""))
+    found: dict[str, Any] = actors(handle._actor_id.hex()).get("Address", {})
+    return found
 
 
 def _keep_others_from_writing() -> None:

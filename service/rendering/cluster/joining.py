@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import socket
+from contextlib import suppress
 from typing import Any, cast
 
 from service.rendering.cluster.control import Join, Joined
@@ -26,22 +27,35 @@ def join(ask: Join) -> Joined:
 
     named = os.environ.get("RAY_ADDRESS", "") if ask.address == "auto" else ask.address
     variable = "RAY_ADDRESS (SUNBOX_RAY is auto)" if ask.address == "auto" and named else "SUNBOX_RAY"
-    if named and named != "auto" and named != "local":
+    local = not named and not _runs_here()
+    if named not in ("", "auto", "local"):
         _answers(variable, named)
-    local = False
+    # Workers' output stays in Ray's own files on their nodes; only what our own loggers write is in our log.
+    quietly: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     try:
-        # Workers' output stays in Ray's own files on their nodes; only what our own loggers write is in our log.
-        ray.init(address=named or "auto", log_to_driver=False, configure_logging=False)
-    except ConnectionError as error:
-        if named:
-            raise CannotJoin(f"{variable}: {error}") from None
-        local = True
-        ray.init(address="local", include_dashboard=False, log_to_driver=False, configure_logging=False)
-    except (Exception, SystemExit) as error:  # Ray ends its process where the head is none of Ray's
-        raise CannotJoin(f"{variable}: could not join the Ray cluster {named or 'that runs here'}: {error}") from None
+        if local:
+            ray.init(address="local", include_dashboard=False, **quietly)
+        else:
+            ray.init(address=named or "auto", **quietly)
+    except (Exception, SystemExit) as error:  # Ray ends its process where the head does not answer as one
+        raise CannotJoin(
+            f"{variable}: could not join the Ray cluster {named or 'of this machine'}: {error}"
+        ) from None
     nodes = [node["Resources"] for node in cast(Any, ray).nodes() if node["Alive"]]
     number, resources = plan(nodes, ask.renderers, ask.gpu)
     return Joined(ray.get_runtime_context().gcs_address, local, number, resources)
+
+
+def _runs_here() -> bool:
+    """Whether the cluster that was started here last still runs; Ray would wait for one that was killed."""
+    from ray._private.utils import read_ray_address
+
+    address = read_ray_address()
+    if address is not None:
+        with suppress(CannotJoin):
+            _answers("", address)
+            return True
+    return False
 
 
 def _answers(variable: str, address: str) -> None:

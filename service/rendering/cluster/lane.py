@@ -18,7 +18,7 @@ from service.rendering.ipc.messages import Drop, FromRenderer, TakeCheckpoint, T
 from service.rendering.supervisor.process import Waiting
 
 SILENCE_S = 30.0  # without an answer from an actor, which gives one every 5 s, until it is given up
-PLACING_S = 2.0  # that Ray may take to place an actor before the reason is asked for; then between two times
+PLACING_S = 4.0  # that Ray may take to place an actor before the reason is asked for; then between two times
 FAREWELL_S = 3.0  # for the renderer to end by itself
 FLUSH_S = 2.0  # for the server to take the last messages
 DRAIN_S = 3.0  # for the checkpoints of a node that is about to go
@@ -42,8 +42,8 @@ class Actors(Protocol):
     def actor(self, number: int, anew: bool = False) -> Any:
         """The handle of a renderer's actor, made if there is none yet; `anew`: Ray has given up the last one."""
 
-    def placing(self) -> str:
-        """Why an actor has not been placed yet."""
+    def placing(self, number: int) -> str:
+        """Why an actor has no place yet; "" where it has one, and begins there."""
 
     def restart(self, number: int) -> None:
         """Have Ray restart an actor that does not answer, or that shall leave its node."""
@@ -146,7 +146,8 @@ class Lane:
         # Ray retries this one call: it waits for an actor that Ray restarts.
         answer = asyncio.ensure_future(_answer(actor.describe.options(max_task_retries=-1).remote()))
         while not (await asyncio.wait({answer}, timeout=PLACING_S))[0]:
-            self._link.send(Waiting(await asyncio.to_thread(self._actors.placing)))
+            if why := await asyncio.to_thread(self._actors.placing, self.number):
+                self._link.send(Waiting(why))
         there: dict[str, Any] = await answer
         return there
 

@@ -24,6 +24,8 @@ for node in ray.nodes():
     if node["Alive"] and node["Resources"].get("CPU"):
         print("node", node["NodeID"])
 """
+# How soon a head gives up a node that does not answer: by default after half a minute.
+QUICK = {"RAY_health_check_period_ms": "500", "RAY_health_check_failure_threshold": "2"}
 OPTIONS = {"patience_s": 10.0, "checkpoint_s": 0.05}
 
 
@@ -94,7 +96,7 @@ class Nodes:
         command += [f"--num-cpus={cpus}", "--num-gpus=0", f"--object-store-memory={100 << 20}"]
         command += more or [f"--address={self.address}"]
         with (self._folder / f"node{len(self._nodes)}.log").open("wb") as log:
-            node = subprocess.Popen(command, stdout=log, stderr=log, process_group=0)
+            node = subprocess.Popen(command, env=os.environ | QUICK, stdout=log, stderr=log, process_group=0)
         self._nodes.append(node)
         return node
 

@@ -129,7 +129,7 @@ class Actors:
     def actor(self, number: int, anew: bool = False) -> Any:
         return self
 
-    def placing(self) -> str:
+    def placing(self, number: int) -> str:
         return "There is no room."
 
     def restart(self, number: int) -> None: ...
