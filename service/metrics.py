@@ -40,6 +40,7 @@ def _collector(state: AppState, traffic: Traffic) -> Collector:
         def collect(self) -> Iterator[Metric]:
             members = state.renderers.members
             yield from _about(state.renderers.info or {})
+            yield from _states(members)
             yield from _requests(traffic)
             yield from _work(state.renderers.statistics, members)
             yield from _kernels(members)
@@ -57,8 +58,15 @@ def _about(renderer: Mapping[str, Any]) -> Iterator[Metric]:
     about = GaugeMetricFamily("sunbox_info", "Version and renderer.", labels=("version", "renderer"))
     about.add_metric((metadata.version("sunbox"), str(renderer.get("renderer", ""))), 1)
     yield about
-    yield _gauge("renderer_up", "Whether there is a renderer.", float(bool(renderer)))
-    yield _gauge("renderer_software", "Whether it runs on the processor.", float(renderer.get("software", 0)))
+    yield _gauge("renderer_up", "Whether any renderer renders.", float(bool(renderer)))
+    yield _gauge(
+        "renderer_software", "Whether the first of them runs on the processor.", float(renderer.get("software", 0))
+    )
+
+
+def _states(members: Sequence[Member]) -> Iterator[Metric]:
+    ready = {member.place.id: float(member.state == "ready") for member in members}
+    yield _gauges("renderer_ready", "Whether this renderer renders.", "renderer", ready)
 
 
 def _requests(traffic: Traffic) -> Iterator[Metric]:

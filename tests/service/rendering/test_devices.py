@@ -138,6 +138,7 @@ def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
     metrics = server.http.get("/metrics").text
     for renderer in "01":
         assert f'sunbox_renderer_resident_bytes{{renderer="{renderer}"}} ' in metrics
+        assert f'sunbox_renderer_ready{{renderer="{renderer}"}} ' in metrics
     endless = settings | {"max_samples": 1 << 24}
     for _ in range(2):
         assert server.http.post("/v1/renders", json={"scene": SCENE, "settings": endless}).status_code == 202

@@ -15,6 +15,7 @@ from service.rendering.ipc import channel
 from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
+    Failed,
     Pause,
     Progress,
     Read,
@@ -22,6 +23,7 @@ from service.rendering.ipc.messages import (
     Restore,
     Resume,
     SavedPicture,
+    Settle,
     StopRule,
     Unable,
     Update,
@@ -263,6 +265,36 @@ def test_a_scene_that_meets_a_move_arrives_once(impatient: None) -> None:
         pool._move(task, pool._supervisors[1])
         await sending
         assert fakes.processes[0].heard(Update) == [] and fakes.processes[1].heard(Update) == [task]
+
+    with_fakes(test, "a", "a")
+
+
+def test_one_renderer_can_help_with_the_task_of_another() -> None:
+    """It is told the same scenes, in the same order, and neither frames nor readings; what it says is heard apart."""
+
+    async def test(fakes: Fakes) -> None:
+        pool, ears, heard = fakes.pool, Ears(), list[Any]()
+        await fakes.until("ready", "ready")
+        home, helper = pool._supervisors
+        helper.stray = heard.append
+        task = pool.open(ears, "render")
+        await pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8)))
+        pool.send(Update(task, 2, stop=StopRule(4), base=1))
+        pool.send(Update(task, 3, settings=settings(9), base=2))
+        pool.send(Want(task, 1, View()))
+        pool.send(Read(task, 1, LINEAR))
+        for message in home.tasks[task].record.scenes():
+            if isinstance(message, tuple):
+                helper.relay_encoded(message)
+            else:
+                helper.relay(message)
+        told = fakes.processes[1].told
+        assert [type(message) for message in told] == [Update, Update, Settle, Update, Update]
+        assert [message.generation for message in told if isinstance(message, Update)] == [1, 2, 1, 3]
+        assert told[-1].settings == settings(9) and told[-1].stop == StopRule(4)
+        said = Failed(task, 3, "of the helper")
+        fakes.processes[1].say(said)
+        assert heard == [said] and ears.messages.empty() and not helper.tasks
 
     with_fakes(test, "a", "a")
 
