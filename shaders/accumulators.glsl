@@ -9,6 +9,15 @@ layout(std430, binding = BLOCK_SLOT_MOMENTS) readonly buffer block_moment_buffer
 uniform uint block_stride; // 1; 0 where there is no block, and a single zero is bound in its place
 uniform float moment_scale; // second moments are of radiance times this
 
+// The sum of a pixel's samples and their number. What rounding added to the parts is left in: it is less than what rounds
+// this sum, and to read it would cost a picture that is shown twice the time.
+vec4 accumulators_sum(uint slot, out float n) {
+    uint b = slot * block_stride;
+    n = moments[slot].w + block_moments[b].w;
+    return sums[slot] + block_sums[b];
+}
+
+// All that is known of a pixel's samples.
 Accumulated accumulators_load(uint slot) {
     uint b = slot * block_stride;
     Accumulated total = Accumulated(sums[slot], compensations[b], moments[slot]);

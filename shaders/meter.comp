@@ -1,6 +1,6 @@
 // Entry: reductions of the accumulators, of which a part is bound, for the noise meter. METER_WEIGH 1 estimates the
 // error of each block of pixels from its own samples and its neighbours'; 0 computes sums over all pixels, and the
-// values of the metered pixels.
+// values of the metered pixels; variances only with METER_VARIANCE.
 #include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 #include "luminance_variance.glsl"
@@ -33,7 +33,21 @@ uniform uint count; // of its pixels
 uniform uint width; // of the picture
 uniform uint lines; // of METER_LINE invocations
 
-float meter_luminance(Accumulated all) { return dot(all.sum.rgb, LUMINANCE) / max(all.moments.w, 1.0); }
+float meter_luminance(uint slot) {
+    float n;
+    vec3 sum = accumulators_sum(slot, n).rgb;
+    return dot(sum, LUMINANCE) / max(n, 1.0);
+}
+
+// The variance of the mean luminance, from the pixel's own samples.
+float meter_variance(uint slot) {
+#if METER_VARIANCE
+    vec4 moments = accumulators_load(slot).moments;
+    return moments.w > 1.0 ? luminance_variance(moments.rgb) / (moments.w * (moments.w - 1.0)) : 0.0;
+#else
+    return 0.0;
+#endif
+}
 
 void main() {
     uvec2 g = gl_GlobalInvocationID.xy;
@@ -42,14 +56,12 @@ void main() {
     vec4 result = vec4(0.0); // luminance, its variance, both summed; and the metered pixel's, where it is bound
     if (k < count) {
         do {
-            Accumulated all = accumulators_load(k);
-            float n = all.moments.w, variance = luminance_variance(all.moments.rgb);
-            result.xy += vec2(meter_luminance(all), n > 1.0 ? variance / (n * (n - 1.0)) : 0.0);
+            result.xy += vec2(meter_luminance(k), meter_variance(k));
             k += uint(METER_LINE) * lines;
         } while (k < count);
     }
     uint pixel = uint(places[i].y) * width + uint(places[i].x) - first;
-    if (pixel < count) result.z = meter_luminance(accumulators_load(pixel));
+    if (pixel < count) result.z = meter_luminance(pixel);
     results[i] = result;
 }
 #endif

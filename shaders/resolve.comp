@@ -25,9 +25,8 @@ void main() {
     uvec2 g = gl_GlobalInvocationID.xy;
     uint slot = g.y * uint(LINE) + g.x;
     if (slot >= count) return;
-    Accumulated all = accumulators_load(slot);
-    float n = all.moments.w;
-    vec4 mean = n > 0.0 ? all.sum / n : vec4(0.0);
+    float n;
+    vec4 sum = accumulators_sum(slot, n), mean = n > 0.0 ? sum / n : vec4(0.0);
     vec3 c = mean.a > 0.0 ? mean.rgb / mean.a : vec3(0.0);
     c = min(c * exposure, vec3(1e37)); // a picture of 1e20 lifted by 60 stops stays finite
     c = resolve_srgb(clamp(TONE_MAP(c), 0.0, 1.0));

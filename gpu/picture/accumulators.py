@@ -123,8 +123,19 @@ class Accumulators:
         """The same of other sums, given as SUM and MOMENTS."""
         bind(kernel, total, None, self._zero, first, count, self.moment_scale)
 
+    def means(self, first: int, count: int) -> np.ndarray:
+        """Mean radiance and alpha of pixels [first, first + count): (count, 4) float32, as `accumulators_sum` has
+        them."""
+        sum_, moments = (self._vectors(self.total[slot], first, count) for slot in (Slot.SUM, Slot.MOMENTS))
+        n = moments[:, 3:]
+        if self.open:
+            sum_ = sum_ + self._vectors(self.block[Slot.SUM], first, count)
+            n = n + self._vectors(self.block[Slot.MOMENTS], first, count)[:, 3:]
+        mean: np.ndarray = sum_ / np.maximum(n, 1)
+        return mean
+
     def read(self, first: int, count: int) -> Sums:
-        """The sums of pixels [first, first + count), the block's among them: each (count, 4) float32."""
+        """All that is known of the samples of pixels [first, first + count): each (count, 4) float32."""
         total = Sums(*(self._vectors(buffer, first, count) for buffer in self.total.values()))
         if not self.open:
             return total

@@ -39,9 +39,10 @@ _BLOCKS = 1 << 20  # blocks of pixels at most for which weights are computed
 _LUMINANCE = np.array(LUMINANCE)
 
 
-def defines(weigh: int) -> dict[str, object]:
+def defines(weigh: int = 0, variance: int = 0) -> dict[str, object]:
     """The defines that meter.comp is compiled with."""
-    return features.defines(frozenset()) | {"METER_WEIGH": weigh, "METER_LINE": LINE}
+    own = {"METER_WEIGH": weigh, "METER_VARIANCE": variance, "METER_LINE": LINE}
+    return features.defines(frozenset()) | own
 
 
 class NoiseMeter:
@@ -74,7 +75,7 @@ class NoiseMeter:
     def _weigh(self, moments: Any, side: int) -> np.ndarray:
         """(rows, columns) of blocks of `side` x `side` pixels: the variance a pixel has there, relative."""
         width, height = self._size
-        kernel = self._kernel(weigh=1)
+        kernel = self._kernels.get("meter.comp", defines(weigh=1))
         columns, parts = -(-width // side), []
         rows_at_once = max(side, self._most // width // side * side)
         for first in range(0, height, rows_at_once):
@@ -94,7 +95,7 @@ class NoiseMeter:
         """Estimated RMSE of the picture's luminance over its mean; `metered`: the pixels were placed and sampled.
         Second moments are of radiance over `scale`."""
         pixels = self._size[0] * self._size[1]
-        totals, seen = self._totals(sums)
+        totals, seen = self._totals(sums, variance=not metered)
         mean = totals[0] / pixels
         if mean == 0:
             return 0.0
@@ -104,16 +105,13 @@ class NoiseMeter:
         other = values[:, :3].astype(float) @ _LUMINANCE / np.maximum(places[:, 3], 1)
         return float(np.sqrt(squared_error(places[:, :3], seen / mean, other / mean) / pixels))
 
-    def _kernel(self, weigh: int) -> Any:
-        return self._kernels.get("meter.comp", defines(weigh))
-
     def _vectors(self, slot: Slot) -> np.ndarray:
         return np.frombuffer(self.buffers[slot].read(), np.float32).reshape(-1, 4)
 
-    def _totals(self, sums: Accumulators) -> tuple[np.ndarray, np.ndarray]:
-        """Luminance and its variance, summed over the picture; and the luminance of each metered pixel."""
+    def _totals(self, sums: Accumulators, variance: bool) -> tuple[np.ndarray, np.ndarray]:
+        """Luminance and, with `variance`, its variance, summed over the picture; that of each metered pixel."""
         width, height = self._size
-        kernel = self._kernel(weigh=0)
+        kernel = self._kernels.get("meter.comp", defines(variance=int(variance)))
         output = contexts.allocate(self._context, 16 * LINE * self.lines)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
         self.buffers[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.NORMAL))

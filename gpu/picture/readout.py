@@ -13,7 +13,6 @@ from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import Slot
 from gpu.picture import noise_meter
 from gpu.picture.accumulators import Accumulators
-from gpu.picture.blocks import Sums
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.first_hit import FirstHit
 from gpu.picture.noise_meter import NoiseMeter
@@ -31,28 +30,27 @@ class Readout:
         self._size = dispatcher.settings.width, dispatcher.settings.height
         self.first_hit = FirstHit(dispatcher.context, self._size)
 
-    def _pieces(self) -> Iterator[tuple[slice, Sums]]:
-        """All pixels, row by row, in pieces that stay in a processor's cache, and their sums."""
+    def _pieces(self) -> Iterator[tuple[int, int]]:
+        """The first pixel, and the number of pixels, of pieces that stay in a processor's cache."""
         pixels = self._size[0] * self._size[1]
-        for first in range(0, pixels, _PIECE):
-            count = min(_PIECE, pixels - first)
-            yield slice(first, first + count), self._sums.read(first, count)
+        return ((first, min(_PIECE, pixels - first)) for first in range(0, pixels, _PIECE))
 
     def color(self) -> np.ndarray:
         """Mean radiance and alpha: (height, width, 4) float32."""
         mean = np.empty((self._size[0] * self._size[1], 4), np.float32)
-        for piece, sums in self._pieces():
-            np.divide(sums.sum, np.maximum(sums.moments[:, 3:], 1), out=mean[piece])
+        for first, count in self._pieces():
+            mean[first : first + count] = self._sums.means(first, count)
         return mean.reshape(self._size[1], self._size[0], 4)
 
     def variance(self) -> np.ndarray:
         """Of each pixel's mean, as if its samples were independent: (height, width, 3) float32."""
         out = np.empty((self._size[0] * self._size[1], 3), np.float32)
         scale = float(np.float32(self._dispatcher.scene.arrays.radiance_scale))
-        for piece, sums in self._pieces():
-            n = np.maximum(sums.moments[:, 3:], 1)
-            spread = np.where(n > 1, sums.moments[:, :3] / np.maximum(n - 1, 1) / n, 0)
-            out[piece] = np.minimum(spread.astype(np.float64) * scale**2, 3e38)
+        for first, count in self._pieces():
+            moments = self._sums.read(first, count).moments
+            n = np.maximum(moments[:, 3:], 1)
+            spread = np.where(n > 1, moments[:, :3] / np.maximum(n - 1, 1) / n, 0)
+            out[first : first + count] = np.minimum(spread.astype(np.float64) * scale**2, 3e38)
         return out.reshape(self._size[1], self._size[0], 3)
 
     def noise(self, samples: int) -> float | None:

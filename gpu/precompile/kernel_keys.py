@@ -110,7 +110,7 @@ def common_keys() -> list[KernelKey]:
     """The keys of the kernels of any scene: those that show a picture, and those of the noise meter, of blocks and
     of `adaptive`."""
     shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
-    metered = [("meter.comp", noise_meter.defines(weigh)) for weigh in (0, 1)]
+    metered = [("meter.comp", noise_meter.defines(*which)) for which in ((1, 0), (0, 0), (0, 1))]
     summed = [("merge.comp", accumulators.defines()), ("areas.comp", features.defines(frozenset()))]
     entries = [*shown, *metered, *summed]
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]

@@ -277,7 +277,7 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
             compiler.hear()
         assert all(compiler.has(key) for key in common_keys())
         asked.append(helper.asked)
-    assert asked == [common_keys(), []] and len(common_keys()) == 16
+    assert asked == [common_keys(), []] and len(common_keys()) == 17
 
 
 def test_clients_take_turns_at_the_compiler(gpu: Renderer, cold: Path) -> None:
