@@ -216,14 +216,16 @@ class Config(BaseSettings):
     @field_validator("ray")
     @classmethod
     def _address(cls, ray: str | None, info: ValidationInfo) -> str | None:
+        if ray is None:
+            return None
         for name in ("device", "devices"):
             if info.data.get(name) not in (None, []):
                 raise ValueError(f"cannot be set together with SUNBOX_{name.upper()}; Ray gives renderers their GPUs")
-        if ray is not None and ray.startswith("ray://"):
+        if ray.startswith("ray://"):
             raise ValueError(
                 "is not the address of Ray's client (ray://); run the server on a node, and write HOST:PORT"
             )
-        if ray not in (None, "auto") and not ADDRESS.fullmatch(ray):
+        if ray != "auto" and not ADDRESS.fullmatch(ray):
             raise ValueError(f"{ray!r} is neither HOST:PORT nor auto")
         return ray
 
