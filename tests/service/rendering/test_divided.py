@@ -1,0 +1,171 @@
+"""Renders and streams that several real renderers trace together: the same bits as with one, whoever is killed."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import signal
+from collections.abc import Awaitable, Callable
+
+import numpy as np
+import pytest
+
+from gpu import Renderer, RenderSettings
+from service.rendering.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule, Update, View, Want
+from service.rendering.renderers import Place
+from service.rendering.supervisor.pool import Pool, Seat
+from service.rendering.supervisor.process import Options
+from tests.gpu.test_precompile import arrays_of
+from tests.service.rendering.test_worker import LINEAR, Ears, settings
+
+SIDE, SAMPLES = 96, 500  # the last block ends before its border
+
+
+@pytest.fixture(scope="module")
+def alone(gpu: Renderer) -> dict[str, np.ndarray]:
+    """The AOVs of the picture that one renderer traces at a time."""
+    scene = gpu.load(arrays_of("plain"))
+    picture = gpu.picture(scene, RenderSettings(**settings(SIDE, seed=4)))
+    picture.trace(1e9, SAMPLES)
+    read = {aov: picture.read(aov) for aov in ("color", "variance", "depth")}
+    picture.release()
+    scene.release()
+    return read
+
+
+class _Divided:
+    """A pool of three renderers with one render, and what it is told of it."""
+
+    def __init__(self) -> None:
+        self.pool = Pool([Seat(Place(str(n)), Options(checkpoint_s=0.2)) for n in range(3)])
+        self.ears = Ears()
+        self.task = 0
+
+    async def begin(self, samples: int = SAMPLES) -> None:
+        self.pool.start()
+        while not all(member.state == "ready" for member in self.pool.members):
+            await asyncio.sleep(0.02)
+        self.task = self.pool.open(self.ears, "render")
+        await self.pool.send_scene(
+            Update(self.task, 1, arrays_of("plain"), settings(SIDE, seed=4), StopRule(samples))
+        )
+
+    async def trace_to(self, samples: int) -> None:
+        while (await self.ears.next(Progressed)).progress.samples < samples:
+            pass
+
+    @property
+    def home(self) -> int:
+        return next(n for n, each in enumerate(self.pool._supervisors) if self.task in each.tasks)
+
+    def kill(self, renderer: int) -> None:
+        pid = self.pool.members[renderer].process_id
+        assert pid is not None
+        os.kill(pid, signal.SIGKILL)
+
+    async def renderers(self, number: int) -> None:
+        """Wait until so many trace the render."""
+        while self.pool.tracing(self.task) != number:
+            await asyncio.sleep(0.005)
+
+    async def pictures(self) -> dict[str, np.ndarray]:
+        done = await self.ears.next(Done)
+        assert done.reason == "max_samples" and done.progress.samples == SAMPLES
+        out = {}
+        for serial, aov in enumerate(("color", "variance", "depth"), 1):
+            self.pool.send(Read(self.task, serial, View(aov, encoding=LINEAR.encoding)))
+            pixels = (await self.ears.next(Image)).pixels
+            assert pixels is not None
+            out[aov] = np.array(pixels)
+        return out
+
+
+def _run(act: Callable[[_Divided], Awaitable[None]]) -> dict[str, np.ndarray]:
+    async def test() -> dict[str, np.ndarray]:
+        divided = _Divided()
+        try:
+            async with asyncio.timeout(240):
+                await divided.begin()
+                await act(divided)
+                return await divided.pictures()
+        finally:
+            await divided.pool.close()
+
+    return asyncio.run(test())
+
+
+async def _nothing(divided: _Divided) -> None:
+    await divided.trace_to(384)
+    others = [member for n, member in enumerate(divided.pool.members) if n != divided.home]
+    assert all(member.statistics.samples > 0 for member in others), "a renderer did not help"
+    assert all(member.statistics.gpu_s["render"] > 0 for member in others)
+
+
+async def _kill_home(divided: _Divided) -> None:
+    await divided.trace_to(128)
+    divided.kill(divided.home)
+
+
+async def _kill_assistant(divided: _Divided) -> None:
+    """It comes back while the picture is traced, and helps again."""
+    await divided.trace_to(64)
+    divided.kill((divided.home + 1) % 3)
+    await divided.renderers(2)
+    await divided.renderers(3)
+
+
+async def _kill_all(divided: _Divided) -> None:
+    await divided.trace_to(200)
+    for renderer in range(3):
+        divided.kill(renderer)
+
+
+@pytest.mark.parametrize("act", [_nothing, _kill_home, _kill_assistant, _kill_all])
+def test_bits_are_those_of_one_renderer(
+    act: Callable[[_Divided], Awaitable[None]], alone: dict[str, np.ndarray]
+) -> None:
+    for aov, pixels in _run(act).items():
+        np.testing.assert_array_equal(pixels, alone[aov], err_msg=aov)
+
+
+def test_a_stream_on_all_renderers_takes_edits(gpu: Renderer) -> None:
+    """Blocks of an older generation are thrown away; the picture after an edit is that of one renderer."""
+    scene = gpu.load(arrays_of("plain"))
+    scene.edit(environment=(0.25, 0.0))
+    picture = gpu.picture(scene, RenderSettings(**settings(SIDE, seed=4)))
+    picture.trace(1e9, 256)
+    expected = picture.read("color")
+    picture.release()
+    scene.release()
+
+    async def test() -> np.ndarray:
+        divided = _Divided()
+        pool, ears = divided.pool, divided.ears
+        try:
+            async with asyncio.timeout(240):
+                pool.start()
+                while not all(member.state == "ready" for member in pool.members):
+                    await asyncio.sleep(0.02)
+                task = divided.task = pool.open(ears)
+                pool.divide(task, 99)
+                size = settings(SIDE, seed=4)
+                await pool.send_scene(Update(task, 1, arrays_of("plain"), size, StopRule(1 << 20), interactive=True))
+                serial, samples = 0, 0
+                while samples < 200:
+                    serial += 1
+                    pool.send(Want(task, serial, View()))
+                    frame = await ears.next(Frame)
+                    assert frame.progress.samples >= samples or frame.scale < 1.0
+                    samples = frame.progress.samples
+                assert pool.tracing(task) == 3
+                pool.send(Update(task, 2, environment=(0.25, 0.0), stop=StopRule(256), base=1))
+                while (await ears.next(Done)).generation != 2:
+                    pass
+                pool.send(Read(task, 1, LINEAR))
+                pixels = (await ears.next(Image)).pixels
+                assert pixels is not None
+                return np.array(pixels)
+        finally:
+            await pool.close()
+
+    np.testing.assert_array_equal(asyncio.run(test()), expected)
