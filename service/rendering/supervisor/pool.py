@@ -6,6 +6,7 @@ import asyncio
 import itertools
 import logging
 from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from functools import partial
 from typing import Any
@@ -20,6 +21,7 @@ from service.rendering.supervisor.keeper import STARTING
 from service.rendering.supervisor.process import Options, Start
 from service.rendering.supervisor.supervisor import Supervisor
 
+DRIVERS_S = 15.0  # how long a stored picture waits for renderers to start, one of which may be its own
 QUESTIONS: tuple[Kind, ...] = ("bsdf", "server")
 
 log = logging.getLogger(__name__)
@@ -133,7 +135,7 @@ class Pool:
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
         if restore is not None and restore.reason is None:
-            self._move_to_driver(update.task, restore.saved.driver)
+            await self._move_to_driver(update.task, restore.saved.driver)
         # It may move to another renderer while the scene is encoded.
         while (home := self._homes.get(update.task)) is not None:
             if await home.sent_scene(update, restore):
@@ -186,15 +188,34 @@ class Pool:
         if moved:
             log.info("moved tasks to other renderers renderer=%s tasks=%d", lost.place.id, moved)
 
-    def _move_to_driver(self, number: int, driver: str) -> None:
-        """Move a task of which nothing has been sent yet to a renderer that can go on with its picture."""
+    async def _move_to_driver(self, number: int, driver: str) -> None:
+        """Move a task of which nothing has been sent yet to a renderer that can go on with its picture.
+
+        Waits for renderers that are being started: nobody knows their drivers before that.
+        """
+        if not driver:
+            return
+        with suppress(TimeoutError):
+            async with asyncio.timeout(DRIVERS_S):
+                while len(self._supervisors) > 1 and not self._is_at_driver(number, driver) and self._starts:
+                    await self._stirred.wait()
         home = self._homes.get(number)
-        if home is None or not driver or home.driver == driver:
+        if home is None or home.driver == driver:
             return
         task = home.tasks[number]
         best = self._best(_load(task.kind, task.client), driver)
         if best is not None and best is not home and best.driver == driver:
             self._move(number, best)
+
+    def _is_at_driver(self, number: int, driver: str) -> bool:
+        """Whether it is with a renderer of that driver, or gone."""
+        home = self._homes.get(number)
+        return home is None or home.driver == driver
+
+    @property
+    def _starts(self) -> bool:
+        """Whether a renderer is being started that was never ready."""
+        return any(each.driver is None and each.takes_tasks and not each.waiting for each in self._supervisors)
 
     def _move(self, number: int, home: Supervisor) -> None:
         task = self._homes[number].give_up(number)

@@ -277,7 +277,7 @@ def test_one_renderer_can_help_with_the_task_of_another() -> None:
         await fakes.until("ready", "ready")
         home, helper = pool._supervisors
         helper.stray = heard.append
-        task = pool.open(ears, "render")
+        task = pool.open(ears)  # which is not divided without being asked for
         await pool.send_scene(Update(task, 1, arrays_of("plain"), settings(8)))
         pool.send(Update(task, 2, stop=StopRule(4), base=1))
         pool.send(Update(task, 3, settings=settings(9), base=2))
@@ -314,6 +314,23 @@ def test_a_stored_picture_goes_to_a_renderer_of_its_driver() -> None:
             pool.drop(task)
 
     with_fakes(test, "a", "b")
+
+
+def test_a_stored_picture_waits_until_the_drivers_are_known() -> None:
+    """As it must at the start of a server, which takes up its renders at once."""
+
+    async def test(fakes: Fakes) -> None:
+        pool = fakes.pool
+        for home, driver in ((2, "c"), (1, "b"), (0, "a")):
+            task = pool.open(Ears(), "render")
+            assert fakes.home(task) == "0"
+            saved = SavedPicture(4, (0, 0, 0), [], driver)
+            update = Update(task, 1, arrays_of("plain"), settings(8))
+            await pool.send_scene(update, Restore(task, 1, saved, None, Progress(4)))
+            assert fakes.home(task) == str(home)
+            pool.drop(task)
+
+    with_fakes(test, "a", "b", "c")
 
 
 def test_who_waits_gets_the_first_that_is_ready_and_nothing_at_the_end() -> None:
