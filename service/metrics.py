@@ -107,6 +107,9 @@ def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[
     yield _counters("checkpoints", "Renders under way that were saved, to go on later.", ("renderer",), checkpoints)
     recovery = {member.place.id: member.statistics.recovery_s for member in members}
     yield _histograms("recovery_seconds", "From a renderer's loss to the next one.", "renderer", recovery)
+    leases = _each_of(members, lambda seen: seen.leases)
+    help = "Parts of divided pictures that a renderer was given by others, traced, or failed to trace."
+    yield _counters("leases", help, ("renderer", "outcome"), leases)
     errors = {(kind,): float(count) for kind, count in clients.errors.items()}
     yield _counters("errors", "Errors on streams and of failed renders, by problem.", ("type",), errors)
 

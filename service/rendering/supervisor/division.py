@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -20,6 +21,10 @@ class Peer(Protocol):
     @property
     def driver(self) -> str | None:
         """What decides about equal bits; None while it cannot render."""
+
+    @property
+    def leases(self) -> Counter[str]:
+        """How many leases it was given, has done, and has failed to do."""
 
     def relay(self, message: ToRenderer) -> None:
         """Send a message as it is, past the records of this renderer's own tasks."""
@@ -134,12 +139,15 @@ class Division:
             return
         if isinstance(message, Lease):
             if message.assistant in held.assistants:
+                self._peers[message.assistant].leases["given"] += 1
                 self._peers[message.assistant].relay(message)
         elif sender not in held.assistants:
             return
         elif isinstance(message, LeaseDone):
+            self._peers[sender].leases["done"] += 1
             self._peers[held.home].relay(message)
         else:
+            self._peers[sender].leases["failed"] += 1
             log.warning("a renderer cannot assist task=%d renderer=%d error=%s", message.task, sender, message.detail)
             held.unfit |= {sender}
             self.assign()

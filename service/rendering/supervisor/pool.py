@@ -240,6 +240,7 @@ class _Peer:
     def __init__(self, supervisor: Supervisor) -> None:
         self._supervisor = supervisor
         self.relay, self.relay_encoded = supervisor.relay, supervisor.relay_encoded
+        self.leases = supervisor.statistics.leases
 
     @property
     def driver(self) -> str | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Iterable
 from typing import Any, cast
 
@@ -19,6 +20,7 @@ class _Peer:
     def __init__(self, driver: str | None = "llvmpipe") -> None:
         self.driver = driver
         self.told: list[ToRenderer] = []
+        self.leases: Counter[str] = Counter()
 
     def relay(self, message: ToRenderer) -> None:
         self.told.append(message)
@@ -105,7 +107,7 @@ def test_leases_and_results_find_their_way() -> None:
     division.handed(lease, 0)
     assert peers[1].told[-1] == lease
     division.handed(done, 1)
-    assert peers[0].told[-1] is done
+    assert peers[0].told[-1] is done and peers[1].leases == {"given": 1, "done": 1}
     peers[0].take()
     division.handed(done, 2)  # nobody asked it
     division.handed(Lease(1, 1, 78, 2, 8, 56, 0, 8), 0)  # which does not assist any more
