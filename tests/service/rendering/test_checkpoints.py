@@ -6,6 +6,7 @@ import asyncio
 import os
 import signal
 from collections.abc import Generator
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,6 +14,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
+from gpu.picture.blocks import FIRST
 from service.rendering.ipc import channel
 from service.rendering.ipc.messages import (
     Checkpoint,
@@ -117,6 +119,33 @@ def test_what_was_stored_is_read_from_there(gpu: Renderer, readable: bool) -> No
         assert (await ears.next(Image)).pixels is not None
 
     with_supervisor(test, checkpoint_s=2.0)
+
+
+@pytest.mark.parametrize("reason", [None, "max_samples"])
+def test_a_picture_of_an_earlier_version(gpu: Renderer, reason: Any) -> None:
+    """It had no blocks of samples: under way it begins again, as other bits would follow; ended it is shown."""
+
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor, ENDLESS)
+        checkpoint = await ears.next(Checkpoint)
+        while checkpoint.saved.samples < FIRST:
+            checkpoint = await ears.next(Checkpoint)
+        supervisor.drop(task)
+        samples = checkpoint.saved.samples + 50
+        old = replace(checkpoint.saved, buffers=checkpoint.saved.buffers[:7], under_way=(0, 0, 0))
+        task, ears = await begun(supervisor, samples)
+        supervisor.send(Restore(task, 1, old, reason, checkpoint.progress))
+        if reason is not None:
+            supervisor.send(Read(task, 1, LINEAR))
+            assert (await ears.next(Image)).progress.samples == old.samples
+            return
+        assert (await ears.next(Done)).progress.samples == samples
+        pixels = await picture(supervisor, task, ears)
+        task, ears = await begun(supervisor, samples)
+        await ears.next(Done)
+        assert np.array_equal(pixels, await picture(supervisor, task, ears))
+
+    with_supervisor(test, checkpoint_s=0.05)
 
 
 def test_what_is_cancelled_meanwhile_stays_as_it_was(gpu: Renderer) -> None:
