@@ -3,14 +3,17 @@
 #   docker build -t sunbox .
 #   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data sunbox
 #   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
+# With Ray, for the nodes of a cluster (docs/scaling.md):
+#   docker build --build-arg LOCK=ray -t sunbox-ray .
 # Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22.
 
 FROM python:3.13-slim-trixie AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/sunbox
 WORKDIR /source
-COPY requirements.serve.lock requirements.build.lock ./
-RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r requirements.serve.lock
+COPY requirements.serve.lock requirements.ray.lock requirements.build.lock ./
+ARG LOCK=serve
+RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r "requirements.${LOCK}.lock"
 COPY pyproject.toml README.md ./
 COPY gpu gpu
 COPY service service

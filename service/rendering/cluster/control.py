@@ -18,6 +18,7 @@ class Join:
     renderers: int | None  # SUNBOX_RAY_RENDERERS
     gpu: bool  # SUNBOX_REQUIRE_GPU
     options: dict[str, Any]  # of a renderer's process: the fields of Options that are for any node
+    nodes_s: float = 15.0  # for nodes to join a head that was started just before, and renders nothing itself
     patience_s: float = 20.0  # for a head that accepts connections and does not answer; Ray itself waits two minutes
 
 

@@ -23,7 +23,7 @@ from service.rendering.cluster import control
 from service.rendering.cluster.actor import Renderer
 from service.rendering.cluster.carriage import Scenes
 from service.rendering.cluster.control import Join, Joined, Open, Refused
-from service.rendering.cluster.joining import CannotJoin, join
+from service.rendering.cluster.joining import CannotJoin, join, survey
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described
 from service.rendering.ipc import channel
@@ -141,11 +141,12 @@ def main() -> int:
     refusal.daemon = True
     refusal.start()
     try:
-        joined = join(ask)
+        local = join(ask)
     except CannotJoin as error:
         _refuse(end, str(error))
     finally:
         refusal.cancel()
+    joined = survey(ask, local)
     with suppress(OSError):
         control.send(end, joined)
     _written.clear()

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import logging
 import os
 import socket
+import time
 from contextlib import suppress
 from typing import Any, cast
 
@@ -14,12 +16,18 @@ ANSWER_S = 5.0  # for the head to accept a connection; Ray itself waits for two 
 INSTALL = "SUNBOX_RAY is set, and Ray is not installed here: pip install 'sunbox[ray]'"
 
 
+log = logging.getLogger(__name__)
+
+
 class CannotJoin(Exception):
     """The text names the variable that is wrong."""
 
 
-def join(ask: Join) -> Joined:
-    """Make this process a driver of the cluster. Raises CannotJoin; may wait for long where a head hangs."""
+def join(ask: Join) -> bool:
+    """Make this process a driver of the cluster; whether that was started for it.
+
+    Raises CannotJoin; may wait for long where a head hangs.
+    """
     try:
         import ray
     except ImportError as error:
@@ -41,9 +49,30 @@ def join(ask: Join) -> Joined:
         raise CannotJoin(
             f"{variable}: could not join the Ray cluster {named or 'of this machine'}: {error}"
         ) from None
-    nodes = [node["Resources"] for node in cast(Any, ray).nodes() if node["Alive"]]
-    number, resources = plan(nodes, ask.renderers, ask.gpu)
+    return local
+
+
+def survey(ask: Join, local: bool) -> Joined:
+    """What there is in the cluster that was joined, and what each renderer gets of it; may wait for `ask.nodes_s`."""
+    import ray
+
+    number, resources = plan(_nodes(ask), ask.renderers, ask.gpu)
     return Joined(ray.get_runtime_context().gcs_address, local, number, resources)
+
+
+def _nodes(ask: Join) -> list[dict[str, float]]:
+    """The resources of each node, as soon as there is one that can render; what it declares depends on them."""
+    import ray
+
+    until = time.monotonic() + ask.nodes_s
+    while True:
+        nodes = [node["Resources"] for node in cast(Any, ray).nodes() if node["Alive"]]
+        if ask.gpu or any(node.get("GPU") or node.get("CPU") for node in nodes):
+            return nodes
+        if time.monotonic() > until:
+            log.warning("no node of the cluster can render yet: each renderer declares one processor")
+            return nodes
+        time.sleep(0.5)
 
 
 def _runs_here() -> bool:

@@ -98,7 +98,7 @@ def test_a_head_that_does_not_answer() -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
         with pytest.raises(CannotJoin, match=rf"^SUNBOX_RAY: the Ray cluster \({address}\) gave no answer in 3 s"):
-            Cluster(address, None, False, OPTIONS, patience_s=3.0)
+            Cluster(address, None, False, OPTIONS, patience_s=3.0, nodes_s=0.0)
 
 
 class Method:

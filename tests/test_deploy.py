@@ -1,0 +1,79 @@
+"""What can be checked of the files for clusters without one: syntax, Ray's schema, and that their names are real."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.config import Config, load_config
+
+yaml = pytest.importorskip("yaml", reason="Ray is not installed, which brings PyYAML: pip install 'sunbox[ray]'")
+
+ROOT = Path(__file__).parents[1]
+DEPLOY = ROOT / "docs" / "deploy"
+
+
+def documents(path: Path) -> list[Any]:
+    return list(yaml.safe_load_all(path.read_text()))
+
+
+@pytest.mark.parametrize("path", sorted(DEPLOY.glob("*.yaml")), ids=lambda path: path.name)
+def test_names_are_real(path: Path) -> None:
+    assert documents(path)
+    known = {f"SUNBOX_{name.upper()}" for name in Config.model_fields}
+    assert set(re.findall(r"SUNBOX_[A-Z_]+", path.read_text())) <= known
+    assert f"docs/deploy/{path.name}" in (ROOT / "docs" / "scaling.md").read_text()
+
+
+def test_ray_takes_the_cluster_file(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    from ray.autoscaler._private.util import prepare_config, validate_config
+
+    monkeypatch.setenv("HOME", str(tmp_path))
+    (config,) = documents(DEPLOY / "ray-cluster.yaml")
+    prepared = prepare_config(config)
+    validate_config(prepared)
+    workers = len(config["provider"]["worker_ips"])
+    assert sum(kind["max_workers"] for kind in prepared["available_node_types"].values()) == workers
+    with pytest.raises(Exception, match="max_wrokers"):
+        validate_config(prepared | {"max_wrokers": 3})
+
+
+def test_the_manifest_asks_for_as_many_renderers_as_there_can_be() -> None:
+    cluster, claim = documents(DEPLOY / "kuberay.yaml")
+    assert (cluster["apiVersion"], cluster["kind"]) == ("ray.io/v1", "RayCluster")
+    spec = cluster["spec"]
+    (workers,) = spec["workerGroupSpecs"]
+    (head,) = spec["headGroupSpec"]["template"]["spec"]["containers"]
+    given = {each["name"]: each["value"] for each in head["env"] if "value" in each}
+    settings = {name.removeprefix("SUNBOX_").lower(): value for name, value in given.items()}
+    config = load_config(**settings)
+    assert config.ray == "auto" and config.ray_renderers == workers["maxReplicas"] > workers["minReplicas"]
+    assert config.require_gpu and spec["enableInTreeAutoscaling"]
+    (volume,) = spec["headGroupSpec"]["template"]["spec"]["volumes"]
+    assert volume["persistentVolumeClaim"]["claimName"] == claim["metadata"]["name"]
+    assert head["volumeMounts"] == [{"name": volume["name"], "mountPath": "/data"}]
+    locked = re.search(r"^ray==(\S+)", (ROOT / "requirements.ray.lock").read_text(), re.MULTILINE)
+    assert locked is not None and spec["rayVersion"] == locked[1]
+
+
+def test_a_profile_of_compose_is_a_cluster() -> None:
+    (compose,) = documents(ROOT / "compose.yaml")
+    head, worker = compose["services"]["head"], compose["services"]["worker"]
+    assert head["profiles"] == worker["profiles"] == ["cluster"]
+    assert head["image"] == worker["image"] == "sunbox-ray" and head["build"]["args"] == {"LOCK": "ray"}
+    assert head["environment"]["SUNBOX_RAY_RENDERERS"] == worker["deploy"]["replicas"]
+    for service in (head, worker):
+        assert service["environment"]["RAY_AUTH_MODE"] == "token" and service["read_only"]
+    assert "SUNBOX_API_KEY" not in worker["environment"]
+
+
+def test_the_image_with_ray_has_what_was_tested() -> None:
+    pins = [
+        dict(re.findall(r"^([a-z0-9_.-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))
+        for name in ("requirements.lock", "requirements.ray.lock", "requirements.serve.lock")
+    ]
+    everything, ray, serve = pins
+    assert "ray" in ray and serve.items() <= ray.items() <= everything.items()
