@@ -169,12 +169,12 @@ def test_too_much_falls_back_to_what_was_there(fragile: Server) -> None:
 
 def test_who_rests_makes_room(fragile: Server) -> None:
     """Four pictures of 24 MB where two fit: each comes back as it was when somebody looks at it."""
-    ids = [started(fragile, width=700, height=700, max_samples=1) for _ in range(2)]
+    ids = [started(fragile, width=500, height=500, max_samples=1) for _ in range(2)]
     jobs = {id: pixels(fragile, id) for id in ids if ended(fragile, id)["state"] == "done"}
     with opened(fragile) as one, opened(fragile) as other:
         shown: list[Picture] = []
         for stream in (one, other):
-            stream.start(settings={**SMALL, "width": 700, "height": 700, "max_samples": 2}, view=RAW)
+            stream.start(settings={**SMALL, "width": 500, "height": 500, "max_samples": 2}, view=RAW)
             shown.append(stream.finished()[1])
         assert len(jobs) == 2 and {id: pixels(fragile, id) for id in jobs} == jobs
         for stream, before in zip((one, other), shown, strict=True):
