@@ -57,10 +57,14 @@ class Division:
     def opened(self, task: int, home: int, most: int | None) -> None:
         self._tasks[task] = _Task(most, home)
 
-    def moved(self, task: int, home: int) -> None:
-        """Another renderer goes on with this task."""
+    def leave(self, task: int) -> None:
+        """End all assistance for a task that is about to move: one of its assistants may be its next home."""
         if (held := self._tasks.get(task)) is not None:
             self._leave(task, held)
+
+    def moved(self, task: int, home: int) -> None:
+        """Another renderer goes on with this task, after `leave`."""
+        if (held := self._tasks.get(task)) is not None:
             held.home = home
             self.assign()
 

@@ -218,6 +218,7 @@ class Pool:
         return any(each.driver is None and each.takes_tasks and not each.waiting for each in self._supervisors)
 
     def _move(self, number: int, home: Supervisor) -> None:
+        self._division.leave(number)
         task = self._homes[number].give_up(number)
         self._homes[number] = home
         home.take_over(number, task)

@@ -6,6 +6,8 @@ import asyncio
 import os
 import signal
 from collections.abc import Awaitable, Callable
+from functools import partial
+from typing import Any
 
 import numpy as np
 import pytest
@@ -14,9 +16,12 @@ from gpu import Renderer, RenderSettings
 from service.rendering.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule, Update, View, Want
 from service.rendering.renderers import Place
 from service.rendering.supervisor.pool import Pool, Seat
-from service.rendering.supervisor.process import Options
+from service.rendering.supervisor.process import Options, Process
 from tests.gpu.test_precompile import arrays_of
+from tests.service.rendering.test_pool import impatient
 from tests.service.rendering.test_worker import LINEAR, Ears, settings
+
+__all__ = ["impatient"]  # a fixture
 
 SIDE, SAMPLES = 96, 500  # the last block ends before its border
 
@@ -37,9 +42,13 @@ class _Divided:
     """A pool of three renderers with one render, and what it is told of it."""
 
     def __init__(self) -> None:
-        self.pool = Pool([Seat(Place(str(n)), Options(checkpoint_s=0.2)) for n in range(3)])
+        self.pool = Pool([Seat(Place(str(n)), start=partial(self._start, n)) for n in range(3)])
         self.ears = Ears()
         self.task = 0
+        self.broken: int | None = None  # the renderer that does not begin any more
+
+    def _start(self, number: int, *given: Any) -> Process:
+        return Process(Options(device=99) if number == self.broken else Options(checkpoint_s=0.2), *given)
 
     async def begin(self, samples: int = SAMPLES) -> None:
         self.pool.start()
@@ -114,15 +123,26 @@ async def _kill_assistant(divided: _Divided) -> None:
     await divided.renderers(3)
 
 
+async def _lose_home(divided: _Divided) -> None:
+    """Its renderer cannot begin again, so that an assistant becomes the home."""
+    await divided.trace_to(128)
+    home = divided.home
+    divided.broken = home
+    divided.kill(home)
+    while divided.home == home:
+        await asyncio.sleep(0.02)
+    await divided.renderers(2)
+
+
 async def _kill_all(divided: _Divided) -> None:
     await divided.trace_to(200)
     for renderer in range(3):
         divided.kill(renderer)
 
 
-@pytest.mark.parametrize("act", [_nothing, _kill_home, _kill_assistant, _kill_all])
+@pytest.mark.parametrize("act", [_nothing, _kill_home, _kill_assistant, _lose_home, _kill_all])
 def test_bits_are_those_of_one_renderer(
-    act: Callable[[_Divided], Awaitable[None]], alone: dict[str, np.ndarray]
+    act: Callable[[_Divided], Awaitable[None]], alone: dict[str, np.ndarray], impatient: None
 ) -> None:
     for aov, pixels in _run(act).items():
         np.testing.assert_array_equal(pixels, alone[aov], err_msg=aov)
