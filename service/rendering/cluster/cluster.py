@@ -8,6 +8,7 @@ import os
 import socket
 import subprocess
 import sys
+from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from functools import partial
@@ -16,15 +17,17 @@ from typing import Any
 
 from service import logs
 from service.rendering.cluster import control
-from service.rendering.cluster.control import Join, Joined, Open, Refused
+from service.rendering.cluster.control import Join, Joined, Open, Refused, Release
 from service.rendering.cluster.joining import INSTALL, CannotJoin
 from service.rendering.cluster.process import ClusterProcess
 from service.rendering.cluster.renderers import described
 from service.rendering.executors import tending
-from service.rendering.supervisor.process import ROOT, Start
+from service.rendering.ipc import channel
+from service.rendering.supervisor.process import ROOT, Start, Waiting
 
 JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself much earlier
 FAREWELL_S = 10.0  # for the gateway to end the actors, and a cluster of its own
+RESTS = "The renderer has been given back to the Ray cluster until there is more work."
 SECRETS = ("SUNBOX_API_KEY",)  # that no process of a cluster needs
 
 # Nothing is reported to Ray's makers. Actors begin at the server's own priority, as renderers of this machine do.
@@ -49,6 +52,7 @@ class Cluster:
             raise CannotJoin(INSTALL)
         self.options = options
         self._join = Join(address, renderers, gpu, options, **join)
+        self._resting: dict[int, socket.socket | None] = {}  # the ends of their channels, once they are asked for
         self._gateway: _Gateway | None = _start(self._join)
         try:
             self.joined = _answered(self._gateway)
@@ -64,12 +68,38 @@ class Cluster:
         """What a renderer has of its node, as /v1/info says it."""
         return described(self.joined.resources)
 
+    def rest(self, number: int) -> None:
+        """Give what a renderer has back to the cluster, until it is woken; meanwhile it says that it waits."""
+        if number not in self._resting:
+            self._resting[number] = None
+            with suppress(OSError):
+                if self._gateway is not None:
+                    control.send(self._gateway.control, Release(number))
+
+    def wake(self, number: int) -> None:
+        """Ask the cluster for a renderer that rests; Ray's autoscaler may have to start a node for it."""
+        end = self._resting.pop(number, None)
+        if end is not None:
+            with end:
+                self._carry(number, end)
+
+    @property
+    def resting(self) -> Collection[int]:
+        """The numbers of the renderers that rest."""
+        return self._resting.keys()
+
     def starter(self, number: int) -> Start:
         """What starts a supervisor's renderer; `number` counts the renderers from 0."""
         return partial(ClusterProcess, partial(self._carry, number))
 
     def _carry(self, number: int, end: socket.socket) -> int:
         """Have the gateway carry the messages of a renderer; `end` is of its channel. The gateway's process id."""
+        if number in self._resting:
+            if (before := self._resting[number]) is not None:
+                before.close()
+            self._resting[number] = end.dup()
+            channel.send(end, Waiting(RESTS))
+            return 0 if self._gateway is None else self._gateway.process.pid
         if self._gateway is not None:
             with suppress(OSError):
                 return self._ask(self._gateway, number, end)
@@ -78,6 +108,10 @@ class Cluster:
         return self._ask(self._gateway, number, end)
 
     async def close(self) -> None:
+        for end in self._resting.values():
+            if end is not None:
+                end.close()
+        self._resting.clear()
         await tending(partial(self._end, FAREWELL_S))
 
     def _ask(self, gateway: _Gateway, number: int, end: socket.socket) -> int:

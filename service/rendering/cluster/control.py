@@ -30,6 +30,7 @@ class Joined:
     local: bool  # it was started for this server
     renderers: int
     resources: dict[str, float]  # that each of them declares
+    room: int  # for so many of them, as the cluster is now
 
 
 @dataclass(frozen=True)
@@ -42,6 +43,13 @@ class Refused:
 @dataclass(frozen=True)
 class Open:
     """Asks for a renderer; the end of its supervisor's channel goes along."""
+
+    number: int
+
+
+@dataclass(frozen=True)
+class Release:
+    """Asks to give what a renderer has back to the cluster; it can be opened again."""
 
     number: int
 

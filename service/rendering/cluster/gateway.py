@@ -22,7 +22,7 @@ from service import logs
 from service.rendering.cluster import control
 from service.rendering.cluster.actor import Renderer
 from service.rendering.cluster.carriage import Scenes
-from service.rendering.cluster.control import Join, Joined, Open, Refused
+from service.rendering.cluster.control import Join, Joined, Open, Refused, Release
 from service.rendering.cluster.joining import CannotJoin, join, survey
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described
@@ -81,7 +81,7 @@ class Gateway:
     def restart(self, number: int) -> None:
         import ray
 
-        with suppress(Exception):  # it has gone meanwhile
+        with suppress(Exception):  # it has gone meanwhile, or was released
             ray.kill(self._handles[number], no_restart=False)
 
     def _readable(self) -> None:
@@ -97,6 +97,17 @@ class Gateway:
             running = asyncio.get_running_loop().create_task(_after(before, lane))
             self._lanes[running] = lane
             running.add_done_callback(self._finished)
+        elif isinstance(message, Release):
+            self._release(message.number)
+
+    def _release(self, number: int) -> None:
+        import ray
+
+        for lane in self._lanes.values():
+            if lane.number == number:
+                lane.release()
+        if (handle := self._handles.pop(number, None)) is not None:
+            ray.kill(handle)
 
     def _finished(self, running: asyncio.Task[None]) -> None:
         lane = self._lanes.pop(running)

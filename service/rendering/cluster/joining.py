@@ -10,7 +10,7 @@ from contextlib import suppress
 from typing import Any, cast
 
 from service.rendering.cluster.control import Join, Joined
-from service.rendering.cluster.renderers import plan
+from service.rendering.cluster.renderers import plan, room
 
 ANSWER_S = 5.0  # for the head to accept a connection; Ray itself waits for two minutes
 INSTALL = "SUNBOX_RAY is set, and Ray is not installed here: pip install 'sunbox[ray]'"
@@ -56,8 +56,10 @@ def survey(ask: Join, local: bool) -> Joined:
     """What there is in the cluster that was joined, and what each renderer gets of it; may wait for `ask.nodes_s`."""
     import ray
 
-    number, resources = plan(_nodes(ask), ask.renderers, ask.gpu)
-    return Joined(ray.get_runtime_context().gcs_address, local, number, resources)
+    nodes = _nodes(ask)
+    number, resources = plan(nodes, ask.renderers, ask.gpu)
+    address = ray.get_runtime_context().gcs_address
+    return Joined(address, local, number, resources, room(nodes, resources))
 
 
 def _nodes(ask: Join) -> list[dict[str, float]]:

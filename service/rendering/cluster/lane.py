@@ -58,7 +58,8 @@ class Lane:
         self._news = asyncio.Event()
         self._held: dict[int, list[ToRenderer]] = {}  # by task, behind a large message of it that is under way
         self._tasks: set[int] = set()
-        self._paused = self._leaving = False
+        self._paused = False
+        self._loss = "node lost"  # why, when the actor is lost
         self._over = asyncio.Event()  # the supervisor has closed its end
         self._carrying: set[asyncio.Task[None]] = set()
         self._link = channel.Channel(end, self._received, self._over.set)
@@ -82,10 +83,14 @@ class Lane:
     def close(self) -> None:
         self._over.set()
 
+    def release(self) -> None:
+        """End as one that is not needed now; whoever calls it ends the actor."""
+        self._loss = "released"
+
     def leave(self) -> None:
         """Leave the node, which is about to go: renders are saved, and Ray restarts the actor elsewhere."""
-        if not self._leaving:
-            self._leaving = True
+        if self._loss == "node lost":
+            self._loss = "drained"
             log.warning("a node is being drained renderer=%d tasks=%d", self.number, len(self._tasks))
             for task in self._tasks:
                 self._received(TakeCheckpoint(task))
@@ -122,7 +127,7 @@ class Lane:
         except RayError as error:
             log.error("Ray failed renderer=%d error=%s", self.number, _first_line(error))
             self._actors.restart(self.number)
-        return Ended("drained" if self._leaving else "node lost")
+        return Ended(self._loss)
 
     async def _begun(self) -> Any:
         """The actor with a renderer that has just been started. Raises Unfit, RayActorError."""
@@ -132,6 +137,8 @@ class Lane:
         try:
             there = await self._placed(actor)
         except RayActorError:  # Ray has given it up, as it does when somebody kills it for good
+            if self._loss == "released":
+                raise
             actor = self._actors.actor(self.number, anew=True)
             try:
                 there = await self._placed(actor)

@@ -24,6 +24,11 @@ def plan(nodes: Sequence[Mapping[str, float]], wanted: int | None, gpu: bool = F
     return number, {"CPU": float(share)}
 
 
+def room(nodes: Sequence[Mapping[str, float]], resources: Resources) -> int:
+    """How many renderers that declare these resources have room on such nodes, if nobody else uses them."""
+    return sum(min(int(node.get(name, 0) // count) for name, count in resources.items()) for node in nodes)
+
+
 def described(resources: Mapping[str, float]) -> str:
     """The resources in words: "1 GPU and 2 CPU"."""
     return " and ".join(f"{count:g} {name}" for name, count in sorted(resources.items(), reverse=True))

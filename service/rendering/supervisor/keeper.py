@@ -187,7 +187,8 @@ class Keeper:
         self.restarts.lost(process, cause)
         self._statistics.restarts[cause] += 1
         line = "renderer lost renderer=%s cause=%s lived_s=%.1f failures=%d"
-        log.error(line, self._id, cause, process.lived_s, self.restarts.failures)
+        level = logging.INFO if cause == "released" else logging.ERROR
+        log.log(level, line, self._id, cause, process.lived_s, self.restarts.failures)
         self.lost(process, cause)
         if self.restarts.hopeless:
             self.hopeless()

@@ -27,7 +27,7 @@ THREADS = ("LP_NUM_THREADS", "OIDN_NUM_THREADS", "OMP_NUM_THREADS", "OPENBLAS_NU
 POLL_S = 0.01  # between two looks whether a process has ended
 KILLS = {-signal.SIGKILL, -signal.SIGTERM}
 
-Cause = Literal["killed", "crashed", "hung", "stopped", "out of memory", "node lost", "drained"]
+Cause = Literal["killed", "crashed", "hung", "stopped", "out of memory", "node lost", "drained", "released"]
 
 log = logging.getLogger(__name__)
 

@@ -6,7 +6,7 @@ from service.rendering.supervisor.process import Cause, RendererProcess
 
 TRIES = 3  # starts in a row that end before rendering; then there is no renderer, and the reason is given
 # Causes from outside, which never count as a failure to start.
-BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped", "node lost", "drained")
+BY_OTHERS: tuple[Cause, ...] = ("killed", "stopped", "node lost", "drained", "released")
 BETWEEN_TRIES_S = 0.5
 AFTER_KILLS_S = 5.0  # between starts of renderers that others kill as soon as they begin, at most
 HOPELESS_S = 15.0  # between tries after that, while nobody waits

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.rendering.cluster.cluster import Cluster
+from service.rendering.cluster.cluster import RESTS, Cluster
 from service.rendering.ipc.messages import Checkpoint, Done, Image, Read, StopRule, Update
 from service.rendering.supervisor.pool import Pool
 from service.rendering.supervisor.supervisor import Supervisor
@@ -27,13 +27,19 @@ Run = Callable[[Callable[[Pool], Awaitable[None]]], None]
 
 
 @pytest.fixture(scope="module")
-def run(gpu: Renderer) -> Iterator[Run]:
-    """Runs a test with two actors, which all tests of this file share."""
+def cluster(gpu: Renderer) -> Iterator[Cluster]:
+    """A cluster of this machine with two actors, which all tests of this file share."""
+    found = Cluster("auto", 2, False, OPTIONS)
+    assert found.joined.local and found.joined.renderers == 2
+    yield found
+    asyncio.run(found.close())
+
+
+@pytest.fixture(scope="module")
+def run(cluster: Cluster) -> Iterator[Run]:
+    """Runs a test with these actors."""
     with asyncio.Runner() as runner:
-        cluster = Cluster("auto", 2, False, OPTIONS)
-        assert cluster.joined.local and cluster.joined.renderers == 2
         yield lambda test: runner.run(with_pool(cluster, test))
-        runner.run(cluster.close())
 
 
 @pytest.fixture(scope="module")
@@ -88,5 +94,21 @@ def test_a_render_goes_on_where_its_renderer_is_killed(run: Run, expected: np.nd
         pool.send(Update(task, 2, stop=StopRule(SAMPLES), base=1))
         assert (await ears.next(Done)).progress.samples == SAMPLES
         assert np.array_equal(expected, await picture(pool, task, ears))
+
+    run(test)
+
+
+def test_a_renderer_that_is_not_needed_is_given_back(run: Run, cluster: Cluster, expected: np.ndarray) -> None:
+    async def test(pool: Pool) -> None:
+        assert pool.process_id is not None
+        await until(lambda: all(member.state == "ready" for member in pool.members))
+        cluster.rest(1)
+        await until(lambda: restarts(pool, "released") == 1 and pool.waiting == RESTS)
+        await until(lambda: len(descendants(pool.process_id or 0, "ray::Renderer")) == 1)
+        task, ears = await begun(pool)
+        await ears.next(Done)
+        assert np.array_equal(expected, await picture(pool, task, ears))
+        cluster.wake(1)
+        await until(lambda: all(member.state == "ready" for member in pool.members))
 
     run(test)
