@@ -73,9 +73,19 @@ class Dispatcher:
         kernel.run(*groups)
 
     @property
+    def counts(self) -> tuple[int, int]:
+        """Paths that the kernel has ended for their throughput, and samples that the driver has cut."""
+        ended, cut = np.frombuffer(self.counters.read(8), np.uint32).tolist()
+        return ended, cut
+
+    @counts.setter
+    def counts(self, values: tuple[int, int]) -> None:
+        self.counters.write(np.minimum(values, 0xFFFFFFFF).astype(np.uint32).tobytes())
+
+    @property
     def warnings(self) -> list[str]:
         """Warnings about paths that the kernel could not follow to their end."""
-        ended, cut = np.frombuffer(self.counters.read(8), np.uint32).tolist()
+        ended, cut = self.counts
         out = [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
         if cut:
             out.append(f"{cut} paths are short: this driver ends the loops of a kernel after 65 535 turns")

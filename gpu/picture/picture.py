@@ -257,6 +257,19 @@ class Picture:
             raise ValueError(f"{band} is not complete")
         return self._sums.read_rows(band.top, band.rows)
 
+    def take_counts(self) -> tuple[int, int]:
+        """The numbers in `warnings` since the last call, of what was traced for others; they begin at zero again."""
+        contexts.use(self.context)
+        counts, self._dispatcher.counts = self._dispatcher.counts, (0, 0)
+        return counts
+
+    def add_counts(self, counts: tuple[int, int]) -> None:
+        """Add to the numbers in `warnings` what `take_counts` gave elsewhere."""
+        if any(counts):
+            contexts.use(self.context)
+            ended, cut = self._dispatcher.counts
+            self._dispatcher.counts = ended + counts[0], cut + counts[1]
+
     def write_band(self, band: Band, values: np.ndarray) -> None:
         """Write what `read_band` gave elsewhere. Raises ValueError for a band that is not of the shared block, and
         values of another shape."""

@@ -156,3 +156,15 @@ def test_paths_that_may_be_long_are_metered_in_rounds(gpu: Renderer, monkeypatch
     home.trace(600.0, 64)
     assert max(counts) == 3 and sum(counts) >= SIZE - FIRST
     assert_same(home, whole)
+
+
+def test_the_warnings_of_helpers_are_those_of_the_picture(made: Callable[[int], Picture]) -> None:
+    home = made(FIRST)
+    helper = beside(home)
+    helper._dispatcher.counts = 3, 5
+    home._dispatcher.counts = 1, 0
+    home.add_counts(helper.take_counts())
+    assert home._dispatcher.counts == (4, 5) and not helper.warnings
+    assert home.warnings[0].startswith("4 paths") and home.warnings[1].startswith("5 paths")
+    home.add_counts((0, 0xFFFFFFFF))
+    assert home._dispatcher.counts == (4, 0xFFFFFFFF), "a count stays where it can rise no further"

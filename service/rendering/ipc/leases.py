@@ -41,12 +41,14 @@ class Lease:
 
 @dataclass(frozen=True)
 class LeaseDone:
-    """From an assistant to the home: (rows, width, 12) float32, as `gpu.Picture.read_band` gives it."""
+    """From an assistant to the home: (rows, width, 12) float32, as `gpu.Picture.read_band` gives it, and the numbers
+    of paths that `gpu.Picture.take_counts` gives."""
 
     task: int
     generation: int
     number: int
     values: np.ndarray
+    counts: tuple[int, int] = (0, 0)
 
 
 @dataclass(frozen=True)

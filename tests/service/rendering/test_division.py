@@ -32,6 +32,7 @@ class _Picture:
     def __post_init__(self) -> None:
         self.block = np.zeros(HEIGHT, int)
         self.own, self.end, self.at = 0, 0, 0
+        self.counts = (0, 0)
         self.under_way = (0, 0, 0)  # samples: of a pass that merges
 
     @property
@@ -67,6 +68,9 @@ class _Picture:
 
     def read_band(self, band: Band) -> Any:
         return np.zeros(0)
+
+    def add_counts(self, counts: tuple[int, int]) -> None:
+        self.counts = self.counts[0] + counts[0], self.counts[1] + counts[1]
 
     def unshare(self) -> None:
         self.sharing = False
@@ -212,6 +216,15 @@ def test_what_was_done_of_a_long_block_is_saved_and_not_traced_again(
             assert (again.block[band.top : band.top + band.rows] == SIZE).all()
     while again.samples < 3 * SIZE:  # the picture complains where rows come twice
         _turn(second, again, 1000)
+
+
+def test_paths_that_were_cut_elsewhere_are_counted_once() -> None:
+    picture = _Picture()
+    home, leases = _home(picture, (1,))
+    _turn(home, picture, 1000)
+    for _ in range(2):
+        home.heard(LeaseDone(1, 1, leases[0].number, np.zeros(0), (3, 2)))
+    assert picture.counts == (3, 2)
 
 
 def test_a_result_is_never_too_large() -> None:

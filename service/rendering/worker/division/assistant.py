@@ -91,7 +91,8 @@ class Assistant:
         if picture.trace_band(band, SLICE_S):
             self._leases.popleft()
             self.traced += band.rows * band.count * picture.settings.width
-            self._send(LeaseDone(self.number, lease.generation, lease.number, picture.read_band(band)))
+            values, counts = picture.read_band(band), picture.take_counts()
+            self._send(LeaseDone(self.number, lease.generation, lease.number, values, counts))
 
     def _apply(self, update: Update) -> None:
         self._updates.pending = None

@@ -156,6 +156,8 @@ class Home:
         picture, ledger = self._picture, self._ledger
         if picture is None or ledger is None or done.generation != self._generation:
             return
+        if done.number in ledger.outstanding:
+            picture.add_counts(done.counts)
         current = ledger.delivered(done.number, done.values)
         if current is not None:
             band, values = current
