@@ -115,7 +115,7 @@ class AppState:
 
     async def gpu_missing(self) -> str | None:
         """Why SUNBOX_REQUIRE_GPU forbids to start; None where nothing does. Waits for the renderer."""
-        if not self.config.require_gpu:
+        if not self.config.require_gpu or self.config.ray is not None:  # Ray has been asked for nodes with GPUs
             return None
         self.renderers.start()
         try:

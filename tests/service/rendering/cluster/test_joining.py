@@ -10,6 +10,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,15 +18,17 @@ import pytest
 
 from service.config import ConfigError, load_config
 from service.rendering.cluster import carriage, code, lane
-from service.rendering.cluster.carriage import Scenes
+from service.rendering.cluster.carriage import Scenes, digest
 from service.rendering.cluster.cluster import Cluster
 from service.rendering.cluster.control import Ended
 from service.rendering.cluster.joining import CannotJoin
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described, plan
 from service.rendering.ipc import channel
-from service.rendering.ipc.messages import Unable
+from service.rendering.ipc.messages import Unable, Update
 from service.rendering.supervisor.process import Waiting
+from service.state import AppState
+from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.cluster.clusters import OPTIONS, until
 
 HAS_RAY = importlib.util.find_spec("ray") is not None
@@ -170,6 +173,19 @@ def test_the_version_is_of_the_code(monkeypatch: pytest.MonkeyPatch, tmp_path: P
 def test_it_says_that_there_is_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lane, "PLACING_S", 0.01)
     assert set(asyncio.run(told(Actors(None), 2))) == {Waiting("There is no room.")}
+
+
+def test_equal_scenes_have_equal_digests() -> None:
+    """Also when they come in different messages, and lie elsewhere in memory."""
+    scene = arrays_of("plain")
+    received = [channel.decode(*channel.encode(Update(task, 1, scene))).scene for task in (1, 2)]
+    assert digest(received[0]) == digest(received[1]) != digest(arrays_of("rich"))
+
+
+def test_a_cluster_without_a_gpu_yet_is_no_reason_to_end() -> None:
+    """Ray's autoscaler may need minutes for the first node."""
+    state: Any = SimpleNamespace(config=load_config(require_gpu=True, ray="auto"))
+    assert asyncio.run(AppState.gpu_missing(state)) is None
 
 
 def test_a_scene_is_stored_once_and_freed_after_its_last_task(monkeypatch: pytest.MonkeyPatch) -> None:
