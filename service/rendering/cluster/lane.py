@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import re
 import socket
 from collections import deque
 from contextlib import suppress
@@ -123,9 +124,9 @@ class Lane:
             log.error("an actor did not answer renderer=%d seconds=%.0f", self.number, SILENCE_S)
             self._actors.restart(self.number)
         except RayActorError as error:
-            log.warning("an actor was lost renderer=%d error=%s", self.number, _first_line(error))
+            log.warning("an actor was lost renderer=%d error=%s", self.number, _said(error))
         except RayError as error:
-            log.error("Ray failed renderer=%d error=%s", self.number, _first_line(error))
+            log.error("Ray failed renderer=%d error=%s", self.number, _said(error))
             self._actors.restart(self.number)
         return Ended(self._loss)
 
@@ -143,7 +144,7 @@ class Lane:
             try:
                 there = await self._placed(actor)
             except RayActorError as error:
-                raise Unfit(f"SUNBOX_RAY: a node of the cluster can't run Sunbox: {_first_line(error)}") from None
+                raise Unfit(f"SUNBOX_RAY: a node of the cluster can't run Sunbox: {_said(error)}") from None
         if (why := difference(there["host"], there["version"])) is not None:
             raise Unfit(why)
         await _answer(actor.begin.remote(self._actors.options, self._actors.threads))
@@ -234,5 +235,10 @@ async def _answer(reference: Any) -> Any:
     return await reference
 
 
-def _first_line(error: Exception) -> str:
-    return " ".join(str(error).split())[:300]
+def _said(error: Exception) -> str:
+    """What Ray's error says in one line: of a traceback from a node the last, with the node's address."""
+    lines = [line.strip() for line in re.sub(r"\x1b\[\d+m", "", str(error)).splitlines() if line.strip()]
+    if len(lines) < 2:
+        return "".join(lines)[:300]
+    node = re.search(r"\bip=([0-9a-f.:]+)", lines[0])
+    return lines[-1][:300] + (f" (on {node[1]})" if node else "")

@@ -82,6 +82,28 @@ def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
     run(test)
 
 
+def test_actors_divide_a_render(run: Run) -> None:
+    async def test(pool: Pool) -> None:
+        await until(lambda: all(member.state == "ready" for member in pool.members))
+        before = [member.statistics.samples for member in pool.members]
+        task, ears = await begun(pool, 1000)
+        await ears.next(Done)
+        divided = await picture(pool, task, ears)
+        traced = [member.statistics.samples - old for member, old in zip(pool.members, before, strict=True)]
+        assert min(traced) > 0
+        pictures.append(divided)
+
+    async def alone(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor, 1000)
+        await ears.next(Done)
+        pictures.append(await picture(supervisor, task, ears))
+
+    pictures = list[np.ndarray]()
+    run(test)
+    with_supervisor(alone)
+    assert np.array_equal(*pictures)
+
+
 @pytest.mark.parametrize(("word", "cause"), [("rendering.worker", "killed"), ("ray::Renderer", "node lost")])
 def test_a_render_goes_on_where_its_renderer_is_killed(run: Run, expected: np.ndarray, word: str, cause: str) -> None:
     async def test(pool: Pool) -> None:

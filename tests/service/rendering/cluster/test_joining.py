@@ -115,17 +115,19 @@ class Method:
 
     def remote(self, *given: Any) -> asyncio.Future[Any]:
         answer = asyncio.get_running_loop().create_future()
-        if self._answer is not None:
+        if isinstance(self._answer, Exception):
+            answer.set_exception(self._answer)
+        elif self._answer is not None:
             answer.set_result(self._answer)
         return answer
 
 
 class Actors:
-    """Fulfils `lane.Actors` with one actor, which describes itself so; None: it has not been placed."""
+    """Fulfils `lane.Actors` with one actor, which describes itself so, or fails; None: it has not been placed."""
 
     threads = 1
 
-    def __init__(self, description: dict[str, str] | None) -> None:
+    def __init__(self, description: dict[str, str] | Exception | None) -> None:
         self.scenes, self.options = Scenes(), dict[str, Any]()
         self.describe = Method(description)
 
@@ -155,6 +157,17 @@ def test_a_node_with_other_code_is_told_apart() -> None:
     assert isinstance(unable, Unable) and ended == Ended("crashed")
     for word in ("SUNBOX_RAY", "host far", "0.0.9+abc", code.version()):
         assert word in unable.detail
+
+
+@needs_ray
+def test_a_node_without_sunbox() -> None:
+    from ray.exceptions import RayActorError
+
+    died = "The actor died because of an error raised in its creation task, \x1b[36mray::A()\x1b[39m (ip=192.0.2.7)"
+    why = "ModuleNotFoundError: No module named 'service'"
+    failure = RayActorError(None, f"{died}\n  File ...\n{why}\n")
+    unable = asyncio.run(told(Actors(failure), 1))[0]
+    assert unable == Unable(f"SUNBOX_RAY: a node of the cluster can't run Sunbox: {why} (on 192.0.2.7)")
 
 
 def test_the_version_is_of_the_code(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
