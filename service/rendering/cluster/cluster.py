@@ -98,7 +98,7 @@ class Cluster:
             if (before := self._resting[number]) is not None:
                 before.close()
             self._resting[number] = end.dup()
-            channel.send(end, Waiting(RESTS))
+            channel.send(end, Waiting(RESTS, needed=False))
             return 0 if self._gateway is None else self._gateway.process.pid
         if self._gateway is not None:
             with suppress(OSError):

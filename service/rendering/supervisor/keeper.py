@@ -143,7 +143,8 @@ class Keeper:
 
     def _waits(self, message: Waiting) -> None:
         if message.detail != self.waiting:
-            log.warning("a renderer waits renderer=%s reason=%s", self._id, message.detail)
+            level = logging.WARNING if message.needed else logging.INFO
+            log.log(level, "a renderer waits renderer=%s reason=%s", self._id, message.detail)
         self.waiting = message.detail
         self.changed()
 

@@ -89,8 +89,9 @@ class Pool:
 
     @property
     def waiting(self) -> str:
-        """What renderers wait for, for which there is no place."""
-        return " ".join(dict.fromkeys(each.waiting for each in self._supervisors if each.waiting))
+        """What all renderers wait for, for which there is no place; "" where one of them renders, or starts."""
+        reasons = [each.waiting for each in self._supervisors]
+        return " ".join(dict.fromkeys(reasons)) if all(reasons) else ""
 
     async def ready(self, timeout_s: float) -> dict[str, Any]:
         try:

@@ -48,6 +48,7 @@ class Waiting:
     """Says, in place of a renderer that has no place to begin at, what it waits for."""
 
     detail: str
+    needed: bool = True  # now; False: there is no work for it
 
 
 class RendererProcess(Protocol):
