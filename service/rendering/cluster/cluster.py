@@ -26,7 +26,7 @@ from service.rendering.ipc import channel
 from service.rendering.supervisor.process import ROOT, Start, Waiting
 
 JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself much earlier
-FAREWELL_S = 10.0  # for the gateway to end the actors, and a cluster of its own
+FAREWELL_S = 6.0  # for the gateway to end the actors, and a cluster of its own
 RESTS = "The renderer has been given back to the Ray cluster until there is more work."
 SECRETS = ("SUNBOX_API_KEY",)  # that no process of a cluster needs
 

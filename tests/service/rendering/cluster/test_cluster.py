@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable, Iterator
+from contextlib import suppress
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -22,6 +24,7 @@ pytest.importorskip("ray", reason="Ray is not installed: pip install 'sunbox[ray
 
 SAMPLES = 400
 ENDLESS = 1 << 24
+SECRET = "a key of callers"
 
 Run = Callable[[Callable[[Pool], Awaitable[None]]], None]
 
@@ -29,7 +32,9 @@ Run = Callable[[Callable[[Pool], Awaitable[None]]], None]
 @pytest.fixture(scope="module")
 def cluster(gpu: Renderer) -> Iterator[Cluster]:
     """A cluster of this machine with two actors, which all tests of this file share."""
-    found = Cluster("auto", 2, False, OPTIONS)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setenv("SUNBOX_API_KEY", SECRET)
+        found = Cluster("auto", 2, False, OPTIONS)
     assert found.joined.local and found.joined.renderers == 2
     yield found
     asyncio.run(found.close())
@@ -78,6 +83,18 @@ def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
         for task, ears in [await begun(pool), await begun(pool)]:
             assert (await ears.next(Done)).saved is not None
             assert np.array_equal(expected, await picture(pool, task, ears))
+
+    run(test)
+
+
+def test_callers_keys_stay_with_the_server(run: Run) -> None:
+    async def test(pool: Pool) -> None:
+        assert pool.process_id is not None
+        everybody = [pool.process_id, *descendants(pool.process_id, "")]
+        assert len(everybody) > 5
+        for pid in everybody:
+            with suppress(OSError):  # it has just ended
+                assert SECRET.encode() not in Path(f"/proc/{pid}/environ").read_bytes()
 
     run(test)
 
