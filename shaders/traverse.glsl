@@ -23,6 +23,7 @@ struct Hit {
     vec2 uv; // barycentric, triangles only
 };
 
+#if HAS_BVH
 struct LeafRange {
     uint kind;
     uint index;
@@ -234,3 +235,4 @@ void traverse_scene(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Hit
         } while (traverse_more(walk) && found.instance == NONE && !(any && hit.t < start));
     } while (traverse_change_tree(found.instance, o, d, tree, ray, walk, scene_walk) && !(any && hit.t < start));
 }
+#endif

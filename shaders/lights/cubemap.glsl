@@ -1,6 +1,7 @@
 // Six square faces in one texture of 3 x 2: px nx py, then ny pz nz. On a face a runs right and b down, -1..1. The
 // density of a texel is per unit of area in the face's plane at distance 1; r^3 turns it into one per solid angle.
 
+#if HAS_ENVIRONMENT_CUBE
 // (a, b) and the face of a direction, by OpenGL's table.
 vec3 cubemap_place(vec3 d) {
     vec3 m = abs(d);
@@ -46,3 +47,4 @@ vec3 cubemap_point(vec2 corner, vec2 inside) {
     vec2 ab = (corner - vec2(column, row) * n + inside) / n * 2.0 - 1.0;
     return normalize(cubemap_direction(ab, column + 3u * row));
 }
+#endif

@@ -1,6 +1,8 @@
 // An ellipsoid, sampled uniformly over the unit sphere that it is an image of. An area element of that sphere with
 // normal n grows by |det A| |A^-T n| under the map A. The ellipsoid's inner side is seen from inside, and through the
 // near half where a ray may pass that, with the chance `transparency`.
+
+#if HAS_ELLIPSOID_LIGHTS
 float ellipsoid_light_density(Solid s, vec3 q) { // per area
     mat3 axes = solid_axes(s);
     vec3 n = q.x * s.row_x + q.y * s.row_y + q.z * s.row_z;
@@ -32,6 +34,7 @@ LightSample ellipsoid_light_sample(Solid s, vec3 p, vec2 u, uint sides, float tr
     vec3 wi = t > 0.0 ? to / t : at.ng;
     return LightSample(wi, t, vec3(share), ellipsoid_light_pdf(s, t, at, wi, sides), true, NONE);
 }
+#endif
 
 void ellipsoid_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
 #if HAS_ELLIPSOID_LIGHTS

@@ -2,6 +2,7 @@
 // names a block of texels (gpu/tables/environment_cells.py); inside a block the direction is uniform in longitude and
 // in the cosine of its colatitude, and its density is constant.
 
+#if HAS_ENVIRONMENT
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
     vec2 cs = frame.environment_turn;
     return vec3(cs.x * d.x - cs.y * d.z, d.y, cs.y * d.x + cs.x * d.z);
@@ -12,6 +13,7 @@ vec3 environment_turn_back(vec3 d) {
     return vec3(cs.x * d.x + cs.y * d.z, d.y, -cs.y * d.x + cs.x * d.z);
 }
 
+#if HAS_ENVIRONMENT_IMAGE
 vec4 environment_image(vec3 d) {
     ivec2 size = textureSize(environment_texels, 0);
     float azimuth = d.x == 0.0 && d.z == 0.0 ? 0.0 : atan(d.x, -d.z);
@@ -28,10 +30,10 @@ vec4 environment_image(vec3 d) {
     vec3 radiance = mix(mix(a.rgb, b.rgb, f.x), mix(e.rgb, g.rgb, f.x), f.y);
     return vec4(radiance, at.y == y0 ? (at.x == x0 ? a.a : b.a) : (at.x == x0 ? e.a : g.a));
 }
+#endif
 
 // The radiance from the world direction w, and the density with which environment_light_sample gives it.
 vec4 environment_radiance(vec3 w) {
-#if HAS_ENVIRONMENT
     vec3 d = environment_turn(w);
 #if HAS_ENVIRONMENT_IMAGE
     vec4 l = environment_image(d);
@@ -48,9 +50,6 @@ vec4 environment_radiance(vec3 w) {
     l.a = mix(l.a, sunny ? 1.0 / (TWO_PI * frame.environment_sun_cap) : 0.0, frame.environment_sun_share);
 #endif
     return vec4(l.rgb * frame.environment_scale, l.a);
-#else
-    return vec4(0.0);
-#endif
 }
 
 // Whether the environment differs between directions.
@@ -97,6 +96,7 @@ LightSample environment_light_sample(uvec2 bits) {
     vec4 l = environment_radiance(wi);
     return LightSample(wi, INFINITY_T, l.rgb, l.a, true, NONE);
 }
+#endif
 
 void environment_light_sample_case(Light l, uvec2 bits, inout LightSample s) {
 #if HAS_ENVIRONMENT

@@ -2,6 +2,7 @@
 // fills [Urena, Fajardo, King 2013]. Other shapes are sampled by area, and so are rectangles of small solid angle,
 // where fp32 has no digits left for a place inside them.
 
+#if HAS_QUAD_LIGHTS
 // The solid angle, in sr, below which a rounding of the angles moves a place by a thousandth of the rectangle.
 const float QUAD_LIGHT_LEAST = 2e-3;
 
@@ -96,6 +97,7 @@ Quad quad_light_load(uint i) {
     return quad_pick(i);
 #endif
 }
+#endif
 
 void quad_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
 #if HAS_QUAD_LIGHTS

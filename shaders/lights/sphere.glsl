@@ -3,6 +3,7 @@
 // that a ray passes through the surface: the inside of the far half is then seen through the near one, and gets half of
 // the samples.
 
+#if HAS_SPHERE_LIGHTS
 // 1 - cos of the cone's half angle, which does not cancel for small or far spheres; 2 from inside.
 float sphere_light_cap(Sphere s, vec3 p) {
     vec3 to = s.center - p;
@@ -48,6 +49,7 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float tran
     float pdf = sphere_light_density(cap, sides, transparency);
     return LightSample(wi, max(0.0, dot(target - p, wi)), vec3(share), pdf, true, NONE);
 }
+#endif
 
 void sphere_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
 #if HAS_SPHERE_LIGHTS

@@ -1,6 +1,7 @@
 // The sun of the sky: a disk of even radiance in the environment's space. It is picked with a share of its own and
 // sampled uniformly over its cone. The part below the horizon is behind the ground.
 
+#if HAS_SUN
 // 1 - cos is taken from the difference of the directions, as cos itself is 0.5 % off for a disk this small.
 bool sun_holds(vec3 d) {
     vec3 off = d - frame.environment_sun;
@@ -19,3 +20,4 @@ uint sun_rest(uint bits, uint cut) {
     float stretch = frame.environment_sun_share / (1.0 - frame.environment_sun_share);
     return x + uint(float(x) * stretch);
 }
+#endif

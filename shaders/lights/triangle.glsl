@@ -1,6 +1,7 @@
 // One triangle of an emitting mesh, sampled uniformly over the solid angle that it fills [Arvo 1995], or by area where
 // that angle is small, as fp32 has no digits left for a place inside it then.
 
+#if HAS_TRIANGLE_LIGHTS
 // The solid angle, in sr, below which roundings move a place by more than a hundredth of the triangle.
 const float TRIANGLE_LIGHT_LEAST = 5e-3;
 
@@ -90,6 +91,7 @@ LightSample triangle_light_sample(Triangle tri, vec3 p, vec2 u, uint sides) {
     return LightSample(wi, t, vec3(1.0), w.s > 0.0 ? 1.0 / w.s : triangle_light_area_pdf(tri, t, at.ng, wi), true,
                        NONE);
 }
+#endif
 
 void triangle_light_sample_case(Light l, vec3 p, vec2 u, Emitter e, inout LightSample s) {
 #if HAS_TRIANGLE_LIGHTS

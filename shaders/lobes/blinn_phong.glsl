@@ -1,6 +1,7 @@
 // The classic highlight about the half vector [Blinn 1977]; it is not normalised: f cos = (diffuse cos + specular z^n)
 // / pi.
 
+#if HAS_BLINN_PHONG || HAS_PHONG
 // wm.z^n. Near the pole it is taken from the sine, as z itself is rounded: at n = 1e6 that would be 6 % off.
 float blinn_phong_power(vec3 wm, float n) {
     float x = dot(wm.xy, wm.xy); // sin^2
@@ -43,3 +44,4 @@ vec3 blinn_phong_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     vec3 mirrored = 2.0 * dot(wo, wm) * wm - wo;
     return u_lobe < blinn_phong_diffuse_chance(s) ? lambert_sample(u) : mirrored;
 }
+#endif

@@ -1,6 +1,7 @@
 // The core BRDF of glTF 2.0, a simplified appendix B: Lambert under GGX, by the share that Fresnel leaves [Khronos
 // 2021]. The highlight is lobes/disney/specular.glsl with one alpha for distribution and masking.
 
+#if HAS_METAL_ROUGH
 vec3 metal_rough_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
     vec3 f = mix(s.spec0, vec3(1.0), fresnel_schlick(cos_d));
     return LOBE(LOBE_DIFFUSE, (1.0 - f) * (1.0 - s.metallic) * INV_PI * s.base_color)
@@ -21,3 +22,4 @@ vec3 metal_rough_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     vec3 mirrored = disney_specular_sample(s, wo, u);
     return u_lobe < metal_rough_diffuse_chance(s, wo) ? lambert_sample(u) : mirrored;
 }
+#endif

@@ -1,6 +1,7 @@
 // The classic highlight about the mirrored direction [Phong 1975]; it is not normalised: f cos = (diffuse cos +
 // specular (r.v)^n) / pi, r being wi mirrored at the normal. (r.v)^0 is 1.
 
+#if HAS_PHONG
 // (r.v)^n, from the distance between the two, which knows a small angle better than the cosine does.
 float phong_power(vec3 wo, vec3 wi, float n) {
     vec3 apart = vec3(-wi.xy, wi.z) - wo;
@@ -35,3 +36,4 @@ vec3 phong_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     vec3 about = mid * (dot(mid, w) / mid.z) - w;                      // |mid|^2 = 2 mid.z
     return u_lobe < phong_diffuse_chance(s) ? lambert_sample(u) : about;
 }
+#endif

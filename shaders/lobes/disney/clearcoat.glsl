@@ -1,5 +1,6 @@
 // A second, thin, isotropic layer of polyurethane: GTR1 with its long tail [Burley 2012, section 5.6].
 
+#if HAS_CLEARCOAT
 // The GTR1 (Berry) density of wm, 1/sr [Burley 2012, eq. 4], with t as sin^2 + alpha^2 cos^2, which does not cancel.
 float disney_clearcoat_gtr1(vec3 wm, float alpha) {
     float a2 = alpha * alpha;
@@ -31,3 +32,4 @@ vec3 disney_clearcoat_sample(Surface s, vec3 wo, vec2 u) {
 float disney_clearcoat_pdf(Surface s, vec3 wm, float cos_d) {
     return cos_d > 0.0 ? disney_clearcoat_gtr1(wm, s.alpha_coat) * wm.z / (4.0 * cos_d) : 0.0;
 }
+#endif
