@@ -3,7 +3,8 @@
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/service/test_hostile.py
 # make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
-# make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it
+# make soak [MINUTES=]   mixed clients and a hand in a browser while renderers are killed, and a table of it;
+#                        with RENDERERS="--devices llvmpipe:2" or RENDERERS="--ray 2" there are several
 # make gallery DATA=...  render the README's pictures, from the folder with the models
 # make tradeoff          measure the price list anew: docs/tradeoff.*, what /v1/info says of the presets, the README
 # make bench-compare [REV=HEAD]  this checkout beside a revision, in turns: speed, error, same bits or not
@@ -37,8 +38,8 @@ image-test: setup
 
 soak:
 	@.ci/setup test
-	.venv/bin/python -m service.bench.soak --minutes $(or $(MINUTES),60)
-	.venv/bin/python -m service.bench.soak_restarts
+	.venv/bin/python -m service.bench.soak --minutes $(or $(MINUTES),60) $(RENDERERS)
+	.venv/bin/python -m service.bench.soak_restarts $(RENDERERS)
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json

@@ -18,7 +18,7 @@ from pathlib import Path
 
 from service.bench import soak_clients as clients
 from service.bench import soak_page
-from service.bench.soak_server import Server, descriptors, largest, resident
+from service.bench.soak_server import Server, add_renderers, descriptors, largest, renderer_settings, resident
 from service.bench.soak_tally import Tally
 
 STREAMS, RENDERS = 4, 2
@@ -35,11 +35,11 @@ def main() -> int:
     parser = argparse.ArgumentParser(prog="python -m service.bench.soak", description=__doc__)
     parser.add_argument("--minutes", type=float, default=60.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--devices", help="SUNBOX_DEVICES of the server, such as llvmpipe:2")
+    add_renderers(parser)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="sunbox-soak-") as folder:
         tally = Tally()
-        server = Server(Path(folder), {"SUNBOX_DEVICES": arguments.devices} if arguments.devices else None)
+        server = Server(Path(folder), renderer_settings(arguments))
         try:
             _run(server, tally, 60.0 * arguments.minutes, random.Random(arguments.seed))
             tally.jain = clients.share_alike(server, tally)

@@ -14,14 +14,14 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
 from shutil import which
 from typing import Any
 
-from service.bench.soak_server import Server, still_there
+from service.bench.soak_server import Server, add_renderers, renderer_settings, still_there
 
 DOCUMENTS = 5  # that differ: the picture of each is known beforehand
 SIDE, SAMPLES = 64, 32
@@ -72,10 +72,16 @@ class Outcome:
 
 
 def run(
-    folder: Path, restarts: int, renders: int, seconds: float, chance: random.Random, devices: str | None = None
+    folder: Path,
+    restarts: int,
+    renders: int,
+    seconds: float,
+    chance: random.Random,
+    several: Mapping[str, str] | None = None,
 ) -> Outcome:
-    """`renders` of them, while the server is restarted `restarts` times over about that many seconds. With `devices`
-    it has these renderers, which are killed one by one all the while; pictures are compared with one renderer's."""
+    """`renders` of them, while the server is restarted `restarts` times over about that many seconds. With
+    `several`, settings of its renderers, these are killed one by one all the while; pictures are compared with those
+    of one renderer."""
     outcome = Outcome()
     settings = {
         "SUNBOX_MAX_JOBS": str(2 * renders + 10),
@@ -89,8 +95,8 @@ def run(
     over = threading.Event()
     try:
         expected = [_picture(current[0], number) for number in range(DOCUMENTS)]
-        if devices is not None:
-            settings["SUNBOX_DEVICES"] = devices
+        if several:
+            settings |= several
             killer = threading.Thread(target=_kill_renderers, args=(current, over, chance, outcome), daemon=True)
             killer.start()
         ids: dict[int, str] = {}
@@ -334,12 +340,13 @@ def main() -> int:
     parser.add_argument("--renders", type=int, default=1000)
     parser.add_argument("--minutes", type=float, default=10.0)
     parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--devices", help="SUNBOX_DEVICES of the server, such as llvmpipe:2; they are killed, too")
+    add_renderers(parser)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory(prefix="sunbox-soak-") as folder:
         seconds = 60 * arguments.minutes
         chance = random.Random(arguments.seed)
-        outcome = run(Path(folder), arguments.restarts, arguments.renders, seconds, chance, arguments.devices)
+        several = renderer_settings(arguments)
+        outcome = run(Path(folder), arguments.restarts, arguments.renders, seconds, chance, several)
         fill_disk(Path(folder), outcome)
         jump_clock(Path(folder), outcome)
     rows = outcome.rows()

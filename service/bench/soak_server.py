@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import argparse
 import json
 import os
 import signal
@@ -26,6 +27,7 @@ class Server:
         """`settings` are further variables of its environment."""
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
         environment |= {"SUNBOX_DATA_DIR": str(folder), "SUNBOX_LOG_LEVEL": "error", **(settings or {})}
+        self._mark = f"SUNBOX_DATA_DIR={folder}\0".encode()
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
         with (folder / "server.log").open("wb") as log:
             self._process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
@@ -61,12 +63,15 @@ class Server:
         return [int(pid) for pid in found.stdout.split()]
 
     def renderers(self) -> list[int]:
-        """The processes that render."""
+        """The processes that render for this server: its children, or in a cluster on this machine those of Ray's
+        actors, and these. They are known by the data folder in their environment."""
         found = []
-        for pid in self.children():
+        for process in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
-                if b"service.rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
-                    found.append(pid)
+                command = (process / "cmdline").read_bytes()
+                renders = b"service.rendering.worker\0" in command or command.startswith(b"ray::Renderer")
+                if renders and self._mark in (process / "environ").read_bytes():
+                    found.append(int(process.name))
         return found
 
     def family(self) -> list[int]:
@@ -92,6 +97,19 @@ class Server:
             self._process.kill()
             code = -9
         return code, still_there(children, 1.0)
+
+
+def add_renderers(parser: argparse.ArgumentParser) -> None:
+    """The options that say which renderers the server has."""
+    parser.add_argument("--devices", help="SUNBOX_DEVICES of the server, such as llvmpipe:2")
+    parser.add_argument("--ray", type=int, help="so many renderers in a Ray cluster that is started for the server")
+
+
+def renderer_settings(arguments: argparse.Namespace) -> dict[str, str]:
+    """The variables that these options stand for."""
+    if arguments.ray:
+        return {"SUNBOX_RAY": "auto", "SUNBOX_RAY_RENDERERS": str(arguments.ray)}
+    return {"SUNBOX_DEVICES": arguments.devices} if arguments.devices else {}
 
 
 def largest(pids: list[int]) -> int:
