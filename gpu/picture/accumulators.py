@@ -10,7 +10,7 @@ from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import BlockSlot, Slot
-from gpu.picture.blocks import Sums, merged
+from gpu.picture.blocks import Sums, merged, merged_moments
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.schedule import work_groups
 
@@ -141,6 +141,16 @@ class Accumulators:
             return total
         block = Sums(*(self._vectors(buffer, first, count) for buffer in self.block.values()))
         return merged(total, block, self.moment_scale)
+
+    def read_moments(self, first: int, count: int) -> np.ndarray:
+        """Second moments and the number of samples of these pixels: (count, 4) float32."""
+        if not self.open:
+            return self._vectors(self.total[Slot.MOMENTS], first, count)
+        total, block = (
+            Sums(*(self._vectors(buffer, first, count) for buffer in buffers.values()))
+            for buffers in (self.total, self.block)
+        )
+        return merged_moments(total, block, self.moment_scale)
 
     def _vectors(self, buffer: Any, first: int, count: int) -> np.ndarray:
         data = buffer.read(PIXEL_BYTES * count, offset=PIXEL_BYTES * first)

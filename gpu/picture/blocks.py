@@ -60,14 +60,25 @@ class Sums(NamedTuple):
 def merged(total: Sums, block: Sums, moment_scale: float) -> Sums:
     """The sums of the samples of both, as `merge.comp` computes them (see `accumulated.glsl` for the formulas).
     Pixels that have no sample in the block keep their bits."""
-    sum_, lost = _added(total, block)
+    sum_, lost = (_chosen(both, total, block, k) for k, both in enumerate(_added(total, block)))
+    return Sums(sum_, lost, merged_moments(total, block, moment_scale))
+
+
+def merged_moments(total: Sums, block: Sums, moment_scale: float) -> np.ndarray:
+    """The moments of `merged` alone."""
     na, nb = total.moments[..., 3:], block.moments[..., 3:]
     n = na + nb
     delta = (_mean(block) - _mean(total)) * np.float32(moment_scale)
     second = total.moments[..., :3] + block.moments[..., :3] + delta * delta * (na * (nb / np.maximum(n, 1)))
-    both = Sums(sum_, lost, np.concatenate([second, n], axis=-1))
-    both = Sums(*(np.where(na > 0, new, own) for new, own in zip(both, block, strict=True)))
-    return Sums(*(np.where(nb > 0, new, old) for new, old in zip(both, total, strict=True)))
+    return _chosen(np.concatenate([second, n], axis=-1), total, block, Sums._fields.index("moments"))
+
+
+def _chosen(both: np.ndarray, total: Sums, block: Sums, k: int) -> np.ndarray:
+    """`both` where both have samples; else the k-th accumulator of the one that has."""
+    na, nb = total.moments[..., 3:] > 0, block.moments[..., 3:] > 0
+    if na.all() and nb.all():
+        return both
+    return np.where(nb, np.where(na, both, block[k]), total[k])
 
 
 def _mean(part: Sums) -> np.ndarray:

@@ -47,7 +47,7 @@ class Readout:
         out = np.empty((self._size[0] * self._size[1], 3), np.float32)
         scale = float(np.float32(self._dispatcher.scene.arrays.radiance_scale))
         for first, count in self._pieces():
-            moments = self._sums.read(first, count).moments
+            moments = self._sums.read_moments(first, count)
             n = np.maximum(moments[:, 3:], 1)
             spread = np.where(n > 1, moments[:, :3] / np.maximum(n - 1, 1) / n, 0)
             out[first : first + count] = np.minimum(spread.astype(np.float64) * scale**2, 3e38)
