@@ -8,6 +8,7 @@ import os
 import socket
 import subprocess
 import sys
+import time
 from collections.abc import Collection
 from contextlib import suppress
 from dataclasses import dataclass, replace
@@ -26,6 +27,7 @@ from service.rendering.ipc import channel
 from service.rendering.supervisor.process import ROOT, Start, Waiting
 
 JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself much earlier
+SILENT_S = 20.0  # without a sign of life, one of which comes every second
 FAREWELL_S = 6.0  # for the gateway to end the actors, and a cluster of its own
 RESTS = "The renderer has been given back to the Ray cluster until there is more work."
 SECRETS = ("SUNBOX_API_KEY",)  # that no process of a cluster needs
@@ -36,10 +38,11 @@ RAY = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0"}
 log = logging.getLogger(__name__)
 
 
-@dataclass(frozen=True)
+@dataclass
 class _Gateway:
     process: subprocess.Popen[bytes]
     control: socket.socket
+    heard: float  # when it gave its last sign of life, or is expected to give the first one
 
 
 class Cluster:
@@ -83,6 +86,20 @@ class Cluster:
             with end:
                 self._carry(number, end)
 
+    def watch(self, excused: bool) -> None:
+        """Kill a gateway that hangs or was stopped, so that another takes its place; to be called now and then."""
+        gateway, now = self._gateway, time.monotonic()
+        if gateway is None:
+            return
+        with suppress(OSError):  # there is nothing more to read
+            while gateway.control.recv(control.MOST_BYTES):
+                gateway.heard = now
+        if excused:
+            gateway.heard = max(gateway.heard, now)
+        if now - gateway.heard > SILENT_S:
+            log.error("the gateway to the Ray cluster hung silent_s=%.0f", now - gateway.heard)
+            self._end(0.0)
+
     @property
     def resting(self) -> Collection[int]:
         """The numbers of the renderers that rest."""
@@ -90,7 +107,7 @@ class Cluster:
 
     def starter(self, number: int) -> Start:
         """What starts a supervisor's renderer; `number` counts the renderers from 0."""
-        return partial(ClusterProcess, partial(self._carry, number))
+        return partial(ClusterProcess, partial(self._carry, number), self.watch)
 
     def _carry(self, number: int, end: socket.socket) -> int:
         """Have the gateway carry the messages of a renderer; `end` is of its channel. The gateway's process id."""
@@ -145,7 +162,8 @@ def _start(ask: Join) -> _Gateway:
             process_group=0,
         )
     control.send(ours, ask)
-    return _Gateway(process, ours)
+    ours.setblocking(False)
+    return _Gateway(process, ours, time.monotonic() + JOIN_S)
 
 
 def _token_mode() -> dict[str, str]:
@@ -163,7 +181,7 @@ def _answered(gateway: _Gateway) -> Joined:
         raise CannotJoin(
             f"SUNBOX_RAY: the process that joins the Ray cluster gave no answer in {JOIN_S:g} s"
         ) from None
-    gateway.control.settimeout(1.0)  # a few bytes now and then: only one that hangs has no room for them
+    gateway.control.setblocking(False)  # a few bytes now and then: only a gateway that hangs has no room for them
     if received is None:
         raise CannotJoin("SUNBOX_RAY: the process that joins the Ray cluster ended at once; the log says more")
     message = received[0]

@@ -41,6 +41,11 @@ class Refused:
 
 
 @dataclass(frozen=True)
+class Alive:
+    """The gateway says now and then that it is neither hung nor stopped."""
+
+
+@dataclass(frozen=True)
 class Open:
     """Asks for a renderer; the end of its supervisor's channel goes along."""
 

@@ -22,7 +22,7 @@ from service import logs
 from service.rendering.cluster import control
 from service.rendering.cluster.actor import Renderer
 from service.rendering.cluster.carriage import Scenes
-from service.rendering.cluster.control import Join, Joined, Open, Refused, Release
+from service.rendering.cluster.control import Alive, Join, Joined, Open, Refused, Release
 from service.rendering.cluster.joining import CannotJoin, join, survey
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described
@@ -31,6 +31,7 @@ from service.rendering.supervisor.process import Waiting
 
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
+ALIVE_S = 1.0  # between two signs of life
 FAREWELL_S = 5.0  # for renderers to end by themselves
 
 _written = deque[str](maxlen=1)  # by Ray, to stdout or stderr
@@ -53,9 +54,10 @@ class Gateway:
         """Return when the server is gone, or has closed its socket."""
         loop = asyncio.get_running_loop()
         loop.add_reader(self._end, self._readable)
-        drains = asyncio.ensure_future(self._watch_drains())
+        chores = [asyncio.ensure_future(work) for work in (self._watch_drains(), self._say_alive())]
         await self._over.wait()
-        drains.cancel()
+        for chore in chores:
+            chore.cancel()
         for lane in self._lanes.values():
             lane.close()
         if self._lanes:
@@ -114,6 +116,12 @@ class Gateway:
         if not running.cancelled() and (error := running.exception()) is not None:
             log.error("a renderer's lane failed renderer=%d", lane.number, exc_info=error)
 
+    async def _say_alive(self) -> None:
+        while True:
+            with suppress(OSError):  # the server is gone, or reads nothing just now
+                control.send(self._end, Alive())
+            await asyncio.sleep(ALIVE_S)
+
     async def _watch_drains(self) -> None:
         """Have renderers leave the nodes that Ray is about to take away."""
         while True:
@@ -162,6 +170,7 @@ def main() -> int:
         control.send(end, joined)
     _written.clear()
     log.info("joined address=%s renderers=%d", joined.address, joined.renderers)
+    end.setblocking(False)
     asyncio.run(Gateway(end, ask, joined).serve())
     _leave()
     return 0

@@ -21,11 +21,14 @@ class ClusterProcess:
     def __init__(
         self,
         carry: Callable[[socket.socket], int],
+        watch: Callable[[bool], None],
         received: Callable[[Any], None],
         lost: Callable[[], None],
         lifeline: int | None = None,
     ) -> None:
-        """`carry` has the gateway carry the messages of a socket, and returns the gateway's process id."""
+        """`carry` has the gateway carry the messages of a socket, and returns the gateway's process id; `watch` looks
+        after the gateway."""
+        self._watch_gateway = watch
         self.began = time.monotonic()
         self.ready = False
         self.unable = False
@@ -46,7 +49,8 @@ class ClusterProcess:
         return self._ended.task
 
     def watch(self, excused: bool = False) -> None:
-        """Nothing to do here: the actor watches."""
+        """Look after the gateway; the actor watches the renderer."""
+        self._watch_gateway(excused)
 
     async def end(self, patience_s: float) -> Cause:
         self.link.close()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
@@ -11,6 +13,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.rendering.cluster import cluster as clusters
 from service.rendering.cluster.cluster import RESTS, Cluster
 from service.rendering.ipc.messages import Checkpoint, Done, Image, Read, StopRule, Update
 from service.rendering.supervisor.pool import Pool
@@ -83,6 +86,21 @@ def test_actors_render_the_same_bits(run: Run, expected: np.ndarray) -> None:
         for task, ears in [await begun(pool), await begun(pool)]:
             assert (await ears.next(Done)).saved is not None
             assert np.array_equal(expected, await picture(pool, task, ears))
+
+    run(test)
+
+
+def test_a_gateway_that_hangs_is_replaced(run: Run, cluster: Cluster, monkeypatch: pytest.MonkeyPatch) -> None:
+    async def test(pool: Pool) -> None:
+        assert pool.process_id is not None
+        before = pool.process_id
+        await asyncio.sleep(1.2)  # past its first sign of life
+        monkeypatch.setattr(clusters, "SILENT_S", 2.5)
+        os.kill(before, signal.SIGSTOP)
+        await until(lambda: restarts(pool, "node lost") >= 2)
+        monkeypatch.undo()
+        await pool.ready(60)
+        assert pool.process_id not in (None, before)
 
     run(test)
 
