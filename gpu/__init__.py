@@ -18,7 +18,7 @@ device      arrays as OpenGL objects
 picture     one picture in the making
 bsdf        one material's BSDF as numbers
 precompile  kernels that are compiled before they are needed; public
-analysis    measurements of a scene at hand; public
+analysis    measurements of a scene and of the device at hand; public
 """
 
 from gpu.analysis.path_truncation import bounced_paths, missing_light

@@ -65,7 +65,7 @@ def create(device: int | None = None) -> Any:
     """
     import moderngl
 
-    opengl = _opengl()
+    opengl = opengl_library()
     for name, library in (("libEGL", ctypes.util.find_library("EGL")), ("libOpenGL", opengl)):
         if library is None:
             raise ContextError(f"{name} is not installed: on Debian `apt-get install {PACKAGES}`")
@@ -138,7 +138,7 @@ def _memory(context: Any) -> int | None:
     if "GL_NVX_gpu_memory_info" not in context.extensions:
         return None
     kibibytes = ctypes.c_int(0)
-    ctypes.CDLL(_opengl()).glGetIntegerv(DEDICATED_VIDEO_MEMORY, ctypes.byref(kibibytes))
+    ctypes.CDLL(opengl_library()).glGetIntegerv(DEDICATED_VIDEO_MEMORY, ctypes.byref(kibibytes))
     return kibibytes.value * 1024 if kibibytes.value > 0 else None
 
 
@@ -150,6 +150,6 @@ def _device(text: Any, handle: int | None) -> Device:
     return Device("GPU" if file is None else file.decode(), False)
 
 
-def _opengl() -> str | None:
-    """The library with OpenGL's functions; the first of these comes without X11's libraries."""
+def opengl_library() -> str | None:
+    """The name of the library with OpenGL's functions; the first of these comes without X11's libraries."""
     return ctypes.util.find_library("OpenGL") or ctypes.util.find_library("GL")

@@ -1,6 +1,8 @@
-"""Measurements of a scene at hand. Public.
+"""Measurements of a scene and of the device at hand. Public.
 
 kernel_cost      what a scene's own kernel saves beside the one with every feature on
 path_truncation  the light that ends with the bounces
 metering         pictures without the noise meter, to measure what it costs
+slices           dispatches of another length, to measure which is best
+device_limits    what a device's driver says of itself
 """
