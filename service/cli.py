@@ -121,9 +121,10 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds"],
+        choices=["speed", "gpu", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds"],
         default="speed",
         help="speed (default): paths per second, compile times, growth with triangles, latencies; "
+        "gpu: what a device can do, from its limits to first frames, in about ten minutes; "
         "compare: this checkout beside an earlier revision; "
         "peers: error at equal time beside Mitsuba and Cycles; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
@@ -136,6 +137,8 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add("--publish", action="store_true", help=text)
     add("--quick", action="store_true", help="tradeoff, seeds: try it out on little; its figures mean nothing")
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
+    add("--seconds", type=float, default=600.0, metavar="S", help="gpu: about how long it may take (default: 600)")
+    add("--device", type=int, metavar="N", help="gpu: the number of the EGL device (default: EGL's own choice)")
     add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
     add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")
     add("--revision", default="HEAD", metavar="REV", help="compare: with this one (default: HEAD)")

@@ -26,6 +26,7 @@ soak_page          a user of the editor in a browser, for `soak`
 soak_restarts      a thousand renders while the whole server is restarted, its disk fills up and its clock jumps
 soak_server        the server under test of `soak`
 soak_tally         the results of `soak`, counted
+device             what a device can do: `sunbox bench gpu`
 seeds              the experiments of the programs that Sunbox grew out of
 gallery            the README's pictures
 thumbnails         the editor's pictures of the material presets

@@ -22,6 +22,7 @@ from websockets.sync.client import ClientConnection, connect
 from websockets.typing import Subprotocol
 
 from service import presets
+from service.bench import machine
 
 SCENE = "sphere-on-floor"  # the editor's default
 SIZE = 512
@@ -34,9 +35,9 @@ PATIENCE_S = 60.0
 def measure() -> dict[str, float]:
     """Milliseconds: server start to first image with empty and with filled caches, and first frames after a move."""
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder:
-        with server(folder) as (port, began), _stream(port) as stream:
+        with server(folder) as (port, began), open_stream(port) as stream:
             cold_ms = Editor(port, stream).start(began)
-        with server(folder) as (port, began), _stream(port) as stream:
+        with server(folder) as (port, began), open_stream(port) as stream:
             editor = Editor(port, stream)
             warm_ms = editor.start(began)
             moves = sorted(editor.move() for _ in range(MOVES))
@@ -55,7 +56,7 @@ def rooms(told: Callable[[str], None]) -> dict[str, dict[str, float]]:
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, server(folder) as (port, _):
         for entry in presets.names("scenes"):
             told(f"first frames of {entry['name']}")
-            with _stream(port) as stream:
+            with open_stream(port) as stream:
                 editor = Editor(port, stream, entry["name"])
                 editor.start(0.0)
                 out[entry["name"]] = {}
@@ -67,13 +68,14 @@ def rooms(told: Callable[[str], None]) -> dict[str, dict[str, float]]:
 
 
 @contextmanager
-def server(folder: str) -> Iterator[tuple[int, float]]:
-    """A server of our own with its caches in `folder`: its port, and when its process was started."""
+def server(folder: str, **variables: str) -> Iterator[tuple[int, float]]:
+    """A server of our own with its caches in `folder` and these variables in its environment: its port, and when its
+    process was started."""
     with socket.socket() as probe:
         probe.bind(("127.0.0.1", 0))
         port = probe.getsockname()[1]
     environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
-    environment |= {"SUNBOX_DATA_DIR": folder, "MESA_SHADER_CACHE_DIR": folder}
+    environment |= {"SUNBOX_DATA_DIR": folder, **machine.shader_caches(folder), **variables}
     began = time.perf_counter()
     command = [sys.executable, "-m", "service.cli", "serve", "--port", str(port)]
     told = Path(folder, "server.log")
@@ -96,19 +98,30 @@ def server(folder: str) -> Iterator[tuple[int, float]]:
 class Editor:
     """As the editor behaves: acknowledges every frame, moves a slider now and then."""
 
-    def __init__(self, port: int, stream: ClientConnection, scene: str = SCENE) -> None:
-        self._stream = stream
-        with urlopen(f"http://127.0.0.1:{port}/v1/presets/scenes/{scene}", timeout=PATIENCE_S) as answer:
+    def __init__(
+        self, port: int, stream: ClientConnection, scene: str = SCENE, size: tuple[int, int] = (SIZE, SIZE)
+    ) -> None:
+        self._port, self._stream, self._size = port, stream, size
+        self._generation = 0
+        self._load(scene)
+
+    def _load(self, scene: str) -> None:
+        with urlopen(f"http://127.0.0.1:{self._port}/v1/presets/scenes/{scene}", timeout=PATIENCE_S) as answer:
             self._scene = json.load(answer)
         kind = self._scene["materials"][SUBJECT]["type"]
         self._slider = "albedo" if kind == "diffuse" else "roughness"
-        self._generation = 0
 
     def start(self, began: float) -> float:
         """Milliseconds from `began` to the first image."""
-        settings = {"width": SIZE, "height": SIZE, "max_samples": 1 << 20}
+        settings = {"width": self._size[0], "height": self._size[1], "max_samples": 1 << 20}
         self._send("start", scene=self._scene, settings=settings)
         return 1e3 * (self._first_frame() - began)
+
+    def show(self, scene: str) -> float:
+        """Milliseconds from asking for another scene, while this one refines, to its first image."""
+        self._load(scene)
+        self._wait(PAUSE_S)
+        return self.start(time.perf_counter())
 
     def move(self) -> float:
         """Milliseconds from sending a slider's new value to having the first frame that shows it."""
@@ -123,11 +136,15 @@ class Editor:
         camera["position"] = [tx + turned.real, y, tz + turned.imag]
         return self._change({"camera": {"position": camera["position"]}})
 
-    def _change(self, scene: dict[str, Any]) -> float:
-        until = time.perf_counter() + PAUSE_S
+    def _wait(self, seconds: float) -> None:
+        """Take frames meanwhile."""
+        until = time.perf_counter() + seconds
         while (left := until - time.perf_counter()) > 0:
             with suppress(TimeoutError):
                 self._receive(left)
+
+    def _change(self, scene: dict[str, Any]) -> float:
+        self._wait(PAUSE_S)
         sent = time.perf_counter()
         self._send("update", scene=scene)
         return 1e3 * (self._first_frame() - sent)
@@ -156,7 +173,7 @@ class Editor:
         return int(header["generation"])
 
 
-def _stream(port: int) -> AbstractContextManager[ClientConnection]:
+def open_stream(port: int) -> AbstractContextManager[ClientConnection]:
     protocol = [Subprotocol("sunbox.v1")]
     address = f"ws://127.0.0.1:{port}/v1/stream"
     return connect(address, subprotocols=protocol, max_size=None, open_timeout=PATIENCE_S)

@@ -24,6 +24,11 @@ def describe(renderer: dict[str, Any]) -> dict[str, Any]:
     }
 
 
+def shader_caches(folder: str | Path) -> dict[str, str]:
+    """Variables of the environment with which Mesa's and NVIDIA's drivers cache kernels in that folder."""
+    return {"MESA_SHADER_CACHE_DIR": str(folder), "__GL_SHADER_DISK_CACHE_PATH": str(folder)}
+
+
 def cores() -> int:
     return len(os.sched_getaffinity(0))
 

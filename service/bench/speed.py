@@ -58,7 +58,7 @@ def _in_fresh_processes(case: Case, options: Options) -> dict[str, Any]:
 
 
 def _measure_case(case: Case, options: Options, runs: int, cache: str) -> dict[str, Any]:
-    os.environ["MESA_SHADER_CACHE_DIR"] = cache
+    os.environ |= machine.shader_caches(cache)
     began = time.perf_counter()
     assets = BenchAssets(options.mesh_file, options.environment_file)
     packed = pack(parse_scene(case.scene), assets)

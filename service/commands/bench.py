@@ -1,9 +1,11 @@
-"""`sunbox bench speed | compare | peers | hemisphere | hand | tradeoff | seeds`: a table; `-o` keeps the figures."""
+"""`sunbox bench speed | gpu | compare | peers | hemisphere | hand | tradeoff | seeds`: a table; `-o` keeps the
+figures."""
 
 from __future__ import annotations
 
 import argparse
 import json
+import math
 import subprocess
 import sys
 from importlib.util import find_spec
@@ -17,6 +19,7 @@ def run(arguments: argparse.Namespace) -> int:
         raise BadInput(f"--runs {arguments.runs}: at least one is needed")
     measures = {
         "speed": _speed,
+        "gpu": _gpu,
         "compare": _compare,
         "peers": _peers,
         "hemisphere": _hemisphere,
@@ -79,6 +82,22 @@ def _speed(arguments: argparse.Namespace) -> int:
     print(speed.table(document))
     if output:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    return 0
+
+
+def _gpu(arguments: argparse.Namespace) -> int:
+    if not 0 < arguments.seconds < math.inf:
+        raise BadInput(f"--seconds {arguments.seconds:g}: must be above 0")
+    output = _output(arguments.output)
+    from service.bench.device import run, stage, table
+
+    options = stage.Options(arguments.seconds, arguments.device)
+    document = run.measure(options, lambda what: print(what, file=sys.stderr))
+    print(table.table(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    if document["device"] is None:
+        raise Failed("the device could not be reached; the table says why")
     return 0
 
 
