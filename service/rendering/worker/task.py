@@ -180,7 +180,9 @@ class Task:
         else:
             residency.insist(lambda: picture.trace(budget_s, cap, sharers))  # the second block takes memory
         tracker.clock.lap()
-        self.traced += (picture.samples - before) * picture.settings.width * picture.settings.height
+        if picture.samples != before:
+            pixels = picture.settings.width * picture.settings.height
+            self.traced += (picture.samples - before) * pixels - self.home.take_foreign()
         tracker.pixel_s = picture.cost_s or tracker.pixel_s
         if picture.samples:
             self._frames.scale = scale

@@ -15,6 +15,8 @@ from service.rendering.worker.division.ledger import LEASE_S, Ledger
 from service.rendering.worker.payloads import Result
 
 if TYPE_CHECKING:
+    import numpy as np
+
     from gpu import Band, Picture
 
 EACH = 2  # leases that an assistant has at a time: the next one lies there when the first is done
@@ -49,6 +51,7 @@ class Home:
         self._done: list[Result] = []  # bands of the current block
         self._resumed: list[Result] = []  # that were saved, for when the ledger is made
         self._began = 0.0  # when the current block was begun to be shared
+        self._foreign = 0  # samples of pixels in the current block, or the one that is merged, from elsewhere
 
     def assist(self, ids: tuple[int, ...]) -> None:
         """These renderers assist from now on; the leases of others are free again."""
@@ -120,9 +123,9 @@ class Home:
             return
         self._window = ledger.window() if progressive else 0
         picture.share(self._window, end)
-        self._done, self._began = parked, time.monotonic()
+        self._done, self._began, self._foreign = [], time.monotonic(), 0
         for band, values in parked:
-            picture.write_band(band, values)
+            self._write(picture, band, values)
 
     def trace(self, budget_s: float) -> None:
         """Do a slice of the block that is shared."""
@@ -160,11 +163,19 @@ class Home:
             picture.add_counts(done.counts)
         current = ledger.delivered(done.number, done.values)
         if current is not None:
-            band, values = current
-            picture.write_band(band, values)
-            ledger.did(band.rows)
-            self._done.append(current)
+            self._write(picture, *current)
+            ledger.did(current[0].rows)
         self._give()
+
+    def _write(self, picture: Picture, band: Band, values: np.ndarray) -> None:
+        picture.write_band(band, values)
+        self._done.append((band, values))
+        self._foreign += band.rows * band.count * picture.settings.width
+
+    def take_foreign(self) -> int:
+        """The samples of pixels that were traced elsewhere, of the block that was just merged."""
+        foreign, self._foreign = self._foreign, 0
+        return foreign
 
     def bands(self) -> list[Result]:
         """What is done of blocks that are not merged yet, for a checkpoint; nothing where the block under way has not
