@@ -6,15 +6,19 @@ import random
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from itertools import count
+from pathlib import Path
 from typing import Any, cast
 
 import numpy as np
 import pytest
 
-from gpu import Band, RenderSettings, border_after
+from gpu import Band, RenderSettings, Saved, border_after
 from service.rendering.ipc.leases import Lease, LeaseDone
+from service.rendering.ipc.messages import Progress, Restore
+from service.rendering.jobs.store.pictures import PictureFiles
 from service.rendering.worker.division.home import Home
 from service.rendering.worker.division.ledger import MOST_BYTES, PIXEL_BYTES, Ledger
+from service.rendering.worker.payloads import saved_bands, saved_picture, sent_picture
 
 FIRST, SIZE = 8, 64  # samples: the first border, and the distance of the others
 WIDTH, HEIGHT = 512, 300
@@ -242,3 +246,20 @@ def test_what_waits_for_its_turn_has_a_bound() -> None:
     while ledger.lease(1, SIZE, 1e-9, 2, 0.0) is not None:
         pass
     assert sum(lease.band.rows for lease in ledger.outstanding.values()) * 4096 * PIXEL_BYTES <= 256 << 20
+
+
+def test_bands_travel_with_a_checkpoint_and_through_its_file(tmp_path: Path) -> None:
+    rng, size = np.random.default_rng(3), RenderSettings(16, 24)
+    state = [np.arange(5, dtype=np.uint8), np.zeros(0, np.uint8)]
+    done = [
+        (Band(64, 64, top, rows), rng.random((rows, 16, 12)).astype(np.float32)) for top, rows in ((0, 8), (20, 4))
+    ]
+    sent = sent_picture(Saved(size, 64, (0, 0, 0), state), "a driver", done)
+    files = PictureFiles(tmp_path)
+    files.write("id", "checkpoint", Restore(3, 1, sent, None, Progress(64)))
+    read = files.read("id", "checkpoint", 3).saved
+    for each in (sent, read):
+        bands = saved_bands(each, size)
+        assert [band for band, _ in bands] == [band for band, _ in done] and each.driver == "a driver"
+        assert all(np.array_equal(a, b) for (_, a), (_, b) in zip(bands, done, strict=True))
+        assert [part.tolist() for part in saved_picture(each, size).buffers] == [part.tolist() for part in state]
