@@ -11,6 +11,7 @@ import pytest
 
 ROOT = Path(__file__).parents[1]
 OLD = "llvmpipe (LLVM 15.0.6, 256 bits) 4.5 (Core Profile) Mesa 22.3.6"
+NEW = "llvmpipe (LLVM 15.0.6, 256 bits) 4.5 (Core Profile) Mesa 25.0.7"
 APT = """#!/bin/sh
 if [ "$1" = indextargets ]; then
     printf '%s\\n' 'contrib bookworm http://other/' 'main bookworm http://mirror/debian/' 'main bookworm-updates http://no/'
@@ -35,7 +36,10 @@ class Machine:
             (self.folder / name).write_text(text)
             (self.folder / name).chmod(0o755)
         (self.folder / "temporary").mkdir(exist_ok=True)
-        script = f"set -euo pipefail; . .ci/packages; is_debian_12() {{ true; }}; has_gpu() {{ false; }}; {command}"
+        script = (
+            "set -euo pipefail; . .ci/packages; is_debian_12() { true; }; has_gpu() { false; }; "
+            f"lavapipe_is_here() {{ false; }}; {command}"
+        )
         paths = {name: str(self.folder / name.lower()) for name in ("ASKED", "SOURCES")}
         environment = {
             **os.environ,
@@ -95,4 +99,28 @@ def test_where_it_is_the_owners_affair_it_is_only_told(tmp_path: Path, user: int
 def test_other_drivers_are_let_be(tmp_path: Path, renderer: str) -> None:
     machine = Machine(tmp_path)
     done = machine.does(f"offer_faster_mesa '{renderer}'")
+    assert done.returncode == 0 and not done.stderr and not machine.asked
+
+
+def test_lavapipe_comes_from_where_mesa_does(tmp_path: Path) -> None:
+    machine = Machine(tmp_path)
+    done = machine.does(f"offer_lavapipe '{NEW}'")
+    assert done.returncode == 0, done.stderr
+    update, install = machine.asked
+    assert update.endswith(" update") and install.endswith(" --no-remove -t bookworm-backports mesa-vulkan-drivers")
+    assert "Dir::Etc::SourceParts=/dev/null" in install and not list((tmp_path / "temporary").iterdir())
+
+
+@pytest.mark.parametrize(("user", "status"), [(1000, 0), (0, 100)])
+def test_without_lavapipe_it_goes_on(tmp_path: Path, user: int, status: int) -> None:
+    done = Machine(tmp_path, user, status).does(f"offer_lavapipe '{NEW}'")
+    assert done.returncode == 0 and "the test that needs it is skipped" in done.stderr
+
+
+@pytest.mark.parametrize(
+    ("renderer", "more"), [("NVIDIA L4 4.6", ""), (OLD, ""), (NEW, "lavapipe_is_here() { true; };")]
+)
+def test_lavapipe_is_only_for_a_machine_that_lacks_it(tmp_path: Path, renderer: str, more: str) -> None:
+    machine = Machine(tmp_path)
+    done = machine.does(f"{more} offer_lavapipe '{renderer}'")
     assert done.returncode == 0 and not done.stderr and not machine.asked
