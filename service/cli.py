@@ -121,7 +121,7 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "gpu", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds"],
+        choices=["speed", "gpu", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds", "scale"],
         default="speed",
         help="speed (default): paths per second, compile times, growth with triangles, latencies; "
         "gpu: what a device can do, from its limits to first frames, in about ten minutes; "
@@ -130,12 +130,18 @@ def _bench(command: argparse.ArgumentParser) -> None:
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
         "hand: from a slider to other pixels, in a browser; "
         "tradeoff: the price list, what every knob that buys speed costs in error; "
-        "seeds: the experiments of the programs that Sunbox grew out of, repeated",
+        "seeds: the experiments of the programs that Sunbox grew out of, repeated; "
+        "scale: what several renderers gain",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
-    text = "tradeoff: write docs/tradeoff.* and the price list that is served; seeds: write docs/experiments*"
+    text = "tradeoff: write docs/tradeoff.* and the price list that is served; seeds: write docs/experiments*; "
+    text += "scale: write docs/scaling.*"
     add("--publish", action="store_true", help=text)
-    add("--quick", action="store_true", help="tradeoff, seeds: try it out on little; its figures mean nothing")
+    text_quick = "tradeoff, seeds, scale: try it out on little; its figures mean nothing"
+    add("--quick", action="store_true", help=text_quick)
+    add(
+        "--simulate", type=int, metavar="N", help="scale: also simulate 1, 2, 4 ... N renderers on hosts of their own"
+    )
     add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
     add("--seconds", type=float, default=600.0, metavar="S", help="gpu: about how long it may take (default: 600)")
     add("--device", type=int, metavar="N", help="gpu: the number of the EGL device (default: EGL's own choice)")

@@ -27,6 +27,10 @@ soak_restarts      a thousand renders while the whole server is restarted, its d
 soak_server        the server under test of `soak`
 soak_tally         the results of `soak`, counted
 device             what a device can do: `sunbox bench gpu`
+scale              what several renderers gain
+scale_model        a model of a divided render, simulated and in closed form
+scale_costs        the costs that the model is fed with
+scale_report       tables, a figure, and a section of docs/scaling.md
 seeds              the experiments of the programs that Sunbox grew out of
 gallery            the README's pictures
 thumbnails         the editor's pictures of the material presets

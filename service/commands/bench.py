@@ -1,5 +1,5 @@
-"""`sunbox bench speed | gpu | compare | peers | hemisphere | hand | tradeoff | seeds`: a table; `-o` keeps the
-figures."""
+"""`sunbox bench speed | gpu | compare | peers | hemisphere | hand | tradeoff | seeds | scale`: a table; `-o` keeps
+the figures."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ def run(arguments: argparse.Namespace) -> int:
         "hand": _hand,
         "tradeoff": _tradeoff,
         "seeds": _seeds,
+        "scale": _scale,
     }
     return measures[arguments.what](arguments)
 
@@ -175,6 +176,36 @@ def _seeds(arguments: argparse.Namespace) -> int:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     if arguments.publish:
         report.publish(document, pictures)
+    return 0
+
+
+def _scale(arguments: argparse.Namespace) -> int:
+    most = arguments.simulate
+    if most is not None and not 1 <= most <= 1024:
+        raise BadInput(f"--simulate {most}: from 1 to 1024 renderers can be simulated")
+    if arguments.publish and (most is None or arguments.quick):
+        raise BadInput("--publish: needs --simulate N, and not --quick, whose figures mean nothing")
+    if arguments.publish and find_spec("matplotlib") is None:
+        raise BadInput("--publish: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+    output = _output(arguments.output)
+    from gpu import GpuError
+    from service.bench import scale, scale_report
+
+    def told(what: str) -> None:
+        print(what, file=sys.stderr)
+
+    try:
+        document = {"measured": scale.measure(scale.Options(arguments.runs, arguments.quick), told)}
+        print(scale_report.measured_table(document["measured"]))
+        if most is not None:
+            document["simulated"] = scale.simulate(most, arguments.quick, told)
+            print(scale_report.speedup_table(document["simulated"]))
+    except (GpuError, scale.NotMeasured) as error:
+        raise Failed(str(error)) from None
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    if arguments.publish:
+        scale_report.publish(**document)
     return 0
 
 
