@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 from gpu import border_after
 from service.rendering.ipc.leases import Lease, LeaseDone
 from service.rendering.ipc.messages import FromRenderer
-from service.rendering.worker.division.ledger import LEASE_S, Ledger
+from service.rendering.worker.division.ledger import Ledger
 from service.rendering.worker.payloads import Result
 
 if TYPE_CHECKING:
@@ -20,9 +20,9 @@ if TYPE_CHECKING:
     from gpu import Band, Picture
 
 EACH = 2  # leases that an assistant has at a time: the next one lies there when the first is done
-# Seconds that the home waits for a lease with nothing else to do, before it traces that band itself. An assistant may
-# have other clients; one that is lost is reported.
-OVERDUE_S = 6 * LEASE_S
+# With nothing else to do the home waits for a lease so many times as long as tracing that band here would take, and
+# so many seconds at least; then it traces it itself. An assistant may have other clients, or a slow link.
+OVERDUE_TIMES, OVERDUE_S = 6, 0.5
 MOST_SAVED = 500  # bands with a checkpoint, whose first line names them
 WORTH_SAVING_S = 4.0  # of a block: as long as between two checkpoints
 GUESS_S = 2e-7  # a sample of a pixel, before any was measured
@@ -79,7 +79,11 @@ class Home:
     def left_s(self) -> float:
         """Seconds until the home no longer waits for the oldest lease of the current block."""
         oldest = None if self._ledger is None else self._ledger.oldest
-        return 0.0 if oldest is None else max(0.0, oldest[1].since + OVERDUE_S - time.monotonic())
+        if oldest is None or self._picture is None:
+            return 0.0
+        lease = oldest[1]
+        here_s = self._pixel_s * lease.band.rows * lease.band.count * self._picture.settings.width
+        return max(0.0, lease.since + max(OVERDUE_S, OVERDUE_TIMES * here_s) - time.monotonic())
 
     def cap(self, picture: Picture, end: int, generation: int, since: int, progressive: bool) -> int:
         """How many samples to aim at where the block under way is not shared: no more than the next border, where one
