@@ -79,6 +79,8 @@ class Render(BaseModel):
     eta_s: float | None
     forecast: dict[str, Forecast] | None = Field(description="By quality preset; null until 16 samples tell.")
     warnings: list[str]
+    renderers: int = Field(description="How many trace it now.")
+    not_divided: str | None = Field(description="Why no more than one may; null where its settings allow it.")
     settings: dict[str, Any] = Field(description="What each knob became; null is no such limit.")
 
 

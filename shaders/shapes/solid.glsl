@@ -1,7 +1,7 @@
 // Affine images of the unit sphere (ellipsoid) and of the cube [-1, 1]^3 (box). Rays are intersected in the solid's own
 // space, where their direction is not of unit length, so that t is the same in both spaces.
 
-#if HAS_BOXES || HAS_BVH_BOXES || HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS
+#if HAS_BOXES || HAS_BVH_BOXES || HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS || HAS_ELLIPSOID_LIGHTS
 vec3 solid_rows(Solid s, vec3 v) { return vec3(dot(s.row_x, v), dot(s.row_y, v), dot(s.row_z, v)); }
 
 // The columns of world_from_object, from the rows of its inverse.

@@ -20,7 +20,7 @@ Shear triangle_shear(vec3 o, vec3 d) {
     return s;
 }
 
-#if HAS_TRIANGLES || HAS_BVH_TRIANGLES || HAS_INSTANCES
+#if HAS_TRIANGLES || HAS_BVH_TRIANGLES || HAS_INSTANCES || HAS_TRIANGLE_LIGHTS
 // The hit in (0, t_max), with the barycentric weights of v1 and v2 in uv, or t_max.
 float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
     vec3 a = triangle_axes(tri.v0 - s.o, s.axis);

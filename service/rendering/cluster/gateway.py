@@ -228,7 +228,7 @@ def _keep_others_from_writing() -> None:
         with open(reading, errors="replace") as lines:
             for line in lines:
                 _written.append(line.strip()[:300])
-                log.debug("Ray wrote: %s", line.strip())
+                log.debug("Ray wrote to its output line=%s", line.strip())
 
     threading.Thread(target=read, name="ray-output", daemon=True).start()
 
