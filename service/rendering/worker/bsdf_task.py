@@ -10,6 +10,7 @@ from service.rendering.ipc.messages import EvaluateBsdf, Evaluated
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.helpers.kernel_wait import KernelWait
 from service.rendering.worker.payloads import scene_arrays
+from service.rendering.worker.scheduler import Account
 
 
 class BsdfTask:
@@ -19,7 +20,7 @@ class BsdfTask:
 
     def __init__(self, context: WorkerContext, question: EvaluateBsdf) -> None:
         self.number, self.client = question.task, question.client
-        self.used_s = 0.0
+        self.account = Account()
         self._question, self._material = question, scene_arrays(question.material)
         self._send = context.send
         self._evaluator = context.renderer.bsdf

@@ -4,15 +4,44 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Hashable
+from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 # How much more than the least served a client may have had and still be preferred for its first frame (s). Without a
 # bound, a slider that never rests starves the others; below some frames' worth, every drag stutters beside a render.
-FIRST_FRAME_LEAD_S = 0.25
+FIRST_FRAME_LEAD_S = 0.5
+# The seconds that a client waits at most for all others to catch up with it. A turn that can't be interrupted, as one
+# that loads a kernel, takes as long as ten others, and 32 clients would take 32 times that to catch up in full.
+CATCH_UP_S = 0.5
+TURN_S = 0.03  # no lead: the length of an ordinary turn, a slice and the tile that is under way at its end
+# What a client had beyond that lead it owes, and pays back as a surcharge on its turns: this share of each. More than
+# so many seconds it can't owe; then it waits for the others.
+SURCHARGE, MOST_OWED_S = 0.125, 1.0
+
+
+@dataclass
+class Account:
+    """What a client used of the device, or a task of its client's part, in seconds of virtual time."""
+
+    used_s: float = 0.0
+    counted_s: float = 0.0  # without what is owed; whoever has the least goes next
+
+    def charge(self, seconds: float) -> None:
+        self.counted_s += seconds + min(self.used_s - self.counted_s, SURCHARGE * seconds)
+        self.used_s += seconds
+
+    def level(self, now_s: float) -> None:
+        """Start level with the others after a rest. This gives no credit for the rest, which pays what was owed."""
+        self.counted_s = max(self.counted_s, now_s)
+        self.used_s = max(self.used_s, self.counted_s)
+
+    def defer(self, most_s: float) -> None:
+        """Owe what counts beyond `most_s`, as far as more can be owed."""
+        self.counted_s = max(min(self.counted_s, most_s), self.used_s - MOST_OWED_S)
 
 
 class Turn(Protocol):
-    used_s: float  # virtual, within its client
+    account: Account  # within its client
     client: str
 
     @property
@@ -30,12 +59,12 @@ T = TypeVar("T", bound=Turn)
 class Scheduler:
     """Virtual time: the client served least goes next, and of its tasks the one served least.
 
-    A client that was idle starts level with the others and gets no credit for its rest; time beyond its share is
-    remembered until the others have caught up.
+    A client that was idle starts level with the others and gets no credit for its rest. Time beyond its share is
+    remembered until the others have caught up, or until the client has paid it back.
     """
 
     def __init__(self) -> None:
-        self._used_s: dict[str, float] = defaultdict(float)
+        self._accounts: dict[str, Account] = defaultdict(Account)
         self._now_s = 0.0
         self._waiting: set[Hashable] = set()
         self._ready: dict[str, int] = {}  # tasks, by client, at the last choice
@@ -45,37 +74,48 @@ class Scheduler:
         for task in tasks:
             if task.ready:
                 ready[task.client].append(task)
-        self._level(ready)
         self._ready = {client: len(tasks) for client, tasks in ready.items()}
+        self._level(ready)
         if not ready:
             return None
-        self._now_s = min(self._used_s[client] for client in ready)
+        accounts = self._accounts
         within = self._now_s + FIRST_FRAME_LEAD_S
         first = [task for tasks in ready.values() for task in tasks if task.unseen]
-        eager = {task.client for task in first if self._used_s[task.client] <= within}
-        client = min(eager or ready, key=lambda name: self._used_s[name])
+        eager = {task.client for task in first if accounts[task.client].used_s <= within}
+        client = min(eager or ready, key=lambda name: accounts[name].counted_s)
         candidates = [task for task in ready[client] if task.unseen] if eager else ready[client]
-        return min(candidates, key=lambda task: task.used_s)
+        return min(candidates, key=lambda task: task.account.counted_s)
 
     def sharers(self, client: str) -> int:
         """The number of equal shares into which the last choice parted the device, for a task of this client."""
         return max(1, len(self._ready) * self._ready.get(client, 1))
 
     def charge(self, task: Turn, seconds: float) -> None:
-        task.used_s += seconds
-        self._used_s[task.client] += seconds
+        task.account.charge(seconds)
+        self._accounts[task.client].charge(seconds)
 
     def _level(self, ready: dict[str, list[T]]) -> None:
-        """Raise the virtual time of clients that have just become ready to that of the others."""
-        waiting: set[Hashable] = set()
+        """Raise the virtual time of clients that have just become ready to that of the others, and have nobody too
+        far ahead. The same among the tasks of each client."""
+        waiting: set[Hashable] = {*ready, *(id(task) for tasks in ready.values() for task in tasks)}
+        clients = [(self._accounts[client], client in self._waiting) for client in ready]
+        self._now_s = _level(clients, self._now_s, len(ready))
         for client, tasks in ready.items():
-            waiting |= {client, *map(id, tasks)}
-            if client not in self._waiting:
-                self._used_s[client] = max(self._used_s[client], self._now_s)
-            old = [task.used_s for task in tasks if id(task) in self._waiting]
-            for task in tasks:
-                if old and id(task) not in self._waiting:
-                    task.used_s = max(task.used_s, min(old))
+            _level([(task.account, id(task) in self._waiting) for task in tasks], 0.0, self.sharers(client))
         self._waiting = waiting
-        for client in [name for name, used_s in self._used_s.items() if name not in ready and used_s <= self._now_s]:
-            del self._used_s[client]
+        for client in [name for name in self._accounts if name not in ready]:
+            if self._accounts[client].used_s <= self._now_s:
+                del self._accounts[client]
+
+
+def _level(accounts: Collection[tuple[Account, bool]], now_s: float, sharers: int) -> float:
+    """Level accounts, each with whether it was waiting before. Returns what the least served has had; where nobody
+    was waiting that is at least `now_s`."""
+    now_s = min((account.counted_s for account, waited in accounts if waited), default=now_s)
+    for account, waited in accounts:
+        if not waited:
+            account.level(now_s)
+    now_s = min((account.counted_s for account, _ in accounts), default=now_s)
+    for account, _ in accounts:
+        account.defer(now_s + max(TURN_S, CATCH_UP_S / sharers))
+    return now_s

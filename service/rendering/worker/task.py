@@ -17,6 +17,7 @@ from service.rendering.worker.ending import Ending
 from service.rendering.worker.kernel_savings import KernelSavings
 from service.rendering.worker.payloads import saved_bands, saved_picture
 from service.rendering.worker.progress.progress import ProgressTracker
+from service.rendering.worker.scheduler import Account
 from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.denoise_policy import DenoisePolicy
 from service.rendering.worker.view.frames import SLICE_S, FrameSource
@@ -43,7 +44,7 @@ class Task:
     def __init__(self, context: WorkerContext, number: int, client: str = "") -> None:
         self.number, self.client = number, client
         self.attempted = 0  # the generation of the last update
-        self.used_s = 0.0
+        self.account = Account()
         self.traced = 0  # samples of pixels
         self._renderer = renderer = context.renderer
         self._send, self._forget = context.send, context.forget

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import pytest
 
@@ -12,7 +12,13 @@ from service.pack import pack
 from service.rendering.ipc.messages import StopRule, Update
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.helpers.denoise_client import DenoiseClient
-from service.rendering.worker.scheduler import FIRST_FRAME_LEAD_S, Scheduler
+from service.rendering.worker.scheduler import (
+    CATCH_UP_S,
+    FIRST_FRAME_LEAD_S,
+    MOST_OWED_S,
+    Account,
+    Scheduler,
+)
 from service.rendering.worker.task import Task
 from service.scene import parse_scene
 from tests.documents import Shelf
@@ -23,7 +29,7 @@ from tests.serving import SCENE
 class Turn:
     ready: bool = True
     unseen: bool = False
-    used_s: float = 0.0
+    account: Account = field(default_factory=Account)
     client: str = ""
 
     def __post_init__(self) -> None:
@@ -98,3 +104,80 @@ def test_a_first_frame_goes_first_but_starves_nobody() -> None:
     assert scheduler.choose([newest, other]) is newest
     had = turns([Turn(unseen=True), Turn()], 200)  # as when an edit follows an edit
     assert had[1] > 80
+
+
+class Stream(Turn):
+    """Traces frames of `frame_s` seconds in turns of 20 ms. Its first turn takes `load_s`."""
+
+    def begin(self, now_s: float, load_s: float, frame_s: float) -> None:
+        self._next_s, self._frame_s, self._done_s = load_s, frame_s, 0.0
+        self.shown_at, self.longest_s, self.unseen = now_s, 0.0, True
+
+    def turn(self, now_s: float) -> float:
+        """The seconds that it takes."""
+        took_s, self._next_s = self._next_s, 0.02
+        self._done_s += 0.02
+        if self._done_s >= (0.04 if self.unseen else self._frame_s):
+            self.longest_s = max(self.longest_s, now_s + took_s - self.shown_at)
+            self.shown_at, self._done_s, self.unseen = now_s + took_s, 0.0, False
+        return took_s
+
+
+@pytest.mark.parametrize("one_key", [False, True])
+def test_nobody_waits_long_among_thirty_two_streams(one_key: bool) -> None:
+    """By a simulated clock: they come one after the other, and every fifth one loads a kernel."""
+    scheduler, clock_s, streams = Scheduler(), 0.0, list[Stream]()
+    while clock_s < 60.0:
+        while len(streams) < 32 and clock_s >= 0.02 * len(streams):
+            streams.append(Stream(client="key" if one_key else ""))
+            streams[-1].begin(clock_s, 0.4 if len(streams) % 5 == 1 else 0.02, 0.08)
+        stream = scheduler.choose(streams)
+        assert stream is not None
+        took_s = stream.turn(clock_s)
+        scheduler.charge(stream, took_s)
+        clock_s += took_s
+    waits = [max(stream.longest_s, clock_s - stream.shown_at) for stream in streams]
+    assert max(waits) <= 5.0, sorted(waits)
+
+
+def test_what_a_long_turn_took_is_paid_back() -> None:
+    scheduler, loads, others = Scheduler(), Turn(), [Turn() for _ in range(31)]
+    used = dict.fromkeys(map(id, [loads, *others]), 0.0)
+    before = 0  # turns of others until its next one
+    for count in range(40_000):
+        task = scheduler.choose([loads, *others])
+        assert task is not None
+        seconds = 0.6 if task is loads and not used[id(loads)] else 0.02
+        scheduler.charge(task, seconds)
+        used[id(task)] += seconds
+        before += used[id(loads)] in (0.0, 0.6)
+        if count == 320:
+            assert used[id(loads)] - min(used.values()) > 0.3
+    assert before < 4 * 32
+    assert max(used.values()) - min(used.values()) < 0.05
+
+
+def test_long_turns_do_not_pay() -> None:
+    """Who takes a second each time gets no more than the others, but for what may be owed."""
+    scheduler, greedy, others = Scheduler(), Turn(), [Turn() for _ in range(7)]
+    used_s = 0.0
+    for _ in range(10_000):
+        task = scheduler.choose([greedy, *others])
+        assert task is not None
+        scheduler.charge(task, 1.0 if task is greedy else 0.02)
+        used_s += 1.0 if task is greedy else 0.02
+    mean_s = sum(other.account.used_s for other in others) / 7
+    assert greedy.account.used_s <= mean_s + MOST_OWED_S + CATCH_UP_S / 8 + 1.0
+
+
+def test_who_comes_during_a_long_turn_is_level_with_whoever_had_it() -> None:
+    scheduler, first, others = Scheduler(), Turn(), [Turn() for _ in range(31)]
+    assert scheduler.choose([first]) is first
+    scheduler.charge(first, 1.0)
+    had = []
+    for _ in range(64):
+        task = scheduler.choose([first, *others])
+        assert task is not None
+        scheduler.charge(task, 0.02)
+        had.append(task is first)
+    assert sum(had) == 2

@@ -12,6 +12,7 @@ from service.rendering.ipc.messages import Update
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.residency import Residency
 from service.rendering.worker.progress.progress import ProgressTracker
+from service.rendering.worker.scheduler import Account
 from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.frames import SLICE_S
 
@@ -29,7 +30,7 @@ class Assistant:
     def __init__(self, context: WorkerContext, number: int, client: str = "") -> None:
         self.number, self.client = number, client
         self.attempted = 0  # the generation of the last update
-        self.used_s = 0.0
+        self.account = Account()
         self.traced = 0  # samples of pixels
         self._send = context.send
         self._residency = Residency(context.renderer, context.memory, self, lambda: None)
