@@ -121,10 +121,11 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "gpu", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds", "scale"],
+        choices=["speed", "gpu", "frames", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds", "scale"],
         default="speed",
         help="speed (default): paths per second, compile times, growth with triangles, latencies; "
         "gpu: what a device can do, from its limits to first frames, in about ten minutes; "
+        "frames: the first frame after every slider's move and every change of scene, caches empty, in half an hour; "
         "compare: this checkout beside an earlier revision; "
         "peers: error at equal time beside Mitsuba and Cycles; "
         "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
@@ -142,8 +143,15 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "--simulate", type=int, metavar="N", help="scale: also simulate 1, 2, 4 ... N renderers on hosts of their own"
     )
-    add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
+    add(
+        "--runs",
+        type=int,
+        default=5,
+        metavar="N",
+        help="runs a scene, of which the median counts; frames: moves of a slider (default: 5)",
+    )
     add("--seconds", type=float, default=600.0, metavar="S", help="gpu: about how long it may take (default: 600)")
+    add("--scenes", metavar="NAMES", help="frames: only these built-in scenes, separated by commas")
     add("--device", type=int, metavar="N", help="gpu: the number of the EGL device (default: EGL's own choice)")
     add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
     add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")

@@ -4,6 +4,8 @@ speed              paths per second, compile times, and the latencies of the edi
 timing             the time of a sample of every pixel
 growth             the cost of more triangles
 latency            start-up and slider moves, at the socket of a real server
+first_frames       every slider of every built-in scene, changes of scene, thumbnails
+sliders            the sliders of a scene's document
 hand               from a slider to other pixels, in a real browser
 scenes             the scenes that are measured
 machine            a description of the machine

@@ -107,14 +107,12 @@ class Editor:
 
     def _load(self, scene: str) -> None:
         with urlopen(f"http://127.0.0.1:{self._port}/v1/presets/scenes/{scene}", timeout=PATIENCE_S) as answer:
-            self._scene = json.load(answer)
-        kind = self._scene["materials"][SUBJECT]["type"]
-        self._slider = "albedo" if kind == "diffuse" else "roughness"
+            self.scene = json.load(answer)
 
     def start(self, began: float) -> float:
         """Milliseconds from `began` to the first image."""
         settings = {"width": self._size[0], "height": self._size[1], "max_samples": 1 << 20}
-        self._send("start", scene=self._scene, settings=settings)
+        self._send("start", scene=self.scene, settings=settings)
         return 1e3 * (self._first_frame() - began)
 
     def show(self, scene: str) -> float:
@@ -126,15 +124,16 @@ class Editor:
     def move(self) -> float:
         """Milliseconds from sending a slider's new value to having the first frame that shows it."""
         value = 0.1 + 0.8 * (self._generation * 0.618 % 1)  # the golden ratio: no value comes twice
-        return self._change({"materials": {SUBJECT: {self._slider: value}}})
+        slider = "albedo" if self.scene["materials"][SUBJECT]["type"] == "diffuse" else "roughness"
+        return self.change({"materials": {SUBJECT: {slider: value}}})
 
     def turn(self) -> float:
         """The same of a camera that goes half a degree around what it looks at."""
-        camera = self._scene["camera"]
+        camera = self.scene["camera"]
         (x, y, z), (tx, _, tz) = camera["position"], camera["target"]
         turned = complex(x - tx, z - tz) * cmath.exp(0.0087j)
         camera["position"] = [tx + turned.real, y, tz + turned.imag]
-        return self._change({"camera": {"position": camera["position"]}})
+        return self.change({"camera": {"position": camera["position"]}})
 
     def _wait(self, seconds: float) -> None:
         """Take frames meanwhile."""
@@ -143,7 +142,8 @@ class Editor:
             with suppress(TimeoutError):
                 self._receive(left)
 
-    def _change(self, scene: dict[str, Any]) -> float:
+    def change(self, scene: dict[str, Any]) -> float:
+        """Milliseconds from sending a merge patch of the scene, after a pause, to having the first frame of it."""
         self._wait(PAUSE_S)
         sent = time.perf_counter()
         self._send("update", scene=scene)

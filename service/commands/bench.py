@@ -1,5 +1,5 @@
-"""`sunbox bench speed | gpu | compare | peers | hemisphere | hand | tradeoff | seeds | scale`: a table; `-o` keeps
-the figures."""
+"""`sunbox bench speed | gpu | frames | compare | peers | hemisphere | hand | tradeoff | seeds | scale`: a table; `-o`
+keeps the figures."""
 
 from __future__ import annotations
 
@@ -20,6 +20,7 @@ def run(arguments: argparse.Namespace) -> int:
     measures = {
         "speed": _speed,
         "gpu": _gpu,
+        "frames": _frames,
         "compare": _compare,
         "peers": _peers,
         "hemisphere": _hemisphere,
@@ -99,6 +100,24 @@ def _gpu(arguments: argparse.Namespace) -> int:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     if document["device"] is None:
         raise Failed("the device could not be reached; the table says why")
+    return 0
+
+
+def _frames(arguments: argparse.Namespace) -> int:
+    from service import presets
+
+    known = [entry["name"] for entry in presets.names("scenes")]
+    scenes = arguments.scenes.split(",") if arguments.scenes else known
+    for name in scenes:
+        if name not in known:
+            raise BadInput(f"--scenes {name!r}: is not one of {', '.join(known)}")
+    output = _output(arguments.output)
+    from service.bench import first_frames
+
+    document = first_frames.measure(scenes, lambda what: print(what, file=sys.stderr), arguments.runs)
+    print(first_frames.table(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     return 0
 
 

@@ -11,10 +11,12 @@ import numpy as np
 import pytest
 import trimesh
 
-from service.bench import compare, growth, latency, machine, scenes, speed, timing
+from service import presets
+from service.bench import compare, first_frames, growth, latency, machine, scenes, speed, timing
+from service.bench.sliders import Slider, sliders
 from service.cli import main
 from service.pack import pack
-from service.scene import parse_scene
+from service.scene import merge_patch, parse_scene
 
 
 @pytest.mark.parametrize("case", scenes.cases(), ids=lambda case: f"{case.name}-{case.max_bounces}")
@@ -70,6 +72,42 @@ def test_latencies_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.M
     room = latency.rooms(lambda line: None)["cornell-empty"]
     for hand in ("slider", "camera"):
         assert room[f"{hand}_p95_ms"] >= room[f"{hand}_p50_ms"] > 0
+
+
+@pytest.mark.parametrize("name", [entry["name"] for entry in presets.names("scenes")])
+def test_every_slider_changes_its_number_and_gives_it_back(name: str) -> None:
+    document = presets.get("scenes", name)
+    found = sliders(document)
+    assert {"camera/vfov", "camera/aperture_radius"} <= {slider.name for slider in found}
+    for slider in found:
+        low, high = (merge_patch(document, slider.patch(document, share)) for share in (0.0, 1.0))
+        assert parse_scene(low) != parse_scene(high), slider.name
+        assert merge_patch(high, slider.restore(document)) == document, slider.name
+
+
+def test_sliders_are_of_the_first_material_of_each_kind() -> None:
+    names = {slider.name for slider in sliders(presets.get("scenes", "cornell-spheres"))}
+    assert {"materials/subject/roughness", "materials/lamp/emission", "materials/white/albedo"} <= names
+    assert not any(name.startswith(("materials/red", "materials/steel")) for name in names)
+    assert "lights/1/intensity" in {slider.name for slider in sliders(presets.get("scenes", "point-lights"))}
+
+
+def test_first_frames_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+    found = [Slider(("camera", "vfov"), 20, 60, "number"), Slider(("materials", "subject", "albedo"), 0, 1, "color")]
+    monkeypatch.setattr(first_frames, "sliders", lambda document: found)
+    monkeypatch.setattr(first_frames.presets, "names", lambda kind: [{"name": "matte-clay"}])
+    document = first_frames.measure(["cornell-empty"], lambda line: None, moves=2)
+    row = document["scenes"][0]
+    assert row["sliders"].keys() == {"camera/vfov", "materials/subject/albedo"}
+    assert all(len(times) == 2 and min(times) > 0 for times in row["sliders"].values())
+    assert row["start_ms"] > row["change_again_ms"] > 0 and row["change_ms"] > 0
+    assert [each["name"] for each in document["thumbnails"]] == ["matte-clay"]
+    assert len(first_frames.table(document).splitlines()) == 6
+
+
+def test_first_frames_refuse_a_scene_that_is_not_built_in(capsys: pytest.CaptureFixture[str]) -> None:
+    assert main(["bench", "frames", "--scenes", "cornell-empty,nowhere"]) == 2
+    assert "nowhere" in capsys.readouterr().err
 
 
 def test_command_prints_a_table_and_keeps_the_figures(
