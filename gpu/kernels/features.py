@@ -221,6 +221,10 @@ FLAGS: dict[str, Callable[[SceneArrays], bool]] = {
     "HAS_ATTENUATION": lambda s: bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any()),
 }
 
+# Flags that sliders of the camera can raise. While a scene is edited they are raised from the start: without an
+# aperture its code costs less than 2 % of a sample's time (cornell-boxes, sphere-on-floor, point-lights).
+EDITED_CAMERA = frozenset(CAMERA_FLAGS)
+
 # Flags that a slider of a model can raise. While a scene is edited they are all raised with the model, so that no
 # slider ever waits for the compiler. For `principled` two are left out because they are expensive: anisotropic
 # highlights double its time and clear bodies add a fifth; the first use of such a slider compiles once.
@@ -242,7 +246,7 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
     """The flags that `scene` raises; with `editing`, also those that an edit of its materials could."""
     raised = {name for name, asks in FLAGS.items() if asks(scene)}
     if editing:
-        raised |= {more for name in raised & set(EDITED) for more in EDITED[name]}
+        raised |= {more for name in raised & set(EDITED) for more in EDITED[name]} | EDITED_CAMERA
     return frozenset(raised)
 
 

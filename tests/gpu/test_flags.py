@@ -195,6 +195,15 @@ def test_the_first_touch_of_a_slider_is_foreseen(shape: Doc, more: Doc) -> None:
     assert keys_after_edit(_packed("DISNEY").arrays, settings) == []
 
 
+def test_no_slider_of_the_camera_asks_for_another_kernel() -> None:
+    document, settings = made_of({"type": "disney"}, ball("m")), RenderSettings(48, 32)
+    open_ = {**document, "camera": {**document["camera"], "aperture_radius": 0.1}}
+    before, after = (pack(parse_scene(each), IMAGES).arrays for each in (document, open_))
+    raised = flags(before, True)
+    assert kernel_key(after, settings, grown(raised, after)) == kernel_key(before, settings, raised)
+    assert "HAS_APERTURE" not in flags(before)
+
+
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:
     price = kernel_cost(gpu, _packed("CLEARCOAT").arrays)
     assert {"clearcoat", "disney", "spheres"} <= set(price.raised) and "bvh" in price.spared
