@@ -230,7 +230,9 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own.assets.warm()
     asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
     await own.resume_renders()
-    warming = asyncio.create_task(warm_up(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)))
+    first = presets.get("scenes", presets.DEFAULT_SCENE)
+    others = (presets.get("scenes", entry["name"]) for entry in presets.names("scenes"))
+    warming = asyncio.create_task(warm_up(own.renderers, own.reader, first, others))
     yield
     warming.cancel()
     asking.cancel()

@@ -86,16 +86,20 @@ def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey |
 
 
 def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[KernelKey]:
-    """The keys that a stream will need when it first moves a slider of `principled` that is not compiled in with the
-    others. They are a guess for meshes, of which only those with the anisotropic material get tangents.
+    """The keys that a stream will need when it first moves a slider that is not compiled in with the others: the
+    opacity of any material, and two of `principled`. They are a guess for meshes, of which only those with the
+    anisotropic material get tangents.
     """
     has = features.flags(arrays, True)
-    if "HAS_PRINCIPLED" not in has:
-        return []
-    along = {"HAS_TANGENTS"} if "HAS_SMOOTH_NORMALS" in has else set()
-    clear, stretched = {"HAS_TRANSMISSION"}, {"HAS_ANISOTROPIC", *along}
-    asked = {has | clear, has | stretched, has | clear | stretched} - {has}
-    return [kernel_key(arrays, settings, raised) for raised in sorted(asked, key=len)]
+    asked = set[frozenset[str]]()
+    if "HAS_PRINCIPLED" in has:
+        along = {"HAS_TANGENTS"} if "HAS_SMOOTH_NORMALS" in has else set()
+        clear, stretched = {"HAS_TRANSMISSION"}, {"HAS_ANISOTROPIC", *along}
+        asked |= {has | clear, has | stretched, has | clear | stretched}
+    asked |= {has | {"HAS_OPACITY"}}
+    return [
+        kernel_key(arrays, settings, raised) for raised in sorted(asked - {has}, key=lambda f: (len(f), sorted(f)))
+    ]
 
 
 def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:

@@ -5,13 +5,14 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
 from service.pack import Packed, warm_builder
 from service.problems import ServiceError, Unavailable
 from service.rendering.executors import packing
-from service.rendering.ipc.messages import Failed, Frame, FromRenderer, StopRule, Update, View, Want
+from service.rendering.ipc.messages import Failed, Foresee, Frame, FromRenderer, StopRule, Update, View, Want
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
 
@@ -42,15 +43,16 @@ async def first_frame(
         listener.frame.cancel()
 
 
-async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) -> None:
+async def warm_up(renderers: Renderers, reader: RequestReader, document: Any, others: Iterable[Any] = ()) -> None:
     """Do what the first client would have to wait for: import modules, compile kernels and the builder's code.
 
-    `document` is the scene that a client is likely to begin with. An error is logged and not raised: a client that
-    comes later meets it as well.
+    `document` is the scene that a client is likely to begin with; kernels of the `others`, to which it may change,
+    are compiled afterwards, without hurry. An error is logged and not raised: a client that comes later meets it as
+    well.
     """
     began = time.monotonic()
     try:
-        packed = await packing(lambda: reader.pack(reader.scene(document)))
+        packed = await packing(partial(_packed, reader, document))
         settings = await packing(partial(reader.settings, WARM_UP_SETTINGS))
         # As many at a time as there are renderers: each gets one, as each one makes it busier than the others.
         frames = [first_frame(renderers, packed, settings.for_gpu()) for _ in renderers.members]
@@ -63,6 +65,26 @@ async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) ->
     log.info("warmed up seconds=%.2f", time.monotonic() - began)
     await packing(warm_builder)
     log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
+    try:
+        await _foresee(renderers, reader, others, settings.for_gpu())
+    except ServiceError as error:
+        log.warning("did not foresee scenes error=%s", error)
+
+
+async def _foresee(
+    renderers: Renderers, reader: RequestReader, documents: Iterable[Any], settings: dict[str, Any]
+) -> None:
+    task = renderers.open(_Listener(), "server")
+    try:
+        for document in documents:
+            packed = await packing(partial(_packed, reader, document))
+            renderers.send(Foresee(task, packed.arrays, settings))
+    finally:
+        renderers.drop(task)
+
+
+def _packed(reader: RequestReader, document: Any) -> Packed:
+    return reader.pack(reader.scene(document))
 
 
 class _Listener:

@@ -192,7 +192,17 @@ def test_the_first_touch_of_a_slider_is_foreseen(shape: Doc, more: Doc) -> None:
     wanted = kernel_key(after, settings, grown(flags(before, True), after))
     assert wanted in keys_after_edit(before, settings)
     assert wanted not in keys_after_edit(after, settings)
-    assert keys_after_edit(_packed("DISNEY").arrays, settings) == []
+
+
+@pytest.mark.parametrize("model", ["disney", "diffuse", "principled"])
+def test_the_first_touch_of_the_opacity_is_foreseen(model: str) -> None:
+    settings, material = RenderSettings(48, 32), {"type": model} | ({"albedo": 0.5} if model == "diffuse" else {})
+    before, after = (
+        pack(parse_scene(made_of({**material, **m}, ball("m"))), IMAGES).arrays for m in ({}, {"alpha": 0.5})
+    )
+    wanted = kernel_key(after, settings, grown(flags(before, True), after))
+    assert wanted in keys_after_edit(before, settings)
+    assert wanted not in keys_after_edit(after, settings)
 
 
 def test_no_slider_of_the_camera_asks_for_another_kernel() -> None:

@@ -107,7 +107,7 @@ def helpers(parent: int | None) -> list[int]:
         try:
             of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
             command = (path / "cmdline").read_bytes()
-            if of == parent and b"compile_main" in command and b"--spare" not in command:
+            if of == parent and b"compile_main" in command and b"--priority\0now" in command:
                 found.append(int(path.name))
         except OSError:
             continue
@@ -270,7 +270,7 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
     """What pictures are shown with, and what the noise meter and `adaptive` ask."""
     asked = []
     for _ in range(2):
-        compiler, helper = CompileClient(gpu.info, None, lambda: True, spare=True), Instant()
+        compiler, helper = CompileClient(gpu.info, None, lambda: True, "spare"), Instant()
         compiler._helper = helper  # type: ignore[assignment]
         compiler.prepare(common_keys())
         while compiler.left_s is not None:

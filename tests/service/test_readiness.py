@@ -16,7 +16,7 @@ from service.config import Config
 from service.problems import Unavailable
 from service.readiness import Readiness
 from service.rendering.first_frame import warm_up
-from service.rendering.ipc.messages import Failed, Frame, Progress, ToRenderer, Update, Want
+from service.rendering.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, Update, Want
 from service.rendering.renderers import Listener
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.statistics import Kind, Statistics
@@ -32,7 +32,7 @@ class StandIn:
 
     def __init__(self, answer: Callable[[Listener, int], None], software: bool = False) -> None:
         self.statistics, self.info = Statistics(), {"renderer": "stand-in", "software": software}
-        self.frames = 0
+        self.frames = self.foreseen = 0
         self.open_tasks: dict[int, Listener] = {}
         self._answer = answer
 
@@ -51,6 +51,9 @@ class StandIn:
         assert update.stop is not None and update.stop.max_samples == 1
 
     def send(self, message: ToRenderer) -> None:
+        if isinstance(message, Foresee):
+            self.foreseen += 1
+            return
         assert isinstance(message, Want)
         self.frames += 1
         self._answer(self.open_tasks[message.task], message.task)
@@ -121,6 +124,7 @@ def test_warming_up_leaves_no_task_and_raises_nothing(
 ) -> None:
     caplog.set_level(logging.INFO, logger=warm_up.__module__)
     renderers = StandIn(answer)
-    asyncio.run(warm_up(renderers, READER, readiness.SCENE))
+    asyncio.run(warm_up(renderers, READER, readiness.SCENE, [readiness.SCENE] * 2))
     assert renderers.frames == len(renderers.members) and not renderers.open_tasks
+    assert renderers.foreseen == (2 if logged == "warmed up" else 0)
     assert [record.message for record in caplog.records if record.message.startswith(logged)]

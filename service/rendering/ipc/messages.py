@@ -121,6 +121,15 @@ class Update:
 
 
 @dataclass(frozen=True)
+class Foresee:
+    """Asks for the kernel to be compiled with which a stream would begin this scene. The task has no other use."""
+
+    task: int
+    scene: SceneData
+    settings: dict[str, Any]  # the arguments of gpu.RenderSettings
+
+
+@dataclass(frozen=True)
 class Want:
     """Asks for one Frame, as soon as there is newer content than the last one showed; with `anyway` at once."""
 
@@ -343,6 +352,7 @@ class Failed:
 
 ToRenderer = (
     Update
+    | Foresee
     | Want
     | Read
     | Pause

@@ -20,6 +20,7 @@ from service.rendering.ipc.messages import (
     EvaluateBsdf,
     Evicted,
     Failed,
+    Foresee,
     FromRenderer,
     Pause,
     Read,
@@ -35,6 +36,7 @@ from service.rendering.ipc.messages import (
 )
 from service.rendering.worker.bsdf_task import BsdfTask
 from service.rendering.worker.context import WorkerContext
+from service.rendering.worker.device.loaded_scene import begin_key
 from service.rendering.worker.device.memory import Memory
 from service.rendering.worker.division.assistant import Assistant
 from service.rendering.worker.helpers.compile_client import CompileClient
@@ -71,12 +73,14 @@ class Loop:
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
         self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline=lifeline)
-        self._spare = CompileClient(renderer.info, device, lambda: True, spare=True)
+        self._soon = CompileClient(renderer.info, device, lambda: True, "soon")
+        self._spare = CompileClient(renderer.info, device, lambda: True, "spare")
         self._context = WorkerContext(
             renderer,
             self._send,
             self._denoiser,
             self._spare,
+            self._soon,
             self._compiler,
             self._memory,
             self._forget,
@@ -97,6 +101,7 @@ class Loop:
                 self._take(message)
             self._denoiser.hear()
             self._compiler.hear()
+            self._soon.hear()
             self._spare.hear()
             chosen = self._scheduler.choose(self._everyone)
             if chosen is not None:
@@ -117,8 +122,8 @@ class Loop:
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
         if wait:
-            ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._spare.ends]
-            waits = [self._compiler.left_s, self._spare.left_s, self._renderer.tidy()]
+            ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._soon.ends, *self._spare.ends]
+            waits = [self._compiler.left_s, self._soon.left_s, self._spare.left_s, self._renderer.tidy()]
             waits.append(None if self._denoiser.late else self._denoiser.left_s)
             waits += [task.left_s for task in self._tasks.values()]
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
@@ -187,6 +192,8 @@ class Loop:
                 task = Task(self._context, message.task, message.client)
                 self._tasks[message.task] = task
             task.update(message)
+        elif isinstance(message, Foresee):
+            self._soon.prepare([begin_key(message)])
         elif isinstance(message, EvaluateBsdf):
             self._questions[message.task] = BsdfTask(self._context, message)
         elif isinstance(message, Drop) and message.task in self._questions:

@@ -23,7 +23,7 @@ class Updates:
         self.stops = False  # the render ends as soon as the pending update is applied
         self.settings: RenderSettings | None = None  # of the last update that was applied
         self.preview = FallbackPreview(number, context.send, context.renderer, context.spare)
-        self._residency, self._tracker, self._spare = residency, tracker, context.spare
+        self._residency, self._tracker, self._soon, self._client = residency, tracker, context.soon, client
         self._wait = KernelWait(context.compiler, client)
         self._request: KernelRequest | None = None  # of the pending update, once it was looked at
 
@@ -77,11 +77,12 @@ class Updates:
         return self._wait.take_ms()
 
     def foresee(self, settings: RenderSettings) -> None:
-        """Have compiled, in spare time, what moving a large mesh would need, and the first touch of some sliders."""
-        if self._spare is not None and self._tracker.interactive:
+        """Have compiled what moving a large mesh would need, and the first touch of some sliders."""
+        if self._soon is not None and self._tracker.interactive:
             arrays = self._residency.full.scene.arrays
             moved = kernel_keys.key_after_move(arrays, settings)
-            self._spare.prepare([*([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)])
+            keys = [*([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
+            self._soon.prepare(keys, self._client)
             self.preview.prepare(arrays, settings)
 
     def release(self) -> None:

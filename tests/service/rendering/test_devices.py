@@ -153,14 +153,14 @@ def test_spare_compilers_wait_for_each_other_and_nobody_for_them(tmp_path: Path)
     mine, theirs = channel.pair()
 
     def again() -> None:
-        with compile_main._alone(record, theirs, compile_main.SPARE_LOCK):
+        with compile_main._alone(record, theirs, compile_main.LOCKS["spare"]):
             done.set()
 
     with mine, theirs:
         other = threading.Thread(target=again)
-        with compile_main._alone(record, theirs, compile_main.SPARE_LOCK):
+        with compile_main._alone(record, theirs, compile_main.LOCKS["spare"]):
             other.start()
-            with compile_main._alone(record, theirs, compile_main.LOCK):
+            with compile_main._alone(record, theirs, compile_main.LOCKS["now"]):
                 assert not done.wait(0.2)
         other.join(10)
         assert done.is_set()

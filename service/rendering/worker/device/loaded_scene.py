@@ -7,9 +7,9 @@ from typing import TYPE_CHECKING, Any
 
 from gpu import RenderSettings, Steps, apply_edit, picture_bytes, scene_bytes
 from gpu.precompile import kernel_keys
-from service.rendering.ipc.messages import Update
+from service.rendering.ipc.messages import Foresee, Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
-from service.rendering.worker.payloads import updated_scene
+from service.rendering.worker.payloads import scene_arrays, updated_scene
 
 if TYPE_CHECKING:
     from gpu import KernelKey, Renderer, Saved, Scene, SceneArrays
@@ -98,6 +98,12 @@ class KernelRequest:
     arrays: SceneArrays
     settings: RenderSettings
     key: KernelKey
+
+
+def begin_key(foreseen: Foresee) -> KernelKey:
+    """The key of the kernel with which a stream begins a scene."""
+    arrays, settings = scene_arrays(foreseen.scene), RenderSettings(**foreseen.settings)
+    return kernel_keys.kernel_key(arrays, settings, kernel_keys.flags(arrays, True))
 
 
 def kernel_request(

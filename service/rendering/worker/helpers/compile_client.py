@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal
 
 from service.cpu_time import RunnableTime
 from service.rendering.ipc import channel
@@ -26,6 +26,10 @@ SPARE_LIMIT_S = 3600.0  # ... which gets no more of the processor than others le
 REMEMBERED = 256  # kernels in memory; records on the disk tell of the others
 RECORDS = 4096  # ... and no more than these: the driver's cache has its own bound
 DISABLED = {"1", "true", "yes", "y", "t"}
+
+# now: somebody waits; soon: somebody may in some seconds, and tracing goes on a little slower meanwhile; spare: in
+# time that nobody else wants, however long that takes
+Priority = Literal["now", "soon", "spare"]
 
 Told = Callable[[float], None]
 
@@ -55,18 +59,18 @@ class CompileClient:
         info: dict[str, Any],
         device: int | None,
         crowded: Callable[[], bool],
-        spare: bool = False,
+        priority: Priority = "now",
         lifeline: int | None = None,
     ) -> None:
-        """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop; `spare`: in time
-        that nobody else wants, however long that takes; `lifeline`: its process ends with the server, and when the
-        renderer is killed goes on with what it compiles, for the next one."""
+        """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop; `lifeline`: its
+        process ends with the server, and when the renderer is killed goes on with what it compiles, for the next
+        one."""
         self._driver = driver_of(info)
         self._crowded = crowded
         given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
-        given += ["--spare"] if spare else []
+        given += ["--priority", priority]
         self._helper = HelperProcess("service.rendering.worker.helpers.compile_main", *given, lifeline=lifeline)
-        self._limit_s = SPARE_LIMIT_S if spare else LIMIT_S
+        self._limit_s = LIMIT_S if priority == "now" else SPARE_LIMIT_S
         self._able = _has_cache()
         self._records = records()
         self._known: set[KernelKey] = set()  # kernels that need no helper any more, or that it could not compile
@@ -114,10 +118,10 @@ class CompileClient:
         order.told[told] = client
         return True
 
-    def prepare(self, keys: list[KernelKey]) -> None:
+    def prepare(self, keys: list[KernelKey], client: str = "") -> None:
         """Compile those of the kernels that no renderer here has had yet, although nobody waits for them."""
         for key in keys:
-            self.waits(key, _nobody)
+            self.waits(key, _nobody, client=client)
 
     def met(self, key: KernelKey) -> None:
         """Note that the renderer has this kernel, and so has the driver's disk cache."""

@@ -17,16 +17,18 @@ import time
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from typing import get_args
 
 from service.rendering.ipc import channel
 from service.rendering.priority import HIGHEST, raise_thread_niceness
-from service.rendering.worker.helpers.compile_client import Compiled, records
+from service.rendering.worker.helpers.compile_client import Compiled, Priority, records
 from service.rendering.worker.helpers.lifeline import end_with, end_with_pipe, hung_up
 
 IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
-LOCK, SPARE_LOCK = ".lock", ".spare"  # endings of the files that are locked
+LOCKS: dict[Priority, str] = {"now": ".lock", "soon": ".soon", "spare": ".spare"}  # endings of the files
 LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
 SPARE_IDLE_S = 5.0  # ... where kernels come seldom
+SOON_NICENESS = 5  # steps above the renderer's: beside tracing on all cores it gets a quarter of one
 
 
 def main() -> int:
@@ -36,9 +38,12 @@ def main() -> int:
     parser.add_argument("--driver", required=True, help="its name and version, which records go by")
     parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
     parser.add_argument("--device", type=int)
-    parser.add_argument("--spare", action="store_true", help="only while nobody else wants the processor")
+    parser.add_argument("--priority", choices=get_args(Priority), default="now")
     arguments = parser.parse_args()
-    if arguments.spare:
+    priority: Priority = arguments.priority
+    if priority == "soon":
+        raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, 0) + SOON_NICENESS)
+    elif priority == "spare":
         try:
             os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
         except OSError:  # a container's runtime may refuse it
@@ -52,13 +57,13 @@ def main() -> int:
     with socket.socket(fileno=arguments.descriptor) as end:
         try:
             ahead = Precompiler(arguments.device)
-            while select.select([end], [], [], SPARE_IDLE_S if arguments.spare else IDLE_S)[0]:
+            while select.select([end], [], [], IDLE_S if priority == "now" else SPARE_IDLE_S)[0]:
                 key = channel.receive(end, wait=True)
                 record = records() / key.digest(arguments.driver)
                 try:
-                    # What compiles in spare time can take as long as it likes: only its like waits for it, that of
-                    # the other renderers, which all have the same list.
-                    with _alone(record, end, SPARE_LOCK if arguments.spare else LOCK):
+                    # What compiles with less of the processor can take as long as it likes: only its like waits for
+                    # it, that of the other renderers, which all have the same list.
+                    with _alone(record, end, LOCKS[priority]):
                         compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(key))
                         if compiled.cached:
                             _record(record)
