@@ -50,12 +50,10 @@ def build(
     light_tree_build.grow(lights, order, children, trails)
     bounds = np.empty((n - 1, 2, WIDTH), np.float64)
     light_tree_build.bound(lights, children, bounds)
-    head = np.zeros(1, LightTreeHead.dtype)
-    near = layout.LIGHT_CODES if share >= 1 else round(share * layout.LIGHT_CODES)
-    shift = max(int(np.floor(np.log2(EVEN * near / n))), 0)
-    head["near"], head["even"], head["even_shift"], head["far_first"] = near, n << shift, shift, n
     origin, step = _grid(lights, reach)
+    head = np.zeros(1, LightTreeHead.dtype)
     head["origin"], head["inverse_step"] = origin, 1 / step
+    even = _deal(head, n, share)
     clusters, entries, clustered = light_tree_clusters.gather(lights, children, bounds, order, 3 * n)
     words = np.zeros((3 * n + len(entries), 4), np.uint32)
     words[:2] = head.view(np.uint32).reshape(2, 4)
@@ -65,7 +63,25 @@ def build(
         words[2 + 2 * first : 2 + 2 * last] = _packed(bounds[some], children[some], clustered[some], origin, step)
     words[2 * n + 1 : 3 * n] = clusters.view(np.uint32).reshape(-1, 4)
     words[3 * n :] = entries.view(np.uint32).reshape(-1, 4)
-    return words, trails, 2.0**shift / layout.LIGHT_CODES, lights[:, INTENSITY].astype(np.float32)
+    return words, trails, even, lights[:, INTENSITY].astype(np.float32)
+
+
+def with_share(words: np.ndarray, n: int, share: float) -> tuple[np.ndarray, float]:
+    """(words, the even part of each light's probability) of the same tree, whose n lights are picked with another
+    probability all together."""
+    head = np.ascontiguousarray(words[:2]).reshape(-1).view(LightTreeHead.dtype).copy()
+    even = _deal(head, n, share)
+    out = words.copy()
+    out[:2] = head.view(np.uint32).reshape(2, 4)
+    return out, even
+
+
+def _deal(head: np.ndarray, n: int, share: float) -> float:
+    """Deal the numbers out: fill in the head, and return the even part of each light's probability."""
+    near = layout.LIGHT_CODES if share >= 1 else round(share * layout.LIGHT_CODES)
+    shift = max(int(np.floor(np.log2(EVEN * near / n))), 0)
+    head["near"], head["even"], head["even_shift"], head["far_first"] = near, n << shift, shift, n
+    return float(2.0**shift / layout.LIGHT_CODES)
 
 
 def _grid(lights: np.ndarray, reach: float) -> tuple[np.ndarray, float]:

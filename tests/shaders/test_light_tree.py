@@ -374,4 +374,13 @@ def test_a_large_tree_is_kept_while_its_lights_are() -> None:
     first = tree(0)
     assert len(nodes_of(first).link) == 2 * 2 * n * n
     assert tree(0.25) is first  # a ball moved
-    assert tree(0.25, emission=[3, 2, 1]) is not first
+    assert tree(0.25, emission=[6, 5, 4]) is first  # all lights are as many times as bright
+
+
+def test_a_tree_is_the_same_with_another_share() -> None:
+    lights = np.random.default_rng(1).uniform(size=(9, 3))
+    flat, ones = np.tile([0.0, 0.0, 1.0], (9, 1)), np.ones(9)
+    given = (lights, lights, 0 * ones, flat, -ones, 0 * ones, ones)
+    (words, *_), (other, _, even, _) = (light_tree.build(*given, share, 2.0) for share in (1.0, 0.3))
+    again, even_again = light_tree.with_share(words, 9, 0.3)
+    assert np.array_equal(again, other) and even_again == even and not np.array_equal(again, words)

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Hashable, Mapping
 
 import numpy as np
 
 from gpu.layout import LightKind, ShapeKind
 from service.pack.edits.cache import PackCache, digest
+from service.pack.lights.lights import SHINING
 
 MANY = 4
 APART = 4.0  # least distance between fewer lights, in radii of the largest, for a tree
@@ -113,24 +114,51 @@ def grow_light_tree(
     reach: float, cache: PackCache | None,
 ) -> Grown | None:  # fmt: skip
     """The result of `light_tree.build` for `layout.Light` records (n,) with their `power` (n,), W of luminance; None
-    where a tree would not pay."""
-    b = bounds(lights, shapes, sides)
-    if not worth(b):
-        return None
-    from gpu.accel.light_tree import build  # here, as it loads numba
+    where a tree would not pay.
 
-    given = (b.low, b.high, b.radius, b.axis, b.normals, b.beyond, power / b.solid_angle)
+    Only ratios of powers count, rounded to float32: a tree in the cache serves whenever all lights of a scene become
+    as many times as bright.
+    """
+    power = (power / (power.max(initial=0.0) or 1.0)).astype(np.float32)
 
-    def make() -> _Kept:
-        return _Kept(*build(*given, share, reach))
+    def make(b: LightBounds) -> _Kept:
+        from gpu.accel.light_tree import build  # here, as it loads numba
+
+        given = (b.low, b.high, b.radius, b.axis, b.normals, b.beyond)
+        return _Kept(share, *build(*given, power / b.solid_angle, share, reach))
 
     if cache is None or len(lights) < LASTING:
-        kept = make()
-    else:
-        kept = cache.get(("light tree", *map(digest, given), share, reach), make)
-    return kept.words, kept.trails, kept.even, kept.intensity
+        b = bounds(lights, shapes, sides)
+        return make(b).grown if worth(b) else None
+    key = ("light tree", *_content(lights, shapes, sides), digest(power), reach)
+    return cache.get(key, lambda: make(bounds(lights, shapes, sides))).with_share(share)
+
+
+def _content(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray) -> list[Hashable]:
+    """Keys that are equal where `bounds` are."""
+    kinds = lights["kind"]
+    places = [lights[name] for name in ("position", "direction", "spread")]
+    shining = [shapes[shape][lights["index"][kinds == light]] for shape, light in SHINING.items()]
+    # Materials and numbers of lights are in the records of shapes, too: they differ where other shapes shine.
+    return [digest(array) for array in (kinds, sides, *places, *shining)]
 
 
 class _Kept:
-    def __init__(self, words: np.ndarray, trails: np.ndarray, even: float, intensity: np.ndarray) -> None:
+    def __init__(
+        self, share: float, words: np.ndarray, trails: np.ndarray, even: float, intensity: np.ndarray
+    ) -> None:
         self.words, self.trails, self.even, self.intensity = words, trails, even, intensity
+        self._share = share
+
+    @property
+    def grown(self) -> Grown:
+        return self.words, self.trails, self.even, self.intensity
+
+    def with_share(self, share: float) -> Grown:
+        """The tree, whose lights have that share of all picks."""
+        if share == self._share:
+            return self.grown
+        from gpu.accel.light_tree import with_share
+
+        words, even = with_share(self.words, len(self.trails), share)
+        return words, self.trails, even, self.intensity
