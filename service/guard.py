@@ -89,8 +89,8 @@ class Guard:
         if scope["type"] == "websocket":
             return await self._app(scope, receive, send)
         body = _Body(self, receive)
-        # HEAD is answered as GET is; the server leaves the body out.
-        asked = {**scope, "method": "GET"} if scope["method"] == "HEAD" else scope
+        # HEAD is answered as GET is; the server leaves the body out. An answer without an end looks at `bodiless`.
+        asked = {**scope, "method": "GET", "bodiless": True} if scope["method"] == "HEAD" else scope
         try:
             await self._app(asked, body.receive, _secured(send, granted))
         finally:

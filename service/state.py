@@ -152,3 +152,8 @@ def owner(connection: HTTPConnection) -> str:
     """The name that the guard gave the key's owner; "" where no keys are needed."""
     found: str = connection.scope.get("owner", "")
     return found
+
+
+def bodiless(connection: HTTPConnection) -> bool:
+    """Whether the caller asked for the head of the answer only."""
+    return bool(connection.scope.get("bodiless", False))

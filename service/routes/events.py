@@ -12,7 +12,7 @@ import time
 from collections.abc import AsyncIterator
 from typing import Any
 
-from starlette.responses import StreamingResponse
+from starlette.responses import Response, StreamingResponse
 
 from service.rendering.jobs.job import Job
 
@@ -24,8 +24,11 @@ KEEP_ALIVE_S = 15.0  # without an event, after which a comment keeps proxies fro
 HEADERS = {"cache-control": "no-store", "x-accel-buffering": "no"}
 
 
-def answer(job: Job) -> StreamingResponse:
-    """`progress` whenever the status has changed, and once `done`, with which the answer ends."""
+def answer(job: Job, bodiless: bool = False) -> Response:
+    """`progress` whenever the status has changed, and once `done`, with which the answer ends; or at once, where it
+    is `bodiless`."""
+    if bodiless:
+        return Response(media_type=MIME, headers=HEADERS)
     return StreamingResponse(_events(job), media_type=MIME, headers=HEADERS)
 
 

@@ -24,7 +24,7 @@ from service.rendering.jobs.store.record import State
 from service.rendering.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission
 from service.routes.errors import GONE
-from service.state import app_state, caller, owner
+from service.state import app_state, bodiless, caller, owner
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["renders"])
@@ -164,7 +164,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving:
     responses=answers.EVENTS | answers.problems(404, 410),
 )
 async def progress(request: Request, id: answers.RenderId) -> Response:
-    return events.answer(app_state(request).renders.get(id, owner(request)))
+    return events.answer(app_state(request).renders.get(id, owner(request)), bodiless(request))
 
 
 @router.get(

@@ -244,6 +244,17 @@ def test_events_tell_how_far_a_render_is(keyed: Server) -> None:
     assert events(keyed, endless)[-1][2]["state"] == "cancelled"
 
 
+def test_the_head_of_events_has_an_end(keyed: Server) -> None:
+    """Another request over the same connection is answered while the render goes on."""
+    id = start(keyed, ENDLESS, headers=ANNA)
+    with httpx.Client(base_url=keyed.url, headers=ANNA, limits=httpx.Limits(max_connections=1)) as one:
+        for _ in range(2):
+            head = one.head(f"/v1/renders/{id}/events")
+            assert head.status_code == 200 and head.headers["content-type"].startswith("text/event-stream")
+        assert one.get(f"/v1/renders/{id}").json()["state"] in ("queued", "running")
+        assert one.delete(f"/v1/renders/{id}").status_code == 204
+
+
 def test_the_end_of_the_server_ends_events(tmp_path: Path) -> None:
     served = Server(tmp_path, **OFTEN)
     id = start(served, ENDLESS)
