@@ -51,11 +51,11 @@ class Job(Ordered):
     """A render, on the event loop.
 
     With a `recorder` it outlives the server, and its picture comes back from the disk when somebody looks at it.
-    Without one it keeps its picture in the renderer until `release`.
-    """
+    Without one it keeps its picture in the renderer until `release`."""
 
     recorder: Recorder | None = None
     number = 0  # rises in the order of arrival
+    _waits = False  # for something that is missing, which was logged
 
     def __init__(
         self,
@@ -67,10 +67,8 @@ class Job(Ordered):
         outcome: Outcome | None = None,
         budget: MemoryBudget | None = None,
     ) -> None:
-        """`load` packs the scene of a folded document; `document` may be left out where there is a recorder.
-
-        Raises TooLarge for a render that never fits into the `budget`.
-        """
+        """`load` packs the scene of a folded `document`, which may be left out where there is a recorder. Raises
+        TooLarge for a render that never fits into the `budget`."""
         super().__init__(order, outcome or Outcome())
         self.began = self.outcome.state == "running"  # when the server ended before
         self.ended_at = 0.0  # by the monotonic clock, once it is finished
@@ -284,9 +282,12 @@ class Job(Ordered):
         except Unavailable as error:
             if self.recorder is None:
                 raise
-            log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
-            return self._over.is_set()
-        await first_of(self._over, self._lost)
+            if not self._waits:  # it is tried again every few seconds
+                log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
+            self._waits = True
+        else:
+            self._waits = False
+            await first_of(self._over, self._lost)
         return self._over.is_set()
 
     async def _begin(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -114,7 +115,7 @@ def test_it_goes_on_from_its_checkpoint_when_something_renders_again(
         assert not job.finished.is_set()
         renderers.hopeless = False
         await until(lambda: renderers.opened == 2)
-        await until(lambda: isinstance(renderers.sent[-1], tuple) and renderers.sent[-1][1] is not None)
+        await until(lambda: isinstance(renderers.sent[-1], tuple) and isinstance(renderers.sent[-1][0], Update))
         restore = renderers.sent[-1][1]
         assert restore.task == 2 and restore.reason is None and restore.progress.samples == 4
         job.heard(Progressed(2, 1, Progress(1, None, 0.1)))  # of the moment before it heard of the checkpoint
@@ -124,6 +125,34 @@ def test_it_goes_on_from_its_checkpoint_when_something_renders_again(
         assert job.state == "done" and store.latest("id") == "picture"
 
     scenario(test, tmp_path)
+
+
+def test_that_it_waits_is_logged_once(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    monkeypatch.setattr(jobs, "AGAIN_S", 0.001)
+    tries: list[None] = []
+
+    async def test(renderers: Any, store: RenderStore) -> None:
+        monkeypatch.setattr(renderers, "open", lambda *_: tries.append(None) or Renderers.open(renderers, *_))
+        renderers.hopeless = True
+        job = await stored(renderers, store)
+        running = asyncio.create_task(job.run())
+        for waits in (1, 2):  # where nothing renders again, that is news
+            before = len(tries)
+            await until(lambda before=before: len(tries) >= before + 3)  # type: ignore[misc]
+            assert [record.levelname for record in caplog.records if "has to wait" in record.message] == (
+                ["WARNING"] * waits
+            )
+            renderers.hopeless = False
+            await until(lambda: renderers.opened)
+            renderers.hopeless, renderers.opened = True, 0
+            job.lost("it died")
+        job.cancel()
+        await running
+
+    with caplog.at_level(logging.INFO):
+        scenario(test, tmp_path)
 
 
 def test_a_render_that_servers_do_not_survive_fails(tmp_path: Path) -> None:
