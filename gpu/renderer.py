@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import threading
+from collections.abc import Sequence
+from pathlib import Path
 from typing import Any
 
 from gpu import context as contexts
@@ -13,18 +15,20 @@ from gpu.device.scene import Scene
 from gpu.device.textures import TextureCache
 from gpu.errors import SceneTooLarge, WrongThread
 from gpu.kernels.cache import KernelCache
+from gpu.kernels.source import SHADERS
 from gpu.picture.picture import Picture
 from gpu.precompile.fallback import FallbackScene
 from gpu.settings import RenderSettings
 
 
 class Renderer:
-    """A device with its context and compiled kernels. Raises ContextError where no context can be created."""
+    """A device with its context and compiled kernels. `shaders` are the folders in which shader files are looked for,
+    one after the other. Raises ContextError where no context can be created."""
 
-    def __init__(self, device: int | None = None) -> None:
+    def __init__(self, device: int | None = None, shaders: Sequence[Path] = (SHADERS,)) -> None:
         self._thread = threading.get_ident()
         self._context = contexts.create(device)
-        self._kernels = KernelCache(self._context)
+        self._kernels = KernelCache(self._context, shaders)
         self._texels = TextureCache()
         self._bsdf = BsdfEvaluator(self._context, self._kernels)
         self._frame = self._context.buffer(reserve=layout.Frame.dtype.itemsize)

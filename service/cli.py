@@ -15,6 +15,20 @@ from importlib import import_module
 from service.commands import CommandError
 from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
 
+BENCHES = (
+    "speed",
+    "gpu",
+    "frames",
+    "compare",
+    "peers",
+    "hemisphere",
+    "hand",
+    "tradeoff",
+    "seeds",
+    "scale",
+    "profile",
+)
+
 
 def main(arguments: Sequence[str] | None = None) -> int:
     """The exit code. What went wrong is one line or a few on stderr, never a traceback."""
@@ -121,7 +135,7 @@ def _bench(command: argparse.ArgumentParser) -> None:
     add(
         "what",
         nargs="?",
-        choices=["speed", "gpu", "frames", "compare", "peers", "hemisphere", "hand", "tradeoff", "seeds", "scale"],
+        choices=BENCHES,
         default="speed",
         help="speed (default): paths per second, compile times, growth with triangles, latencies; "
         "gpu: what a device can do, from its limits to first frames, in about ten minutes; "
@@ -132,17 +146,22 @@ def _bench(command: argparse.ArgumentParser) -> None:
         "hand: from a slider to other pixels, in a browser; "
         "tradeoff: the price list, what every knob that buys speed costs in error; "
         "seeds: the experiments of the programs that Sunbox grew out of, repeated; "
-        "scale: what several renderers gain",
+        "scale: what several renderers gain; "
+        "profile: where the time of a path goes on llvmpipe, scene by scene, in about ten minutes",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
     text = "tradeoff: write docs/tradeoff.* and the price list that is served; seeds: write docs/experiments*; "
-    text += "scale: write docs/scaling.*"
+    text += "scale: write docs/scaling.*; profile: write docs/profile.*"
     add("--publish", action="store_true", help=text)
-    text_quick = "tradeoff, seeds, scale: try it out on little; its figures mean nothing"
+    text_quick = "tradeoff, seeds, scale, profile: try it out on little; its figures mean nothing"
     add("--quick", action="store_true", help=text_quick)
     add(
         "--simulate", type=int, metavar="N", help="scale: also simulate 1, 2, 4 ... N renderers on hosts of their own"
     )
+    text = "profile: this scene or model instead of the built-in ones; may be given again"
+    add("--file", action="append", default=[], metavar="FILE", help=text)
+    text = "profile: also compare the system's Mesa with the one unpacked in this folder (dpkg -x)"
+    add("--mesa", metavar="DIR", help=text)
     add(
         "--runs",
         type=int,

@@ -4,5 +4,6 @@ kernel_cost      what a scene's own kernel saves beside the one with every featu
 path_truncation  the light that ends with the bounces
 metering         pictures without the noise meter, to measure what it costs
 slices           dispatches of another length, to measure which is best
+instrumented     a renderer whose kernels also count, at lines of their shaders that are named
 device_limits    what a device's driver says of itself
 """

@@ -33,6 +33,7 @@ scale              what several renderers gain
 scale_model        a model of a divided render, simulated and in closed form
 scale_costs        the costs that the model is fed with
 scale_report       tables, a figure, and a section of docs/scaling.md
+profile            where the time of a path goes on llvmpipe
 seeds              the experiments of the programs that Sunbox grew out of
 gallery            the README's pictures
 thumbnails         the editor's pictures of the material presets

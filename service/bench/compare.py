@@ -10,7 +10,7 @@ import subprocess
 import sys
 import tarfile
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
@@ -42,11 +42,11 @@ class NoRevision(Exception):
 
 
 class Side:
-    """A process that renders with the source of one revision."""
+    """A process that renders with the source of one revision, with these environment variables besides its own."""
 
-    def __init__(self, tree: Path, folder: Path) -> None:
+    def __init__(self, tree: Path, folder: Path, variables: Mapping[str, str] | None = None) -> None:
         command = [sys.executable, "-P", str(SCRIPT), str(folder / "cases.json")]
-        environment = os.environ | {"PYTHONPATH": str(tree)}
+        environment = os.environ | {"PYTHONPATH": str(tree)} | dict(variables or {})
         self._out = folder / "picture.npy"
         pipe = subprocess.PIPE
         self._process = subprocess.Popen(command, cwd=tree, env=environment, text=True, stdin=pipe, stdout=pipe)

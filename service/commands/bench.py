@@ -1,5 +1,5 @@
-"""`sunbox bench speed | gpu | frames | compare | peers | hemisphere | hand | tradeoff | seeds | scale`: a table; `-o`
-keeps the figures."""
+"""`sunbox bench speed | gpu | frames | compare | peers | hemisphere | hand | tradeoff | seeds | scale | profile`:
+a table; `-o` keeps the figures."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import json
 import math
 import subprocess
 import sys
+from contextlib import ExitStack
 from importlib.util import find_spec
 from pathlib import Path
 
@@ -28,6 +29,7 @@ def run(arguments: argparse.Namespace) -> int:
         "tradeoff": _tradeoff,
         "seeds": _seeds,
         "scale": _scale,
+        "profile": _profile,
     }
     return measures[arguments.what](arguments)
 
@@ -225,6 +227,36 @@ def _scale(arguments: argparse.Namespace) -> int:
         files.write(output, (json.dumps(document, indent=1) + "\n").encode())
     if arguments.publish:
         scale_report.publish(**document)
+    return 0
+
+
+def _profile(arguments: argparse.Namespace) -> int:
+    if arguments.publish and arguments.quick:
+        raise BadInput("--publish --quick: figures that mean nothing are not for publishing")
+    output = _output(arguments.output)
+    from gpu import GpuError
+    from service.bench.profile import drivers, page, run, scenes
+    from service.commands.configuration import configuration
+    from service.commands.documents import read_source, source_assets
+
+    with ExitStack() as stack:
+        subjects = scenes.built_in() if not arguments.file else []
+        for name in arguments.file:
+            source = read_source(Path(name), [], configuration())
+            assets = stack.enter_context(source_assets(source, [], configuration()))
+            subjects.append(scenes.of_file(source.path.name, source.document, assets))
+        options = run.Options(Path(arguments.mesa) if arguments.mesa else None, arguments.runs, arguments.quick)
+        try:
+            document = run.measure(subjects, options, lambda what: print(what, file=sys.stderr))
+        except drivers.NoMesa as error:
+            raise BadInput(f"--mesa {error}") from None
+        except (GpuError, run.NotSoftware, EOFError) as error:
+            raise Failed(str(error) or "one of the drivers could not render") from None
+    print(page.section(document))
+    if output:
+        files.write(output, (json.dumps(document, indent=1) + "\n").encode())
+    if arguments.publish:
+        page.publish(document)
     return 0
 
 
