@@ -55,7 +55,6 @@ class Job(Ordered):
 
     recorder: Recorder | None = None
     number = 0  # rises in the order of arrival
-    _waits = False  # for something that is missing, which was logged
 
     def __init__(
         self,
@@ -132,7 +131,8 @@ class Job(Ordered):
         """Take the render from queued to finished, however it ends; return early when the server ends."""
         try:
             if self.recorder is not None:
-                self.outcome = await self.recorder.start(self.outcome)
+                starts = await self.recorder.start(self.outcome)
+                self.outcome = replace(self.outcome, starts=starts)  # which may have been cancelled meanwhile
             while not await self._ended():
                 self.outcome = replace(self.outcome, state="queued")
                 await within(self._over, AGAIN_S)
@@ -282,11 +282,11 @@ class Job(Ordered):
         except Unavailable as error:
             if self.recorder is None:
                 raise
-            if not self._waits:  # it is tried again every few seconds
+            if not self.waits:  # it is tried again every few seconds
                 log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
-            self._waits = True
+            self.waits = True
         else:
-            self._waits = False
+            self.waits = False
             await first_of(self._over, self._lost)
         return self._over.is_set()
 

@@ -9,6 +9,8 @@ from service.rendering.jobs.store.record import Order, Outcome, State
 class Ordered:
     """The order of a render, which never changes, and its outcome."""
 
+    waits = False  # for memory or a renderer, which was logged
+
     def __init__(self, order: Order, outcome: Outcome) -> None:
         self.order = order
         self.outcome = outcome

@@ -54,13 +54,14 @@ class Recorder:
         if not self._closed:
             self._written.clear()
 
-    async def start(self, outcome: Outcome) -> Outcome:
-        """Write that this server begins to render it. Raises Internal where others ended again and again by then."""
+    async def start(self, outcome: Outcome) -> int:
+        """Write that this server begins to render it; the number of servers that did. Raises Internal where others
+        ended again and again by then."""
         if outcome.starts >= MOST_STARTS and not outcome.progress.elapsed_s:
             raise Internal(f"The server ended {outcome.starts} times while this render was being prepared.")
-        started = replace(outcome, starts=outcome.starts + 1)
-        await self.note(replace(started, state="running"))
-        return started
+        starts = outcome.starts + 1
+        await self.note(replace(outcome, starts=starts, state="running"))
+        return starts
 
     async def note(self, outcome: Outcome) -> None:
         """Write how far it is. Where that cannot be written, the next attempt counts."""

@@ -155,6 +155,21 @@ def test_that_it_waits_is_logged_once(
         scenario(test, tmp_path)
 
 
+def test_what_is_cancelled_while_it_begins_stays_cancelled(tmp_path: Path) -> None:
+    async def test(renderers: Any, store: RenderStore) -> None:
+        job = await stored(renderers, store)
+        running = asyncio.create_task(job.run())
+        await asyncio.sleep(0)  # that it begins is being written
+        job.cancel()
+        await running
+        assert job.state == "cancelled" and job.outcome.starts == 1 and not renderers.opened
+        await job.recorded()
+        (left,) = RenderStore(tmp_path).load()
+        assert left.outcome.state == "cancelled"
+
+    scenario(test, tmp_path)
+
+
 def test_a_render_that_servers_do_not_survive_fails(tmp_path: Path) -> None:
     async def test(renderers: Any, store: RenderStore) -> None:
         job = await stored(renderers, store, Outcome("running", starts=MOST_STARTS - 1))
