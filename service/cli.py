@@ -1,4 +1,4 @@
-"""The command line: `sunbox serve | render | bsdf | import | info | check-data | bench`.
+"""The command line: `sunbox serve | render | renders | bsdf | import | info | check-data | bench`.
 
 Everything heavy is imported by the command that needs it: a scene with a mistake is refused before OpenGL is loaded.
 Exit codes: 0 done, 1 the machine could not do it, 2 the input was wrong, 128 + n ended by signal n.
@@ -57,6 +57,7 @@ def parser() -> argparse.ArgumentParser:
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _serve(commands.add_parser("serve", help="serve the editor and the API"))
     _render(commands.add_parser("render", help="render a scene to a file"))
+    _renders(commands.add_parser("renders", help="submit renders to a server, list them, wait for them, fetch them"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a glTF or OBJ model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
@@ -74,19 +75,57 @@ def _serve(command: argparse.ArgumentParser) -> None:
 def _render(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
     add("input", metavar="INPUT", help="a scene's JSON, a glTF or OBJ model, or a PNG or EXR that Sunbox made")
-    endings = _any_of([f".{name}" for name in LOSSLESS_FORMATS])
-    add("-o", "--output", required=True, metavar="OUT", help=f"the picture: {endings}")
+    _picture(command)
+    _settings(command)
+    add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
+    _asset_root(command)
+
+
+def _settings(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
     spp = "samples per pixel: the setting max_samples"
     add("--spp", dest="set", action="append", type=_setting("max_samples"), metavar="N", help=spp)
     add("--seed", dest="set", action="append", type=_setting("seed"), metavar="N", help="the setting seed")
     add("--set", action="append", metavar="KEY=VALUE", help="any setting; its value in JSON or a bare word")
+
+
+def _picture(command: argparse.ArgumentParser) -> None:
+    add = command.add_argument
+    endings = _any_of([f".{name}" for name in LOSSLESS_FORMATS])
+    add("-o", "--output", required=True, metavar="OUT", help=f"the picture: {endings}")
     aovs = f"{_any_of(AOVS[1:])} instead of {AOVS[0]}; all: each a layer of an .exr"
     add("--aov", metavar="NAME", help=aovs)
     add("--exposure", metavar="STOPS", help="for .png (default: 0)")
     curves = [f"{name} (default)" if name == DEFAULT_TONE_MAP else name for name in TONE_MAPS]
     add("--tone-map", metavar="NAME", help=f"for .png: {_any_of(curves)}")
-    add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
-    _asset_root(command)
+
+
+def _renders(command: argparse.ArgumentParser) -> None:
+    text = "the server's address (default: http://SUNBOX_HOST:SUNBOX_PORT); SUNBOX_API_KEY is sent to it"
+    command.add_argument("--server", metavar="URL", help=text)
+    actions = command.add_subparsers(dest="action", required=True, metavar="ACTION")
+    submit = actions.add_parser("submit", help="start a render and print its id")
+    submit.add_argument("input", metavar="INPUT", help="a scene's JSON, or a PNG or EXR that Sunbox made")
+    _settings(submit)
+    submit.add_argument("--label", metavar="TEXT", help="to list it by")
+    submit.add_argument("--priority", type=int, metavar="N", help="-10 to 10, higher ones first (default: 0)")
+    text = "a name of your own: the same render again instead of a second one, for 24 h"
+    submit.add_argument("--idempotency-key", metavar="KEY", help=text)
+    _asset_root(submit)
+    listed = actions.add_parser("list", help="your renders, the newest first")
+    listed.add_argument("--label", metavar="TEXT", help="only those with this label")
+    listed.add_argument("--state", metavar="STATE", help="only queued, running, done, cancelled or failed ones")
+    listed.add_argument("--limit", type=int, default=100, metavar="N", help="no more than these (default: 100)")
+    for name, text in (
+        ("show", "its status, as JSON"),
+        ("wait", "show its progress until it ends; exit code 1 unless it is done"),
+        ("fetch", "write the image so far to a file"),
+        ("cancel", "end it; the image so far stays"),
+    ):
+        action = actions.add_parser(name, help=text)
+        action.add_argument("id", metavar="ID")
+        if name == "fetch":
+            _picture(action)
 
 
 def _bsdf(command: argparse.ArgumentParser) -> None:

@@ -1,6 +1,8 @@
 """The commands, a module each: `run(arguments) -> exit code`. The errors that end them early are here.
 
 render         a picture of a document, into a file
+renders        the renders of a server: submitted, listed, waited for, fetched, cancelled
+api            requests to a server
 serve          the editor and the API
 bsdf           curves of a material's BSDF, into a table or a figure
 bsdf_curves    what those curves are, by kind

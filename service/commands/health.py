@@ -27,7 +27,7 @@ def main() -> int:
     arguments, _ = options.parse_known_args(serving)
     try:
         config = configuration(host=arguments.host, port=arguments.port)
-        connection = http.client.HTTPConnection(_reachable(config.host), config.port, timeout=TIMEOUT_S)
+        connection = http.client.HTTPConnection(reachable(config.host), config.port, timeout=TIMEOUT_S)
         # By this name the server may always be asked.
         connection.request("GET", "/healthz", headers={"Host": "localhost"})
         status = connection.getresponse().status
@@ -49,7 +49,7 @@ def _commands() -> Iterator[list[str]]:
                 yield words[index:]
 
 
-def _reachable(host: str) -> str:
+def reachable(host: str) -> str:
     """A server that listens on all addresses is asked on loopback."""
     try:
         address = ipaddress.ip_address(host)
