@@ -81,10 +81,12 @@ def test_what_is_given_comes_first(gpu: Any, scene: Path, tmp_path: Path) -> Non
     assert made is not None and made["settings"]["max_bounces"] == 5 and made["settings"]["seed"] == 7
 
 
+@pytest.mark.calm
 @pytest.mark.parametrize("query", [{"bits": 16, "exposure": 0.5}, {"tone_map": "aces"}, {"aov": "depth"}])
 def test_a_servers_picture_again(server: Server, tmp_path: Path, query: dict[str, Any]) -> None:
-    """Ended by time: the picture says how many samples that were."""
-    settings = {"width": 32, "height": 24, "time_limit": 0.1, "seed": 3}
+    """Ended by time: the picture says how many samples that were. A machine so busy that it cannot end the pass under
+    way leaves some pixels with more samples than others, and no picture is the same again."""
+    settings = {"width": 32, "height": 24, "time_limit": 0.5, "seed": 3}
     answer = server.http.post("/v1/renders", json={"scene": SCENE, "settings": settings})
     address = f"/v1/{answer.headers['location']}"
     done = server.http.get(address, params={"wait": 20}).json()
