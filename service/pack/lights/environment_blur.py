@@ -11,7 +11,9 @@ from gpu.tables.alias_table import cube_solid_angles, solid_angles
 
 MOST_WIDTH = 2048  # texels of a blurred picture, twice as wide as high: the most costly blur takes some seconds
 LEAST_WIDTH = 64  # texels; the rows of a coarser picture would blur more than asked
-PER_BLUR = 4  # texels to one standard deviation: bilinear filtering between them errs by less than 1 % of a peak
+PER_BLUR = (
+    4  # texels to one standard deviation at least: bilinear filtering between them errs by less than 1 % of a peak
+)
 REACH = 6  # standard deviations: there the kernel is 2e-8 of its peak, which hides the light of any sun
 # Face -> directions at its middle, along s to the right and along t down, where s and t go from -1 to 1.
 CUBE_FACES = {
@@ -28,12 +30,17 @@ def blur_image(texels: np.ndarray, degrees: float) -> np.ndarray:
     """A latitude-longitude map (h, w, 3) blurred over the sphere: (H, W, 3) float32, H <= h, W <= w.
 
     The kernel is the von Mises-Fisher density of concentration 1 / blur^2, the counterpart on a sphere of a Gaussian
-    of that standard deviation. The result has as few texels as its detail needs, at most MOST_WIDTH across.
+    of that standard deviation. The result has as few texels as its detail needs, at most MOST_WIDTH across: a
+    power of two unless that is more than w, as kernels are compiled anew where it becomes or ceases to be one.
     """
     height, width = texels.shape[:2]
     wanted = _width(degrees)
     shape = min(height, wanted // 2), min(width, wanted)
     solid = solid_angles(height, width)[:, None]
+    if shape == (height, width):
+        whole = np.empty((height, width, 4))
+        whole[..., :3], whole[..., 3] = texels * solid[..., None], solid
+        return _convolved(whole, math.radians(degrees))
     rows = (_weighted(texels[i : i + 1], solid[i : i + 1]) for i in range(height))
     return _convolved(_reduced(rows, height, shape), math.radians(degrees))
 
@@ -67,7 +74,8 @@ def blur_cube(faces: list[np.ndarray], degrees: float) -> np.ndarray:
 
 
 def _width(degrees: float) -> int:
-    return min(MOST_WIDTH, max(LEAST_WIDTH, 2 * math.ceil(PER_BLUR * 180 / degrees)))
+    texels = 2 * math.ceil(PER_BLUR * 180 / degrees)
+    return min(MOST_WIDTH, max(LEAST_WIDTH, 1 << (texels - 1).bit_length()))
 
 
 def _weighted(row: np.ndarray, solid: np.ndarray) -> np.ndarray:
