@@ -18,6 +18,15 @@ from service.bench.scenes import cases
 
 SIZE, SAMPLES = 256, 4
 
+_DESCRIBE = """
+import json
+from gpu import Renderer
+from gpu.analysis.load_costs import load_costs
+with Renderer() as renderer:
+    info = renderer.info
+print(json.dumps({"renderer": f"{info['renderer']}, {info['version']}", "loads": load_costs()}))
+"""
+
 
 class NoMesa(Exception):
     """The folder holds no Mesa."""
@@ -65,15 +74,15 @@ def measure(root: Path, runs: int, told: Callable[[str], None], size: int = SIZE
     return rows
 
 
-def renderer(root: Path) -> str:
-    """What the other Mesa says of itself. Raises NoMesa."""
+def described(root: Path) -> dict[str, Any]:
+    """`renderer`, what the other Mesa says of itself, and `loads`, its load_costs. Raises NoMesa."""
     with tempfile.TemporaryDirectory(prefix="sunbox-profile-") as name:
         (Path(name) / "cache").mkdir()
         environment = os.environ | variables(root, Path(name)) | {"PYTHONPATH": str(machine.ROOT)}
-        script = (
-            "from gpu import Renderer\nwith Renderer() as r: print(r.info['renderer'], r.info['version'], sep=', ')"
+        done = subprocess.run(
+            [sys.executable, "-P", "-c", _DESCRIBE], env=environment, capture_output=True, text=True
         )
-        done = subprocess.run([sys.executable, "-P", "-c", script], env=environment, capture_output=True, text=True)
         if done.returncode:
             raise NoMesa(f"{root}: {done.stderr.strip().splitlines()[-1]}")
-        return done.stdout.strip()
+        answer: dict[str, Any] = json.loads(done.stdout)
+        return answer

@@ -6,6 +6,7 @@ import json
 from pathlib import Path
 from typing import Any
 
+from gpu.analysis.load_costs import ACTIVE
 from service.bench.profile.hooks import ANY, EVENTS, KINDS, WHAT
 from service.bench.profile.knockouts import WHOLE
 
@@ -42,6 +43,8 @@ def section(document: Document) -> str:
         f"their turn under the same load. Load average at the end: {document['load']:.1f}.",
         "",
     ]
+    if "loads" in document:
+        lines += ["### Loads", "", *loads_table(document["loads"], document["machine"]["driver"]), ""]
     for name, scene in scenes.items():
         lines += [f"### {name}", "", f"Commit {_short(scene['commit'])}.", ""]
         lines += [*parts_table(scene), "", *counts_table(scene), "", *loops_table(scene), ""]
@@ -54,7 +57,7 @@ def parts_table(scene: Document) -> list[str]:
     """What is left of a path's time without one of its parts."""
     rows = scene["parts"]
     whole = rows[0]["path_ns"]
-    out = ["| | ns a path | share | rays a path | ns a ray |", "|---|---|---|---|---|"]
+    out = ["| | ns a path | of the whole | rays a path | ns a ray |", "|---|---|---|---|---|"]
     for row in rows:
         rays = row["counts"]["a_path"][ANY]["ray"]
         ns = row["path_ns"]
@@ -66,7 +69,7 @@ def counts_table(scene: Document) -> list[str]:
     """How often a loop turns in a path, and the share of a vector's lanes that take part in it."""
     counts = next(row for row in scene["parts"] if row["name"] == WHOLE)["counts"]
     out = [
-        "| in a path | " + " | ".join(f"{kind} | lanes" for kind in KINDS) + " |",
+        "| in a path | " + " | ".join(f"{kind} | lanes in use" for kind in KINDS) + " |",
         "|---" * (1 + 2 * len(KINDS)) + "|",
     ]
     for event in EVENTS:
@@ -97,7 +100,9 @@ def drivers_table(document: Document) -> list[str]:
     out = [
         "### Another Mesa",
         "",
-        f"{document['other']}, beside the one above, in turns; commit {_short(document['commit'])}.",
+        f"{document['renderer']}, beside the one above, in turns; commit {_short(document['commit'])}.",
+        "",
+        *loads_table(document["loads"], document["renderer"]),
         "",
         "| scene | bounces | ns a path | other Mesa | ratio |",
         "|---|---|---|---|---|",
@@ -106,6 +111,17 @@ def drivers_table(document: Document) -> list[str]:
         figures = f"{row['path_ns']:,.0f} | {row['other_path_ns']:,.0f} | {row['ratio']:.2f}"
         out.append(f"| {row['name']} | {row['max_bounces']} | {figures} |")
     return out
+
+
+def loads_table(loads: dict[str, list[float]], driver: str) -> list[str]:
+    """What loads cost."""
+    return [
+        f"Nanoseconds for a turn of a loop in which lanes load 16 bytes, each from another place ({driver}):",
+        "",
+        "| lanes that load | " + " | ".join(map(str, ACTIVE)) + " |",
+        "|---" * (1 + len(ACTIVE)) + "|",
+        *(f"| {kind} | " + " | ".join(f"{ns:.1f}" for ns in row) + " |" for kind, row in loads.items()),
+    ]
 
 
 def _short(commit: str | None) -> str:

@@ -10,6 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from gpu import Renderer, RenderSettings
+from gpu.analysis.load_costs import load_costs
 from service.bench import machine
 from service.bench.profile import drivers, knockouts, machine_code
 from service.bench.profile.counts import Counter
@@ -39,7 +40,7 @@ def measure(subjects: Sequence[Subject], options: Options, told: Callable[[str],
         about = machine.describe(renderer.info)
     if "llvmpipe" not in about["renderer"] or "256 bits" not in about["renderer"]:
         raise NotSoftware(f"{about['renderer']}: only llvmpipe with vectors of 256 bits can be profiled")
-    other = drivers.renderer(options.mesa) if options.mesa else None
+    other = drivers.described(options.mesa) if options.mesa else {}
     began = time.perf_counter()
     parts = knockouts.Options(16, 1, 0.01) if options.quick else options.parts
     scenes = {}
@@ -50,11 +51,13 @@ def measure(subjects: Sequence[Subject], options: Options, told: Callable[[str],
                 "parts": [asdict(part) for part in knockouts.measure(subject, parts, counter, told)],
                 **_loops(subject, options, told),
             }
-    document: dict[str, Any] = {"machine": about, "size": parts.size, "scenes": scenes}
+    told("loads")
+    loads = load_costs(1, 1) if options.quick else load_costs()
+    document: dict[str, Any] = {"machine": about, "size": parts.size, "loads": loads, "scenes": scenes}
     if options.mesa:
         size = 32 if options.quick else drivers.SIZE
         rows = drivers.measure(options.mesa, 1 if options.quick else options.runs, told, size)
-        document["drivers"] = {"commit": about["commit"], "other": other, "rows": rows}
+        document["drivers"] = {"commit": about["commit"], "rows": rows, **other}
     return document | {"took_s": time.perf_counter() - began, "load": os.getloadavg()[0]}
 
 

@@ -12,6 +12,7 @@ import pytest
 
 from gpu import Renderer, RenderSettings
 from gpu.analysis.instrumented import Edit, InstrumentedRenderer, LineGone
+from gpu.analysis.load_costs import ACTIVE, KINDS, NOTHING, load_costs
 from service.bench.profile import drivers, hooks, knockouts, machine_code, page, run, scenes
 from service.bench.profile.counts import Counter, Counts
 from service.bench.profile.loops import instructions, loops
@@ -88,6 +89,14 @@ def test_a_hook_without_its_line_is_an_error(gpu: Renderer) -> None:
     for line, many in (("no such line", "0"), ("}", r"[1-9]\d+")):
         with pytest.raises(LineGone, match=f"traverse.glsl: {many} lines contain"):
             InstrumentedRenderer([Edit("traverse.glsl", line, "profile();")], "", 1)
+
+
+def test_loads_are_timed_by_kind_and_lanes(gpu: Renderer) -> None:
+    found = load_costs(runs=3, groups=8)
+    assert set(found) == {*KINDS, NOTHING}
+    assert all(len(row) == len(ACTIVE) and min(row) > 0 for row in found.values())
+    # Eight chains of dependent loads take longer than none.
+    assert found["storage buffer, uvec4"][0] > found[NOTHING][0]
 
 
 def test_variants_leave_out_one_thing_each(subjects: dict[str, scenes.Subject]) -> None:
@@ -176,12 +185,14 @@ def test_publishing_keeps_what_was_not_measured_again(tmp_path: Path) -> None:
     }
     about = {"processor": "a", "cores": 2, "renderer": "b"}
     rows = [{"name": "ball", "max_bounces": 8, "path_ns": 100.0, "other_path_ns": 150.0, "ratio": 1.5}]
-    other = {"commit": None, "other": "c", "rows": rows}
+    loads = {"uniform block": [4.0, 3.0, 2.0, 1.25]}
+    other = {"commit": None, "renderer": "c", "loads": loads, "rows": rows}
     (tmp_path / "profile.md").write_text("# Profile\n\nBefore.\n")
     page.publish({"machine": about, "size": 64, "load": 0.5, "scenes": {"one": scene}, "drivers": other}, tmp_path)
     page.publish({"machine": about, "size": 64, "load": 0.5, "scenes": {"two": scene}}, tmp_path)
     text = (tmp_path / "profile.md").read_text()
     assert text.startswith("# Profile\n\nBefore.\n") and text.count(page.BEGIN) == 1
+    assert "| uniform block | 4.0 | 3.0 | 2.0 | 1.2 |" in text
     assert "### one" in text and "### two" in text and "| ball | 8 | 100 | 150 | 1.50 |" in text
     assert "| as it is | 100 | 1.00 | 2.00 | 50 |" in text and "| · 1 | 50.0% | 9 | 3 | 0 | 1 |" in text
     assert set(_published(tmp_path)["scenes"]) == {"one", "two"}
