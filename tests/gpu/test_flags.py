@@ -214,6 +214,22 @@ def test_no_slider_of_the_camera_asks_for_another_kernel() -> None:
     assert "HAS_APERTURE" not in flags(before)
 
 
+def test_the_code_of_the_aperture_changes_no_bit_of_a_pinhole(gpu: Renderer) -> None:
+    """A stream has it compiled in; the picture that a render makes of the same scene has the same bits."""
+    document = made_of({"type": "diffuse", "albedo": 0.5}, ball("m"))
+    camera = {"position": [0.3, 1.1, 4.2], "target": [0.1, 0.2, 0], "vfov": 37, "focus_distance": 2.7}
+    arrays, pictures = pack(parse_scene({**document, "camera": camera}), IMAGES).arrays, []
+    for editing in (False, True):
+        scene = gpu.load(arrays, editing)
+        picture = gpu.picture(scene, RenderSettings(48, 32, max_bounces=2))
+        picture.trace(60.0, 4)
+        pictures.append(picture.read())
+        assert ("HAS_APERTURE" in scene.flags) == editing
+        picture.release()
+        scene.release()
+    assert np.array_equal(*pictures)
+
+
 def test_what_a_scene_does_not_need_costs_it_nothing(gpu: Renderer) -> None:
     price = kernel_cost(gpu, _packed("CLEARCOAT").arrays)
     assert {"clearcoat", "disney", "spheres"} <= set(price.raised) and "bvh" in price.spared
