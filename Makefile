@@ -23,7 +23,8 @@ test:
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest -n 2 --dist loadfile -m 'not calm' --durations 20
+	.venv/bin/pytest -n 2 --dist loadfile -m 'not browser and not calm' --durations 20
+	.venv/bin/pytest -n 2 --dist loadfile -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
 	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed  # once more: the machine may not have been calm
 
 extremes: setup

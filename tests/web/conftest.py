@@ -25,10 +25,9 @@ PATIENCE_S = 60.0  # two cores that other tests may share
 
 @pytest.hookimpl(tryfirst=True)  # before markers choose
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
-    """A browser, its server and its renderer need the machine for themselves."""
     for item in items:
-        if item.path.is_relative_to(Path(__file__).parent):
-            item.add_marker(pytest.mark.calm)
+        if item.path.is_relative_to(Path(__file__).parent) and item.get_closest_marker("calm") is None:
+            item.add_marker(pytest.mark.browser)
 
 
 def free_port() -> int:

@@ -288,6 +288,7 @@ def test_lobes_are_drawn_apart(lobe: Editor) -> None:
     assert lobe.complaints == []
 
 
+@pytest.mark.calm  # it counts the answers in a second
 def test_a_moving_hand_gets_a_curve_for_each_answer(lobe: Editor) -> None:
     """Slow answers are not given up for newer questions, and no two are under way at once."""
     page = lobe.page

@@ -18,6 +18,7 @@ from service.bench.soak_tally import Tally
 SECONDS = 6.0
 
 
+@pytest.mark.calm  # it counts what a hand gets done
 def test_a_drag_session_survives_a_renderer_and_keeps_its_memory(
     gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
