@@ -36,8 +36,8 @@ void shapes_take(uint kind, uint index, float t, vec2 uv, uvec2 skip, inout Hit 
     if (t < hit.t && id != skip.x && id != skip.y) hit = Hit(t, id, uv);
 }
 
-void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
-    Shear shear = triangle_shear(o, d);
+// The nearest hit with the shapes that stand in loops.
+void shapes_loops(vec3 o, vec3 d, Shear shear, uvec2 skip, inout Hit hit) {
 #if HAS_SPHERES
     for (uint i = 0u; i < uint(SPHERE_LOOP); i++) {
         shapes_take(SHAPE_SPHERE, i, sphere_hit(sphere_load(i), o, d, hit.t), hit.uv, skip, hit);
@@ -65,6 +65,11 @@ void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
         shapes_take(SHAPE_TRIANGLE, i, t, uv, skip, hit);
     }
 #endif
+}
+
+void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
+    Shear shear = triangle_shear(o, d);
+    shapes_loops(o, d, shear, skip, hit);
 #if HAS_BVH
     // The loops may have found something that hides the lamp.
     if (!any || hit.id == NONE) traverse_scene(o, d, shear, skip, any, hit);
@@ -88,17 +93,23 @@ bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
     return hit.id != NONE;
 }
 
-SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
+// What a ray that meets nothing has in place of a surface.
+SurfacePoint shapes_none(vec3 p, vec3 n) {
+#if HAS_TEXTURES
+    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),
+                        vec4(1.0));
+#elif HAS_ANISOTROPIC
+    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
+#else
+    return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
+#endif
+}
+
+// The point of a hit, unless it is one with a triangle.
+SurfacePoint shapes_analytic_point(Hit hit, vec3 o, vec3 d) {
     uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK;
     vec3 p = o + hit.t * d;
-#if HAS_TEXTURES
-    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0),
-                                  vec2(0.0), vec4(1.0));
-#elif HAS_ANISOTROPIC
-    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0);
-#else
-    SurfacePoint r = SurfacePoint(p, vec3(0.0), -d, -d, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u);
-#endif
+    SurfacePoint r = shapes_none(p, -d);
     // llvmpipe reads all kinds, whichever was hit: the index may be outside another kind's range, for which robust
     // buffer access returns 0.
 #if HAS_SPHERES || HAS_BVH_SPHERES
@@ -113,6 +124,12 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
 #if HAS_ELLIPSOIDS || HAS_BVH_ELLIPSOIDS
     if (kind == SHAPE_ELLIPSOID) r = ellipsoid_point(ellipsoid_pick(index), p);
 #endif
+    return r;
+}
+
+SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
+    uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK;
+    SurfacePoint r = shapes_analytic_point(hit, o, d);
 #if HAS_INSTANCES
     // Ids of triangles in instances are negative and below NONE. Written as `hit.id != NONE && ...` this goes wrong: a
     // driver (Mesa 22.3) takes hit.id for NONE in lanes that have left the loop of transparency.glsl.
@@ -134,6 +151,37 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
 #endif
     return r;
 }
+
+#if HAS_OPACITY
+// The point of a hit as far as its opacity depends on it; of a triangle that is much less than the whole point.
+SurfacePoint shapes_veil(Hit hit, vec3 o, vec3 d) {
+    uint kind = hit.id >> LEAF_KIND_SHIFT, index = hit.id & LEAF_FIRST_MASK;
+    SurfacePoint r = shapes_analytic_point(hit, o, d);
+#if HAS_TRIANGLES || HAS_BVH_TRIANGLES || HAS_INSTANCES
+    bool within = false;
+#if HAS_INSTANCES
+    within = int(hit.id) < -1;
+    if (within) {
+        Instance it = instance_load(instance_number(hit.id));
+        index = it.first + instance_triangle(hit.id);
+        r.material = it.material;
+        r.shape = it.shape;
+    }
+#endif
+    if (within || kind == SHAPE_TRIANGLE) {
+        Triangle tri = triangle_pick(index);
+        if (!within) {
+            r.material = tri.material;
+            r.shape = tri.shape;
+        }
+#if HAS_TEXTURES
+        triangle_detail(index, vec3(1.0 - hit.uv.x - hit.uv.y, hit.uv), r);
+#endif
+    }
+#endif
+    return r;
+}
+#endif
 
 // The next float above x, or below.
 float shapes_next(float x, bool up) {

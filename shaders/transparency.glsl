@@ -3,37 +3,165 @@
 const uint PAIR_TRANSPARENCY = 0x8000u; // the first pair, beyond those of any path; each bounce has TRANSPARENCY_MAX
 const uint TRANSPARENCY_MAX = 4096u;    // layers that a ray passes at most; it ends on the next one
 
-// The nearest surface that the ray does not pass; hit.t is its distance from o. `bounce` is how often the path was
-// scattered before: 0 for a camera ray.
-Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, out SurfacePoint at) {
-#if HAS_OPACITY || HAS_HIDDEN_SHAPES
+#include "transparency_walk.glsl"
+
+#if HAS_OPACITY
+// Whether the ray passes the surface. Each one that it comes to takes the next number, whether it comes to them in
+// their order or not: a number that nothing else depended on makes the chance right.
+bool transparency_passes(SurfacePoint at, uint bounce, Sampler rng, inout uint layer) {
+    float u = sobol_pair(rng, PAIR_TRANSPARENCY + bounce * TRANSPARENCY_MAX + layer).x;
+    return layer++ < TRANSPARENCY_MAX && u >= transparency_opacity(at, bounce == 0u);
+}
+
+// The next layer: a shape that stands in a loop. Kernels without OPACITY_WALK look for those of the tree here, too.
+void transparency_next(vec3 o, vec3 d, uvec2 skip, inout Hit hit) {
+#if OPACITY_WALK
+    shapes_loops(o, d, triangle_shear(o, d), skip, hit);
+#else
+    shapes_intersect(o, d, skip, false, hit);
+#endif
+}
+
+// The nearest of the shapes in loops that the ray does not pass.
+Hit transparency_nearest_loop(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, inout uint layer,
+                              out SurfacePoint at) {
     Hit hit;
     float before = 0.0;
-    uint layer = 0u;
     bool passes;
     do {
-        hit = shapes_nearest(o, d, skip);
+        hit = Hit(INFINITY_T, NONE, vec2(0.0));
+        transparency_next(o, d, uvec2(skip, NONE), hit);
         at = shapes_point(hit, o, d);
-        passes = false;
-#if HAS_HIDDEN_SHAPES
-        passes = bounce == 0u && (at.shape & HIDDEN) != 0u;
-#endif
-#if HAS_OPACITY
-        float u = sobol_pair(rng, PAIR_TRANSPARENCY + bounce * TRANSPARENCY_MAX + layer).x;
-#if HAS_TEXTURES
-        passes = passes || u >= texture_opacity(at);
-#else
-        passes = passes || u >= material_pick(at.material).opacity;
-#endif
-#endif
-        passes = passes && hit.id != NONE && layer < TRANSPARENCY_MAX;
+        passes = hit.id != NONE && transparency_passes(at, bounce, rng, layer);
         hit.t += before;
         if (passes) {
             before = hit.t;
             o = shapes_leave(at, d);
             skip = at.flat_id;
         }
-        layer++;
+    } while (passes);
+    return hit;
+}
+
+#if HAS_BVH && OPACITY_WALK
+// Makes `hit` the nearest of the shapes in the tree that the ray does not pass, where one is before it.
+void transparency_nearest_tree(vec3 o, vec3 d, uvec2 skip, uint bounce, Sampler rng, inout uint layer, inout Hit hit) {
+    Passage on = transparency_begin(o, d);
+    bool more;
+    do {
+        Hit veil = transparency_advance(skip, TRAVERSE_SLACK, false, INFINITY_T, bounce == 0u, on, hit);
+        more = veil.id != NONE;
+        if (more) {
+            Hit next = veil;
+            vec3 from = o;
+            bool passes;
+            do {
+                SurfacePoint at = shapes_veil(next, from, d);
+                passes = transparency_passes(at, bounce, rng, layer);
+                if (!passes) hit = veil;
+                from = shapes_leave(at, d);
+                next = transparency_again(on, veil.id, from, skip, hit.t - veil.t);
+                veil.t += next.t;
+            } while (passes && next.id != NONE);
+        } else {
+            more = transparency_change_tree(o, d, on);
+        }
+    } while (more);
+}
+#endif
+
+// The share of light that passes the shapes in loops.
+float transparency_share_loop(vec3 o, vec3 d, float t_max, uvec2 skip, inout uint layer) {
+    float share = 1.0;
+    bool more;
+    do {
+        Hit hit = Hit(t_max, NONE, vec2(0.0));
+        transparency_next(o, d, skip, hit);
+        SurfacePoint at = shapes_point(hit, o, d);
+        more = hit.id != NONE;
+        if (more) {
+            share *= layer++ < TRANSPARENCY_MAX ? 1.0 - transparency_opacity(at, false) : 0.0;
+            o = shapes_leave(at, d);
+            skip.x = at.flat_id;
+            t_max -= hit.t;
+        }
+    } while (more && share > 0.0);
+    return share;
+}
+
+#if HAS_BVH && OPACITY_WALK
+// The share that passes the shapes of the tree.
+float transparency_share_tree(vec3 o, vec3 d, float t_max, uvec2 skip, inout uint layer) {
+    Passage on = transparency_begin(o, d);
+    Hit hit = Hit(t_max, NONE, vec2(0.0));
+    float share = 1.0, reach = skip.y != NONE ? TRAVERSE_REACH : TRAVERSE_SLACK;
+    bool more;
+    do {
+        Hit veil = transparency_advance(skip, reach, true, t_max, false, on, hit);
+        if (hit.id != NONE) share = 0.0;
+        more = veil.id != NONE;
+        if (more) {
+            float left = t_max;
+            vec3 from = o;
+            do {
+                SurfacePoint at = shapes_veil(veil, from, d);
+                share *= layer++ < TRANSPARENCY_MAX ? 1.0 - transparency_opacity(at, false) : 0.0;
+                left -= veil.t;
+                from = shapes_leave(at, d);
+                veil = transparency_again(on, veil.id, from, skip, left);
+            } while (veil.id != NONE && share > 0.0);
+        } else {
+            more = transparency_change_tree(o, d, on);
+        }
+    } while (more && share > 0.0);
+    return share;
+}
+#endif
+
+// The share of light that passes all surfaces in (0, t_max), which is the mean of what the rays of
+// transparency_nearest do. `skip` is as in shapes_occluded.
+float transparency_share(vec3 o, vec3 d, float t_max, uvec2 skip) {
+    float share = 1.0;
+    uint layer = 0u;
+#if !HAS_BVH || !OPACITY_WALK || HAS_SPHERES || HAS_QUADS || HAS_BOXES || HAS_ELLIPSOIDS || HAS_TRIANGLES
+    share = transparency_share_loop(o, d, t_max, skip, layer);
+#endif
+#if HAS_BVH && OPACITY_WALK
+    if (share > 0.0) share *= transparency_share_tree(o, d, t_max, skip, layer);
+#endif
+    return share;
+}
+#endif
+
+// The nearest surface that the ray does not pass; hit.t is its distance from o. `bounce` is how often the path was
+// scattered before: 0 for a camera ray.
+Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, out SurfacePoint at) {
+#if HAS_OPACITY
+    Hit hit = Hit(INFINITY_T, NONE, vec2(0.0));
+    uint layer = 0u;
+#if !HAS_BVH || !OPACITY_WALK || HAS_SPHERES || HAS_QUADS || HAS_BOXES || HAS_ELLIPSOIDS || HAS_TRIANGLES
+    hit = transparency_nearest_loop(o, d, skip, bounce, rng, layer, at);
+#endif
+#if HAS_BVH && OPACITY_WALK
+    transparency_nearest_tree(o, d, uvec2(skip, NONE), bounce, rng, layer, hit);
+    at = shapes_point(hit, o, d);
+#endif
+#elif HAS_HIDDEN_SHAPES
+    Hit hit;
+    float before = 0.0;
+    vec3 from = o;
+    uint layer = 0u;
+    bool passes;
+    do {
+        hit = shapes_nearest(from, d, skip);
+        at = shapes_point(hit, from, d);
+        passes = bounce == 0u && (at.shape & HIDDEN) != 0u && hit.id != NONE && layer++ < TRANSPARENCY_MAX;
+        hit.t += before;
+        if (passes) {
+            before = hit.t;
+            from = shapes_leave(at, d);
+            skip = at.flat_id;
+        }
     } while (passes);
 #else
     Hit hit = shapes_nearest(o, d, skip);
@@ -41,31 +169,3 @@ Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, ou
 #endif
     return hit;
 }
-
-#if HAS_OPACITY
-// The share of light that passes all surfaces in (0, t_max), which is the mean of what the rays above do. `skip` is as
-// in shapes_occluded.
-float transparency_share(vec3 o, vec3 d, float t_max, uvec2 skip) {
-    float share = 1.0;
-    uint layer = 0u;
-    bool more;
-    do {
-        Hit hit = Hit(t_max, NONE, vec2(0.0));
-        shapes_intersect(o, d, skip, false, hit);
-        SurfacePoint at = shapes_point(hit, o, d);
-        more = hit.id != NONE;
-        if (more) {
-#if HAS_TEXTURES
-            share *= layer < TRANSPARENCY_MAX ? 1.0 - texture_opacity(at) : 0.0;
-#else
-            share *= layer < TRANSPARENCY_MAX ? 1.0 - material_pick(at.material).opacity : 0.0;
-#endif
-            o = shapes_leave(at, d);
-            skip.x = at.flat_id;
-            t_max -= hit.t;
-        }
-        layer++;
-    } while (more && share > 0.0);
-    return share;
-}
-#endif

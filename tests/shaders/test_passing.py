@@ -67,16 +67,19 @@ def test_hidden_shapes_are_seen_in_reflections_and_light_the_room(gpu: Renderer)
     assert _mean(gpu, _scene([turned], glow), 16).tolist() == [0, 0, 0, 0]  # it faces the camera, and hides
 
 
-@pytest.mark.parametrize("estimator", ESTIMATORS)
+@pytest.mark.parametrize(("estimator", "many"), [*((name, False) for name in ESTIMATORS), ("mis", True)])
 @pytest.mark.parametrize("kind", SHAPES)
-def test_alpha_is_the_chance_of_being_met(gpu: Renderer, kind: str, estimator: str) -> None:
-    """Black veils over a floor in a point light: what is left is (1 - alpha) to the number of layers, both ways."""
+def test_alpha_is_the_chance_of_being_met(gpu: Renderer, kind: str, estimator: str, many: bool) -> None:
+    """Black veils over a floor in a point light: what is left is (1 - alpha) to the number of layers, both ways; in
+    the tree as well, where a ray that goes into a solid must also come out."""
     alpha, n = 0.3, LAYERS[kind]
     veil = {**SHAPES[kind], "material": "veil"}
-    image = _mean(gpu, _scene([FLOOR, veil], {"alpha": alpha}, lights=[POINT]), 1 << 14, estimator=estimator)
+    away = [{**veil, "transform": {"translate": [50 + 3 * i, 0, 0]}} for i in range(30 if many else 0)]
+    scene = _scene([FLOOR, veil, *away], {"alpha": alpha}, lights=[POINT])
+    image = _mean(gpu, scene, 1 << 14, estimator=estimator)
     expected = (1 - alpha) ** (2 * n) * 0.6 / math.pi * 5 / 4
     np.testing.assert_allclose(image[:3], expected, rtol=0.02)
-    aside = _mean(gpu, _scene([FLOOR, veil], {"alpha": alpha}, lights=[POINT], camera=ASKEW), 64, estimator=estimator)
+    aside = _mean(gpu, {**scene, "camera": ASKEW}, 64, estimator=estimator)
     if kind == "quad":  # the camera's ray misses the others' shadows
         np.testing.assert_allclose(aside[:3], (1 - alpha) * 0.6 / math.pi * 5 / 4, rtol=1e-4)
 
@@ -90,6 +93,25 @@ def test_alpha_of_the_picture_is_the_background_s(gpu: Renderer) -> None:
         expected = [*(through * np.array([2, 1, 0.5]) * background), 1 if background else 1 - through]
         np.testing.assert_allclose(image, expected, rtol=0.01, atol=1e-6)
     assert _mean(gpu, _scene([veil], {"alpha": 0}), 16).tolist() == [0, 0, 0, 0]
+
+
+def test_layers_cover_each_other_from_the_front(gpu: Renderer) -> None:
+    """Glowing veils of many alphas, in an order that is not theirs along the ray: the walk down the tree meets some
+    layers before others that are in front of them. An opaque one ends the stack."""
+    rng = np.random.default_rng(5)
+    alphas, glow = rng.uniform(0.1, 0.6, 40), rng.uniform(0, 4, (40, 3))
+    alphas[30] = 1
+    heights = np.linspace(3, 0.1, 40).tolist()
+    order = rng.permutation(40)
+    stack = [{**SHAPES["quad"], "origin": [-1, -1, heights[i]], "material": f"veil {i}"} for i in order]
+    scene = _scene(stack, {})
+    scene["materials"] = {
+        f"veil {i}": {"type": "diffuse", "albedo": 0, "alpha": float(alphas[i]), "emission": glow[i].tolist()}
+        for i in range(40)
+    }
+    before = np.cumprod([1, *(1 - alphas[:-1])])
+    image = _mean(gpu, scene, 1 << 16, max_bounces=0)
+    np.testing.assert_allclose(image, [*((before * alphas) @ glow), 1], rtol=0.01)
 
 
 def test_passing_is_no_bounce(gpu: Renderer) -> None:
