@@ -35,6 +35,7 @@ AHEAD = """
 import sys
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import ENTRY, GUIDES, common_keys, kernel_key
+from gpu.precompile.precompiler import Precompiler
 from tests.gpu.test_precompile import SETTINGS, arrays_of
 a, settings = arrays_of(sys.argv[1]), SETTINGS[sys.argv[1]]
 precompiler = Precompiler()
