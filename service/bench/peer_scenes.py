@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from service import presets
-from service.bench.scenes import MESH, STUDIO, BenchAssets
+from service.bench.scenes import MESH, SOFT_SUN, STUDIO, BenchAssets
 from service.scene.transform import Transform
 
 Document = dict[str, Any]
@@ -20,6 +20,11 @@ class PeerCase:
     scene: Document
     max_bounces: int
 
+    @property
+    def is_textured(self) -> bool:
+        """Textures are not put in Blender's words."""
+        return "textures" in self.scene
+
 
 def cases() -> list[PeerCase]:
     return [
@@ -28,6 +33,7 @@ def cases() -> list[PeerCase]:
         PeerCase("Cornell box, depth 4", presets.get("scenes", "cornell-boxes"), 4),
         PeerCase("Cornell box, depth 8", presets.get("scenes", "cornell-boxes"), 8),
         PeerCase("glass sphere on a floor", _glass(), 8),
+        PeerCase("glass on a checker, wide soft sun", _glass_on_checker(), 8),
         PeerCase("74k mesh on a plane, HDR image", _mesh(), 8),
     ]
 
@@ -57,6 +63,14 @@ def _glass() -> Document:
         "materials": {"subject": glass, "ground": {"type": "diffuse", "albedo": 0.5}},
         "shapes": [{"type": "sphere", "center": [0, 1, 0], "radius": 1, "material": "subject"}, _ground()],
     }
+
+
+def _glass_on_checker() -> Document:
+    scene = _glass()
+    scene["environment"] = {"type": "image", "asset": SOFT_SUN}
+    scene["textures"] = {"tiles": {"type": "checker", "a": 0.75, "b": 0.1, "scale": [20, 20]}}
+    scene["materials"]["ground"] = {"type": "diffuse", "albedo": {"texture": "tiles"}}
+    return scene
 
 
 def _mesh() -> Document:
@@ -90,7 +104,8 @@ def for_mitsuba(case: PeerCase, size: int) -> tuple[Document, dict[str, np.ndarr
             "sampler": {"type": "independent"},
         },
     }
-    bsdfs = {name: _bsdf(material) for name, material in document["materials"].items()}
+    textures = document.get("textures", {})
+    bsdfs = {name: _bsdf(material, textures) for name, material in document["materials"].items()}
     if "environment" in document:
         arrays["environment"] = assets.image(document["environment"]["asset"]).pixels[..., :3].astype(np.float32)
         # Their middle column looks along +Z, ours along -Z.
@@ -123,9 +138,18 @@ def _rgb(color: Any) -> Document:
     return {"type": "rgb", "value": list(np.broadcast_to(color, 3).astype(float))}
 
 
-def _bsdf(material: Document) -> Document:
+def _checker(texture: Document) -> Document:
+    """Their pattern repeats after two fields, as ours does after two units of the scaled coordinates."""
+    scale = np.diag([*(s / 2 for s in texture["scale"]), 1.0, 1.0])
+    colors = {"color0": _rgb(texture["a"]), "color1": _rgb(texture["b"])}
+    return {"type": "checkerboard", **colors, "to_uv": {"matrix": scale.ravel().tolist()}}
+
+
+def _bsdf(material: Document, textures: Document) -> Document:
     if material["type"] == "diffuse":
-        return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": _rgb(material["albedo"])}}
+        albedo = material["albedo"]
+        reflectance = _checker(textures[albedo["texture"]]) if isinstance(albedo, dict) else _rgb(albedo)
+        return {"type": "twosided", "bsdf": {"type": "diffuse", "reflectance": reflectance}}
     if material.get("transmission"):
         return {"type": "dielectric", "int_ior": material["ior"], "ext_ior": 1.0}
     return {

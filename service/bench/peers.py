@@ -64,7 +64,7 @@ def _row(case: PeerCase, options: Options, folder: Path, told: Callable[[str], N
     sides = {"sunbox": _sunbox}
     if options.mitsuba:
         sides["mitsuba"] = _mitsuba
-    if options.cycles:
+    if options.cycles and not case.is_textured:
         sides["cycles"] = _cycles
     row: dict[str, Any] = {"name": case.name, "max_bounces": case.max_bounces}
     references: dict[str, np.ndarray] = {}

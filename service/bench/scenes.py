@@ -14,6 +14,7 @@ from service.config import load_config
 
 Document = dict[str, Any]
 MESH = "mesh"  # the asset that stands for the measured mesh
+SOFT_SUN = "soft-sun"  # the image of a sky whose sun is wide, which is made and not stored
 STUDIO = "studio"  # the built-in environment that lights what has none of its own
 
 
@@ -57,7 +58,21 @@ class BenchAssets:
     def image(self, ref: str) -> ImageData:
         if self._environment_file:
             return _beside(self._environment_file).image(self._environment_file.name)
+        if ref == SOFT_SUN:
+            return _soft_sun()
         return self._builtin.image(ref)
+
+
+def _soft_sun(height: int = 256, width: float = 8.0) -> ImageData:
+    """A pale blue sky over a grey ground, and a warm sun whose radiance falls off over `width` degrees."""
+    theta = (np.arange(height) + 0.5)[:, None] * (np.pi / height)
+    phi = (np.arange(2 * height) + 0.5) * (np.pi / height) - np.pi
+    ones = np.ones_like(phi)
+    d = np.stack([np.sin(theta) * np.sin(phi), np.cos(theta) * ones, -np.sin(theta) * np.cos(phi)], axis=-1)
+    sun = np.array([0.5, 0.7, 0.5]) / np.linalg.norm([0.5, 0.7, 0.5])
+    away = np.degrees(np.arccos(np.clip(d @ sun, -1, 1)))[..., None]
+    sky = np.where(d[..., 1:2] > 0, [0.25, 0.35, 0.5], [0.1, 0.1, 0.1])
+    return ImageData((sky + np.exp(-((away / width) ** 2)) * [40.0, 36.0, 30.0]).astype(np.float32))
 
 
 def _beside(path: Path) -> Assets:

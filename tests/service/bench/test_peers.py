@@ -10,6 +10,7 @@ import pytest
 
 from service import cli
 from service.bench import peer_blender, peer_scenes, peers
+from service.bench.scenes import SOFT_SUN
 from service.pack import pack
 from service.scene import parse_scene
 
@@ -31,7 +32,25 @@ def test_a_parallelogram_stands_where_ours_does() -> None:
     assert np.allclose(matrix[:3, 2], [0, 1, 0])  # the outward side is the one that shines
 
 
-@pytest.mark.parametrize("case", peer_scenes.cases(), ids=lambda case: case.name)
+def test_a_checker_has_as_many_fields_as_ours() -> None:
+    checker = peer_scenes._checker({"type": "checker", "a": 0.75, "b": 0.1, "scale": [20, 10]})
+    assert np.diag(np.reshape(checker["to_uv"]["matrix"], (4, 4))).tolist() == [10, 5, 1, 1]
+    assert (checker["color0"]["value"], checker["color1"]["value"]) == ([0.75] * 3, [0.1] * 3)
+
+
+def test_the_soft_sun_stands_where_the_scene_says() -> None:
+    pixels = peer_scenes.BenchAssets().image(SOFT_SUN).pixels
+    row, column = np.unravel_index(pixels[..., 0].argmax(), pixels.shape[:2])
+    elevation, azimuth = 90 - (row + 0.5) * 180 / 256, (column + 0.5) * 360 / 512 - 180
+    assert elevation == pytest.approx(np.degrees(np.arcsin(0.7 / 0.99**0.5)), abs=1)
+    assert azimuth == pytest.approx(135, abs=1)  # from -Z towards +X, past it: towards +Z
+    assert pixels.max() == pytest.approx(40.25, rel=0.01)
+
+
+PLAIN = [case for case in peer_scenes.cases() if not case.is_textured]
+
+
+@pytest.mark.parametrize("case", PLAIN, ids=lambda case: case.name)
 def test_every_scene_is_described_in_triangles(case: peer_scenes.PeerCase) -> None:
     scene, arrays = peer_blender.for_cycles(case, 64)
     assert scene["shapes"] == [shape["material"] for shape in case.scene["shapes"]]
@@ -114,8 +133,11 @@ def test_runs_are_scaled_to_the_moment() -> None:
     assert summary["mpaths_per_s"] == pytest.approx(40 / 10.5 * 4 / 1e6)
 
 
-def test_no_run_shares_its_samples_with_the_reference(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """It would be compared with itself, in part."""
+@pytest.mark.parametrize("case", peer_scenes.cases(), ids=lambda case: case.name)
+def test_no_run_shares_its_samples_with_the_reference(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path, case: peer_scenes.PeerCase
+) -> None:
+    """It would be compared with itself, in part. Cycles is not asked for textures."""
     seeds: dict[str, list[int]] = {}
 
     def run(command: list[str], job: dict[str, Any], folder: Path) -> peers.Course:
@@ -125,5 +147,7 @@ def test_no_run_shares_its_samples_with_the_reference(monkeypatch: pytest.Monkey
 
     monkeypatch.setattr(peers, "_run", run)
     options = peers.Options(mitsuba=Path("m"), cycles=Path("c"), rounds=2)
-    peers._row(peer_scenes.cases()[0], options, tmp_path, lambda _: None)
-    assert {side: len(set(given)) for side, given in seeds.items()} == dict.fromkeys(seeds, 3) and len(seeds) == 3
+    row = peers._row(case, options, tmp_path, lambda _: None)
+    sides = ["mitsuba"] if case.is_textured else ["mitsuba", "cycles"]
+    assert list(row["ratios"]) == sides and len(seeds) == 1 + len(sides)
+    assert {side: len(set(given)) for side, given in seeds.items()} == dict.fromkeys(seeds, 3)
