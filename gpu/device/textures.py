@@ -45,12 +45,22 @@ def bound_textures(arrays: SceneArrays, flags: frozenset[str]) -> dict[int, np.n
     return {unit: each for unit, each in values.items() if len(each)}
 
 
+def rows(size: int, channels: int, dtype: str) -> int:
+    """The height of the texture of `linear_texture` for that many bytes.
+
+    Of records ("u4") it is a power of two: llvmpipe compiles a kernel anew where a height becomes or ceases to be
+    one, and the number of records may change with an edit.
+    """
+    height = -(-size // (bindings.TEXELS_A_ROW * channels * BYTES[dtype]))
+    return 1 << max(height - 1, 0).bit_length() if dtype == "u4" else height
+
+
 def linear_texture(context: Any, values: np.ndarray, channels: int, dtype: str) -> Any:
-    """A texture of `bindings.TEXELS_A_ROW` texels a row, in the order of `values`; the last row is filled up."""
+    """A texture of `bindings.TEXELS_A_ROW` texels a row, in the order of `values`; the rest of it is undefined."""
     flat = np.ascontiguousarray(values).reshape(-1).view(np.uint8)
     pitch = bindings.TEXELS_A_ROW * channels * BYTES[dtype]
     height, rest = divmod(len(flat), pitch)
-    size = (bindings.TEXELS_A_ROW, height + (rest > 0))
+    size = (bindings.TEXELS_A_ROW, rows(len(flat), channels, dtype))
     context.error  # noqa: B018  # an older one is not this texture's
     try:
         texture = context.texture(size, channels, dtype=dtype)

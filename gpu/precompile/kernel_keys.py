@@ -12,7 +12,7 @@ import numpy as np
 from gpu import layout
 from gpu.arrays import HEAVY, SHAREABLE, SceneArrays
 from gpu.bsdf import kernels as bsdf
-from gpu.device.textures import BYTES, KINDS, bound_textures
+from gpu.device.textures import KINDS, bound_textures, rows
 from gpu.kernels import features
 from gpu.kernels.source import KernelSource
 from gpu.layout import ShapeKind, bindings
@@ -142,8 +142,8 @@ def _textures(a: SceneArrays, raised: frozenset[str]) -> tuple[tuple[int, int, s
     out = [(bindings.ENVIRONMENT_TEXTURE, 4, "f4", _side(width), _side(height))]
     for unit, values in bound_textures(a, raised).items():
         channels, dtype = KINDS[unit]
-        height = -(-values.nbytes // (bindings.TEXELS_A_ROW * channels * BYTES[dtype]))
-        out.append((unit, channels, dtype, _side(bindings.TEXELS_A_ROW), _side(height)))
+        height = _side(rows(values.nbytes, channels, dtype))
+        out.append((unit, channels, dtype, _side(bindings.TEXELS_A_ROW), height))
     return tuple(out)
 
 
