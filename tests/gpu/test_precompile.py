@@ -280,6 +280,20 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
     assert asked == [common_keys(), []] and len(common_keys()) == 17
 
 
+def test_what_a_newer_scene_needs_takes_the_place_of_the_older_one_s(gpu: Renderer, cold: Path) -> None:
+    """But for the kernel that is being compiled."""
+    compiler, helper = CompileClient(gpu.info, None, lambda: True, "soon"), Instant()
+    compiler._helper = helper  # type: ignore[assignment]
+    keys = common_keys()
+    streams: list[Any] = [lambda milliseconds: None, lambda milliseconds: 0]
+    compiler.prepare(keys[:3], told=streams[0])
+    compiler.prepare(keys[3:5], told=streams[1])
+    compiler.prepare(keys[2:3] + keys[6:8], told=streams[0])
+    while compiler.left_s is not None:
+        compiler.hear()
+    assert sorted(map(keys.index, helper.asked)) == [0, 2, 3, 4, 6, 7]
+
+
 def test_clients_take_turns_at_the_compiler(gpu: Renderer, cold: Path) -> None:
     compiler, helper = CompileClient(gpu.info, None, lambda: True), Instant()
     compiler._helper = helper  # type: ignore[assignment]

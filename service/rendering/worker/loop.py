@@ -6,10 +6,10 @@ import logging
 import select
 import socket
 import time
-from collections import defaultdict
+from collections import defaultdict, deque
 from collections.abc import Callable, Iterator
 
-from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
+from gpu import GpuError, KernelKey, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
 from service.rendering.ipc import channel
 from service.rendering.ipc.heartbeat import Heartbeat
@@ -88,6 +88,7 @@ class Loop:
             self._scheduler.sharers,
         )
         self._foreseen = kernel_keys.bsdf_keys()  # to be compiled when nothing else is, so that no panel has to wait
+        self._scenes = deque[KernelKey]()  # with which streams may begin; compiled after those that edits need
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
@@ -154,14 +155,15 @@ class Loop:
         return task is not None
 
     def _foresee(self) -> bool:
-        """Whether another kernel could be handed to the spare compiler, which is free; one at a time, as others may
-        soon have something for it that is needed more."""
-        if self._spare.left_s is not None:
-            return False
-        key = next(self._foreseen, None)
+        """Whether another kernel could be handed to a compiler which is free; one at a time, as others may soon have
+        something for it that is needed more."""
+        soon = self._soon.left_s is None and bool(self._scenes)
+        if soon:
+            self._soon.prepare([self._scenes.popleft()])
+        key = next(self._foreseen, None) if self._spare.left_s is None else None
         if key is not None:
             self._spare.prepare([key])
-        return key is not None
+        return soon or key is not None
 
     def _crowded(self) -> bool:
         return sum(each.awaited for each in self._everyone) > 1
@@ -193,7 +195,7 @@ class Loop:
                 self._tasks[message.task] = task
             task.update(message)
         elif isinstance(message, Foresee):
-            self._soon.prepare([begin_key(message)])
+            self._scenes.append(begin_key(message))
         elif isinstance(message, EvaluateBsdf):
             self._questions[message.task] = BsdfTask(self._context, message)
         elif isinstance(message, Drop) and message.task in self._questions:

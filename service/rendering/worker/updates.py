@@ -82,8 +82,11 @@ class Updates:
             arrays = self._residency.full.scene.arrays
             moved = kernel_keys.key_after_move(arrays, settings)
             keys = [*([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
-            self._soon.prepare(keys, self._client)
+            self._soon.prepare(keys, self._client, self._foreseen)
             self.preview.prepare(arrays, settings)
+
+    def _foreseen(self, milliseconds: float) -> None:
+        """A foreseen kernel was compiled: nobody waits for it."""
 
     def release(self) -> None:
         """Wait for no kernel, and show nothing meanwhile; what is pending stays so."""

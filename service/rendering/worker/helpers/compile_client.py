@@ -101,13 +101,18 @@ class CompileClient:
         it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop, as
         where nobody else is there, unless there is something to do meanwhile (`alone`). Turns go round the clients.
         """
-        if told is not _nobody:
-            self.forget(told)
+        self.forget(told)
+        return self._enlist(key, told, alone, client)
+
+    def _enlist(self, key: KernelKey, told: Told, alone: bool, client: str) -> bool:
         if self.knows(key):
             return False
         order = next((order for order in self._orders if order.key == key), None)
         if order is None:
-            if not self._able or not (alone or self._crowded()) or self._is_recorded(key):
+            if not self._able or not (alone or self._crowded()):
+                return False
+            if self._is_recorded(key):
+                self._known.add(key)
                 return False
             order = _CompileRequest(key, {told: client})
             self._orders.append(order)
@@ -118,10 +123,13 @@ class CompileClient:
         order.told[told] = client
         return True
 
-    def prepare(self, keys: list[KernelKey], client: str = "") -> None:
-        """Compile those of the kernels that no renderer here has had yet, although nobody waits for them."""
+    def prepare(self, keys: list[KernelKey], client: str = "", told: Told | None = None) -> None:
+        """Compile those of the kernels that no renderer here has had yet, although nobody waits for them. With `told`
+        they take the place of those that were prepared with it before."""
+        if told is not None:
+            self.forget(told)
         for key in keys:
-            self.waits(key, _nobody, client=client)
+            self._enlist(key, told or _nobody, False, client)
 
     def met(self, key: KernelKey) -> None:
         """Note that the renderer has this kernel, and so has the driver's disk cache."""
