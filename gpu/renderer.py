@@ -55,15 +55,15 @@ class Renderer:
         _check(arrays)
         return Scene(self._context, arrays, editing, self._texels, everything, raised)
 
-    def load_fallback(self, arrays: SceneArrays) -> Scene:
-        """Upload a scene for the kernel of `fallback`, which must be able to show it. Images that it shares with
-        other scenes are uploaded once.
+    def load_fallback(self, arrays: SceneArrays, raised: frozenset[str] | None = None) -> Scene:
+        """Upload a scene for a kernel of `fallback`, which must be able to show it: the superset kernel with the
+        flags `raised`, or the one for many scenes. Images that it shares with other scenes are uploaded once.
 
         Raises SceneTooLarge, OutOfMemory.
         """
         self._own()
         _check(arrays)
-        return FallbackScene(self._context, arrays, self._texels)
+        return FallbackScene(self._context, arrays, self._texels, raised)
 
     def picture(self, scene: Scene, settings: RenderSettings) -> Picture:
         """A picture of `scene`, at zero samples: compiles its kernel and allocates its accumulators.

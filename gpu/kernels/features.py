@@ -251,12 +251,12 @@ def flags(scene: SceneArrays, editing: bool = False) -> frozenset[str]:
 
 
 # Flags that only save work and change no picture: an edit that could raise one does not wait for the compiler.
-_SPARING = frozenset({"HAS_MIRRORS"})
+SPARING = frozenset({"HAS_MIRRORS"})
 
 
 def grown(raised: frozenset[str], scene: SceneArrays) -> frozenset[str]:
     """The flags of a scene after an edit: those that were raised before, and those that it needs now."""
-    return raised | (flags(scene, True) - _SPARING)
+    return raised | (flags(scene, True) - SPARING)
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no

@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings
+from gpu import Renderer, RenderSettings, Scene
 from gpu.analysis.kernel_cost import full_kernel
 from gpu.kernels import features
 from gpu.precompile import fallback
@@ -57,10 +57,10 @@ def test_one_kernel_for_all_that_it_knows() -> None:
     assert len(found) == len(sides) <= 2, "one for environments of each kind"
 
 
-@pytest.mark.parametrize("name", KNOWN)
-def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
+def same_picture(*scenes: Scene, gpu: Renderer) -> None:
+    """Releases the scenes."""
     pictures = []
-    for scene in (gpu.load(KNOWN[name]), gpu.load_fallback(KNOWN[name])):
+    for scene in scenes:
         picture = gpu.picture(scene, SMALL)
         while picture.samples < 8:  # the first turn may end when the kernel is compiled
             picture.trace(60.0, 8)
@@ -69,6 +69,30 @@ def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
         scene.release()
     apart = np.abs(pictures[0] - pictures[1]) > 1e-3 * (pictures[0] + 0.01)
     assert np.isfinite(pictures[1]).all() and apart.mean() < 0.01, "but for paths on which rounding decides"
+
+
+@pytest.mark.parametrize("name", KNOWN)
+def test_it_shows_the_same_picture(gpu: Renderer, name: str) -> None:
+    same_picture(gpu.load(KNOWN[name]), gpu.load_fallback(KNOWN[name]), gpu=gpu)
+
+
+@pytest.mark.parametrize("name", ["CHECKERS", "LIGHT_TREE", "SMOOTH_NORMALS"])
+def test_the_superset_kernel_shows_the_same_picture(gpu: Renderer, name: str) -> None:
+    arrays = arrays_of(SCENES[name], IMAGES)
+    same_picture(gpu.load(arrays), gpu.load_fallback(arrays, fallback.superset(arrays)), gpu=gpu)
+
+
+def test_the_superset_kernel_shows_what_sliders_make_of_the_scene(gpu: Renderer) -> None:
+    """A box that shines, which is six quads then, and glass that lets a third of all rays pass."""
+    before = SCENES["BOXES"]
+    glowing = {"type": "principled", "transmission": 1, "alpha": 0.67, "emission": 2}
+    dull = arrays_of({**before, "materials": {"m": {"type": "principled"}}}, IMAGES)
+    bright = arrays_of({**before, "materials": {"m": glowing}}, IMAGES)
+    superset = fallback.superset(dull)
+    key = fallback.kernel_key(bright, SMALL, superset)
+    assert key in fallback.superset_keys(dull, SMALL, superset)
+    assert key not in fallback.superset_keys(dull, SMALL, superset)[:1], "numbers of shapes are compiled in"
+    same_picture(gpu.load(bright), gpu.load_fallback(bright, superset), gpu=gpu)
 
 
 def test_clamp_is_a_number_to_it(gpu: Renderer) -> None:

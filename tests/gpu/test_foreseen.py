@@ -7,12 +7,17 @@ from pathlib import Path
 from typing import Any
 
 from gpu import KernelKey, Renderer, RenderSettings
+from gpu.precompile import fallback
 from gpu.precompile.kernel_keys import keys_after_edit
-from service.rendering.ipc.messages import Foresee, Loaded, StopRule, Update, driver_of
+from service.pack import pack
+from service.rendering.ipc.messages import Foresee, Frame, Loaded, StopRule, Update, View, Want, driver_of
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device.loaded_scene import begin_key
 from service.rendering.worker.helpers.compile_client import records
+from service.scene import parse_scene
+from tests.documents import Shelf
 from tests.gpu.test_precompile import SIZE, Ears, arrays, cold
+from tests.serving import SCENE
 from tests.supervisors import with_supervisor
 
 __all__ = ["arrays", "cold"]  # fixtures
@@ -32,8 +37,37 @@ def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arra
             await recorded(key)
 
     async def recorded(key: KernelKey) -> None:
-        async with asyncio.timeout(60):
-            while not (records() / key.digest(driver_of(gpu.info))).exists():
-                await asyncio.sleep(0.05)
+        await until_recorded(gpu, key)
 
     with_supervisor(test)
+
+
+def test_a_lamp_is_seen_before_its_kernel_is_there(gpu: Renderer, arrays: Any, cold: Path) -> None:
+    """Any number of shapes may begin to shine, so that the kernel for it is not foreseen; the superset kernel is."""
+    lamp = {name: {**material, "emission": 2.0} for name, material in SCENE["materials"].items()}
+    lit = pack(parse_scene({**SCENE, "materials": lamp}), Shelf()).arrays
+    superset = fallback.superset(arrays)
+    keys = fallback.superset_keys(arrays, RenderSettings(**SIZE), superset)
+    assert fallback.kernel_key(lit, RenderSettings(**SIZE), superset) in keys
+
+    async def test(supervisor: Supervisor) -> None:
+        ears = Ears()
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(4), interactive=True))
+        await ears.next(task, Loaded)
+        for key in keys:
+            await until_recorded(gpu, key)
+        await supervisor.send_scene(Update(task, 2, lit, SIZE, StopRule(4), interactive=True))
+        supervisor.send(Want(task, 1, View()))
+        while (first := await ears.next(task, Frame, Loaded)).generation != 2:
+            supervisor.send(Want(task, 1, View()))
+        assert isinstance(first, Frame) and first.provisional
+        assert (await ears.next(task, Loaded)).generation == 2
+
+    with_supervisor(test)
+
+
+async def until_recorded(gpu: Renderer, key: KernelKey) -> None:
+    async with asyncio.timeout(60):
+        while not (records() / key.digest(driver_of(gpu.info))).exists():
+            await asyncio.sleep(0.05)

@@ -81,9 +81,9 @@ class Updates:
         if self._soon is not None and self._tracker.interactive:
             arrays = self._residency.full.scene.arrays
             moved = kernel_keys.key_after_move(arrays, settings)
-            keys = [*([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
+            first = self.preview.prepare(arrays, settings)  # with which any of them can be shown
+            keys = [*first, *([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
             self._soon.prepare(keys, self._client, self._foreseen)
-            self.preview.prepare(arrays, settings)
 
     def _foreseen(self, milliseconds: float) -> None:
         """A foreseen kernel was compiled: nobody waits for it."""

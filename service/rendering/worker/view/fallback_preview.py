@@ -1,4 +1,4 @@
-"""First looks at what waits for its kernel, by one that is slower and there already (gpu/precompile/fallback.py).
+"""First looks at what waits for its kernel, by one that is there already (gpu/precompile/fallback.py).
 
 They are small, so that the picture by its own kernel, which begins anew, is larger whenever it comes.
 """
@@ -19,7 +19,7 @@ from service.rendering.worker.helpers.compile_client import CompileClient
 from service.rendering.worker.view.frames import SLICE_S, pixels_of
 
 if TYPE_CHECKING:
-    from gpu import Renderer, RenderSettings, Scene, SceneArrays
+    from gpu import KernelKey, Renderer, RenderSettings, Scene, SceneArrays
 
 MOST_BYTES = 1 << 28  # of a scene: it is on the device twice, and of this size it loads in 0.1 s
 ENOUGH_S = 0.25  # of tracing: on llvmpipe it takes from the compiler what it is there to bridge
@@ -37,8 +37,16 @@ class _Content(NamedTuple):
     samples: int
 
 
+class _Compiled(NamedTuple):
+    """A kernel of `fallback`: a superset kernel with the flags `raised`, or the one for many scenes."""
+
+    key: KernelKey
+    raised: frozenset[str] | None
+
+
 class FallbackPreview:
-    """Shows an update between `begin` and `release` with a kernel that suits many scenes."""
+    """Shows an update between `begin` and `release` with the superset kernel of the scene that was edited, or with
+    the kernel for many scenes."""
 
     def __init__(
         self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, spare: CompileClient | None
@@ -47,7 +55,9 @@ class FallbackPreview:
         self.generation = 0
         self.scale: float | None = None  # of what there is to see
         self._number, self._send, self._renderer, self._spare = number, send, renderer, spare
+        self._superset: frozenset[str] | None = None  # of the scene that is being edited
         self._scene: Scene | None = None
+        self._raised: frozenset[str] | None = None  # flags of `_scene`; None: those of the kernel for many scenes
         self._ladder: ResolutionLadder | None = None
         self._next = 1.0  # the scale that is traced
         self._pixel_s = BEGIN_S
@@ -67,38 +77,49 @@ class FallbackPreview:
         """Whether there is more to trace."""
         return self._ladder is not None and (self.scale != self._next or self._spent_s < ENOUGH_S)
 
-    def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> None:
-        """Have the kernel compiled in idle time that edits of these arrays will need."""
-        key = fallback.kernel_key(arrays, settings)
-        if key is not None and self._spare is not None:
-            self._spare.prepare([key])
+    def prepare(self, arrays: SceneArrays, settings: RenderSettings) -> list[KernelKey]:
+        """The keys of the superset kernels, which edits of these arrays may need soon. Has the kernel for many scenes
+        compiled in idle time."""
+        general = fallback.kernel_key(arrays, settings)
+        if general is not None and self._spare is not None:
+            self._spare.prepare([general])
+        self._superset = fallback.superset(arrays)
+        return fallback.superset_keys(arrays, settings, self._superset)
 
     def can(self, wanted: KernelRequest) -> bool:
         """Whether the update could be shown at once."""
-        if self._spare is None or min(wanted.settings.width, wanted.settings.height) * LARGEST < SMALLEST_SIDE:
+        if min(wanted.settings.width, wanted.settings.height) * LARGEST < SMALLEST_SIDE:
             return False
-        key = fallback.kernel_key(wanted.arrays, wanted.settings)
-        return key is not None and self._spare.has(key) and scene_bytes(wanted.arrays) <= MOST_BYTES
+        return scene_bytes(wanted.arrays) <= MOST_BYTES and self._compiled(wanted) is not None
+
+    def _compiled(self, wanted: KernelRequest) -> _Compiled | None:
+        """The kernel that shows such a picture soonest, of those that are compiled."""
+        for raised in (None,) if self._superset is None else (self._superset, None):
+            key = fallback.kernel_key(wanted.arrays, wanted.settings, raised)
+            if key is not None and self._spare is not None and self._spare.has(key):
+                return _Compiled(key, raised)
+        return None
 
     def begin(self, wanted: KernelRequest, generation: int) -> None:
         """Begin to show what `can` be shown; where loading fails, nothing is shown."""
-        settings = fallback.settings_for(wanted.settings)
-        key = fallback.kernel_key(wanted.arrays, wanted.settings)
-        assert settings is not None and key is not None and self._spare is not None
+        settings, kernel = fallback.settings_for(wanted.settings), self._compiled(wanted)
+        assert settings is not None and kernel is not None and self._spare is not None
         self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
         try:
-            edits = None if self._scene is None else fallback.edits(self._scene.arrays, wanted.arrays)
+            same = self._scene is not None and self._raised == kernel.raised
+            edits = fallback.edits(self._scene.arrays, wanted.arrays) if self._scene is not None and same else None
             if self._scene is not None and edits is not None:
                 self._scene.edit(**edits)
             else:
                 self.release()
-                self._scene = self._renderer.load_fallback(wanted.arrays)
+                self._scene = self._renderer.load_fallback(wanted.arrays, kernel.raised)
+                self._raised = kernel.raised
             if self._ladder is not None:
                 self._ladder.release()
             self._ladder = ResolutionLadder(self._renderer, self._scene, settings, full=False)
             self._next = self._fitting(self._ladder, FIRST_S)
             self._ladder.picture(self._next)
-            self._spare.met(key)
+            self._spare.met(kernel.key)
         except GpuError as error:
             log.info("could not show a preview by the fallback kernel error=%s", error)
             self.release()

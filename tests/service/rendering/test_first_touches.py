@@ -1,0 +1,110 @@
+"""Every slider of every built-in scene finds a kernel that was foreseen when the scene was shown."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any, cast
+
+import pytest
+
+from gpu import KernelKey, RenderSettings, SceneArrays, apply_edit
+from gpu.precompile import fallback, kernel_keys
+from service import presets
+from service.bench.scenes import BenchAssets
+from service.bench.sliders import Slider, sliders
+from service.config import Config
+from service.rendering.ipc.messages import Update
+from service.rendering.requests.request_reader import RequestReader
+from service.rendering.streams import protocol
+from service.rendering.streams.edit_session import EditSession
+from service.rendering.worker.device.loaded_scene import KernelRequest, LoadedScene, kernel_request
+from service.rendering.worker.payloads import updated_scene
+
+SETTINGS = {"width": 256, "height": 256}
+SHARES = (0.0, 0.618, 1.0)  # of a slider's range: it is dragged to its ends, too
+READER = RequestReader(Config(_env_file=None), BenchAssets())  # type: ignore[call-arg]
+
+
+class Shown:
+    """A scene as a stream edits it, and the scene's arrays and flags as its renderer has them."""
+
+    def __init__(self, document: Any) -> None:
+        self._session = EditSession(READER, 1)
+        self._generation = 1
+        start = protocol.Start(type="start", generation=1, scene=document, settings=SETTINGS)
+        update = self._session.take(start) or self._session.settle()
+        assert update is not None and update.settings is not None
+        self.settings = RenderSettings(**update.settings)
+        self._take(update)
+
+    def _take(self, update: Update) -> None:
+        scene = updated_scene(update)
+        if scene is not None:
+            self.arrays, self.flags = scene, kernel_keys.flags(scene, True)
+        else:
+            self.arrays = apply_edit(self.arrays, **update.edits)
+            self.flags = kernel_keys.flags_after_edit(self.flags, self.arrays, True)
+
+    def change(self, patch: Any) -> KernelRequest | None:
+        """The kernel that the renderer asks for after a merge patch; None where it goes on with the one it has."""
+        self._generation += 1
+        message = protocol.Update(type="update", generation=self._generation, scene=patch)
+        update = self._session.take(message) or self._session.settle()
+        if update is None:
+            return None
+        loaded = SimpleNamespace(scene=SimpleNamespace(arrays=self.arrays, flags=self.flags), editing=True)
+        request = kernel_request(update, self.settings, cast(LoadedScene, loaded), None)
+        self._take(update)
+        return request
+
+
+def foreseen(arrays: SceneArrays, settings: RenderSettings) -> tuple[set[KernelKey], frozenset[str]]:
+    """The keys that are compiled once a stream shows the scene, and the flags of its superset kernels."""
+    superset = fallback.superset(arrays)
+    own = kernel_keys.kernel_key(arrays, settings, kernel_keys.flags(arrays, True))
+    later = kernel_keys.keys_after_edit(arrays, settings)
+    return {own, *later, *fallback.superset_keys(arrays, settings, superset)}, superset
+
+
+def touches(document: Any) -> Iterator[tuple[Slider, KernelRequest, RenderSettings]]:
+    """What is asked for when one slider after the other is touched, and brought back."""
+    shown = Shown(document)
+    for slider in sliders(document):
+        for share in SHARES:
+            request = shown.change(slider.patch(document, share))
+            if request is not None:
+                yield slider, request, shown.settings
+        shown.change(slider.restore(document))
+
+
+@pytest.mark.parametrize("name", [entry["name"] for entry in presets.names("scenes")])
+def test_every_slider_is_foreseen(name: str) -> None:
+    document = presets.get("scenes", name)
+    first = Shown(document)
+    keys, superset = foreseen(first.arrays, first.settings)
+    late = {
+        slider.name
+        for slider, request, settings in touches(document)
+        if request.key not in keys
+        and fallback.kernel_key(request.arrays, request.settings, superset) not in keys
+    }
+    assert late == set()
+
+
+def test_a_superset_kernel_depends_on_no_light() -> None:
+    """Else one would have to be compiled for each lamp that somebody may turn on."""
+    document = presets.get("scenes", "point-lights")
+    shown = Shown(document)
+    superset = fallback.superset(shown.arrays)
+    before = fallback.kernel_key(shown.arrays, shown.settings, superset)
+    for patch in ({"materials": {"subject": {"emission": 2.0}}}, {"lights": document["lights"][:1]}):
+        request = shown.change(patch)
+        assert request is not None and fallback.kernel_key(request.arrays, request.settings, superset) == before
+
+
+def test_what_a_superset_kernel_does_not_show() -> None:
+    shown = Shown(presets.get("scenes", "cornell-boxes"))
+    superset = fallback.superset(shown.arrays)
+    other = Shown(presets.get("scenes", "sphere-on-floor"))
+    assert fallback.kernel_key(other.arrays, other.settings, superset) is None
