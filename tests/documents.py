@@ -85,8 +85,8 @@ def document(*shapes, **fields):
     }  # fmt: skip
 
 
-def packed(*shapes, assets=None, cache=None, limits=None, **fields) -> Packed:
-    return pack(parse_scene(document(*shapes, **fields)), assets or Shelf(), cache, limits)
+def packed(*shapes, assets=None, cache=None, limits=None, environments=None, **fields) -> Packed:
+    return pack(parse_scene(document(*shapes, **fields)), assets or Shelf(), cache, limits, environments)
 
 
 def matrix_of(transform):

@@ -19,7 +19,7 @@ from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.shared_meshes import shift
 from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights
-from service.pack.lights.environment import PackedEnvironment, environment_key, pack_environment
+from service.pack.lights.environment import PackedEnvironment, check_images, environment_key, pack_environment
 from service.pack.lights.light_bounds import Grown, grow_light_tree
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
@@ -73,9 +73,14 @@ class _Lights:
     peak: float
 
 
-def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: Limits | None = None) -> Packed:
+def pack(
+    scene: Scene, assets: Assets, cache: PackCache | None = None, limits: Limits | None = None,
+    environments: PackCache | None = None,
+) -> Packed:  # fmt: skip
     """The renderer's arrays for `scene`.
 
+    `cache` is that of a document that is being edited. `environments` keeps those of other documents; what an edit
+    makes is not kept there, as nobody asks for it again.
     Raises InvalidDocument, its pointers from the scene's root. Slow where there is geometry: not for an event loop.
     """
     materials = pack_materials(scene)
@@ -83,7 +88,11 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
     emissive = np.any(materials["emission"] > 0, axis=1)
     emissive[dark(uses, texels)] = False
     built = _geometry(scene, emissive, assets, cache, limits)
-    sky = _Sky() if scene.environment is None else _environment(scene.environment, built.radius, assets, cache)
+    sky = (
+        _Sky()
+        if scene.environment is None
+        else _environment(scene.environment, built.radius, assets, cache, environments)
+    )
     emission, brightest = mean_emission(materials, uses, texels, built)
     picked = _lights(scene, built, materials, emission, sky.power, cache)
     arrays = SceneArrays(
@@ -99,8 +108,10 @@ def pack(scene: Scene, assets: Assets, cache: PackCache | None = None, limits: L
     return Packed(_with_geometry(arrays, built), [*built.warnings, *texture_warnings, *sky.warnings])
 
 
-def _environment(environment: Environment, radius: float, assets: Assets, cache: PackCache | None) -> _Sky:
-    sky = _packed_environment(environment, assets, cache)
+def _environment(
+    environment: Environment, radius: float, assets: Assets, cache: PackCache | None, shared: PackCache | None
+) -> _Sky:
+    sky = _packed_environment(environment, assets, cache, shared)
     rotation, scale = pack_turn(environment)
     warnings = tuple(sky.warnings)
     if scale * sky.peak > BRIGHTEST:
@@ -202,7 +213,16 @@ def _geometry(
     return cache.get(("geometry", contents, shining, *shared), make)
 
 
-def _packed_environment(environment: Environment, assets: Assets, cache: PackCache | None) -> PackedEnvironment:
+def _packed_environment(
+    environment: Environment, assets: Assets, cache: PackCache | None, shared: PackCache | None
+) -> PackedEnvironment:
     key = environment_key(environment)
     make = partial(pack_environment, environment, assets)
-    return make() if cache is None or key is None else cache.get(key, make)
+    if key is None:
+        return make()
+    known: PackedEnvironment | None = shared.find(key) if shared is not None else None
+    if known is not None:
+        check_images(environment, assets)  # of another document they may have been deleted since
+    if cache is not None:
+        return cache.get(key, lambda: known or make())
+    return known or (make() if shared is None else shared.get(key, make))

@@ -76,6 +76,11 @@ class PackCache:
                 self.bytes -= self._kept.popitem(last=False)[1][1]
         return value
 
+    def find(self, key: Hashable) -> Any:
+        """The part that was made for an equal key; None where there is none."""
+        with self._lock:
+            return self._kept.get(key, (None, 0))[0]
+
     def drop_oldest(self) -> int:
         """Forget the part that was used longest ago, unless it is the only one. Returns its bytes."""
         with self._lock:

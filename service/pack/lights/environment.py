@@ -76,6 +76,14 @@ def pack_environment(environment: Environment, assets: Assets) -> PackedEnvironm
     return _packed(blur_image(texels, environment.blur) if environment.blur else texels, warnings)
 
 
+def check_images(environment: Environment, assets: Assets) -> None:
+    """Raise InvalidDocument where an image of the environment cannot be read."""
+    if isinstance(environment, ImageEnvironment):
+        _image(environment.asset, assets, "/environment/asset")
+    elif isinstance(environment, CubemapEnvironment):
+        _faces(environment.assets, assets)
+
+
 def _image(reference: str, assets: Assets, pointer: str) -> ImageData:
     try:
         return assets.image(reference)
@@ -87,22 +95,29 @@ def _refused(pointer: str, detail: str) -> InvalidDocument:
     return InvalidDocument([FieldError(pointer, detail)])
 
 
+def _faces(faces: CubeFaces, assets: Assets) -> dict[str, ImageData]:
+    return {name: _image(getattr(faces, name), assets, _pointer(name)) for name in CubeFaces.model_fields}
+
+
+def _pointer(face: str) -> str:
+    return f"/environment/assets/{face}"
+
+
 def _cube(faces: CubeFaces, assets: Assets, blur: float) -> PackedEnvironment:
-    pointers = {name: f"/environment/assets/{name}" for name in CubeFaces.model_fields}
-    images = {name: _image(getattr(faces, name), assets, pointer) for name, pointer in pointers.items()}
+    images = _faces(faces, assets)
     sizes = {name: image.pixels.shape[:2] for name, image in images.items()}
     wanted = Counter(height for height, _ in sizes.values()).most_common(1)[0][0]
     errors = []
     for name, (height, width) in sizes.items():
         if height != width:
-            errors.append(FieldError(pointers[name], f"is {width} x {height}: the face of a cube is square"))
+            errors.append(FieldError(_pointer(name), f"is {width} x {height}: the face of a cube is square"))
         elif height > LARGEST_FACE:
-            errors.append(FieldError(pointers[name], f"is {width} x {height}; at most {LARGEST_FACE} a side"))
+            errors.append(FieldError(_pointer(name), f"is {width} x {height}; at most {LARGEST_FACE} a side"))
         elif height != wanted:
-            errors.append(FieldError(pointers[name], f"is {width} x {height}, others are {wanted} x {wanted}"))
+            errors.append(FieldError(_pointer(name), f"is {width} x {height}, others are {wanted} x {wanted}"))
     if errors:
         raise InvalidDocument(errors)
-    parts, warnings = zip(*(_clamped(image, pointers[name]) for name, image in images.items()), strict=True)
+    parts, warnings = zip(*(_clamped(image, _pointer(name)) for name, image in images.items()), strict=True)
     if blur:
         return _packed(blur_cube(list(parts), blur), sum(warnings, ()))
     texels = np.vstack([np.hstack(parts[:3]), np.hstack(parts[3:])]).astype(np.float32)

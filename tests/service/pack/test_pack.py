@@ -11,6 +11,7 @@ import pytest
 from gpu import layout
 from gpu.layout import MaterialModel
 from service.pack import CacheBudget, PackCache, pack_camera, pack_materials
+from service.problems import InvalidDocument
 from service.scene import parse_scene
 from tests.documents import (
     CAMERA,
@@ -266,6 +267,26 @@ def test_cache_keeps_what_an_edit_leaves_alone():
     assert again(shape=mesh(asset="sha256:cube", transform={"scale": 2})).triangles is not first.triangles
     assert again(materials={"grey": LAMP, "lamp": LAMP}).triangles is not first.triangles
     assert again().triangles is first.triangles
+
+
+def test_documents_share_their_environments():
+    """A one-shot render has no cache of its own, and the tables of the studio take longer than its scene."""
+    shelf, shared = Shelf(sky=picture(np.ones((2, 4, 3)))), PackCache()
+    sky = {"type": "image", "asset": "sha256:sky"}
+
+    def light(cache=None, **more):
+        lit = packed(mesh(), assets=shelf, cache=cache, environments=shared, environment={**sky, **more})
+        return lit.arrays.environment
+
+    first = light()
+    assert light(rotation=30).cells is first.cells
+    assert light(cache=PackCache()).cells is first.cells, "one that is edited, too"
+    edited = light(cache=PackCache(), blur=20)
+    assert light(blur=20).cells is not edited.cells, "nobody else asks for what a slider passes"
+    shelf.known.clear()
+    for cache in (None, PackCache()):
+        with pytest.raises(InvalidDocument):
+            light(cache)
 
 
 def test_cache_forgets_the_oldest_and_trusts_no_path():
