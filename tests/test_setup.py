@@ -117,6 +117,19 @@ def test_without_lavapipe_it_goes_on(tmp_path: Path, user: int, status: int) -> 
     assert done.returncode == 0 and "the test that needs it is skipped" in done.stderr
 
 
+@pytest.mark.parametrize("status", [0, 100])
+def test_a_headless_shell_is_offered_beside_a_whole_browser(tmp_path: Path, status: int) -> None:
+    machine = Machine(tmp_path, status=status)
+    done = machine.does("headless_shell_is_here() { false; }; offer_headless_shell")
+    assert done.returncode == 0 and machine.asked[0].endswith(" update")
+    assert ("run in chromium instead" in done.stderr) == bool(status)
+    if not status:
+        assert machine.asked[1].endswith(" install chromium-headless-shell")
+    (tmp_path / "asked").unlink()
+    machine.does("headless_shell_is_here() { true; }; offer_headless_shell")
+    assert not machine.asked
+
+
 @pytest.mark.parametrize(
     ("renderer", "more"), [("NVIDIA L4 4.6", ""), (OLD, ""), (NEW, "lavapipe_is_here() { true; };")]
 )

@@ -21,6 +21,7 @@ ADDED_S = 0.1  # seconds that are added to a round trip
 CHUNK = 1 << 16
 PATIENCE_MS = 60_000
 FLAGS = ["--no-sandbox", "--disable-dev-shm-usage"]
+BROWSERS = ("chromium", "chromium-headless-shell")  # the first that is installed; people have a whole one
 
 # Metallic goes from one end to the other: a change of this size in a picture of 8 x 8 averages is not noise.
 MEASURE = """async (moves) => {
@@ -50,6 +51,11 @@ MEASURE = """async (moves) => {
 }"""
 
 
+def chromium() -> str | None:
+    """The path of the program, or None where it is not installed."""
+    return next(filter(None, map(shutil.which, BROWSERS)), None)
+
+
 def measure() -> dict[str, float]:
     """Milliseconds, as `hand_p50_ms`, `hand_p95_ms`, and with `_far` through the longer way."""
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, server(folder) as (port, _):
@@ -75,7 +81,7 @@ def _moves(port: int) -> list[float]:
     from playwright.sync_api import sync_playwright
 
     with sync_playwright() as playwright:
-        browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+        browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
         page = browser.new_page(viewport={"width": 1280, "height": 800})
         page.goto(f"http://127.0.0.1:{port}/")
         page.wait_for_selector("#stage.live[aria-busy=false]", timeout=PATIENCE_MS)

@@ -3,13 +3,12 @@
 from __future__ import annotations
 
 import random
-import shutil
 import threading
 import time
 from importlib.util import find_spec
 from typing import TYPE_CHECKING
 
-from service.bench.hand import FLAGS
+from service.bench.hand import FLAGS, chromium
 from service.bench.soak_server import Server
 from service.bench.soak_tally import Tally
 
@@ -27,7 +26,7 @@ def missing() -> str | None:
     """The thing that is missing for a drag session, or None."""
     if find_spec("playwright") is None:
         return "playwright (pip install playwright)"
-    return None if shutil.which("chromium") else "Debian's chromium"
+    return None if chromium() else "Debian's chromium"
 
 
 def drag(server: Server, tally: Tally, over: threading.Event, chance: random.Random) -> None:
@@ -36,7 +35,7 @@ def drag(server: Server, tally: Tally, over: threading.Event, chance: random.Ran
 
     try:
         with sync_playwright() as playwright:
-            browser = playwright.chromium.launch(executable_path=shutil.which("chromium"), args=FLAGS)
+            browser = playwright.chromium.launch(executable_path=chromium(), args=FLAGS)
             page = browser.new_page(viewport={"width": 800, "height": 560})
             page.on("pageerror", lambda error: tally.lose(f"page: {error}"))
             page.goto(server.url)
