@@ -202,7 +202,8 @@ class Editor:
 
 @pytest.fixture
 def context(browser: Browser) -> Iterator[BrowserContext]:
-    opened = browser.new_context(viewport={"width": 800, "height": 560})
+    # A pixel of the picture for four of the page: all waits for samples are a quarter as long.
+    opened = browser.new_context(viewport={"width": 800, "height": 560}, device_scale_factor=0.5)
     yield opened
     opened.close()
 
