@@ -12,6 +12,8 @@
 
 PORT ?= 8000
 export PYTHON
+# Where it is set, every server under test would compile all modules, and every run of pytest all tests.
+unexport PYTHONDONTWRITEBYTECODE
 
 .PHONY: run test extremes hostile image-test soak bench bench-compare tradeoff gallery lint setup
 
@@ -23,8 +25,8 @@ test:
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest -n 2 --dist loadfile -m 'not browser and not calm' --durations 20
-	.venv/bin/pytest -n 2 --dist loadfile -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
+	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm' --durations 20
+	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
 	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed  # once more: the machine may not have been calm
 
 extremes: setup

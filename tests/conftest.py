@@ -15,6 +15,33 @@ from tests.privileges import shed
 from tests.rendering import release_pictures
 from tests.serving import Server
 
+TESTS = Path(__file__).parent
+# The files that take longest, in this order: begun last, one of them would leave a core without work.
+LONG_FILES = (
+    "web/test_editor.py", "web/test_saving.py", "web/test_everyone.py", "web/test_lobe.py", "web/test_picture.py",
+    "web/test_variants.py", "service/bench/test_bench.py", "shaders/test_furnace.py",
+    "service/rendering/test_durable.py", "service/bench/test_scale.py", "service/test_hostile.py",
+    "service/rendering/cluster/test_cluster.py", "service/rendering/test_survival.py", "shaders/test_light.py",
+    "service/rendering/cluster/test_nodes.py", "gpu/test_precompile.py", "service/rendering/test_divided.py",
+    "service/rendering/test_fairness.py", "shaders/test_microfacet.py", "service/test_rest.py",
+    "shaders/test_lobes.py", "service/bench/test_device.py", "service/rendering/test_checkpoints.py",
+)  # fmt: skip
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Import only the files that have tests of the one marker that is asked for: all of them take 7 s."""
+    if collection_path.name.startswith("test_"):
+        if config.option.markexpr == "browser":
+            return None if collection_path.is_relative_to(TESTS / "web") else True
+        if config.option.markexpr == "calm":
+            return None if "mark.calm" in collection_path.read_text("utf-8") else True
+    return None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    ranks = {TESTS / name: rank for rank, name in enumerate(LONG_FILES)}
+    items.sort(key=lambda item: ranks.get(item.path, len(ranks)))
+
 
 def pytest_configure(config: pytest.Config) -> None:
     folder = tempfile.TemporaryDirectory(prefix="sunbox-tests-")
