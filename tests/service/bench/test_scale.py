@@ -17,7 +17,7 @@ from service.rendering.worker.division.home import EACH
 
 FREE = Network(1e15)
 COSTS = Costs(sample_s=4e-7, write_s=0.0, merge_s=0.0, meter_pixels=0)
-WORK = Work(960, 540, 64 * 64)
+WORK = Work(960, 540, 32 * 64)
 
 
 def gained(costs: Costs, network: Network, renderers: int, work: Work = WORK) -> float:
@@ -26,7 +26,7 @@ def gained(costs: Costs, network: Network, renderers: int, work: Work = WORK) ->
 
 def test_one_renderer_takes_the_time_of_its_samples_and_merges() -> None:
     costs = Costs(4e-7, write_s=1e-3, merge_s=5e-7, meter_pixels=1000)
-    blocks = 64
+    blocks = WORK.samples // BLOCK
     meter_s = (WORK.samples - 8) * 4e-7 * 1000
     expected = WORK.pixels * (WORK.samples * 4e-7 + blocks * 5e-7) + meter_s
     assert simulate(costs, FREE, WORK, 1).seconds == pytest.approx(expected, rel=1e-9)
