@@ -67,6 +67,9 @@ def test_latencies_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.M
     figures = latency.measure()
     assert figures["server_start_warm_ms"] > figures["slider_p50_ms"] > 0
     assert figures["slider_p50_ms"] <= figures["slider_p95_ms"] <= figures["slider_worst_ms"]
+
+
+def test_latencies_in_rooms_are_measured(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(latency, "MOVES", 2)
     monkeypatch.setattr(latency.presets, "names", lambda kind: [{"name": "cornell-empty"}])
     room = latency.rooms(lambda line: None)["cornell-empty"]
@@ -92,7 +95,7 @@ def test_sliders_are_of_the_first_material_of_each_kind() -> None:
     assert "lights/1/intensity" in {slider.name for slider in sliders(presets.get("scenes", "point-lights"))}
 
 
-def test_first_frames_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_first_frames_are_measured_at_a_real_server(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
     found = [Slider(("camera", "vfov"), 20, 60, "number"), Slider(("materials", "subject", "albedo"), 0, 1, "color")]
     monkeypatch.setattr(first_frames, "sliders", lambda document: found)
     monkeypatch.setattr(first_frames.presets, "names", lambda kind: [{"name": "matte-clay"}])

@@ -28,7 +28,11 @@ def _in_little(measure: Callable[..., dict[str, Any]]) -> Callable[..., dict[str
 
 
 def test_every_part_gives_figures(
-    gpu: Renderer, monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+    gpu: Renderer,
+    filled: None,
+    monkeypatch: pytest.MonkeyPatch,
+    tmp_path: Path,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
     monkeypatch.setattr(run, "measure", _in_little(run.measure))
     output = tmp_path / "new" / "device.json"
