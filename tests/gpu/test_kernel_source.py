@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gpu import CompileError, Renderer
-from gpu.kernels import features
+from gpu.kernels import features, source
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS, KernelSource
 
@@ -25,6 +25,16 @@ def test_includes_happen_once(tmp_path: Path) -> None:
     )
     lines = KernelSource("a.comp", {}, folders).text.splitlines()
     assert [line for line in lines if not line.startswith("#")] == ["C", "B"]
+
+
+def test_files_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A kernel's key is its text: a scene's first frame would wait 6 ms for each that is looked up."""
+    defines = features.defines(frozenset(features.FLAGS))
+    first = KernelSource("pathtrace.comp", defines)
+    monkeypatch.setattr(source, "_read", None)
+    again = KernelSource("pathtrace.comp", defines | {"HAS_BVH": 0})
+    assert again.text == first.text.replace("#define HAS_BVH 1\n", "#define HAS_BVH 0\n")
+    assert again.files == first.files
 
 
 def test_an_unknown_flag_is_refused(tmp_path: Path) -> None:
