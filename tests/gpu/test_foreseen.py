@@ -12,7 +12,7 @@ from gpu.precompile.kernel_keys import keys_after_edit
 from service.pack import pack
 from service.rendering.ipc.messages import Foresee, Frame, Loaded, StopRule, Update, View, Want, driver_of
 from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.device.loaded_scene import begin_key
+from service.rendering.worker.device.loaded_scene import begin_key, slider_keys
 from service.rendering.worker.helpers.compile_client import records
 from service.scene import parse_scene
 from tests.documents import Shelf
@@ -24,13 +24,14 @@ __all__ = ["arrays", "cold"]  # fixtures
 
 
 def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arrays: Any, cold: Path) -> None:
-    """As does the first touch of its opacity, once a stream has begun with it."""
+    """As does the first touch of its sliders; and that of opacity, once a stream has begun with it."""
 
     async def test(supervisor: Supervisor) -> None:
         ears = Ears()
         task = supervisor.open(ears)
         supervisor.send(Foresee(task, arrays, SIZE))
-        await recorded(begin_key(Foresee(task, arrays, SIZE)))
+        for key in [begin_key(Foresee(task, arrays, SIZE)), *slider_keys(Foresee(task, arrays, SIZE))]:
+            await recorded(key)
         await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(4), interactive=True))
         assert (await ears.next(task, Loaded)).compile_ms < 250.0  # from the disk cache
         for key in keys_after_edit(arrays, RenderSettings(**SIZE)):

@@ -122,7 +122,8 @@ class Update:
 
 @dataclass(frozen=True)
 class Foresee:
-    """Asks for the kernel to be compiled with which a stream would begin this scene. The task has no other use."""
+    """Asks for the kernels to be compiled with which a stream would begin this scene and touch its sliders. The task
+    has no other use."""
 
     task: int
     scene: SceneData

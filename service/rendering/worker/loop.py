@@ -36,7 +36,7 @@ from service.rendering.ipc.messages import (
 )
 from service.rendering.worker.bsdf_task import BsdfTask
 from service.rendering.worker.context import WorkerContext
-from service.rendering.worker.device.loaded_scene import begin_key
+from service.rendering.worker.device.loaded_scene import begin_key, slider_keys
 from service.rendering.worker.device.memory import Memory
 from service.rendering.worker.division.assistant import Assistant
 from service.rendering.worker.helpers.compile_client import CompileClient
@@ -89,6 +89,7 @@ class Loop:
         )
         self._foreseen = kernel_keys.bsdf_keys()  # to be compiled when nothing else is, so that no panel has to wait
         self._scenes = deque[KernelKey]()  # with which streams may begin; compiled after those that edits need
+        self._sliders = deque[KernelKey]()  # of those scenes; compiled while nothing is traced
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
@@ -114,7 +115,7 @@ class Loop:
                     self._work(task, task.answer)
             busy = any(each.ready for each in self._everyone)
             self._account(at_once=not busy)
-            busy = self._foresee() or busy or self._measure_kernel()
+            busy = self._foresee(idle=not busy) or busy or self._measure_kernel()
 
     @property
     def _everyone(self) -> list[Turns]:
@@ -154,16 +155,17 @@ class Loop:
             self._work(task, task.measure_kernel, spare=True)
         return task is not None
 
-    def _foresee(self) -> bool:
+    def _foresee(self, idle: bool) -> bool:
         """Whether another kernel could be handed to a compiler which is free; one at a time, as others may soon have
         something for it that is needed more."""
-        soon = self._soon.left_s is None and bool(self._scenes)
-        if soon:
-            self._soon.prepare([self._scenes.popleft()])
-        key = next(self._foreseen, None) if self._spare.left_s is None else None
-        if key is not None:
-            self._spare.prepare([key])
-        return soon or key is not None
+        waiting = self._scenes or (self._sliders if idle else None)
+        soon = waiting.popleft() if waiting and self._soon.left_s is None else None
+        if soon is not None:
+            self._soon.prepare([soon])
+        spare = next(self._foreseen, None) if self._spare.left_s is None else None
+        if spare is not None:
+            self._spare.prepare([spare])
+        return soon is not None or spare is not None
 
     def _crowded(self) -> bool:
         return sum(each.awaited for each in self._everyone) > 1
@@ -196,6 +198,7 @@ class Loop:
             task.update(message)
         elif isinstance(message, Foresee):
             self._scenes.append(begin_key(message))
+            self._sliders += slider_keys(message)
         elif isinstance(message, EvaluateBsdf):
             self._questions[message.task] = BsdfTask(self._context, message)
         elif isinstance(message, Drop) and message.task in self._questions:

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 from gpu import RenderSettings, Steps, apply_edit, picture_bytes, scene_bytes
-from gpu.precompile import kernel_keys
+from gpu.precompile import fallback, kernel_keys
 from service.rendering.ipc.messages import Foresee, Update
 from service.rendering.worker.device.resolution_ladder import ResolutionLadder
 from service.rendering.worker.payloads import scene_arrays, updated_scene
@@ -104,6 +104,12 @@ def begin_key(foreseen: Foresee) -> KernelKey:
     """The key of the kernel with which a stream begins a scene."""
     arrays, settings = scene_arrays(foreseen.scene), RenderSettings(**foreseen.settings)
     return kernel_keys.kernel_key(arrays, settings, kernel_keys.flags(arrays, True))
+
+
+def slider_keys(foreseen: Foresee) -> list[KernelKey]:
+    """The keys of the kernels with which the first touch of any of its sliders is shown."""
+    arrays, settings = scene_arrays(foreseen.scene), RenderSettings(**foreseen.settings)
+    return fallback.superset_keys(arrays, settings, fallback.superset(arrays))
 
 
 def kernel_request(

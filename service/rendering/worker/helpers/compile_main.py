@@ -28,7 +28,7 @@ IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler 
 LOCKS: dict[Priority, str] = {"now": ".lock", "soon": ".soon", "spare": ".spare"}  # endings of the files
 LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
 SPARE_IDLE_S = 5.0  # ... where kernels come seldom
-SOON_NICENESS = 5  # steps above the renderer's: beside tracing on all cores it gets a quarter of one
+SOON_NICENESS = 2  # steps above the renderer's: beside tracing on two cores it gets half of one
 
 
 def main() -> int:
