@@ -1,5 +1,6 @@
 """First frames at the socket of a real server whose caches are empty: every slider of every built-in scene, the
-change to that scene, and the thumbnail of each material preset.
+change to that scene, and the thumbnail of each material preset. Then the change to each scene on a server that was
+left alone until it had compiled what it foresees.
 """
 
 from __future__ import annotations
@@ -8,6 +9,7 @@ import json
 import tempfile
 import time
 from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 from urllib.request import Request, urlopen
 
@@ -18,6 +20,8 @@ from service.bench.sliders import sliders
 GOLDEN = 0.618  # no value comes twice
 THUMBNAIL = {"width": 256, "height": 256, "max_samples": 16, "denoise": True, "seed": 1}
 PATIENCE_S = 120.0
+QUIET_S = 20.0  # without a new kernel: none of those that are foreseen takes as long
+LONGEST_S = 600.0
 
 Row = dict[str, Any]
 
@@ -29,6 +33,9 @@ def measure(scenes: Sequence[str], told: Callable[[str], None], moves: int) -> R
     for name in scenes:
         told(f"first frames of {name}")
         rows.append(_scene(name, moves))
+    told("changes of scene, foreseen")
+    for row, change_ms in zip(rows, _foreseen_changes(scenes), strict=True):
+        row["change_foreseen_ms"] = change_ms
     told("thumbnails")
     return {"scenes": rows, "thumbnails": _thumbnails()}
 
@@ -36,8 +43,7 @@ def measure(scenes: Sequence[str], told: Callable[[str], None], moves: int) -> R
 def _scene(name: str, moves: int) -> Row:
     """The scene is shown twice, after the editor's first one: what it needs is compiled at the first time. Then each
     slider is moved, at once after the one before it."""
-    others = [entry["name"] for entry in presets.names("scenes") if entry["name"] != name]
-    before = presets.DEFAULT_SCENE if name != presets.DEFAULT_SCENE else others[0]
+    before = _another(name)
     with (
         tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder,
         latency.server(folder) as (port, began),
@@ -56,6 +62,34 @@ def _scene(name: str, moves: int) -> Row:
             row["sliders"][slider.name] = [editor.change(slider.patch(document, share)) for share in shares]
             editor.change(slider.restore(document))
     return row
+
+
+def _another(name: str) -> str:
+    """A built-in scene that a client changes from: the editor's first one, where that is another."""
+    if name != presets.DEFAULT_SCENE:
+        return presets.DEFAULT_SCENE
+    return next(entry["name"] for entry in presets.names("scenes") if entry["name"] != name)
+
+
+def _foreseen_changes(scenes: Sequence[str]) -> list[float]:
+    """The change to each scene, once the server has compiled what it foresees."""
+    with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, latency.server(folder) as (port, began):
+        _wait_for_quiet(Path(folder, "sunbox", "kernels"))
+        with latency.open_stream(port) as stream:
+            editor = latency.Editor(port, stream, _another(scenes[0]))
+            editor.start(began)
+            return [editor.show(name) for name in scenes]
+
+
+def _wait_for_quiet(records: Path) -> None:
+    """Return when no kernel was recorded for some time."""
+    began = changed = time.monotonic()
+    count = 0
+    while time.monotonic() - changed < QUIET_S and time.monotonic() - began < LONGEST_S:
+        time.sleep(1)
+        found = len(list(records.glob("*"))) if records.exists() else 0
+        if found != count:
+            count, changed = found, time.monotonic()
 
 
 def _thumbnails() -> list[Row]:
@@ -85,8 +119,9 @@ def percentiles(times: Sequence[float]) -> tuple[float, float, float]:
 
 
 def table(document: Row) -> str:
-    """A row for each scene: the change to it, all moves of its sliders, the first move of each, the worst slider."""
-    heads = ["change", "again", "sliders", "p50", "p95", "max", "first p95", "max"]
+    """A row for each scene: the change to it, cold, again and foreseen; all moves of its sliders, the first move of
+    each, the worst slider."""
+    heads = ["change", "again", "foreseen", "sliders", "p50", "p95", "max", "first p95", "max"]
     lines = [f"{'first frames, ms':20}" + "".join(f"{head:>10}" for head in heads) + "  worst slider, by its median"]
     for row in document["scenes"]:
         found = row["sliders"]
@@ -94,7 +129,8 @@ def table(document: Row) -> str:
         first = percentiles([times[0] for times in found.values()])
         medians = {name: percentiles(times)[0] for name, times in found.items()}
         worst = max(medians, key=lambda name: medians[name])
-        figures = [row["change_ms"], row["change_again_ms"], len(found), *everything, *first[1:]]
+        changes = [row[f"change_{which}ms"] for which in ("", "again_", "foreseen_")]
+        figures = [*changes, len(found), *everything, *first[1:]]
         cells = "".join(f"{figure:10.0f}" for figure in figures)
         lines.append(f"{row['name']:20}{cells}  {worst} {medians[worst]:.0f}")
     lines += ["", f"{'thumbnails, ms':20}" + "".join(f"{head:>10}" for head in ("p50", "p95", "max"))]
