@@ -14,6 +14,7 @@ from service.pack.edits.cache import CacheBudget, PackCache
 from service.pack.edits.scene_delta import scene_delta
 from service.pack.geometry.scene_bvh import warm_builder
 from service.pack.lights.environment_blur import CUBE_FACES
+from service.pack.lights.light_bounds import warm_light_tree
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
 from service.pack.scene import Packed, pack, pack_material
@@ -33,4 +34,5 @@ __all__ = [
     "repacked",
     "scene_delta",
     "warm_builder",
+    "warm_light_tree",
 ]

@@ -9,7 +9,7 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from service.pack import Packed, warm_builder
+from service.pack import Packed, warm_builder, warm_light_tree
 from service.problems import ServiceError, Unavailable
 from service.rendering.executors import packing
 from service.rendering.ipc.messages import Failed, Foresee, Frame, FromRenderer, StopRule, Update, View, Want
@@ -64,7 +64,8 @@ async def warm_up(renderers: Renderers, reader: RequestReader, document: Any, ot
         return
     log.info("warmed up seconds=%.2f", time.monotonic() - began)
     await packing(warm_builder)
-    log.info("loaded the builder seconds=%.2f", time.monotonic() - began)
+    await packing(warm_light_tree)
+    log.info("loaded the builders seconds=%.2f", time.monotonic() - began)
     try:
         await _foresee(renderers, reader, others, settings.for_gpu())
     except ServiceError as error:

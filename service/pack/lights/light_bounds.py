@@ -134,6 +134,15 @@ def grow_light_tree(
     return cache.get(key, lambda: make(bounds(lights, shapes, sides))).with_share(share)
 
 
+def warm_light_tree() -> None:
+    """Load the compiled code of the builder of light trees, or compile it: the first scene with several lamps would
+    wait 0.07 s or some seconds for it."""
+    from gpu.accel.light_tree import build
+
+    b = LightBounds(MANY)
+    build(b.low, b.high, b.radius, b.axis, b.normals, b.beyond, np.ones(MANY, np.float32), 1.0, 1.0)
+
+
 def _content(lights: np.ndarray, shapes: Mapping[ShapeKind, np.ndarray], sides: np.ndarray) -> list[Hashable]:
     """Keys that are equal where `bounds` are."""
     kinds = lights["kind"]

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import subprocess
+import sys
+
 import numpy as np
 import pytest
 
@@ -290,3 +293,29 @@ def test_each_light_and_each_way_to_pass_raises_its_flag():
     assert raised(grey={"alpha": 0.5}) == {"HAS_OPACITY"}
     assert raised(grey={"alpha": 0.5, "alpha_cutoff": 0.5}) == set()
     assert raised(lamp={"emission_sides": "both"}) == {"HAS_EMISSION_BOTH"}
+
+
+WARMED = """
+from numba.core.registry import CPUDispatcher
+from gpu.accel import light_tree, light_tree_build, light_tree_clusters
+from service.pack import pack, warm_light_tree
+from service.scene import parse_scene
+def compiled():
+    modules = (light_tree, light_tree_build, light_tree_clusters)
+    found = [each for module in modules for each in vars(module).values() if isinstance(each, CPUDispatcher)]
+    return sum(len(each.signatures) for each in found)
+warm_light_tree()
+warm = compiled()
+lamps = [{"type": "point", "position": [i, 2, i % 7], "intensity": 4} for i in range(300)]
+scene = {"version": 1, "camera": {"position": [0, 0, 5], "target": [0, 0, 0]}, "lights": lamps,
+    "materials": {"a": {"type": "diffuse", "albedo": 0.5, "emission": 2}},
+    "shapes": [{"type": "box", "min": [0, 0, 0], "max": [1, 1, 1], "material": "a"}]}
+assert len(pack(parse_scene(scene), None).arrays.light_tree)
+print(warm, compiled())
+"""
+
+
+def test_the_first_lamps_find_the_builder_warm():
+    done = subprocess.run([sys.executable, "-c", WARMED], capture_output=True, text=True, check=True)
+    warm, after = map(int, done.stdout.split())
+    assert warm == after > 0
