@@ -12,6 +12,7 @@ import time
 import urllib.request
 from collections.abc import Callable, Iterator
 from pathlib import Path
+from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, BrowserContext, Page, sync_playwright
@@ -86,7 +87,13 @@ def mortal(gpu: Renderer, tmp_path: Path) -> Iterator[MortalServer]:
     served.stop()
 
 
-@pytest.fixture(scope="module")
+def _as_long_as_possible(*, fixture_name: str, config: pytest.Config) -> Any:
+    """A scope. Playwright's event loop runs until the browser is closed, and tests outside of this folder that come
+    after it could start none of their own."""
+    return "session" if config.option.markexpr == "browser" else "module"
+
+
+@pytest.fixture(scope=_as_long_as_possible)
 def browser() -> Iterator[Browser]:
     if CHROMIUM is None:
         if os.environ.get("CI"):
