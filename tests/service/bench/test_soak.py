@@ -58,7 +58,6 @@ def test_who_gets_further_is_not_stuck() -> None:
     assert tally.still_s(threading.get_ident(), began) < 100.0 <= tally.still_s(None, began)
 
 
-@pytest.mark.calm
 def test_a_short_soak_with_restarts(gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The long form has 20 restarts and 1 000 renders."""
     monkeypatch.setattr(soak_restarts, "LONG_SAMPLES", 100)
