@@ -30,7 +30,7 @@ from tests.hostile import mutated_bytes, mutated_document, mutated_json
 from tests.serving import Server, client
 
 DOCUMENTS = int(os.environ.get("HOSTILE_DOCUMENTS", 300))
-FILES = int(os.environ.get("HOSTILE_FILES", 100))
+FILES = int(os.environ.get("HOSTILE_FILES", 66))
 EXAMPLES = int(os.environ.get("HOSTILE_EXAMPLES", 8))
 SEED = int(os.environ.get("HOSTILE_SEED", 1))
 CHECKS = [

@@ -11,6 +11,7 @@ import pytest
 from gpu import ESTIMATORS, FILTERS, Renderer, RenderSettings
 from service.pack import pack
 from service.scene import parse_scene
+from tests.extremes.scenes import LONG
 from tests.rendering import Images, assert_estimators_agree, document, picture, render
 
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
@@ -224,9 +225,10 @@ def test_editing_a_scene_equals_making_it_anew(gpu: Renderer) -> None:
     assert not (made.read() == anew.read()).all()
 
 
-def test_a_million_samples_do_not_drift(gpu: Renderer) -> None:
+def test_many_samples_do_not_drift(gpu: Renderer) -> None:
+    """A plain sum in 32 bits is 0.25 % off after these, and 1 % after the million that `make extremes` takes."""
     scene = document([], environment={"type": "constant", "radiance": [0.1, 0.7, 1e-6]})
-    made = picture(gpu, scene, 1 << 20, width=8, height=8, max_bounces=0)
+    made = picture(gpu, scene, 1 << (20 if LONG else 18), width=8, height=8, max_bounces=0)
     expected = np.array([0.1, 0.7, 1e-6], np.float32)
     np.testing.assert_allclose(made.read()[..., :3] / expected, 1, rtol=2e-7)
     assert made.read("variance").max() < 1e-12
