@@ -20,27 +20,22 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
     next.valid = next.scatter.pdf > 0.0 && facing_agrees(wi.z, dot(next.d, here.front));
     path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
     path_extend(next, 1.0, s, rng, path);
-    path_add_emission(1.0, path);
 }
 #endif
 
-// Takes a path on to the first surface that does more; true where the path has ended on the way.
+// Takes a path on to the first surface that does more; false where the path ends on the way.
 bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Material m) {
-#if HAS_MIRRORS
     bool taken;
     do {
-        path.radiance_before = path.radiance;
-        here = interaction_make(path, m);
-        taken = material_is_delta(m) && !here.mapped;
-        if (taken) {
-            delta_chain_step(here, m, rng, path);
-            taken = path.alive && path.bounce < frame.max_bounces;
-        }
-    } while (taken);
-    return !path.alive || path.bounce >= frame.max_bounces;
-#else
-    path.radiance_before = path.radiance;
-    here = interaction_make(path, m);
-    return false;
+        path_trace(rng, path);
+        taken = false;
+        if (path.alive) {
+            here = interaction_make(path, m);
+#if HAS_MIRRORS
+            taken = material_is_delta(m) && !here.mapped;
+            if (taken) delta_chain_step(here, m, rng, path);
 #endif
+        }
+    } while (taken && path.alive);
+    return path.alive;
 }

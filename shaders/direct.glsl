@@ -45,12 +45,14 @@ float direct_weight(LightSample light, float found_pdf) {
     return weight;
 }
 
-// The weight of emission that the path has found by chance; `context` is that of the surface where it came from.
-float direct_found_weight(LightContext context, Path path) {
+// The weight of emission that the path has found by chance.
+float direct_found_weight(Path path) {
     float weight = path.counts ? 1.0 : 0.0;
 #if HAS_EMISSION && ESTIMATOR == ESTIMATOR_MIS
-    float light_pdf = lights_pdf(path.at.light, path.hit, path.at, context, path.d);
-    if (path.at.light != NONE) weight = power_heuristic(path.found_pdf, light_pdf);
+    if (path.at.light != NONE && path.found_pdf < PDF_DELTA) {
+        float light_pdf = lights_pdf(path.at.light, path.hit, path.at, path.lit, path.d);
+        weight = power_heuristic(path.found_pdf, light_pdf);
+    }
 #endif
     return weight;
 }

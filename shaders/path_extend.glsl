@@ -1,16 +1,20 @@
-// A path, and its step from the surface where it is scattered to the next hit.
+// A path: the ray that it is about to follow, what that ray meets, and the step from a surface to the next ray.
 struct Path {
+    vec3 o;               // the ray that comes next, or came last
     vec3 d;
-    Hit hit;              // what d meets; hit.id is NONE where it meets nothing
-    SurfacePoint at;      // there
+    Hit hit;              // what it meets; hit.id is NONE where it meets nothing
+    SurfacePoint at;      // there; before the ray is traced: where it begins
     vec3 throughput;
     vec3 radiance;        // found so far
     vec3 radiance_before; // found before the last bounce
+    float alpha;          // 1 where the camera sees a surface, or a background that is shown
     uint bounce;
-    bool alive;           // there is a surface to scatter at
+    bool alive;           // there is a ray to follow, and after that a surface to scatter at
     // Light that is found along d is weighted by d's density per solid angle; `counts` says whether it is added at all.
+    // `lit` is the surface where d begins, as its lights were sampled.
     float found_pdf;
     bool counts;
+    LightContext lit;
     // The path has left the scene. It does so at most once, so that light from infinity is added once, by path_finish,
     // when all neighbouring lanes have ended, too.
     bool escaped;
@@ -44,21 +48,11 @@ void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
     }
 }
 
-// Finds what the ray from o meets.
-void path_trace(vec3 o, uint skip, Sampler rng, inout Path path) {
-    path.hit.id = NONE;
-#if HAS_OPACITY
-    if (path.alive) path.hit = transparency_nearest(o, path.d, skip, path.bounce, rng, path.at);
-#else
-    if (path.alive) path.hit = shapes_nearest(o, path.d, skip);
-    path.at = shapes_point(path.hit, o, path.d);
-#endif
-}
-
-// Takes the path on to the nearest surface in the direction `next`. Where a light is sampled 1 / share times
-// (direct.glsl), the density of finding it by chance counts only that share.
+// Takes the path on in the direction `next`. Where a light is sampled 1 / share times (direct.glsl), the density of
+// finding it by chance counts only that share.
 void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Path path) {
     path.alive = next.valid;
+    path.o = shapes_leave(path.at, next.d);
     path.d = next.d;
     path.found_pdf = next.is_delta ? PDF_DELTA : share * next.scatter.pdf;
     path.counts = ESTIMATOR != ESTIMATOR_LIGHT || next.is_delta;
@@ -73,23 +67,6 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     path.bounce++;
     path_roulette(rng, pair, reach, path);
     path.eta_scale = facing_eta_scale(path.eta_scale, next.side, s, 0.0);
-    path_trace(shapes_leave(path.at, next.d), path.at.flat_id, rng, path);
-    path.throughput *= medium_share(path.medium, path.hit.t);
-    bool met = path.hit.id != NONE;
-    path.escaped = path.alive && !met && path.counts;
-    path.alive = path.alive && met;
-}
-
-// Adds the ambient light of the surface that the path has come to, and its emission times `weight`.
-void path_add_emission(float weight, inout Path path) {
-#if HAS_EMISSION
-    vec3 arriving = arriving_emission(path.at, path.d) * weight * path.eta_scale;
-    if (path.alive) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
-#endif
-#if HAS_AMBIENT
-    vec3 ambient = arriving_ambient(path.at) * path.eta_scale;
-    if (path.alive) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u);
-#endif
 }
 
 // Adds the light from infinity, where the path has left the scene.

@@ -61,13 +61,9 @@ void main() {
     uint i = 0u;
     do {
         vec3 o, d;
-        SurfacePoint at;
         Sampler rng = sobol_begin(pixel, first + i, replicate);
         camera_ray(pixel, rng, o, d);
-        Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
-        Path path;
-        float alpha = path_begin(d, hit, at, medium, path);
-        add(vec4(path_radiance(rng, path), alpha));
+        add(path_radiance(rng, o, d, medium));
         if (path_was_cut) break; // the driver has ended this loop as well
     } while (++i < count);
     if (i < count) atomicAdd(path_cut, count - i);
