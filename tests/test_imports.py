@@ -10,6 +10,8 @@ from pathlib import Path
 
 import pytest
 
+from tests.conftest import LONG_FILES, TESTS
+
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((*ROOT.glob("gpu/**/*.py"), *ROOT.glob("service/**/*.py")))
 FOLDERS = sorted({path.parent for path in MODULES})
@@ -243,3 +245,7 @@ def test_lobe_light_or_shape_includes_no_sibling(path: Path) -> None:
         assert not included.startswith(f"{folder}/") and (path.parent / included).exists() is False, (
             f"{path.relative_to(ROOT)} includes its sibling {included}"
         )
+
+
+def test_the_long_test_files_are_there() -> None:
+    assert not [name for name in LONG_FILES if not (TESTS / name).exists()]

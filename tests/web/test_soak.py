@@ -15,7 +15,7 @@ from service.bench import soak_page
 from service.bench.soak_server import Server, resident
 from service.bench.soak_tally import Tally
 
-SECONDS = 6.0
+SECONDS = 4.0
 
 
 @pytest.mark.calm  # it counts what a hand gets done
