@@ -41,13 +41,15 @@ ENDLESS = {"width": 32, "height": 24, "max_samples": 1 << 24}
 
 
 class Server:
-    """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one."""
+    """`sunbox serve` on a free port, with its data in `folder`. `python` starts it, in the place of this one; with
+    `warms` set to False it does nothing ahead of its first client."""
 
-    def __init__(self, folder: Path, *, python: Sequence[str] = (), **variables: str) -> None:
+    def __init__(self, folder: Path, *, python: Sequence[str] = (), warms: bool = True, **variables: str) -> None:
         self.log = folder / "server.log"
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
         environment |= {"SUNBOX_DATA_DIR": str(folder / "data"), **variables}
-        command = [*(python or [sys.executable]), "-m", "service.cli", "serve", "--port", "0"]
+        program = "service.cli" if warms else "tests.unwarmed"
+        command = [*(python or [sys.executable]), "-m", program, "serve", "--port", "0"]
         with self.log.open("wb") as log:
             self.process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
         assert self.process.stdout is not None

@@ -10,6 +10,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, suppress
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -18,28 +19,30 @@ import pytest
 
 from gpu import Renderer
 from service.database import FILE
-from tests.serving import ENDLESS, SCENE, SMALL, Server
+from tests.serving import ENDLESS, SCENE, SMALL
+from tests.serving import Server as AnyServer
 
+Server = partial(AnyServer, warms=False)
 OFTEN = {"SUNBOX_CHECKPOINT_S": "0.1", "SUNBOX_MAX_RUNNING": "1"}
 LONG = {"width": 96, "height": 96, "max_samples": 1500, "seed": 3}
 ANNA, BERT = {"authorization": "Bearer anna"}, {"authorization": "Bearer bert"}
 
 
-def start(server: Server, settings: Any = SMALL, headers: Any = None, **more: Any) -> str:
+def start(server: AnyServer, settings: Any = SMALL, headers: Any = None, **more: Any) -> str:
     body = {"scene": SCENE, "settings": settings, **more}
     return str(server.http.post("/v1/renders", json=body, headers=headers).raise_for_status().json()["id"])
 
 
-def status(server: Server, id: str, wait: float = 0) -> dict[str, Any]:
+def status(server: AnyServer, id: str, wait: float = 0) -> dict[str, Any]:
     found: dict[str, Any] = server.http.get(f"/v1/renders/{id}", params={"wait": wait}).raise_for_status().json()
     return found
 
 
-def pixels(server: Server, id: str, aov: str = "color") -> bytes:
+def pixels(server: AnyServer, id: str, aov: str = "color") -> bytes:
     return server.http.get(f"/v1/renders/{id}/image?format=npy&aov={aov}").raise_for_status().content
 
 
-def until_samples(server: Server, id: str, samples: int) -> dict[str, Any]:
+def until_samples(server: AnyServer, id: str, samples: int) -> dict[str, Any]:
     by = time.monotonic() + 60
     while (found := status(server, id))["samples"] < samples:
         assert time.monotonic() < by and found["state"] in ("queued", "running"), found
@@ -54,7 +57,7 @@ def until_checkpoint(folder: Path, id: str) -> None:
         time.sleep(0.02)
 
 
-def kill(server: Server) -> None:
+def kill(server: AnyServer) -> None:
     """The server and all its processes at once, which cannot know."""
     for pid in [server.process.pid, *server.children()]:
         with suppress(ProcessLookupError):
@@ -64,7 +67,7 @@ def kill(server: Server) -> None:
 
 
 @pytest.fixture(scope="module")
-def undisturbed(server: Server) -> bytes:
+def undisturbed(server: AnyServer) -> bytes:
     """The picture of LONG from a server that nobody kills."""
     id = start(server, LONG)
     assert status(server, id, 60)["state"] == "done"
@@ -141,20 +144,20 @@ def test_time_counts_while_the_server_is_down(tmp_path: Path) -> None:
 
 
 @pytest.fixture(scope="module")
-def keyed(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Server]:
+def keyed(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[AnyServer]:
     served = Server(tmp_path_factory.mktemp("lasting"), SUNBOX_API_KEY="anna,bert")
     served.wait()
     yield served
     assert served.stop() == 0
 
 
-def submit(server: Server, key: str | None, body: Any, headers: Any = ANNA) -> httpx.Response:
+def submit(server: AnyServer, key: str | None, body: Any, headers: Any = ANNA) -> httpx.Response:
     sent = {**headers, "content-type": "application/json"} | ({} if key is None else {"idempotency-key": key})
     text = body if isinstance(body, str) else json.dumps(body)
     return server.http.post("/v1/renders", content=text, headers=sent)
 
 
-def test_an_idempotency_key_gives_one_render(keyed: Server) -> None:
+def test_an_idempotency_key_gives_one_render(keyed: AnyServer) -> None:
     body = {"scene": SCENE, "settings": SMALL, "priority": 1}
     answers: list[httpx.Response] = []
     threads = [threading.Thread(target=lambda: answers.append(submit(keyed, "once", body))) for _ in range(4)]
@@ -173,7 +176,7 @@ def test_an_idempotency_key_gives_one_render(keyed: Server) -> None:
     assert submit(keyed, None, body).json()["id"] != id
 
 
-def test_only_an_accepted_request_takes_a_key(keyed: Server) -> None:
+def test_only_an_accepted_request_takes_a_key(keyed: AnyServer) -> None:
     body = {"scene": SCENE, "settings": SMALL}
     assert submit(keyed, "later", {**body, "settings": {"width": 0}}).status_code == 422
     assert submit(keyed, "later", body).status_code == 202
@@ -193,12 +196,12 @@ def test_only_an_accepted_request_takes_a_key(keyed: Server) -> None:
         ({"lable": "x"}, "/lable"),
     ],
 )
-def test_labels_and_priorities_are_checked(keyed: Server, wrong: Any, pointer: str) -> None:
+def test_labels_and_priorities_are_checked(keyed: AnyServer, wrong: Any, pointer: str) -> None:
     answer = submit(keyed, None, {"scene": SCENE, "settings": SMALL, **wrong})
     assert answer.status_code == 422 and [each["pointer"] for each in answer.json()["errors"]] == [pointer]
 
 
-def test_lists_have_pages(keyed: Server) -> None:
+def test_lists_have_pages(keyed: AnyServer) -> None:
     ids = [start(keyed, headers=BERT, label="page") for _ in range(5)]
     start(keyed, headers=BERT, label="pages")
     found, address = [], "/v1/renders?label=page&limit=2"
@@ -216,7 +219,7 @@ def test_lists_have_pages(keyed: Server) -> None:
         assert keyed.http.get(f"/v1/renders?{wrong}", headers=BERT).status_code == 422
 
 
-def events(server: Server, id: str) -> list[tuple[float, str, dict[str, Any]]]:
+def events(server: AnyServer, id: str) -> list[tuple[float, str, dict[str, Any]]]:
     found, name = [], ""
     with server.http.stream("GET", f"/v1/renders/{id}/events", headers=ANNA) as answer:
         assert answer.headers["content-type"].startswith("text/event-stream")
@@ -229,7 +232,7 @@ def events(server: Server, id: str) -> list[tuple[float, str, dict[str, Any]]]:
     return found
 
 
-def test_events_tell_how_far_a_render_is(keyed: Server) -> None:
+def test_events_tell_how_far_a_render_is(keyed: AnyServer) -> None:
     id = start(keyed, {**SMALL, "max_samples": 1 << 24, "time_limit": 1.0}, headers=ANNA)
     told = events(keyed, id)
     assert [name for _, name, _ in told] == ["progress"] * (len(told) - 1) + ["done"]
@@ -244,7 +247,7 @@ def test_events_tell_how_far_a_render_is(keyed: Server) -> None:
     assert events(keyed, endless)[-1][2]["state"] == "cancelled"
 
 
-def test_the_head_of_events_has_an_end(keyed: Server) -> None:
+def test_the_head_of_events_has_an_end(keyed: AnyServer) -> None:
     """Another request over the same connection is answered while the render goes on."""
     id = start(keyed, ENDLESS, headers=ANNA)
     with httpx.Client(base_url=keyed.url, headers=ANNA, limits=httpx.Limits(max_connections=1)) as one:
