@@ -22,6 +22,7 @@ from service.rendering.ipc.messages import Done, Image, Loaded, Read, StopRule, 
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device.loaded_scene import LoadedScene, kernel_request
 from service.rendering.worker.helpers.compile_client import CompileClient, Compiled, records
+from service.rendering.worker.helpers.compile_main import LOCKS
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -333,6 +334,8 @@ def test_a_kernel_outlives_the_renderer_that_wanted_it(gpu: Renderer, arrays: An
         late, helper = await compiled_for(supervisor, arrays)
         pid = supervisor.process_id
         assert pid is not None
+        while not record.with_suffix(LOCKS["now"]).exists():  # it was told what to compile
+            await asyncio.sleep(0.01)
         supervisor.drop(late)
         os.kill(pid, signal.SIGKILL)
         while supervisor.process_id in (pid, None):
