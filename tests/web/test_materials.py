@@ -49,7 +49,7 @@ def test_a_material_is_renamed(editor: Editor) -> None:
     page.fill(name, "type")  # in patches the word means something
     page.keyboard.press("Enter")
     editor.wait("the end of the question", lambda: page.locator("dialog[open]").count() == 0)
-    assert page.input_value("#material") == "type"
+    editor.wait("the new name", lambda: page.input_value("#material") == "type")
     before = editor.settled()
     page.click("#material-presets [data-name=gold]")
     editor.wait_for_change(before)
