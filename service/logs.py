@@ -10,7 +10,7 @@ import time
 import warnings
 from collections.abc import Callable, Iterable, MutableMapping
 from datetime import UTC, datetime
-from secrets import token_urlsafe
+from secrets import token_hex
 from types import TracebackType
 from typing import Any
 
@@ -146,7 +146,7 @@ class Requests:
         if scope["type"] == "lifespan":
             return await self._app(scope, receive, send)
         given = Headers(scope=scope).get("x-request-id", "")
-        id = given if GIVEN_ID.fullmatch(given) else token_urlsafe(ID_BYTES)
+        id = given if GIVEN_ID.fullmatch(given) else token_hex(ID_BYTES)
         began, status = time.perf_counter(), 0
 
         async def sending(message: Message) -> None:

@@ -22,7 +22,7 @@ from service.rendering.jobs.store.record import IdempotencyKey, Order, StoredRen
 from service.rendering.requests.request_parser import ParsedRequest
 from service.state import STARTING_S, AppState, app_state, caller, owner
 
-ID_BYTES = 16  # 128 bits: an id cannot be guessed
+ID_BYTES = 16  # 128 bits: an id cannot be guessed; as hex digits: none of them reads as an option in a shell
 LONGEST_KEY = 200  # characters
 
 _turns: weakref.WeakValueDictionary[tuple[int, str, str], asyncio.Lock] = weakref.WeakValueDictionary()
@@ -82,7 +82,7 @@ async def _submitted(
 async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float) -> Job:
     """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
     packed = await packing(partial(own.reader.pack, parsed.scene), name)
-    id, document = secrets.token_urlsafe(ID_BYTES), parsed.document
+    id, document = secrets.token_hex(ID_BYTES), parsed.document
     order = Order(id, name, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
     return own.job(order, document, packed, time.monotonic() - began)
 

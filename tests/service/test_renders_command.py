@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import threading
 from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
@@ -57,6 +58,7 @@ def test_a_render_from_its_scene_to_its_picture(
 ) -> None:
     """The mesh beside the scene is uploaded, and the picture is the one that the command makes by itself."""
     id = command.submitted(scene, *SHORT, "--seed", 7, "--label", "from a shell", "--priority", 3)
+    assert re.fullmatch("[0-9a-f]{32}", id)  # one that began with a hyphen would be read as an option
     assert command("wait", id)[:2] == (0, "done\n")
     code, out, _ = command("show", id)
     told = json.loads(out)

@@ -21,7 +21,7 @@ log = logging.getLogger(__name__)
 
 class Session:
     def __init__(self, stream: Stream, owner: str) -> None:
-        self.id = secrets.token_urlsafe(ID_BYTES)
+        self.id = secrets.token_hex(ID_BYTES)
         self.owner = owner  # the owner of the key that opened it
         self.stream = stream
         self.connections = 0  # at present; two while one replaces the other
