@@ -25,6 +25,10 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
 
 // Takes a path on to the first surface that does more; false where the path ends on the way.
 bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Material m) {
+#if !(HAS_BVH || HAS_MIRRORS)
+    here = interaction_make(path, m);
+    return true;
+#else
     bool taken;
     do {
         path_trace(rng, path);
@@ -38,4 +42,5 @@ bool delta_chain(Sampler rng, inout Path path, out Interaction here, out Materia
         }
     } while (taken && path.alive);
     return path.alive;
+#endif
 }

@@ -47,7 +47,8 @@ vec4 path_finish(Path path) {
 // The radiance that a path brings to o from the direction d, and its alpha.
 vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
     Path path = path_begin(o, d, medium);
-    do {
+    path_trace_ahead(rng, path);
+    if (path.alive) do {
         Interaction here;
         Material m;
         if (delta_chain(rng, path, here, m)) {
@@ -58,6 +59,7 @@ vec4 path_radiance(Sampler rng, vec3 o, vec3 d, Medium medium) {
             BsdfSample next = bsdf_sample_world(s, here, rng, path.bounce);
             path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
             path_extend(next, share, s, rng, path);
+            path_trace_ahead(rng, path);
         }
     } while (path.alive);
     return path_finish(path);
