@@ -15,6 +15,7 @@ PER_BLUR = (
     4  # texels to one standard deviation at least: bilinear filtering between them errs by less than 1 % of a peak
 )
 REACH = 6  # standard deviations: there the kernel is 2e-8 of its peak, which hides the light of any sun
+LEAST = 1e-14  # of a frequency, which is as much as rounding leaves of it
 # Face -> directions at its middle, along s to the right and along t down, where s and t go from -1 to 1.
 CUBE_FACES = {
     "px": ((1, 0, 0), (0, 0, -1), (0, -1, 0)),
@@ -91,7 +92,9 @@ def _reduced(rows: Iterable[np.ndarray], count: int, shape: tuple[int, int]) -> 
     height, width = shape
     out = np.zeros((height, width, 4))
     for i, row in enumerate(rows):
-        if len(row) != width:
+        if len(row) % width == 0:
+            row = row.reshape(width, -1, 4).sum(axis=1)
+        else:
             total = np.concatenate([np.zeros((1, 4)), np.cumsum(row, axis=0)])
             edge = np.linspace(0, len(row), width + 1)
             left = np.minimum(edge.astype(np.intp), len(row) - 1)
@@ -112,9 +115,11 @@ def _convolved(sums: np.ndarray, blur: float) -> np.ndarray:
     in latitude it is a sum over the rows within reach.
     """
     height, width = sums.shape[:2]
-    spectrum = np.fft.rfft(sums, axis=1)
+    count = _frequencies(width, blur)
+    points = min(width, -(-2 * count // 16) * 16)  # that tell so many frequencies of a kernel apart
+    spectrum = np.fft.rfft(sums, axis=1)[:, :count].view(np.float64)  # (h, count, 4 real and imaginary parts)
     polar = (np.arange(height) + 0.5) * (math.pi / height)
-    around = 2 * np.sin(np.arange(width) * (math.pi / width)) ** 2
+    around = 2 * np.sin(np.arange(points) * (math.pi / points)) ** 2
     reach = math.ceil(REACH * blur / (math.pi / height))
     out = np.empty((height, width, 3), np.float32)
     for i in range((height + 1) // 2):
@@ -123,10 +128,19 @@ def _convolved(sums: np.ndarray, blur: float) -> np.ndarray:
         # 1 - cos of the angle between two directions, in a form that does not cancel.
         apart = 2 * np.sin((polar[i] - near) / 2) ** 2
         apart = apart[:, None] + math.sin(polar[i]) * np.sin(near)[:, None] * around
-        kernel = np.fft.rfft(np.exp(-apart / blur**2), axis=1).real[:, :, None]
+        kernel = np.fft.rfft(np.exp(-apart / blur**2), axis=1).real[:, :count]
         # For the rows below the equator the same kernel serves, upside down.
         mirrored = np.s_[height - last : height - first]
         for row, met in ((i, spectrum[first:last]), (height - 1 - i, spectrum[mirrored][::-1])):
-            light = np.fft.irfft((kernel * met).sum(axis=0), width, axis=0)
+            light = np.fft.irfft(np.einsum("rf,rfc->fc", kernel, met).view(np.complex128), width, axis=0)
             out[row] = light[:, :3] / light[:, 3:]
-    return np.maximum(out, 0)  # light that a transform leaves below 0 is its rounding, 1e-16 of the brightest
+    return np.maximum(out, 0)  # light that a transform leaves below 0 is its rounding, 1e-14 of the brightest
+
+
+def _frequencies(width: int, blur: float) -> int:
+    """How many frequencies about the axis the kernel leaves: those that it takes to LEAST are not computed. They are
+    most at the equator."""
+    around = 2 * np.sin(np.arange(width) * (math.pi / width)) ** 2
+    left = np.fft.rfft(np.exp(-around / blur**2)).real
+    faint = np.flatnonzero(left < LEAST * left[0])
+    return int(faint[0]) if len(faint) else len(left)
