@@ -86,8 +86,7 @@ def test_every_slider_is_foreseen(name: str) -> None:
     late = {
         slider.name
         for slider, request, settings in touches(document)
-        if request.key not in keys
-        and fallback.kernel_key(request.arrays, request.settings, superset) not in keys
+        if request.key not in keys and fallback.kernel_key(request.arrays, request.settings, superset) not in keys
     }
     assert late == set()
 
