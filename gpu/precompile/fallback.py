@@ -6,7 +6,7 @@ one, and it compiles in 1 to 3 s (llvmpipe, the built-in scenes).
 
 The kernel for many scenes has every flag on but those of features that it does not support, and reads the numbers of
 shapes from the frame. So its machine code depends on no scene, only on whether the sides of the environment's map are
-powers of two. It is several times slower than a scene's own, and takes LLVM a minute or two to compile.
+powers of two. It is several times slower than a scene's own, and takes LLVM about a minute to compile.
 """
 
 from __future__ import annotations

@@ -35,8 +35,8 @@ Saving = Annotated[
     bool,
     Query(
         description="Have measured what this render's kernel saves beside the one with everything on. That happens "
-        "once, while nothing is being rendered; the other kernel may have to be compiled for it, in spare time (17 s "
-        "of a core by llvmpipe). Answers bring it from then on."
+        "once, while nothing is being rendered; the other kernel may have to be compiled for it, in spare time (a "
+        "minute and a half of a core by llvmpipe). Answers bring it from then on."
     ),
 ]
 FLOAT_BYTES = 4  # of a number in a layer, as the renderer gives it

@@ -1,5 +1,5 @@
 """What the kernel of one task's picture saves beside the one with everything on: measured when somebody asks, while
-nobody has work. That kernel is compiled (17 s of llvmpipe) by a process that gets what time is left over.
+nobody has work. A process that gets what time is left over compiles that kernel (a minute and a half of llvmpipe).
 """
 
 from __future__ import annotations

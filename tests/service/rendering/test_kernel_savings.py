@@ -32,7 +32,7 @@ FIGURES = ("saving", "sample_s", "full_sample_s", "full_compile_ms")
 
 @pytest.fixture
 def more(monkeypatch: pytest.MonkeyPatch, gpu: Renderer) -> None:
-    """A stand-in for the kernel with everything on, which takes 17 s to compile."""
+    """A stand-in for the kernel with everything on, which takes a minute and a half to compile."""
     raised = features.flags(arrays_of("plain")) | {"HAS_BLINN_PHONG", "HAS_METAL_ROUGH", "HAS_BOXES"}
     monkeypatch.setattr(features, "everything", lambda: raised)
 
