@@ -95,7 +95,7 @@ def _wait_for_quiet(records: Path) -> None:
 def _thumbnails() -> list[Row]:
     """Each preset of a material twice, so that its kernel is there the second time, and once more when the server has
     been left alone, as all that it compiles before takes some of the machine."""
-    rows = []
+    rows = list[Row]()
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, latency.server(folder) as (port, _):
         for name in (entry["name"] for entry in presets.names("materials")):
             scene = thumbnails.scene(presets.get("materials", name))
