@@ -1,4 +1,8 @@
-"""This checkout beside an earlier revision, in turns: their speed, and their error at equal samples."""
+"""This checkout beside an earlier revision, in turns: their speed, and their error at equal samples.
+
+Two processes that run the same kernel differ by up to a tenth of its time, each for as long as it lives. So every
+pair of times comes from a pair of processes of its own.
+"""
 
 from __future__ import annotations
 
@@ -22,13 +26,14 @@ from service.bench import machine
 from service.bench.peers import rel_mse
 from service.bench.scenes import cases
 
+TURNS = 3  # of each process; its time is their median
 SCRIPT = Path(__file__).parent / "compare_run.py"
 
 
 @dataclass(frozen=True)
 class Options:
     revision: str
-    runs: int = 5
+    runs: int = 5  # pairs of processes
     size: int = 512
     samples: int = 8  # of a run that is timed
     error_size: int = 128
@@ -90,9 +95,8 @@ def measure(options: Options, told: Callable[[str], None]) -> dict[str, Any]:
         (folder / "cases.json").write_text(json.dumps(listed))
         for number, case in enumerate(cases()):
             told(f"{case.name}, {case.max_bounces} bounces")
-            with _sides(folder) as sides:
-                row = {"name": case.name, "max_bounces": case.max_bounces}
-                rows.append(row | _compared(number, sides, options))
+            row = {"name": case.name, "max_bounces": case.max_bounces}
+            rows.append(row | _compared(number, folder, options))
     about = {"processor": machine.processor(), "before": commit, "after": machine.commit()}
     return {"machine": about, "scenes": rows}
 
@@ -120,24 +124,40 @@ def _sides(folder: Path) -> Iterator[tuple[Side, Side]]:
         after.close()
 
 
-def _compared(case: int, sides: tuple[Side, Side], options: Options) -> dict[str, Any]:
+def _compared(case: int, folder: Path, options: Options) -> dict[str, Any]:
+    row: dict[str, Any] = {}
     try:
-        runs = [[side.time(case, options.size, options.samples) for side in sides] for _ in range(options.runs)]
+        runs = [_timed(case, folder, options) for _ in range(options.runs)]
+        for key in ("wall", "cpu"):
+            times = [[1e3 * side[f"{key}_s"] / options.samples for side in run] for run in runs]
+            before, after = (statistics.median(column) for column in zip(*times, strict=True))
+            row[f"{key}_ms_per_sample"] = {"before": before, "after": after, "ratio": after / before}
+        with _sides(folder) as sides:
+            return row | _errors(case, sides, options)
     except EOFError:
         return {"failed": "one of the two revisions cannot render it"}
-    row: dict[str, Any] = {}
-    for key in ("wall", "cpu"):
-        times = [[1e3 * side[f"{key}_s"] / options.samples for side in run] for run in runs]
-        before, after = (statistics.median(column) for column in zip(*times, strict=True))
-        ratio = statistics.median(b / a for a, b in times)
-        row[f"{key}_ms_per_sample"] = {"before": before, "after": after, "ratio": ratio}
+
+
+def _timed(case: int, folder: Path, options: Options) -> list[dict[str, float]]:
+    """The seconds of a run of each side, by each clock, in processes that were started for it."""
+    with _sides(folder) as sides:
+        for side in sides:
+            side.time(case, options.size, 1)  # loads the scene and its kernel
+        turns = [[side.time(case, options.size, options.samples) for side in sides] for _ in range(TURNS)]
+    return [
+        {key: statistics.median(turn[key] for turn in each) for key in each[0]} for each in zip(*turns, strict=True)
+    ]
+
+
+def _errors(case: int, sides: tuple[Side, Side], options: Options) -> dict[str, Any]:
     size, count = options.error_size, options.error_samples
     reference = sides[1].picture(case, size, options.reference_samples, 1_000_000)
     pictures = [[side.picture(case, size, count, 1 + seed) for side in sides] for seed in range(options.seeds)]
     errors = np.mean([[rel_mse(picture, reference) for picture in pair] for pair in pictures], axis=0)
-    row["rel_mse"] = {"before": errors[0], "after": errors[1], "ratio": errors[1] / errors[0]}
-    row["same_bits"] = all(np.array_equal(a, b) for a, b in pictures)
-    return row
+    return {
+        "rel_mse": {"before": errors[0], "after": errors[1], "ratio": errors[1] / errors[0]},
+        "same_bits": all(np.array_equal(a, b) for a, b in pictures),
+    }
 
 
 def table(document: dict[str, Any]) -> str:
