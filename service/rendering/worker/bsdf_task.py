@@ -17,6 +17,7 @@ class BsdfTask:
     """Evaluated in slices. Where others would have to wait for its kernel, a helper compiles that first."""
 
     attempted = 0  # there are no generations
+    wanted = False  # there are no frames
 
     def __init__(self, context: WorkerContext, question: EvaluateBsdf) -> None:
         self.number, self.client = question.task, question.client

@@ -8,6 +8,7 @@ import socket
 import time
 from collections import defaultdict, deque
 from collections.abc import Callable, Iterator
+from functools import partial
 
 from gpu import GpuError, KernelKey, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
@@ -112,7 +113,7 @@ class Loop:
                 self._heartbeat.lasted(time.monotonic() - began)
             for task in list(self._tasks.values()):
                 if task.wanted:
-                    self._work(task, task.answer)
+                    self._work(task, partial(self._answer, task))
             busy = any(each.ready for each in self._everyone)
             self._account(at_once=not busy)
             busy = self._foresee(idle=not busy) or busy or self._measure_kernel()
@@ -136,6 +137,10 @@ class Loop:
                 yield message
         except BlockingIOError:
             return
+
+    def _answer(self, task: Task) -> None:
+        if task.answer():
+            self._scheduler.shown(task)
 
     def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None, spare: bool = False) -> None:
         """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:

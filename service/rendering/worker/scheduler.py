@@ -1,11 +1,13 @@
-"""Decides whose turn it is: clients share the GPU equally, and a picture that nobody has seen yet goes first."""
+"""Decides whose turn it is: clients share the GPU equally, and a picture that nobody has seen yet goes first, or one
+that has not been seen for long."""
 
 from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Collection, Hashable
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import NamedTuple, Protocol, TypeVar
+from weakref import WeakKeyDictionary
 
 # How much more than the least served a client may have had and still be preferred for its first frame (s). Without a
 # bound, a slider that never rests starves the others; below some frames' worth, every drag stutters beside a render.
@@ -17,6 +19,9 @@ TURN_S = 0.03  # no lead: the length of an ordinary turn, a slice and the tile t
 # What a client had beyond that lead it owes, and pays back as a surcharge on its turns: this share of each. More than
 # so many seconds it can't owe; then it waits for the others.
 SURCHARGE, MOST_OWED_S = 0.125, 1.0
+# Whoever has waited for a frame for longer than this (s) goes first, up to this share of the device. With equal time
+# alone the costliest scenes of a crowd wait twice as long as the mean one.
+LATE_S, LATE_SHARE = 2.0, 1 / 16
 
 
 @dataclass
@@ -40,6 +45,14 @@ class Account:
         self.counted_s = max(min(self.counted_s, most_s), self.used_s - MOST_OWED_S)
 
 
+class Seen(NamedTuple):
+    """What everybody, a task's client and the task had used of the device when the task's last frame was sent (s)."""
+
+    all_s: float
+    client_s: float
+    task_s: float
+
+
 class Turn(Protocol):
     account: Account  # within its client
     client: str
@@ -51,6 +64,10 @@ class Turn(Protocol):
     @property
     def unseen(self) -> bool:
         """Whether somebody waits for its first frame."""
+
+    @property
+    def wanted(self) -> bool:
+        """Whether somebody waits for its next frame."""
 
 
 T = TypeVar("T", bound=Turn)
@@ -68,6 +85,8 @@ class Scheduler:
         self._now_s = 0.0
         self._waiting: set[Hashable] = set()
         self._ready: dict[str, int] = {}  # tasks, by client, at the last choice
+        self._all_s = 0.0  # that everybody has used
+        self._seen = WeakKeyDictionary[Turn, Seen]()
 
     def choose(self, tasks: Collection[T]) -> T | None:
         ready: dict[str, list[T]] = defaultdict(list)
@@ -82,15 +101,31 @@ class Scheduler:
         within = self._now_s + FIRST_FRAME_LEAD_S
         first = [task for tasks in ready.values() for task in tasks if task.unseen]
         eager = {task.client for task in first if accounts[task.client].used_s <= within}
-        client = min(eager or ready, key=lambda name: accounts[name].counted_s)
+        late = {} if eager else {name: max(map(self._late_s, tasks)) for name, tasks in ready.items()}
+        client = min(eager or ready, key=lambda name: (-late.get(name, 0.0), accounts[name].counted_s))
         candidates = [task for task in ready[client] if task.unseen] if eager else ready[client]
-        return min(candidates, key=lambda task: task.account.counted_s)
+        return min(candidates, key=lambda task: (-self._late_s(task, within=True), task.account.counted_s))
+
+    def shown(self, task: Turn) -> None:
+        """Somebody has got a frame of it."""
+        self._seen[task] = Seen(self._all_s, self._accounts[task.client].used_s, task.account.used_s)
+
+    def _late_s(self, task: Turn, within: bool = False) -> float:
+        """How long it has waited for its next frame; 0 where that is not long, or where its client, or `within` its
+        client the task, has had so much since that others go first."""
+        seen = self._seen.get(task)
+        if seen is None or not task.wanted:
+            return 0.0
+        waited_s = self._all_s - seen.all_s
+        used_s = task.account.used_s - seen.task_s if within else self._accounts[task.client].used_s - seen.client_s
+        return waited_s if waited_s > LATE_S and used_s < LATE_SHARE * waited_s else 0.0
 
     def sharers(self, client: str) -> int:
         """The number of equal shares into which the last choice parted the device, for a task of this client."""
         return max(1, len(self._ready) * self._ready.get(client, 1))
 
     def charge(self, task: Turn, seconds: float) -> None:
+        self._all_s += seconds
         task.account.charge(seconds)
         self._accounts[task.client].charge(seconds)
 

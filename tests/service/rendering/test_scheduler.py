@@ -15,6 +15,7 @@ from service.rendering.worker.helpers.denoise_client import DenoiseClient
 from service.rendering.worker.scheduler import (
     CATCH_UP_S,
     FIRST_FRAME_LEAD_S,
+    LATE_S,
     MOST_OWED_S,
     Account,
     Scheduler,
@@ -29,6 +30,7 @@ from tests.serving import SCENE
 class Turn:
     ready: bool = True
     unseen: bool = False
+    wanted: bool = False
     account: Account = field(default_factory=Account)
     client: str = ""
 
@@ -123,21 +125,66 @@ class Stream(Turn):
         return took_s
 
 
-@pytest.mark.parametrize("one_key", [False, True])
-def test_nobody_waits_long_among_thirty_two_streams(one_key: bool) -> None:
-    """By a simulated clock: they come one after the other, and every fifth one loads a kernel."""
-    scheduler, clock_s, streams = Scheduler(), 0.0, list[Stream]()
+def simulated(streams: list[Stream], frames_s: list[float], loads: bool = True) -> list[float]:
+    """The longest wait of each in a minute, by a simulated clock: they come one after the other, with frames that
+    take so long in turn, and every fifth one loads a kernel."""
+    scheduler, clock_s, here = Scheduler(), 0.0, 0
     while clock_s < 60.0:
-        while len(streams) < 32 and clock_s >= 0.02 * len(streams):
-            streams.append(Stream(client="key" if one_key else ""))
-            streams[-1].begin(clock_s, 0.4 if len(streams) % 5 == 1 else 0.02, 0.08)
-        stream = scheduler.choose(streams)
+        while here < len(streams) and clock_s >= 0.02 * here:
+            streams[here].begin(clock_s, 0.4 if loads and here % 5 == 0 else 0.02, frames_s[here % len(frames_s)])
+            here += 1
+        stream = scheduler.choose(streams[:here])
         assert stream is not None
         took_s = stream.turn(clock_s)
         scheduler.charge(stream, took_s)
         clock_s += took_s
-    waits = [max(stream.longest_s, clock_s - stream.shown_at) for stream in streams]
+        if stream.shown_at == clock_s:
+            scheduler.shown(stream)
+    return [max(stream.longest_s, clock_s - stream.shown_at) for stream in streams]
+
+
+@pytest.mark.parametrize("frames_s", [[0.08], [0.06, 0.08, 0.1, 0.16]], ids=["equal", "unequal"])
+@pytest.mark.parametrize("one_key", [False, True])
+def test_nobody_waits_long_among_thirty_two_streams(one_key: bool, frames_s: list[float]) -> None:
+    waits = simulated([Stream(client="key" if one_key else "", wanted=True) for _ in range(32)], frames_s)
     assert max(waits) <= 5.0, sorted(waits)
+
+
+def test_large_pictures_get_no_more_time_than_others() -> None:
+    """Where a few share the device, whose frames are late makes no difference."""
+    streams = [Stream(wanted=True) for _ in range(4)]
+    simulated(streams, [8.0, 0.06, 0.06, 0.06], loads=False)
+    used_s = [stream.account.used_s for stream in streams]
+    assert max(used_s) < 1.1 * min(used_s)
+
+
+def test_a_late_picture_gets_a_sixteenth_at_most() -> None:
+    streams = [Stream(wanted=True) for _ in range(64)]
+    simulated(streams, [8.0, *63 * [0.02]], loads=False)
+    used_s = [stream.account.used_s for stream in streams]
+    assert max(used_s) == used_s[0] < 60.0 * (1 / 16 + 1 / 64)
+
+
+def test_a_key_with_many_late_streams_takes_nothing_from_another() -> None:
+    many = [Stream(client="many", wanted=True) for _ in range(31)]
+    one = Stream(client="one", wanted=True)
+    simulated([*many, one], [0.16], loads=False)
+    assert 25.0 < one.account.used_s < 32.0
+
+
+def test_only_who_wants_a_frame_is_late() -> None:
+    scheduler, late, others = Scheduler(), Turn(wanted=True), [Turn() for _ in range(31)]
+    tasks = [late, *others]
+    for task in tasks:
+        scheduler.shown(task)
+        scheduler.charge(task, LATE_S / 16)  # they are all late now, by a share of half a sixteenth
+    scheduler.charge(late, 0.01)
+    assert scheduler.choose(tasks) is late
+    late.wanted = False
+    assert scheduler.choose(tasks) is not late
+    late.wanted = True
+    scheduler.shown(late)
+    assert scheduler.choose(tasks) is not late
 
 
 def test_what_a_long_turn_took_is_paid_back() -> None:

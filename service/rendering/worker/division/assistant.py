@@ -25,7 +25,7 @@ log = logging.getLogger(__name__)
 class Assistant:
     """Has turns like a task: applies updates, traces a slice of the oldest lease, and sends its result."""
 
-    unseen = False  # nobody looks at it
+    unseen = wanted = False  # nobody looks at it
 
     def __init__(self, context: WorkerContext, number: int, client: str = "") -> None:
         self.number, self.client = number, client
