@@ -120,8 +120,9 @@ class SceneArrays:
         return self.light_tree if len(self.light_tree) else np.zeros((2, 4), np.uint32)
 
 
-class MovedArrays(TypedDict):
-    """The members of `SceneArrays` that say where shapes stand, for a scene in which shapes were moved."""
+class MovedArrays(TypedDict, total=False):
+    """The members of `SceneArrays` that say where shapes and lights are, for a scene in which some are others; those
+    that are not may be missing."""
 
     spheres: np.ndarray
     quads: np.ndarray
@@ -144,12 +145,14 @@ def apply_edit(
     texture_words: np.ndarray | None = None,
     microfacets: np.ndarray | None = None,
     environment: tuple[float, float] | None = None,
+    environment_map: EnvironmentArrays | None = None,
     moved: MovedArrays | None = None,
 ) -> SceneArrays:
     """The arrays after an edit. None leaves a part as it is.
 
     `materials` are as many records as before, `texture_words` their `TextureArrays.words`, `microfacets` the words of
-    the model `microfacet`, `environment` is (rotation, scale). The arrays of `moved` have the same lengths as before,
+    the model `microfacet`, `environment_map` is another environment in the place of one, and `environment` its
+    (rotation, scale). The arrays of `moved` have the same lengths as before,
     except that the scene's tree may differ in length where there are instances. Raises ValueError for another number
     of materials.
     """
@@ -164,7 +167,10 @@ def apply_edit(
         changes["textures"] = replace(arrays.textures, words=texture_words)
     if microfacets is not None:
         changes["microfacets"] = microfacets
-    if environment is not None and arrays.environment is not None:
+    lit = arrays.environment if environment_map is None else environment_map
+    if environment is not None and lit is not None:
         rotation, scale = environment
-        changes["environment"] = replace(arrays.environment, rotation=rotation, scale=scale)
+        lit = replace(lit, rotation=rotation, scale=scale)
+    if lit is not arrays.environment:
+        changes["environment"] = lit
     return replace(arrays, **changes)

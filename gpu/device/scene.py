@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import logging
 import math
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from gpu import context as contexts
 from gpu import layout
-from gpu.arrays import MovedArrays, SceneArrays, apply_edit
+from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, apply_edit
 from gpu.device import buffers
 from gpu.device.textures import IMAGE_UNITS, KINDS, TextureCache, bound_textures, linear_texture, placeholder
 from gpu.errors import OutOfMemory
@@ -48,6 +48,18 @@ def upload_tables(context: Any) -> dict[int, Any]:
         texture.repeat_x = texture.repeat_y = texture.repeat_z = False
         out[unit] = texture
     return out
+
+
+class _Environment(NamedTuple):
+    """An environment on the device, and the greatest factor by which it may be brighter."""
+
+    texels: Any
+    cells: Any
+    scale_max: float
+
+    def release(self) -> None:
+        self.texels.release()
+        self.cells.release()
 
 
 def _words(flags: frozenset[str]) -> tuple[str, ...]:
@@ -93,8 +105,7 @@ class Scene:
             self._buffers[slot] = buffers.shared(self._context, slot, self.arrays)
         self._buffers[Slot.MATERIALS] = buffers.upload(self._context, self._materials())
         self._upload_details()
-        self._texels, cells = self._upload_environment()
-        self._buffers[Slot.ENVIRONMENT_CELLS] = buffers.upload(self._context, cells)
+        self._take_environment(self._upload_environment(self.arrays.environment))
 
     def _materials(self) -> np.ndarray:
         """Bytes of all materials, each followed by its slots and uses of textures."""
@@ -132,20 +143,25 @@ class Scene:
         else:
             self._raised = features.flags(self.arrays, self._editing)
 
-    def _upload_environment(self) -> tuple[Any, np.ndarray]:
-        e = self.arrays.environment
+    def _upload_environment(self, e: EnvironmentArrays | None) -> _Environment:
+        """Raises OutOfMemory."""
         texels = np.zeros((1, 1, 4), np.float32)
-        self._scale_max = RADIANCE_MAX
+        scale_max = RADIANCE_MAX
         cells = np.zeros(0, layout.EnvironmentCell.dtype)
         if e is not None:
             texels = np.dstack([e.texels, e.probability]).astype(np.float32)
             cells = e.cells
             peak = float(e.texels.max()) + (max(e.sun.radiance) if e.sun is not None else 0.0)
-            self._scale_max = RADIANCE_MAX / max(peak, 1.0)
+            scale_max = RADIANCE_MAX / max(peak, 1.0)
         height, width = texels.shape[:2]
+        buffer = buffers.upload(self._context, cells)
         texture = self._context.texture((width, height), 4, np.ascontiguousarray(texels), dtype="f4")
         texture.filter = (self._context.NEAREST, self._context.NEAREST)
-        return texture, cells
+        return _Environment(texture, buffer, scale_max)
+
+    def _take_environment(self, lit: _Environment) -> None:
+        self._texels, self._scale_max = lit.texels, lit.scale_max
+        self._buffers[Slot.ENVIRONMENT_CELLS] = lit.cells
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
         """The defines that its kernels are compiled with."""
@@ -172,6 +188,7 @@ class Scene:
         texture_words: np.ndarray | None = None,
         microfacets: np.ndarray | None = None,
         environment: tuple[float, float] | None = None,
+        environment_map: EnvironmentArrays | None = None,
         moved: MovedArrays | None = None,
     ) -> None:
         """Change the parts that `gpu.arrays.apply_edit` describes, and upload nothing else.
@@ -179,18 +196,29 @@ class Scene:
         The caller resets its pictures. Raises OutOfMemory or ValueError, and changes nothing then.
         """
         contexts.use(self._context)
-        arrays = apply_edit(self.arrays, camera, materials, texture_words, microfacets, environment, moved)
+        arrays = apply_edit(
+            self.arrays, camera, materials, texture_words, microfacets, environment, environment_map, moved
+        )
         tables = None
         if microfacets is not None and not np.array_equal(microfacets, self.arrays.microfacets):
             unit = bindings.MICROFACETS_TEXTURE
             tables = linear_texture(self._context, microfacets, *KINDS[unit])
-        if moved is not None:
-            self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
+        lit = self._upload_environment(environment_map) if environment_map is not None else None
+        try:
+            if moved is not None:
+                self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
+        except OutOfMemory:
+            if lit is not None:
+                lit.release()
+            raise
         self.arrays = arrays
         if tables is not None:
             if bindings.MICROFACETS_TEXTURE in self._details:  # else this edit brings the first such material
                 self._details[bindings.MICROFACETS_TEXTURE].release()
             self._details[bindings.MICROFACETS_TEXTURE] = tables
+        if lit is not None:
+            _Environment(self._texels, self._buffers[Slot.ENVIRONMENT_CELLS], 0.0).release()
+            self._take_environment(lit)
         if len(arrays.materials) and (materials is not None or texture_words is not None):
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._raise_flags()

@@ -54,7 +54,7 @@ def test_what_moves_is_uploaded_and_nothing_else(gpu: Renderer, changes: dict[st
     difference = scene_delta(old, new)
     assert difference is not None
     loaded, fresh = gpu.load(old), gpu.load(new)
-    loaded.edit(moved=difference)
+    loaded.edit(moved=difference.moved)
     assert 0 < loaded.uploaded <= sent
     seen = []
     for each in (loaded, fresh):
@@ -87,7 +87,7 @@ def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
     difference = scene_delta(old, new)
     assert difference is not None
     loaded = gpu.load(old)
-    loaded.edit(moved=difference)
+    loaded.edit(moved=difference.moved)
     assert loaded.uploaded == 0
     loaded.release()
 

@@ -1,9 +1,10 @@
-"""The difference between the arrays of two scenes in which shapes stand at other places: what must be uploaded."""
+"""The difference between the arrays of two scenes in which shapes stand at other places, or which another environment
+lights: what must be uploaded."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, cast
+from typing import Any, NamedTuple, cast
 
 import numpy as np
 
@@ -15,20 +16,39 @@ EDITED = ("camera", "materials", "microfacets")  # `Scene.edit` takes these, in 
 SMALL = 1 << 20  # bytes of an array whose contents are compared; a larger one must be the same object
 
 
-def scene_delta(old: SceneArrays, new: SceneArrays) -> MovedArrays | None:
-    """The argument `moved` of `Scene.edit` that leads from one scene to the other; None where no edit does."""
+class SceneDelta(NamedTuple):
+    """Arguments of `Scene.edit`."""
+
+    moved: MovedArrays
+    environment_map: EnvironmentArrays | None  # None: as it is
+
+
+def scene_delta(old: SceneArrays, new: SceneArrays) -> SceneDelta | None:
+    """What leads from one scene to the other, besides the members in EDITED; None where no edit does."""
     if len(old.materials) != len(new.materials) or bool(len(old.light_tree)) != bool(len(new.light_tree)):
         return None
     if not len(new.instances) and not _same(old.nodes, new.nodes):  # in which triangles lie, too
         return None
     for name in (field.name for field in fields(SceneArrays)):
         a, b = getattr(old, name), getattr(new, name)
-        if name in EDITED or name in MANY:
+        if name in EDITED or name in MANY or name == "environment":
             continue
         fits = _as_many(a, b) if name in MOVED else _same(a, b)
         if not fits:
             return None
-    return cast(MovedArrays, {name: getattr(new, name) for name in MOVED})
+    if not _alike(old.environment, new.environment):
+        return None
+    moved = {name: getattr(new, name) for name in MOVED if not _same(getattr(old, name), getattr(new, name))}
+    map_stays = _same(old.environment, new.environment)
+    return SceneDelta(cast(MovedArrays, moved), None if map_stays else new.environment)
+
+
+def _alike(a: EnvironmentArrays | None, b: EnvironmentArrays | None) -> bool:
+    """Whether kernels read both in the same way."""
+    if a is None or b is None:
+        return a is b
+    kinds = [(e.cube, e.sun is None, e.texels.size > 3) for e in (a, b)]
+    return kinds[0] == kinds[1]
 
 
 def _as_many(a: Any, b: Any) -> bool:

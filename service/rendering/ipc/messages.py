@@ -15,7 +15,9 @@ from service.views import DEFAULT_TONE_MAP, Encoding
 BsdfQuestion = Literal["values", "albedo", "terms"]
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 
-EDITS = ("camera", "materials", "texture_words", "microfacets", "environment", "moved")  # what `Scene.edit` takes
+EDITS = (  # what `Scene.edit` takes
+    "camera", "materials", "texture_words", "microfacets", "environment", "environment_map", "moved"
+)  # fmt: skip
 
 
 class SceneData(Protocol):
@@ -95,6 +97,7 @@ class Update:
     texture_words: np.ndarray | None = None
     microfacets: np.ndarray | None = None
     environment: tuple[float, float] | None = None
+    environment_map: object = None  # a gpu.EnvironmentArrays; `environment` comes with it
     moved: Mapping[str, object] | None = None  # a gpu.MovedArrays
     denoise: bool | None = None
     base: int | None = None  # the generation that it changes; without one it is whole
@@ -117,6 +120,8 @@ class Update:
             return replace(later, settings=settings, stop=stop, denoise=denoise)
         names = ("settings", "stop", "denoise", *EDITS)
         values = {name: getattr(later, name) for name in names if getattr(later, name) is not None}
+        if self.moved is not None and later.moved is not None:
+            values["moved"] = {**self.moved, **later.moved}
         return replace(self, generation=later.generation, **values)
 
 

@@ -173,15 +173,16 @@ class EditSession:
             packed = self._reader.pack(new.scene, self._cache)
             arrays = packed.arrays
             self._reader.budget.hold("scenes", self, COPIES * weight(packed))
-            elsewhere = None if old is None else scene_delta(self._arrays, arrays)
+            delta = None if old is None else scene_delta(self._arrays, arrays)
             self._arrays, lit = arrays, arrays.environment
-            if old is None or elsewhere is None:
+            if old is None or delta is None:
                 return replace(update, scene=arrays)
             return replace(
-                update, base=old.generation, moved=elsewhere, camera=arrays.camera, materials=arrays.materials,
+                update, base=old.generation, moved=delta.moved, camera=arrays.camera, materials=arrays.materials,
                 texture_words=None if arrays.textures is None else arrays.textures.words,
                 microfacets=arrays.microfacets if len(arrays.microfacets) else None,
                 environment=None if lit is None else (lit.rotation, lit.scale),
+                environment_map=delta.environment_map,
             )  # fmt: skip
         environment = new.scene.environment
         textures = self._arrays.textures

@@ -140,3 +140,11 @@ def test_updates_are_joined() -> None:
     again = joined.then(Update(1, 4, scene="second", interactive=True))
     assert again == Update(1, 4, "second", {"seed": 1}, StopRule(20), interactive=True)
     assert joined.restarts and not stop.restarts
+
+
+def test_what_two_updates_moved_is_joined() -> None:
+    first = Update(1, 1, environment=(0.0, 1.0), environment_map="dusk", moved={"lights": "a", "nodes": "b"})
+    turned = Update(1, 2, environment=(0.5, 2.0))
+    joined = first.then(turned).then(Update(1, 3, moved={"lights": "c"}))
+    assert joined.moved == {"lights": "c", "nodes": "b"}
+    assert joined.environment_map == "dusk" and joined.environment == (0.5, 2.0)

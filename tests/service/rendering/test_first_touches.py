@@ -39,6 +39,7 @@ class Shown:
         self._take(update)
 
     def _take(self, update: Update) -> None:
+        self.whole = update.scene is not None  # the last update brought all arrays
         scene = updated_scene(update)
         if scene is not None:
             self.arrays, self.flags = scene, kernel_keys.flags(scene, True)
@@ -89,6 +90,18 @@ def test_every_slider_is_foreseen(name: str) -> None:
         if request.key not in keys and fallback.kernel_key(request.arrays, request.settings, superset) not in keys
     }
     assert late == set()
+
+
+@pytest.mark.parametrize("name", [entry["name"] for entry in presets.names("scenes")])
+def test_sliders_of_the_environment_send_no_shapes(name: str) -> None:
+    document = presets.get("scenes", name)
+    shown, whole = Shown(document), set()
+    for slider in sliders(document):
+        if slider.path[0] == "environment":
+            for share in (0.1, 0.618, 0.9):
+                shown.change(slider.patch(document, share))
+                whole |= {slider.name} if shown.whole else set()
+    assert whole == set()
 
 
 def test_a_superset_kernel_depends_on_no_light() -> None:

@@ -129,7 +129,7 @@ def kernel_request(
         same_flags = update.camera is None or kernel_keys.camera_flags(update.camera) == kernel_keys.camera_flags(
             arrays.camera
         )
-        compiled = {"materials", "texture_words", "microfacets", "moved"}
+        compiled = {"materials", "texture_words", "microfacets", "environment_map", "moved"}
         if update.settings is None and same_flags and not edits.keys() & compiled:
             return None
     elif offloaded is not None:
