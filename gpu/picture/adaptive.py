@@ -13,7 +13,7 @@ from gpu.layout import PLAN_AREA as AREA
 from gpu.layout import PLAN_CLASSES as CLASSES
 from gpu.layout.bindings import Slot
 from gpu.picture.sample_plan import DECISIONS, WORDS, SamplePlan, pixels_of, weights_of
-from gpu.picture.schedule import Dispatch, Tile, work_groups
+from gpu.picture.schedule import Dispatch, Tile, mean_rate, resampled, work_groups
 from gpu.picture.tiles import GUESS_S, SLICE_S, USUAL_BOUNCES, usual_pass
 
 _MOST_AREAS = 1 << 14  # of a dispatch
@@ -29,11 +29,10 @@ class Adaptive:
         self._context, self._kernels, self._picture, self._most = context, kernels, size, most
         self.max_bounces = max_bounces
         self._caution = max(1.0, max_bounces / USUAL_BOUNCES)
-        self.cost_s = 0.0  # per sample of a pixel; 0: unknown
         self.rounds = self.chunk = 1  # of the pass under way: how often it comes to an area; samples of an invocation
         self.stops: tuple[int, ...] = DECISIONS
         self._pixels = pixels_of(*size)
-        self._rates = np.zeros(len(self._pixels))  # the same as cost_s, by row of areas
+        self.rates = np.zeros(len(self._pixels))  # by row of areas
         self._areas, self._amounts = np.zeros(0, np.int64), np.zeros(0)  # listed; samples that each gets
         self._turns = np.zeros(1, np.int64)  # where each round ends in the list
         self._plan: SamplePlan | None = SamplePlan(self._pixels)
@@ -41,6 +40,13 @@ class Adaptive:
         self._words = contexts.allocate(context, WORDS.itemsize * count)
         self._counts = contexts.allocate(context, 4 * CLASSES * count)
         self._work = contexts.allocate(context, 4 * _MOST_AREAS)
+
+    @property
+    def cost_s(self) -> float:
+        return mean_rate(self.rates)
+
+    def expect(self, rates: np.ndarray) -> None:
+        self.rates = resampled(rates, len(self.rates))
 
     @property
     def size(self) -> tuple[int, int]:
@@ -103,7 +109,7 @@ class Adaptive:
         # Just decided anew, the plan would have some pixels at a sample that they do not have.
         had = plan.counts if before in DECISIONS else plan.at(before)
         left = (wanted - had).astype(np.int64).max(axis=2).ravel()
-        fits = SLICE_S / (self._rates.max() * AREA * AREA) if self.cost_s else 1
+        fits = SLICE_S / (self.rates.max() * AREA * AREA) if self.cost_s else 1
         self.chunk = max(1, min(most, int(fits)))
         self.rounds = max(1, -(-int(left.max()) // self.chunk))
         turns = [np.flatnonzero(left > turn * self.chunk) for turn in range(self.rounds)]
@@ -120,7 +126,7 @@ class Adaptive:
         end = min(end, row + _MOST_AREAS)
         lines = self._areas[row:end] // columns
         rates = np.where(
-            self._rates[lines] > 0, self._rates[lines], (self.cost_s or GUESS_S * self._caution) * self._caution
+            self.rates[lines] > 0, self.rates[lines], (self.cost_s or GUESS_S * self._caution) * self._caution
         )
         seconds = np.cumsum(self._amounts[row:end] * rates * AREA * AREA)
         fitting = np.searchsorted(seconds, SLICE_S, side="right")
@@ -131,10 +137,9 @@ class Adaptive:
         """Record what a tile has cost: a rise counts at once, a fall little by little, as in `Tiles`."""
         listed = slice(tile[1], tile[1] + tile[3])
         rate = seconds / (AREA * AREA * self._amounts[listed].sum())
-        self.cost_s = rate if self.cost_s == 0 else 0.7 * self.cost_s + 0.3 * rate
         lines = np.unique(self._areas[listed] // self._pixels.shape[1])
-        old = self._rates[lines]
-        self._rates[lines] = np.where(old == 0, rate, np.maximum(rate, 0.7 * old + 0.3 * rate))
+        old = self.rates[lines]
+        self.rates[lines] = np.where(old == 0, rate, np.maximum(rate, 0.7 * old + 0.3 * rate))
 
     def pass_samples(self, samples: int, sharers: int) -> int:
         """The mean number of samples that a pixel gets in the next pass, where `sharers` pictures take turns."""

@@ -140,6 +140,7 @@ class Passes:
             standing = sum(int(str(counts[name])) for name in features.COUNTS)
             samples = samples_at_once(s.max_bounces, standing, len(d.scene.arrays.nodes) // 8)
         self._most_samples = samples  # of an invocation
+        rates = None if self._schedule is None else self._schedule.rates
         if self._schedule is not None:
             self._schedule.release()
             self._schedule = None
@@ -148,6 +149,8 @@ class Passes:
             self._schedule = Adaptive(d.context, self._kernels, size, d.most_pixels, s.max_bounces)
         else:
             self._schedule = Tiles(*size, d.most_pixels, s.max_bounces, samples)
+        if rates is not None:
+            self._schedule.expect(rates)  # by another kernel, but nothing is nearer
         self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples)
 
     def _compile_fully(self) -> None:

@@ -121,6 +121,11 @@ class Picture:
         """Seconds per sample of one pixel, as measured so far; 0 before the first slice."""
         return self._passes.schedule.cost_s
 
+    def expect_costs(self, other: Picture) -> None:
+        """Size the first slices by what the other picture of the scene has cost: without, one that begins with the
+        sky would take what is below for sky as well."""
+        self._passes.schedule.expect(other._passes.schedule.rates)
+
     @property
     def guided(self) -> bool:
         """Whether it holds AOVs of the first hit."""

@@ -6,6 +6,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
+import numpy as np
+
 from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
 
@@ -28,13 +30,32 @@ def work_groups(columns: int, rows: int) -> tuple[int, int]:
     return -(-columns // WORK_GROUP), -(-rows // WORK_GROUP)
 
 
+def mean_rate(rates: np.ndarray) -> float:
+    """The mean over what is known; 0 where nothing is."""
+    known = rates[rates > 0]
+    return float(known.mean()) if len(known) else 0.0
+
+
+def resampled(rates: np.ndarray, count: int) -> np.ndarray:
+    """Rates of another picture of the same scene, for that many parts of this one's height; none stays unknown where
+    any is known."""
+    filled = np.where(rates > 0, rates, mean_rate(rates))
+    parts = (np.arange(count) + 0.5) * (len(filled) / count) - 0.5
+    out: np.ndarray = np.interp(parts, np.arange(len(filled)), filled)
+    return out
+
+
 class Schedule(Protocol):
     """Cuts a pass into tiles of a grid, row by row; each tile is one dispatch."""
 
     stops: tuple[int, ...]  # numbers of samples at which a pass must end
     chunk: int  # samples that an invocation of the pass under way takes
     max_bounces: int
-    cost_s: float  # seconds per sample of a pixel, as measured lately; 0: unknown
+    rates: np.ndarray  # seconds per sample of a pixel, by equal parts of the picture's height; 0: unknown
+
+    @property
+    def cost_s(self) -> float:
+        """Seconds per sample of a pixel, in the mean over the rows that were measured; 0: unknown."""
 
     @property
     def size(self) -> tuple[int, int]:
@@ -56,6 +77,9 @@ class Schedule(Protocol):
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
         """The tile that begins there and takes about SLICE_S."""
+
+    def expect(self, rates: np.ndarray) -> None:
+        """Size the first tiles by the rates of another picture of about the same cost."""
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
         """Record what a tile has cost, to size the next ones."""

@@ -12,7 +12,7 @@ import numpy as np
 
 from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
-from gpu.picture.schedule import Dispatch, Tile, work_groups
+from gpu.picture.schedule import Dispatch, Tile, mean_rate, resampled, work_groups
 
 SLICE_S = 0.008  # seconds of a dispatch: short enough to turn to another client, long beside its overhead
 PASS_S = 0.2  # seconds of a pass, once there are some samples
@@ -46,21 +46,27 @@ class Tiles:
         self._band = band if band * width <= most else max(1, most // width)
         self._most_rows = max(self._band, most // width // self._band * self._band)
         self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
-        self._rates = np.zeros(-(-height // self._band))  # s per sample of a pixel, by band; 0: unknown
-        self.cost_s = 0.0  # the same of late; 0: unknown
+        self.rates = np.zeros(-(-height // self._band))  # by band
         self.stops: tuple[int, ...] = ()
         self._before, self.chunk = 0, 1  # the first sample of the pass under way, and how many it takes
+
+    @property
+    def cost_s(self) -> float:
+        return mean_rate(self.rates)
+
+    def expect(self, rates: np.ndarray) -> None:
+        self.rates = resampled(rates, len(self.rates))
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
         """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
         width, height = self.size
         first = row // self._band
         guess = (self.cost_s or GUESS_S * self._caution) * self._caution
-        pixels = SLICE_S / samples / (self._rates[first] or guess)
+        pixels = SLICE_S / samples / (self.rates[first] or guess)
         rows = min(self._band, height - row)
         if column == 0 and pixels >= self._band * width:
-            left = SLICE_S / samples / (self._band * width) - self._rates[first]
-            for rate in self._rates[first + 1 :]:
+            left = SLICE_S / samples / (self._band * width) - self.rates[first]
+            for rate in self.rates[first + 1 :]:
                 left -= rate or guess
                 if left < 0 or rows + self._band > self._most_rows:
                     break
@@ -73,15 +79,14 @@ class Tiles:
         """Record what a tile has cost: a rise counts at once, a fall little by little."""
         _, y, width, height = tile
         rate = seconds / (width * height * samples)
-        self.cost_s = rate if self.cost_s == 0 else 0.7 * self.cost_s + 0.3 * rate
-        bands = self._rates[y // self._band : -(-(y + height) // self._band)]
+        bands = self.rates[y // self._band : -(-(y + height) // self._band)]
         bands[:] = np.where(bands == 0, rate, np.maximum(rate, 0.7 * bands + 0.3 * rate))
 
     def pass_samples(self, samples: int, sharers: int = 1) -> int:
         """The samples of every pixel to take in the pass after `samples`, so that the smallest tile fits a slice."""
         if samples == 0 or self.cost_s == 0:
             return 1
-        fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
+        fits = int(SLICE_S / (self.rates.max() * self._least * self._band))
         return max(1, min(fits, usual_pass(self.size, self.cost_s, samples, sharers), self._most_samples))
 
     def band_samples(self) -> int:
@@ -89,7 +94,7 @@ class Tiles:
         has time for in a large tile, as small ones cost more."""
         if self.cost_s == 0:
             return 1
-        fits = int(SLICE_S / (self._rates.max() * self._least * self._band))
+        fits = int(SLICE_S / (self.rates.max() * self._least * self._band))
         usual = max(LEAST_A_PASS, int(SLICE_S / (self.cost_s * _LARGE)))
         return max(1, min(fits, usual, self._most_samples))
 

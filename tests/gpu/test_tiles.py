@@ -46,6 +46,43 @@ def test_a_dear_band_gets_small_tiles_and_its_cheap_neighbours_large_ones() -> N
     assert tiles.pass_samples(1000) == 1
 
 
+def test_a_picture_that_begins_with_the_sky_knows_from_a_smaller_one_what_is_below() -> None:
+    small, large, blind = Tiles(64, 64, 1 << 30), Tiles(512, 512, 1 << 30), Tiles(512, 512, 1 << 30)
+    for band in range(4):
+        small.took((0, 16 * band, 64, 16), 1, (1e-8 if band < 2 else 4e-6) * 64 * 16)
+    large.expect(small.rates)
+    worst = {}
+    for name, tiles in (("large", large), ("blind", blind)):
+        row = column = 0
+        worst[name] = 0.0
+        while row < 512:
+            x, y, width, height = tile = tiles.tile(row, column, 1)
+            below = max(0, y + height - max(y, 256)) * width
+            seconds = 4e-6 * below + 1e-8 * (width * height - below)
+            worst[name] = max(worst[name], seconds)
+            tiles.took(tile, 1, seconds)
+            column = (x + width) % 512
+            row = y if column else y + height
+    assert worst["large"] < 2 * SLICE_S < 10 * SLICE_S < worst["blind"]
+
+
+@pytest.mark.parametrize("count", [1, 3, 32])
+def test_rates_of_another_size(count: int) -> None:
+    tiles = Tiles(512, 16 * count, 1 << 30)
+    tiles.expect(np.array([1e-6, 0.0, 3e-6]))  # the middle is unknown: as the mean
+    assert tiles.cost_s == pytest.approx(2e-6) and tiles.rates.min() >= 1e-6 and tiles.rates.max() <= 3e-6
+    tiles.expect(np.zeros(3))
+    assert tiles.cost_s == 0
+
+
+def test_what_a_picture_costs_is_the_mean_of_its_rows() -> None:
+    """And not what was traced last, which may be its sky."""
+    tiles = Tiles(64, 64, 1 << 30)
+    for band in (3, 2, 1, 0):
+        tiles.took((0, 16 * band, 64, 16), 1, (1e-8 if band < 2 else 4e-6) * 64 * 16)
+    assert tiles.cost_s == pytest.approx(2e-6, rel=0.01)
+
+
 @pytest.mark.parametrize("size", [256, 512, 1024, 2048, 4096])
 def test_large_pictures_get_several_samples_a_pass_as_small_ones_do(size: int) -> None:
     """Beginning and ending an invocation costs as much as a third of a sample: a pixel would cost more in those."""

@@ -47,7 +47,10 @@ class ResolutionLadder:
     def picture(self, scale: float) -> Picture:
         if scale not in self._pictures:
             self._pictures[scale] = self._renderer.picture(self._scene, self._sized(scale))
-        return self._pictures[scale]
+        made = self._pictures[scale]
+        if not made.cost_s and self.begun:
+            made.expect_costs(self.begun[max(self.begun)])
+        return made
 
     def pixels(self, scale: float) -> int:
         sized = self._sized(scale)
