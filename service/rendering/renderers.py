@@ -105,7 +105,7 @@ class Renderers(Protocol):
         """Hand a message on; nothing happens when its task was lost or dropped."""
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
-        """Like `send`, for a whole scene: it is copied to shared memory off the event loop.
+        """Like `send`, for a whole scene or a large edit: it is copied to shared memory off the event loop.
 
         `restore`: its picture as the server has it, which the task goes on from, or has ended with.
         """

@@ -38,8 +38,8 @@ def scene_delta(old: SceneArrays, new: SceneArrays) -> SceneDelta | None:
             return None
     if not _alike(old.environment, new.environment):
         return None
-    moved = {name: getattr(new, name) for name in MOVED if not _same(getattr(old, name), getattr(new, name))}
     map_stays = _same(old.environment, new.environment)
+    moved = {name: getattr(new, name) for name in MOVED if not _same(getattr(old, name), getattr(new, name))}
     return SceneDelta(cast(MovedArrays, moved), None if map_stays else new.environment)
 
 

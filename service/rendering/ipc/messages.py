@@ -20,6 +20,9 @@ EDITS = (  # what `Scene.edit` takes
 )  # fmt: skip
 
 
+LARGE = 4 << 20  # bytes, which are copied in about a millisecond
+
+
 class SceneData(Protocol):
     """A gpu.SceneArrays, of which the server reads nothing: it may not import gpu."""
 
@@ -109,6 +112,14 @@ class Update:
         return {name: getattr(self, name) for name in EDITS if getattr(self, name) is not None}
 
     @property
+    def is_large(self) -> bool:
+        """Whether copying it to shared memory is too much for the event loop."""
+        if self.scene is not None:
+            return True
+        members = {**(self.moved or {}), **(vars(self.environment_map) if self.environment_map is not None else {})}
+        return sum(part.nbytes for part in members.values() if isinstance(part, np.ndarray)) > LARGE
+
+    @property
     def restarts(self) -> bool:
         return self.scene is not None or self.settings is not None or bool(self.edits)
 
@@ -164,6 +175,14 @@ class Pause:
 
 @dataclass(frozen=True)
 class Resume:
+    task: int
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Stops sampling for a moment, or until the next update: one is being packed, which wants the processor, and what
+    is shown will be out of date."""
+
     task: int
 
 
@@ -363,6 +382,7 @@ ToRenderer = (
     | Read
     | Pause
     | Resume
+    | Hold
     | Stop
     | Drop
     | Settle

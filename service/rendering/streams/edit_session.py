@@ -53,6 +53,7 @@ class EditSession:
         self._bytes = 0  # that the scene's document takes at most
         self._given: Version | None = None  # the last one that the renderer has
         self._good: dict[int, Accepted] = {}  # that the renderer may go back to, by generation
+        self.packs = False  # `settle` will pack more than a camera and materials
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
         self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
 
@@ -70,6 +71,7 @@ class EditSession:
             self._give(version) if self._given is None or may_be_refused(self._given.scene, version.scene) else None
         )
         self.version = version
+        self.packs = update is None and self._given is not None and scene_diff(self._given.scene, version.scene).whole
         return update
 
     def settle(self) -> Update | None:

@@ -13,7 +13,18 @@ from typing import Any, Protocol, cast
 
 from service.problems import Conflict, Internal, MalformedJson, ServiceError, answer, problem
 from service.rendering.executors import ClientExecutor, encoding
-from service.rendering.ipc.messages import Done, Failed, Frame, FromRenderer, Loaded, Pause, Resume, Stop, Update
+from service.rendering.ipc.messages import (
+    Done,
+    Failed,
+    Frame,
+    FromRenderer,
+    Hold,
+    Loaded,
+    Pause,
+    Resume,
+    Stop,
+    Update,
+)
 from service.rendering.jobs.status import error_of
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader
@@ -225,6 +236,8 @@ class Stream:
                 break
             message = cast(Edit, self._inbox.popleft().message)
         self._stir()
+        if self._live.packs:  # threads that trace what is out of date would take the time from the one that packs
+            self._renderers.send(Hold(self._task))
         try:
             await self._tell(await self._executor.run(self._live.settle), began)
         except ServiceError as error:
@@ -244,7 +257,7 @@ class Stream:
     async def _tell(self, update: Update | None, began: float) -> None:
         if update is None:
             return
-        if update.scene is not None:
+        if update.is_large:
             await self._renderers.send_scene(update)
         else:
             self._renderers.send(update)

@@ -139,9 +139,13 @@ class Pool:
             await self._move_to_driver(update.task, restore.saved.driver)
         # It may move to another renderer while the scene is encoded.
         while (home := self._homes.get(update.task)) is not None:
-            if await home.sent_scene(update, restore):
+            if not await home.sent_scene(update, restore):
+                continue
+            if update.scene is None:
+                self._division.sent(update)
+            else:
                 self._division.scene_sent(update, ended=restore is not None and restore.reason is not None)
-                break
+            break
 
     def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
         if (home := self._homes.get(task)) is not None:

@@ -186,7 +186,8 @@ class ReplayLog:
             return
         last = self._states[-1]
         since = last.since.then(update) if last.since is not None else update
-        if update.settings is not None:  # it may be too large, and then the state before it is the one that counts
+        # It may be too large, and then the state before it is the one that counts.
+        if update.settings is not None or update.environment_map is not None:
             self._push(_State(update.generation, channel.another(last.scene), whole=False, since=since))
         else:
             last.since = since

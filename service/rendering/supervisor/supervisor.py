@@ -208,7 +208,7 @@ class Supervisor:
             self._keeper.do(self._bring_back(message.task, held))
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
-        """Like `send`, for a whole scene: copying that to shared memory is not the event loop's work.
+        """Like `send`, for a whole scene or a large edit: copying that to shared memory is not the event loop's work.
 
         `restore`: its picture as the server has it.
         """
@@ -224,6 +224,13 @@ class Supervisor:
         if update.task not in self._tasks:
             channel.discard(encoded)
             return False
+        if update.scene is None:
+            held.record.told(update)
+            if held.resident:
+                self._keeper.send_encoded(encoded)
+            else:
+                channel.discard(encoded)
+            return True
         held.record.scene_told(update, encoded)
         if restore is None:
             self._keeper.send_encoded(encoded)

@@ -23,6 +23,7 @@ from service.rendering.ipc.messages import (
     Failed,
     Foresee,
     FromRenderer,
+    Hold,
     Pause,
     Read,
     Restore,
@@ -233,6 +234,8 @@ class Loop:
             task.pause(message.away)
         elif isinstance(message, Resume):
             task.resume()
+        elif isinstance(message, Hold):
+            task.hold()
         elif isinstance(message, Stop):
             self._work(task, task.stop)
         elif isinstance(message, Drop):

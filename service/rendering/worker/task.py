@@ -22,6 +22,7 @@ from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.denoise_policy import DenoisePolicy
 from service.rendering.worker.view.frames import SLICE_S, FrameSource
 
+HOLD_S = 0.5  # an edit that takes longer to pack has to share the processor
 WATCHED_FROM = 64  # samples: a picture that somebody watches, or whose noise is judged, is shared from there on
 
 log = logging.getLogger(__name__)
@@ -61,6 +62,7 @@ class Task:
         self.savings = KernelSavings(context, number)
         self._scale = 1.0  # of what is traced
         self._paused = self._away = False
+        self._held_until = 0.0  # by the monotonic clock
 
     @property
     def phase(self) -> Phase:
@@ -91,7 +93,7 @@ class Task:
             return self._updates.preview.due and not self._paused
         if phase in (Phase.UPDATING, Phase.SAVING) or self._frames.due:
             return True
-        return phase is Phase.TRACING and (self.unseen or not stands) and not self._waiting
+        return phase is Phase.TRACING and (self.unseen or not (stands or self._held_s)) and not self._waiting
 
     @property
     def _waiting(self) -> bool:
@@ -129,7 +131,12 @@ class Task:
     @property
     def left_s(self) -> float | None:
         """Seconds until it is ready by itself; None where it is not, or is already."""
-        return self.home.left_s if self.home.waiting else None
+        return self.home.left_s if self.home.waiting else self._held_s or None
+
+    @property
+    def _held_s(self) -> float:
+        """Seconds for which it goes on standing still, unless an update comes."""
+        return max(0.0, self._held_until - time.monotonic())
 
     @property
     def bytes(self) -> int:
@@ -141,6 +148,7 @@ class Task:
 
     def update(self, update: Update) -> None:
         """Take an update, which the next turn applies together with others that wait."""
+        self._held_until = 0.0
         self._updates.join(update)
 
     def turn(self) -> None:
@@ -315,6 +323,10 @@ class Task:
     def resume(self) -> None:
         self._paused = self._away = False
         self.home.pause(False)
+
+    def hold(self) -> None:
+        """Stand still for a moment: an update is being packed, for which somebody waits."""
+        self._held_until = time.monotonic() + HOLD_S
 
     def stop(self) -> None:
         """Ends the render; an update that waits is applied first, unless the render has not even begun."""

@@ -38,6 +38,10 @@ class Shown:
         self.settings = RenderSettings(**update.settings)
         self._take(update)
 
+    @property
+    def packs(self) -> bool:
+        return self._session.packs
+
     def _take(self, update: Update) -> None:
         self.whole = update.scene is not None  # the last update brought all arrays
         scene = updated_scene(update)
@@ -102,6 +106,15 @@ def test_sliders_of_the_environment_send_no_shapes(name: str) -> None:
                 shown.change(slider.patch(document, share))
                 whole |= {slider.name} if shown.whole else set()
     assert whole == set()
+
+
+def test_only_what_is_packed_holds_the_picture() -> None:
+    shown, packs = Shown(presets.get("scenes", "sphere-on-floor")), {}
+    for slider in sliders(presets.get("scenes", "sphere-on-floor")):
+        shown.change(slider.patch(presets.get("scenes", "sphere-on-floor"), 0.618))
+        packs[slider.name] = shown.packs
+    assert packs["environment/blur"] and packs["materials/subject/emission"]
+    assert not any(packs[name] for name in ("camera/vfov", "environment/rotation", "materials/subject/roughness"))
 
 
 def test_a_superset_kernel_depends_on_no_light() -> None:

@@ -20,7 +20,7 @@ from service.rendering.worker.scheduler import (
     Account,
     Scheduler,
 )
-from service.rendering.worker.task import Task
+from service.rendering.worker.task import HOLD_S, Task
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -81,6 +81,23 @@ def test_a_stream_among_many_takes_passes_of_one_sample(gpu: Renderer, monkeypat
             passes[interactive].add(task._residency.full.under_way[0])
         task.release()
     assert passes[True] == {0, 1} and max(passes[False]) >= LEAST_A_PASS
+
+
+def test_a_hold_ends_with_an_update(gpu: Renderer) -> None:
+    context = WorkerContext(gpu, lambda _: None, DenoiseClient())
+    arrays = pack(parse_scene(SCENE), Shelf()).arrays
+    task = Task(context, 1)
+    task.update(Update(1, 1, arrays, {"width": 32, "height": 32}, StopRule(1 << 20), interactive=True))
+    while task.unseen:
+        task.turn()
+    assert task.ready and task.left_s is None
+    task.hold()
+    assert not task.ready and task.left_s is not None and 0 < task.left_s <= HOLD_S
+    task.update(Update(1, 2, camera=arrays.camera, base=1))
+    assert task.ready and task.left_s is None
+    task.turn()
+    assert task.ready
+    task.release()
 
 
 def test_who_was_idle_saves_nothing_up() -> None:

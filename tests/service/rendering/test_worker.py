@@ -3,8 +3,11 @@
 from __future__ import annotations
 
 import asyncio
+import os
+import signal
 import time
 from collections.abc import Awaitable, Callable, Iterator
+from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
@@ -16,11 +19,13 @@ import pytest
 from gpu import Renderer, RenderSettings
 from service.pack import pack
 from service.problems import Unavailable
+from service.rendering.ipc import messages
 from service.rendering.ipc.messages import (
     Done,
     Failed,
     Frame,
     FromRenderer,
+    Hold,
     Image,
     Loaded,
     Pause,
@@ -39,6 +44,7 @@ from service.rendering.worker.device.resolution_ladder import FULL_S, NEXT_S, Re
 from service.rendering.worker.loop import coalesced
 from service.rendering.worker.progress.noise import NoiseReading
 from service.rendering.worker.progress.stop_rules import judged_after, judged_from, late, reached
+from service.rendering.worker.task import HOLD_S
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE
@@ -122,6 +128,31 @@ def test_ladder(side: int, pixel_s: float | None) -> None:
     assert all(higher >= 2 * lower for lower, higher in pairwise(climbed))
     if pixel_s and side * side * pixel_s <= NEXT_S:
         assert len(climbed) <= 2
+
+
+class Costly:
+    """As much of a picture as a ladder needs to pass its rates on."""
+
+    def __init__(self) -> None:
+        self.samples, self.cost_s = 0, 0.0
+        self.like: Any = None
+
+    def expect_costs(self, other: Any) -> None:
+        self.cost_s, self.like = other.cost_s, other
+
+
+def test_each_rung_is_expected_to_cost_what_the_sharpest_so_far_did() -> None:
+    renderer: Any = SimpleNamespace(picture=lambda scene, settings: Costly())
+    ladder = ResolutionLadder(renderer, renderer, RenderSettings(512, 512))
+    first: Any = ladder.picture(1 / 8)
+    second: Any = ladder.picture(1 / 4)
+    assert first.like is second.like is None
+    first.samples, first.cost_s = 1, 1e-6
+    assert ladder.picture(1 / 4) is second and second.like is first
+    second.samples = 1
+    whole: Any = ladder.picture(1.0)
+    assert whole.like is second and whole.cost_s == 1e-6
+    assert first.like is None
 
 
 def test_coalescing_keeps_order_where_it_matters() -> None:
@@ -220,6 +251,73 @@ def test_pauses_and_other_tasks_change_no_pixel(rendering: Any, arrays: Any) -> 
         alone = await picture(disturbed=False)
         crowd = await asyncio.gather(*(picture(disturbed=True) for _ in range(3)))
         assert all(np.array_equal(alone, one) for one in crowd)
+
+    rendering(test)
+
+
+def test_a_held_task_stands_still_for_a_moment_or_until_its_update(rendering: Any, arrays: Any) -> None:
+    async def test(supervisor: Supervisor) -> None:
+        ears = Ears()
+        task = supervisor.open(ears)
+        await supervisor.send_scene(Update(task, 1, arrays, settings(), ENDLESS, interactive=True))
+        supervisor.send(Want(task, 1, View()))
+        await ears.next(Frame)
+        for serial, ended_by in enumerate(("time", "an update"), 2):
+            supervisor.send(Hold(task))
+            supervisor.send(Want(task, 2 * serial, View(), anyway=True))
+            held = await ears.next(Frame)
+            began = time.monotonic()
+            if ended_by == "an update":
+                supervisor.send(Update(task, 2, camera=arrays.camera, base=1))
+            supervisor.send(Want(task, 2 * serial + 1, View()))
+            frame = await ears.next(Frame)
+            stood_s = time.monotonic() - began
+            if ended_by == "time":
+                assert frame.generation == 1 and frame.progress.samples > held.progress.samples
+                assert stood_s > 0.5 * HOLD_S
+            else:
+                assert frame.generation == 2
+        supervisor.drop(task)
+
+    rendering(test)
+
+
+def test_a_large_edit_is_copied_off_the_event_loop_and_survives_the_renderer(
+    rendering: Any, arrays: Any, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(messages, "LARGE", 0)
+    dim = replace(arrays.environment, scale=0.25)
+    turn = dim.rotation, dim.scale
+
+    async def test(supervisor: Supervisor) -> None:
+        def send(update: Update) -> None:
+            raise AssertionError("this is the event loop")
+
+        seen = []
+        for edited in (True, False):
+            ears = Ears()
+            task = supervisor.open(ears)
+            scene = arrays if edited else replace(arrays, environment=dim)
+            await supervisor.send_scene(Update(task, 1, scene, settings(), StopRule(4), interactive=True))
+            await ears.next(Done)
+            if edited:
+                edit = Update(task, 2, environment=turn, environment_map=dim, base=1)
+                assert edit.is_large
+                with monkeypatch.context() as patch:
+                    patch.setattr(supervisor, "send", send)
+                    await supervisor.send_scene(edit)
+                assert (await ears.next(Done)).generation == 2
+            supervisor.send(Read(task, 1, LINEAR))
+            seen.append(np.array((await ears.next(Image)).pixels))
+            if edited:
+                pid = supervisor.process_id
+                assert pid is not None
+                os.kill(pid, signal.SIGKILL)
+                assert (await ears.next(Done)).generation == 2  # of the next one
+                supervisor.send(Read(task, 2, LINEAR))
+                seen.append(np.array((await ears.next(Image)).pixels))
+            supervisor.drop(task)
+        assert np.array_equal(seen[0], seen[2]) and np.array_equal(seen[1], seen[2])
 
     rendering(test)
 

@@ -6,7 +6,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from gpu import OutOfMemory, RenderSettings
+from gpu import OutOfMemory, RenderSettings, apply_edit, scene_bytes
 from service.rendering.ipc.messages import Update
 from service.rendering.worker.device.loaded_scene import LoadedScene, Offloaded, needed
 from service.rendering.worker.device.memory import Holder, Memory
@@ -63,6 +63,10 @@ class Residency:
             self.wake()
             assert self.loaded is not None
             if update.edits:
+                arrays = self.loaded.scene.arrays
+                growth = scene_bytes(apply_edit(arrays, **update.edits)) - scene_bytes(arrays)
+                if growth > 0:
+                    self.make_room(growth)
                 self.loaded.scene.edit(**update.edits)
             if update.settings is None:
                 if update.edits:
