@@ -111,8 +111,8 @@ def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:
 
 
 def common_keys() -> list[KernelKey]:
-    """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, and those that show
-    a picture."""
+    """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, and those that
+    show a picture."""
     shown = [("resolve.comp", resolve.defines(curve, dtype)) for curve in TONE_MAPS for dtype in ("u1", "f4")]
     metered = [("meter.comp", noise_meter.defines(*which)) for which in ((1, 0), (0, 0), (0, 1))]
     summed = [("merge.comp", accumulators.defines()), ("areas.comp", features.defines(frozenset()))]

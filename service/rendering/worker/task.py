@@ -22,7 +22,7 @@ from service.rendering.worker.updates import Updates
 from service.rendering.worker.view.denoise_policy import DenoisePolicy
 from service.rendering.worker.view.frames import SLICE_S, FrameSource
 
-HOLD_S = 0.5  # an edit that takes longer to pack has to share the processor
+HOLD_S = 2.0  # an edit that takes longer to pack has to share the processor
 WATCHED_FROM = 64  # samples: a picture that somebody watches, or whose noise is judged, is shared from there on
 
 log = logging.getLogger(__name__)
