@@ -251,10 +251,12 @@ class Task:
         self._ending.checkpoints.restart()
         if update.restarts:
             self._restart()
-        if update.scene is not None or update.settings is not None:
+        whole = update.scene is not None or update.settings is not None
+        if whole or update.environment_map is not None:  # what may be too much for the device
             setup_s, full = time.monotonic() - began, residency.full
             kernel = full.compile_ms + updates.take_compile_ms(), full.scene.features, full.scene.spared
             self._send(Loaded(self.number, self.generation, setup_s, *kernel, self._ending.warnings))
+        if whole:
             updates.foresee(settings)
 
     def evict(self) -> None:

@@ -306,6 +306,7 @@ def test_a_large_edit_is_copied_off_the_event_loop_and_survives_the_renderer(
                 with monkeypatch.context() as patch:
                     patch.setattr(supervisor, "send", send)
                     await supervisor.send_scene(edit)
+                assert (await ears.next(Loaded)).generation == 2  # else all such edits would be kept
                 assert (await ears.next(Done)).generation == 2
             supervisor.send(Read(task, 1, LINEAR))
             seen.append(np.array((await ears.next(Image)).pixels))
