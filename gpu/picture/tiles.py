@@ -12,7 +12,7 @@ import numpy as np
 
 from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
-from gpu.picture.schedule import Dispatch, Tile, mean_rate, resampled, work_groups
+from gpu.picture.schedule import Dispatch, Tile, resampled, work_groups
 
 SLICE_S = 0.008  # seconds of a dispatch: short enough to turn to another client, long beside its overhead
 PASS_S = 0.2  # seconds of a pass, once there are some samples
@@ -47,15 +47,17 @@ class Tiles:
         self._most_rows = max(self._band, most // width // self._band * self._band)
         self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
         self.rates = np.zeros(-(-height // self._band))  # by band
+        self._known, self._known_s = 0, 0.0  # how many of them are known, and their sum
         self.stops: tuple[int, ...] = ()
         self._before, self.chunk = 0, 1  # the first sample of the pass under way, and how many it takes
 
     @property
     def cost_s(self) -> float:
-        return mean_rate(self.rates)
+        return self._known_s / self._known if self._known else 0.0
 
     def expect(self, rates: np.ndarray) -> None:
         self.rates = resampled(rates, len(self.rates))
+        self._known, self._known_s = int(np.count_nonzero(self.rates)), float(self.rates.sum())
 
     def tile(self, row: int, column: int, samples: int) -> Tile:
         """The tile that begins there: several whole bands where they fit into a slice, else part of one."""
@@ -80,7 +82,10 @@ class Tiles:
         _, y, width, height = tile
         rate = seconds / (width * height * samples)
         bands = self.rates[y // self._band : -(-(y + height) // self._band)]
-        bands[:] = np.where(bands == 0, rate, np.maximum(rate, 0.7 * bands + 0.3 * rate))
+        now = np.where(bands == 0, rate, np.maximum(rate, 0.7 * bands + 0.3 * rate))
+        self._known += int(np.count_nonzero(bands == 0))
+        self._known_s += float((now - bands).sum())
+        bands[:] = now
 
     def pass_samples(self, samples: int, sharers: int = 1) -> int:
         """The samples of every pixel to take in the pass after `samples`, so that the smallest tile fits a slice."""

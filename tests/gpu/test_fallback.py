@@ -19,7 +19,8 @@ from gpu.analysis.kernel_cost import full_kernel
 from gpu.kernels import features
 from gpu.precompile import fallback
 from service.pack import pack
-from service.rendering.ipc.messages import Frame, Loaded, Pause, StopRule, Update, View, Want
+from service.rendering.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
+from service.rendering.ipc.orders import Pause
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.helpers.compile_client import records
 from service.scene import parse_scene

@@ -15,7 +15,8 @@ from service.rendering.cluster.carriage import LARGE, Scenes, size, stored
 from service.rendering.cluster.code import difference
 from service.rendering.cluster.control import Ended
 from service.rendering.ipc import channel
-from service.rendering.ipc.messages import Drop, FromRenderer, TakeCheckpoint, ToRenderer, Unable, Update
+from service.rendering.ipc.messages import FromRenderer, ToRenderer, Unable, Update
+from service.rendering.ipc.orders import Drop, TakeCheckpoint
 from service.rendering.supervisor.process import Waiting
 
 SILENCE_S = 30.0  # without an answer from an actor, which gives one every 5 s, until it is given up

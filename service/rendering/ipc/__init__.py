@@ -1,6 +1,7 @@
 """What the server and the renderer's process say to each other.
 
 messages         the messages in both directions; immutable
+orders           those that tell a task to stand still, to end or to be saved
 kernel_messages  those about the kernel of a render
 leases           those by which a picture is divided among renderers
 channel          datagrams with arrays in shared memory beside them

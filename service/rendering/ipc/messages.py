@@ -10,6 +10,7 @@ import numpy as np
 
 from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
+from service.rendering.ipc.orders import Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.views import DEFAULT_TONE_MAP, Encoding
 
 BsdfQuestion = Literal["values", "albedo", "terms"]
@@ -163,53 +164,6 @@ class Read:
     task: int
     serial: int
     view: View
-
-
-@dataclass(frozen=True)
-class Pause:
-    """Stops sampling but for a first look at what is new; with `away` that as well, as nobody is there to look."""
-
-    task: int
-    away: bool = False
-
-
-@dataclass(frozen=True)
-class Resume:
-    task: int
-
-
-@dataclass(frozen=True)
-class Hold:
-    """Stops sampling for a moment, or until the next update: one is being packed, which wants the processor, and what
-    is shown will be out of date."""
-
-    task: int
-
-
-@dataclass(frozen=True)
-class Stop:
-    """Ends sampling; the picture so far stays readable until Drop."""
-
-    task: int
-
-
-@dataclass(frozen=True)
-class Drop:
-    task: int
-
-
-@dataclass(frozen=True)
-class TakeCheckpoint:
-    """Asks for a Checkpoint of a render under way as soon as possible: the server is about to end."""
-
-    task: int
-
-
-@dataclass(frozen=True)
-class Settle:
-    """Asks to apply the updates so far before the next one, which may be too much and fall back to them."""
-
-    task: int
 
 
 @dataclass(frozen=True)

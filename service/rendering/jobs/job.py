@@ -26,11 +26,10 @@ from service.rendering.ipc.messages import (
     Progress,
     Progressed,
     Restore,
-    Stop,
-    TakeCheckpoint,
     Update,
     View,
 )
+from service.rendering.ipc.orders import Stop, TakeCheckpoint
 from service.rendering.jobs.memory import RenderMemory
 from service.rendering.jobs.ordered import Ordered
 from service.rendering.jobs.reads import Reads

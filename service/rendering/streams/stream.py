@@ -18,13 +18,10 @@ from service.rendering.ipc.messages import (
     Failed,
     Frame,
     FromRenderer,
-    Hold,
     Loaded,
-    Pause,
-    Resume,
-    Stop,
     Update,
 )
+from service.rendering.ipc.orders import Hold, Pause, Resume, Stop
 from service.rendering.jobs.status import error_of
 from service.rendering.renderers import Renderers
 from service.rendering.requests.request_reader import RequestReader

@@ -10,7 +10,8 @@ from typing import Protocol
 
 from service.rendering.ipc.channel import Encoded
 from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, undivided
-from service.rendering.ipc.messages import Done, Drop, Failed, Heard, Pause, Resume, Stop, ToRenderer, Update
+from service.rendering.ipc.messages import Done, Failed, Heard, ToRenderer, Update
+from service.rendering.ipc.orders import Drop, Pause, Resume, Stop
 
 log = logging.getLogger(__name__)
 

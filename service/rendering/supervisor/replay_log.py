@@ -17,19 +17,16 @@ from service.rendering.ipc.messages import (
     Heard,
     Image,
     Loaded,
-    Pause,
     Progressed,
     Read,
     Restore,
-    Resume,
     SavedPicture,
-    Settle,
-    Stop,
     StopRule,
     ToRenderer,
     Update,
     Want,
 )
+from service.rendering.ipc.orders import Pause, Resume, Settle, Stop
 
 # A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
 Kept = Restore | Callable[[], Restore]

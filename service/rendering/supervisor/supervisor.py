@@ -19,7 +19,6 @@ from service.rendering.ipc.messages import (
     Checkpoint,
     Discarded,
     Done,
-    Drop,
     Evicted,
     Frame,
     Heard,
@@ -34,6 +33,7 @@ from service.rendering.ipc.messages import (
     Update,
     Usage,
 )
+from service.rendering.ipc.orders import Drop
 from service.rendering.renderers import Listener, Member, Place
 from service.rendering.statistics import Kind, Statistics
 from service.rendering.supervisor.keeper import CLOSING, Keeper

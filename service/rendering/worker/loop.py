@@ -17,25 +17,19 @@ from service.rendering.ipc.heartbeat import Heartbeat
 from service.rendering.ipc.kernel_messages import MeasureKernel
 from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
 from service.rendering.ipc.messages import (
-    Drop,
     EvaluateBsdf,
     Evicted,
     Failed,
     Foresee,
     FromRenderer,
-    Hold,
-    Pause,
     Read,
     Restore,
-    Resume,
-    Settle,
-    Stop,
-    TakeCheckpoint,
     ToRenderer,
     Update,
     Usage,
     Want,
 )
+from service.rendering.ipc.orders import Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.rendering.worker.bsdf_task import BsdfTask
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.loaded_scene import begin_key, slider_keys

@@ -24,10 +24,10 @@ from service.rendering.ipc.messages import (
     Progressed,
     Read,
     Restore,
-    Stop,
     StopRule,
     Update,
 )
+from service.rendering.ipc.orders import Stop
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device import checkpoints
 from tests.gpu.test_precompile import LINEAR, arrays_of

@@ -10,7 +10,8 @@ import numpy as np
 
 from service.rendering.ipc.channel import Encoded
 from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
-from service.rendering.ipc.messages import Done, Drop, Failed, Pause, Progress, Resume, StopRule, ToRenderer, Update
+from service.rendering.ipc.messages import Done, Failed, Progress, StopRule, ToRenderer, Update
+from service.rendering.ipc.orders import Drop, Pause, Resume
 from service.rendering.supervisor.division import Division
 
 SCENE = cast(Any, "a scene")

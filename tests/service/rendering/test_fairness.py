@@ -10,7 +10,8 @@ import pytest
 
 from gpu import Renderer
 from service.pack import pack
-from service.rendering.ipc.messages import FromRenderer, Pause, StopRule, Update
+from service.rendering.ipc.messages import FromRenderer, StopRule, Update
+from service.rendering.ipc.orders import Pause
 from service.rendering.statistics import Kind
 from service.rendering.supervisor.supervisor import Supervisor
 from service.scene import parse_scene

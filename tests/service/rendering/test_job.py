@@ -24,11 +24,10 @@ from service.rendering.ipc.messages import (
     Read,
     Restore,
     SavedPicture,
-    Stop,
-    TakeCheckpoint,
     Update,
     View,
 )
+from service.rendering.ipc.orders import Stop, TakeCheckpoint
 from service.rendering.jobs import job as jobs
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.recorder import MOST_STARTS, Recorder

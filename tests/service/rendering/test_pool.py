@@ -16,20 +16,18 @@ from service.rendering.ipc.messages import (
     Checkpoint,
     Done,
     Failed,
-    Pause,
     Progress,
     Read,
     Ready,
     Restore,
-    Resume,
     SavedPicture,
-    Settle,
     StopRule,
     Unable,
     Update,
     View,
     Want,
 )
+from service.rendering.ipc.orders import Pause, Resume, Settle
 from service.rendering.renderers import Place
 from service.rendering.supervisor import restarts
 from service.rendering.supervisor.pool import Pool, Seat
