@@ -116,10 +116,12 @@ def _convolved(sums: np.ndarray, blur: float) -> np.ndarray:
     """
     height, width = sums.shape[:2]
     count = _frequencies(width, blur)
-    points = min(width, -(-2 * count // 16) * 16)  # that tell so many frequencies of a kernel apart
+    points = min(width, -(-2 * count // 16) * 16)  # of a kernel, to tell its frequencies apart
     spectrum = np.fft.rfft(sums, axis=1)[:, :count].view(np.float64)  # (h, count, 4 real and imaginary parts)
+    # For rows below the equator the same kernels serve, upside down: (count, 16, h), with those beside the others.
+    both = np.concatenate([spectrum, spectrum[::-1]], axis=2).transpose(1, 2, 0).copy()
     polar = (np.arange(height) + 0.5) * (math.pi / height)
-    around = 2 * np.sin(np.arange(points) * (math.pi / points)) ** 2
+    around = 2 * np.sin(np.arange(points // 2 + 1) * (math.pi / points)) ** 2  # symmetric, as the kernel is: one half
     reach = math.ceil(REACH * blur / (math.pi / height))
     out = np.empty((height, width, 3), np.float32)
     for i in range((height + 1) // 2):
@@ -128,12 +130,11 @@ def _convolved(sums: np.ndarray, blur: float) -> np.ndarray:
         # 1 - cos of the angle between two directions, in a form that does not cancel.
         apart = 2 * np.sin((polar[i] - near) / 2) ** 2
         apart = apart[:, None] + math.sin(polar[i]) * np.sin(near)[:, None] * around
-        kernel = np.fft.rfft(np.exp(-apart / blur**2), axis=1).real[:, :count]
-        # For the rows below the equator the same kernel serves, upside down.
-        mirrored = np.s_[height - last : height - first]
-        for row, met in ((i, spectrum[first:last]), (height - 1 - i, spectrum[mirrored][::-1])):
-            light = np.fft.irfft(np.einsum("rf,rfc->fc", kernel, met).view(np.complex128), width, axis=0)
-            out[row] = light[:, :3] / light[:, 3:]
+        kernel = np.fft.hfft(np.exp(apart / -(blur**2)), points, axis=1)[:, :count]
+        met = np.matmul(both[:, :, first:last], kernel.T[:, :, None].copy())[..., 0]
+        light = np.fft.irfft(met.view(np.complex128), width, axis=0)  # (width, 8)
+        out[i] = light[:, :3] / light[:, 3:4]
+        out[height - 1 - i] = light[:, 4:7] / light[:, 7:]
     return np.maximum(out, 0)  # light that a transform leaves below 0 is its rounding, 1e-14 of the brightest
 
 
