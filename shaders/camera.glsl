@@ -23,9 +23,16 @@ void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
     d = normalize(through);
 }
 
+// The place of this work group among those of the dispatch: neighbours in order stand apart (gpu/picture/schedule.py).
+uvec2 camera_group() {
+    uvec2 size = gl_NumWorkGroups.xy;
+    uint place = (gl_WorkGroupID.y * size.x + gl_WorkGroupID.x) * frame.group_stride % (size.x * size.y);
+    return uvec2(place % size.x, place / size.x);
+}
+
 // Finds the pixel of this invocation; false where there is none.
 bool camera_pixel(out uvec2 pixel, out uint slot) {
-    uvec2 g = gl_GlobalInvocationID.xy;
+    uvec2 g = uint(WORK_GROUP) * camera_group() + gl_LocalInvocationID.xy;
     pixel = frame.tile_origin + g;
     slot = pixel.y * frame.slot_width + pixel.x - frame.slot_first;
     return g.x < frame.tile_size.x && g.y < frame.tile_size.y;

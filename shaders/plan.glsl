@@ -6,7 +6,8 @@ layout(std430, binding = SLOT_OUTPUT) readonly buffer work_buffer { uint plan_wo
 
 // Finds the pixel of this invocation; false where there is none. tile_size.x is the number of areas.
 bool plan_pixel(out uvec2 pixel, out uint slot) {
-    uint area = gl_WorkGroupID.x < frame.tile_size.x ? plan_work[gl_WorkGroupID.x] : 0xffffffffu;
+    uint at = camera_group().x;
+    uint area = at < frame.tile_size.x ? plan_work[at] : 0xffffffffu;
     pixel = PLAN_AREA * uvec2(area & 0xffffu, area >> 16u) + gl_LocalInvocationID.xy;
     slot = pixel.y * frame.slot_width + pixel.x - frame.slot_first;
     return all(lessThan(pixel, frame.resolution));

@@ -297,6 +297,7 @@ class Frame(Record):
     looped_boxes: u32
     looped_ellipsoids: u32
     looped_triangles: u32
+    group_stride: u32  # places from one work group to the next; see gpu.picture.schedule.group_stride
     node_first: u32  # of the tree's nodes: those of instances lie before
     instance_shift: u32  # of an instance's number in an id, above its triangle's
 

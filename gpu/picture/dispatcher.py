@@ -13,7 +13,7 @@ from gpu.kernels import features
 from gpu.layout import Frame, bindings
 from gpu.layout.bindings import Slot
 from gpu.picture import filters
-from gpu.picture.schedule import Tile
+from gpu.picture.schedule import Tile, group_stride
 from gpu.settings import RenderSettings
 
 _PIXEL_BYTES = 16  # of every accumulator
@@ -29,6 +29,7 @@ class Dispatcher:
         # As drivers bind no more than 128 MiB at once, to be sure of.
         self.most_pixels = contexts.storage_block_bytes(context) // 16 // _ALIGNED * _ALIGNED - _ALIGNED
         self.counters = context.buffer(reserve=16)  # paths that were ended, and cut
+        self._spreads = bool(contexts.describe(context)["software"])
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
 
     def configure(self, settings: RenderSettings) -> None:
@@ -69,6 +70,7 @@ class Dispatcher:
 
     def run(self, kernel: Any, frame: np.ndarray, groups: tuple[int, int]) -> None:
         """Start a kernel; the caller waits for it."""
+        frame["group_stride"] = group_stride(groups[0] * groups[1]) if self._spreads else 1
         self._frame_buffer.write(frame.tobytes())
         kernel.run(*groups)
 

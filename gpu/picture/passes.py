@@ -20,7 +20,7 @@ from gpu.picture.bands import BandTracer
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.schedule import Schedule, Tile, work_groups
-from gpu.picture.tiles import MAX_SAMPLES_A_PASS, Tiles, samples_at_once
+from gpu.picture.tiles import MAX_SAMPLES_A_PASS, SLICE_S, Tiles, samples_at_once
 
 _MERGED = 1 << 18  # pixels that are merged in a slice: this takes llvmpipe some milliseconds
 
@@ -85,12 +85,13 @@ class Passes:
         """Trace for about `budget_s` seconds, never past `max_samples` per pixel. Returns the seconds that it
         took."""
         start = time.perf_counter()
+        enough = start + budget_s - SLICE_S / 2
         self._dispatcher.bind()
         while self.samples < max_samples:
             if self._pass_samples == 0:
                 self._begin_pass(max_samples, sharers)
             self._slice()
-            if time.perf_counter() - start >= budget_s:
+            if time.perf_counter() >= enough:
                 break
         return time.perf_counter() - start
 
@@ -98,6 +99,7 @@ class Passes:
         """Trace a band into the block's accumulators for about `budget_s` seconds, at most to its end. Returns the
         seconds that it took."""
         start = time.perf_counter()
+        enough = start + budget_s - SLICE_S / 2
         self._dispatcher.bind()
         while not tracer.complete:
             tile, first, samples = tracer.next(self._tiles, self._most_samples)
@@ -106,7 +108,7 @@ class Passes:
             self._dispatcher.context.finish()
             self._tiles.took(tile, samples, time.perf_counter() - began)
             tracer.took(tile, self._dispatcher.settings.width)
-            if time.perf_counter() - start >= budget_s:
+            if time.perf_counter() >= enough:
                 break
         return time.perf_counter() - start
 

@@ -3,6 +3,7 @@ plan."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple, Protocol
 
@@ -12,6 +13,7 @@ from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
 
 Tile = tuple[int, int, int, int]  # x, y, width, height
+_MOST_SPREAD = 1 << 16  # groups: their number times the stride must fit into 32 bits
 
 
 class Dispatch(NamedTuple):
@@ -28,6 +30,20 @@ class Dispatch(NamedTuple):
 def work_groups(columns: int, rows: int) -> tuple[int, int]:
     """The work groups that cover `columns` x `rows` invocations."""
     return -(-columns // WORK_GROUP), -(-rows // WORK_GROUP)
+
+
+def group_stride(groups: int) -> int:
+    """A stride that comes to each of so many work groups once, and to all parts of a tile in any stretch of them.
+
+    llvmpipe cuts a dispatch into as many stretches as it has threads and waits for the slowest; the upper half of a
+    tile may be sky and the lower one a mesh. Steps of the golden section spread evenly for any number of threads.
+    """
+    if groups > _MOST_SPREAD:
+        return 1
+    stride = max(1, round(groups * (math.sqrt(5) - 1) / 2))
+    while math.gcd(stride, groups) > 1:
+        stride += 1
+    return stride
 
 
 def mean_rate(rates: np.ndarray) -> float:

@@ -7,6 +7,7 @@ import pytest
 
 from gpu import Renderer
 from gpu import context as contexts
+from gpu.picture.schedule import group_stride
 from gpu.picture.tiles import BAND, LEAST_A_PASS, ROUND_S, SLICE_S, Tiles
 from tests.extremes.scenes import everything
 from tests.rendering import picture
@@ -138,3 +139,31 @@ def test_sixteen_megapixels(gpu: Renderer) -> None:
     assert (made.display()[..., 3] == 255).all()
     made.release()
     made.scene.release()
+
+
+@pytest.mark.parametrize("size", [(1, 1), (1, 2), (22, 2), (64, 2), (32, 17), (64, 64), (1 << 8, 1 << 8)])
+def test_every_stretch_of_work_groups_comes_to_all_parts_of_a_tile(size: tuple[int, int]) -> None:
+    columns, rows = size
+    count = columns * rows
+    stride = group_stride(count)
+    places = np.arange(count, dtype=np.uint32) * np.uint32(stride) % np.uint32(count)
+    assert stride * count < 1 << 32 and len(np.unique(places)) == count
+    for threads in (2, 3, 16):
+        for part in np.array_split(places, threads):
+            for where, parts in ((part // columns, rows), (part % columns, columns)):
+                upper = np.count_nonzero(2 * where >= parts) / max(len(part), 1)
+                assert len(part) < 20 or abs(upper - (parts // 2) / parts) < 0.2
+
+
+def test_more_work_groups_than_a_stride_can_count_keep_their_order() -> None:
+    assert group_stride(1 << 16) > 1 and group_stride((1 << 16) + 1) == 1
+
+
+def test_the_order_of_work_groups_never_shows(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    def pixels(stride: int | None) -> bytes:
+        if stride is not None:
+            monkeypatch.setattr("gpu.picture.dispatcher.group_stride", lambda groups: stride)
+        made = picture(gpu, everything(), 3, width=100, height=50)  # 13 x 7 work groups, the last ones in part
+        return made.read().tobytes()
+
+    assert pixels(None) == pixels(1) == pixels(45)
