@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import time
 
 import numpy as np
@@ -24,16 +25,19 @@ def many(count: int) -> Gltf:
     return file
 
 
-def test_sixty_thousand_nodes_in_three_seconds() -> None:
-    """A third of them in a third of the time, of the processor; it took 2.8 s with numpy for each node."""
-    data, times = many(20_000).glb(), []
+def test_twenty_thousand_nodes_take_as_long_as_a_few_readings_of_their_text() -> None:
+    """In processor time: about 10 readings. With numpy for each node it took several times as long."""
+    file = many(20_000)
+    data, text = file.glb(), json.dumps(file.tree)
+    seconds, text_seconds = [], []
     for _ in range(3):
         began = time.process_time()
+        json.loads(text)
+        between = time.process_time()
         shapes = read_scene(data, LIMITS).document["shapes"]
-        times.append(time.process_time() - began)
-        if times[-1] < 1:
-            break
-    assert min(times) < 1
+        text_seconds.append(between - began)
+        seconds.append(time.process_time() - between)
+    assert min(seconds) < 20 * min(text_seconds)
     assert len(shapes) == 20_000 and shapes[7]["transform"]["matrix"][:4] == [0.5, 0, 0, 7]
 
 
