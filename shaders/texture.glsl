@@ -105,7 +105,11 @@ float texture_opacity(SurfacePoint at) {
     float opacity = m.opacity;
 #if TEXTURE_OPACITY >= 0
     TextureSlot slot = texture_slot_pick(at.material, uint(TEXTURE_OPACITY));
-    texture_use_opacity(at.material, texture_sample(slot, at), opacity);
+    vec4 texel = texture_sample(slot, at);
+#if TEXTURE_OPACITY_IN_ALPHA
+    texel.rgb = vec3(0.0); // so that they are neither decoded nor filtered
+#endif
+    texture_use_opacity(at.material, texel, opacity);
 #endif
 #if HAS_VERTEX_COLORS
     opacity *= at.color.a;

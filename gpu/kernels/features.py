@@ -99,10 +99,9 @@ def _slot_flags(scene: SceneArrays) -> np.ndarray:
     """The flags of all slots in use."""
     if scene.textures is None:
         return np.zeros(0, np.uint32)
-    count = max(scene.textures.slots.values(), default=-1) + 1
-    words = scene.textures.words[:, : count * texture_records.TextureSlot.words]
-    out: np.ndarray = np.ascontiguousarray(words).view(texture_records.TextureSlot.dtype)
-    return out["flags"][out["width"] > 0]
+    slots, _ = textures_glsl.records(scene.textures)
+    flags: np.ndarray = slots["flags"][slots["width"] > 0]
+    return flags
 
 
 def _slot(flag: int, kind: int = 0) -> Callable[[SceneArrays], bool]:
@@ -118,8 +117,7 @@ def _coat_apart(s: SceneArrays) -> bool:
     if s.textures is None or not _mapped(s, "normal", "coat_normal"):
         return False
     names = list(s.textures.slots)
-    first = (max(s.textures.slots.values()) + 1) * texture_records.TextureSlot.words
-    uses = np.ascontiguousarray(s.textures.words[:, first:]).view(texture_records.TextureUse.dtype)
+    _, uses = textures_glsl.records(s.textures)
     mapped = [
         uses["channel"][:, names.index(n)] != texture_records.CHANNEL_NONE
         for n in texture_records.NORMALS
@@ -303,7 +301,7 @@ def counts(scene: SceneArrays) -> dict[str, object]:
     room = _BLOCK_BYTES // (layout.Material.dtype.itemsize + 16 * textures_glsl.groups(slots))
     most = {"MATERIAL_COUNT": min(_FEW_MAX, room), "LIGHT_COUNT": _FEW_MAX}
     out |= {name: n if n <= most[name] else 0 for name, n in few.items()}
-    return {**out, **textures_glsl.defines(slots), "QUAD_LAMP": _quad_lamp(scene)}
+    return {**out, **textures_glsl.defines(scene.textures), "QUAD_LAMP": _quad_lamp(scene)}
 
 
 def _quad_lamp(scene: SceneArrays) -> int:
@@ -318,7 +316,7 @@ def defines(
     """The defines of a kernel: every flag as 0 or 1, numbers of records, and the settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
-    out |= {"QUAD_LAMP": -1} | textures_glsl.defines({}) | dict(shapes or {})
+    out |= {"QUAD_LAMP": -1} | textures_glsl.defines(None) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE
     out |= {f"ESTIMATOR_{name.upper()}": i for i, name in enumerate(ESTIMATORS)}

@@ -10,6 +10,7 @@ from __future__ import annotations
 import numpy as np
 
 from gpu import layout
+from gpu.arrays import TextureArrays
 from gpu.layout import bindings, texture_records
 from gpu.layout.record import Record
 from gpu.layout.texture_records import TextureSlot, TextureUse
@@ -30,8 +31,16 @@ def unpacked(record: type[Record], group: int) -> str:
     return ", ".join(values)
 
 
-def defines(slots: dict[str, int]) -> dict[str, object]:
-    """The defines of a scene whose textured members get their texels from these slots; see `arrays.TextureArrays`."""
+def records(textures: TextureArrays) -> tuple[np.ndarray, np.ndarray]:
+    """The slots (materials, k) and the uses (materials, members) of a scene's materials."""
+    first = (max(textures.slots.values(), default=-1) + 1) * TextureSlot.words
+    slots, uses = np.ascontiguousarray(textures.words[:, :first]), np.ascontiguousarray(textures.words[:, first:])
+    return slots.view(TextureSlot.dtype), uses.view(TextureUse.dtype)
+
+
+def defines(textures: TextureArrays | None) -> dict[str, object]:
+    """The defines of a scene with these textures."""
+    slots = {} if textures is None else textures.slots
     count = max(slots.values(), default=-1) + 1
     out: dict[str, object] = {f"TEXTURE_{name.upper()}": slots.get(name, -1) for name in ALL}
     out |= {f"TEXTURE_{name.upper()}_USE": f"{i}u" for i, name in enumerate(slots)}
@@ -39,7 +48,16 @@ def defines(slots: dict[str, int]) -> dict[str, object]:
     out["TEXTURE_SLOTS"] = count
     out["TEXTURE_SURFACE_SLOTS"] = max(surface, default=-1) + 1
     out["MATERIAL_GROUPS"] = f"{BASE + groups(slots)}u"
+    out["TEXTURE_OPACITY_IN_ALPHA"] = int(textures is not None and _opacity_is_in_alpha(textures))
     return out
+
+
+def _opacity_is_in_alpha(textures: TextureArrays) -> bool:
+    """Whether no material takes its opacity from another channel than alpha."""
+    if "opacity" not in textures.slots:
+        return False
+    channels = records(textures)[1]["channel"][:, list(textures.slots).index("opacity")]
+    return bool(np.isin(channels, (texture_records.CHANNEL_NONE, texture_records.CHANNEL_R + 3)).all())
 
 
 def groups(slots: dict[str, int]) -> int:
