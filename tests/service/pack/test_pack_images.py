@@ -1,0 +1,62 @@
+"""A scene's images are read several at a time, and every broken one is named."""
+
+from __future__ import annotations
+
+import threading
+
+import numpy as np
+import pytest
+
+from service.assets import ImageData
+from service.pack import pack
+from service.problems import AssetError, InvalidDocument
+from service.scene import parse_scene
+from tests.rendering import Images, document
+
+QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m0"}
+PIXELS = np.random.default_rng(4).integers(0, 256, (4, 6, 3)).astype(np.uint8)
+PATIENCE_S = 30.0
+
+
+class Meeting(Images):
+    """Each image is given once two are asked for."""
+
+    def __init__(self) -> None:
+        super().__init__(a=PIXELS, b=PIXELS[::-1])
+        self._both = threading.Barrier(2, timeout=PATIENCE_S)
+
+    def image(self, ref: str) -> ImageData:
+        self._both.wait()
+        return super().image(ref)
+
+
+class Broken(Images):
+    """No image whose name begins with "broken" can be read."""
+
+    def image(self, ref: str) -> ImageData:
+        if ref.startswith("broken"):
+            raise AssetError(f"{ref} can't be read")
+        return super().image(ref)
+
+
+def textured(**assets: str) -> dict[str, object]:
+    materials = {f"m{k}": {"type": "diffuse", "albedo": {"texture": name}} for k, name in enumerate(assets)}
+    return document([QUAD], materials, textures={name: {"asset": asset} for name, asset in assets.items()})
+
+
+def test_two_images_are_read_at_a_time() -> None:
+    arrays = pack(parse_scene(textured(first="a", second="b")), Meeting()).arrays
+    assert arrays.textures is not None
+    assert len(arrays.textures.texels) == 2 * PIXELS.shape[0] * PIXELS.shape[1]
+
+
+def test_every_texture_without_an_image_is_named_in_order() -> None:
+    scene = parse_scene(textured(x="broken b", y="a", z="broken a", w="broken b"))
+    with pytest.raises(InvalidDocument) as caught:
+        pack(scene, Broken(a=PIXELS))
+    found = [(error.pointer, error.detail) for error in caught.value.errors]
+    assert found == [
+        ("/textures/x/asset", "broken b can't be read"),
+        ("/textures/z/asset", "broken a can't be read"),
+        ("/textures/w/asset", "broken b can't be read"),
+    ]
