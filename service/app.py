@@ -215,7 +215,8 @@ class _Server(uvicorn.Server):
         yield
 
     def _end(self) -> None:
-        self.force_exit = self.should_exit  # the second time
+        if self.should_exit:  # told twice: nobody is waited for, and other processes end with this one
+            os._exit(int(self.refused))
         self.should_exit = True
         # Threads that pack a huge scene can't be interrupted, and Python waits for them.
         last_resort = threading.Timer(LAST_RESORT_S, os._exit, [0])

@@ -182,3 +182,20 @@ def test_who_rests_makes_room(fragile: Server) -> None:
             frame = stream.frame()
             assert frame.samples == before.samples and np.array_equal(frame.array(), before.array())
     assert fragile.http.get("/healthz").status_code == 200
+
+
+def test_a_server_that_is_told_twice_ends_at_once(tmp_path: Path) -> None:
+    """Its processes end with it, and its log tells of no error."""
+    server = Server(tmp_path)
+    server.wait()
+    with opened(server) as client:
+        client.start(settings=ENDLESS)
+        client.frame()
+        renderer = server.renderer()
+        while server.process.poll() is None:
+            server.process.send_signal(signal.SIGINT)
+            time.sleep(0.002)
+        assert server.stop() == 0
+    until(lambda: not Path(f"/proc/{renderer}").exists())
+    log = server.log.read_text()
+    assert "Traceback" not in log and "error" not in log, log
