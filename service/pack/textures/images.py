@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from concurrent.futures import ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass, field
 from typing import Protocol
 
@@ -43,7 +44,10 @@ def images_of(scene: Scene, assets: Assets) -> dict[str, ImageData]:
     out: dict[str, ImageData] = {}
     errors = []
     with ThreadPoolExecutor(AT_ONCE) as pool:
-        loading = {asset: pool.submit(assets.image, asset) for asset in dict.fromkeys(names.values())}
+        # In the caller's context, as lines of the log name its request.
+        loading = {
+            asset: pool.submit(copy_context().run, assets.image, asset) for asset in dict.fromkeys(names.values())
+        }
     for name, asset in names.items():
         try:
             out[asset] = loading[asset].result()

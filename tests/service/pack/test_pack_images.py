@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import threading
+from contextvars import ContextVar
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from tests.rendering import Images, document
 QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m0"}
 PIXELS = np.random.default_rng(4).integers(0, 256, (4, 6, 3)).astype(np.uint8)
 PATIENCE_S = 30.0
+REQUEST = ContextVar("REQUEST", default="")
 
 
 class Meeting(Images):
@@ -24,9 +26,11 @@ class Meeting(Images):
     def __init__(self) -> None:
         super().__init__(a=PIXELS, b=PIXELS[::-1])
         self._both = threading.Barrier(2, timeout=PATIENCE_S)
+        self.requests: list[str] = []
 
     def image(self, ref: str) -> ImageData:
         self._both.wait()
+        self.requests.append(REQUEST.get())
         return super().image(ref)
 
 
@@ -45,9 +49,13 @@ def textured(**assets: str) -> dict[str, object]:
 
 
 def test_two_images_are_read_at_a_time() -> None:
-    arrays = pack(parse_scene(textured(first="a", second="b")), Meeting()).arrays
+    """For the request that the caller serves, which lines of the log name."""
+    assets = Meeting()
+    REQUEST.set("mine")
+    arrays = pack(parse_scene(textured(first="a", second="b")), assets).arrays
     assert arrays.textures is not None
     assert len(arrays.textures.texels) == 2 * PIXELS.shape[0] * PIXELS.shape[1]
+    assert assets.requests == ["mine", "mine"]
 
 
 def test_every_texture_without_an_image_is_named_in_order() -> None:
