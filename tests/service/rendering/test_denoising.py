@@ -187,6 +187,8 @@ def test_a_denoiser_that_dies_is_replaced_and_then_given_up() -> None:
     color, guide = np.random.default_rng(1).random((32, 32, 4), np.float32), np.ones((32, 32, 3), np.float32)
 
     def ask(kill: bool) -> DenoiseResult:
+        if kill and denoiser.process_id is not None:
+            os.kill(denoiser.process_id, signal.SIGSTOP)  # or it may have answered by the time that it is killed
         denoiser.ask(denoise_request(color, (guide, guide), fine=False), told.append)
         assert denoiser.busy
         if kill:
