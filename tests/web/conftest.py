@@ -136,6 +136,16 @@ class Editor:
                 pytest.fail(f"waited in vain for {what}; page says: {self.complaints}, {self.text('#messages')!r}")
             self.page.wait_for_timeout(30)
 
+    def click_until(self, what: str, reached: Callable[[], object]) -> None:
+        """Clicks into the middle of the picture, again where it was not yet ready to tell what stands there."""
+
+        def clicked() -> bool:
+            self.page.click("#stage")
+            self.page.wait_for_timeout(500)
+            return bool(reached())
+
+        self.wait(what, clicked)
+
     def text(self, selector: str) -> str:
         return self.page.inner_text(selector)
 

@@ -57,8 +57,7 @@ def test_nothing_is_lost_before_there_is_a_picture(context: BrowserContext, serv
 
     slow.passing = "previews"
     page.keyboard.press("ArrowLeft")
-    click(editor, 0.5, 0.5)
-    editor.wait("the ball, found in a preview", lambda: page.input_value("#material") == "subject")
+    editor.click_until("the ball, found in a preview", lambda: page.input_value("#material") == "subject")
 
 
 def test_an_image_that_comes_with_a_mesh_is_for_the_mesh(editor: Editor) -> None:

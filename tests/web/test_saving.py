@@ -276,8 +276,7 @@ def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
     assert "tiny.obj: taken as it is. 3 edges" in " ".join(editor.text("#messages").split())
     editor.settled()
     editor.page.click("#outline-list [data-thing='/camera']")
-    editor.page.click("#stage")
-    editor.wait("what is in the middle", lambda: editor.text("#thing-title") == "Mesh")
+    editor.click_until("what is in the middle", lambda: editor.text("#thing-title") == "Mesh")
     editor.page.keyboard.press("Control+z")
     editor.wait("all as before", lambda: not editor.differs(before, 6))
 
