@@ -13,6 +13,7 @@ import signal
 import socket
 import sys
 import threading
+import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
 from importlib import metadata
@@ -56,6 +57,7 @@ PING_S = 15.0  # proxies cut connections that are idle for a minute
 KEEP_ALIVE_S = 150  # longer than proxies keep idle connections (Caddy two minutes), or they meet a closed one
 TICKS = 10  # of uvicorn, ten a second, between two checks of the connections
 GRACE_S = 10  # for answers under way when the server ends
+AGAIN_S = 1.0  # from one signal to another that asks for more: `timeout` sends two in a row, and means one
 LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
 DESCRIPTORS = 65_536
 # How long a thread that computes may keep the event loop waiting whenever that comes back from a system call. With
@@ -183,6 +185,7 @@ class _Server(uvicorn.Server):
         self._state = state
         self._address = address
         self._watch = Watch()
+        self._told_at: float | None = None
         self.refused = False
 
     async def on_tick(self, counter: int) -> bool:
@@ -215,8 +218,11 @@ class _Server(uvicorn.Server):
         yield
 
     def _end(self) -> None:
-        if self.should_exit:  # told twice: nobody is waited for, and other processes end with this one
-            os._exit(int(self.refused))
+        if self._told_at is not None:
+            if time.monotonic() - self._told_at > AGAIN_S:  # nobody is waited for; other processes end with this one
+                os._exit(int(self.refused))
+            return
+        self._told_at = time.monotonic()
         self.should_exit = True
         # Threads that pack a huge scene can't be interrupted, and Python waits for them.
         last_resort = threading.Timer(LAST_RESORT_S, os._exit, [0])

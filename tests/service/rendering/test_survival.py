@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import os
 import signal
+import subprocess
+import sys
 import time
 from collections.abc import Iterator
 from pathlib import Path
@@ -184,18 +186,30 @@ def test_who_rests_makes_room(fragile: Server) -> None:
     assert fragile.http.get("/healthz").status_code == 200
 
 
-def test_a_server_that_is_told_twice_ends_at_once(tmp_path: Path) -> None:
-    """Its processes end with it, and its log tells of no error."""
+def test_a_server_that_is_told_twice_in_a_row_ends_well(tmp_path: Path) -> None:
+    """As `timeout` tells it. Its processes end with it, and its log tells of no error."""
     server = Server(tmp_path)
     server.wait()
     with opened(server) as client:
         client.start(settings=ENDLESS)
         client.frame()
         renderer = server.renderer()
-        while server.process.poll() is None:
+        for _ in range(5):
             server.process.send_signal(signal.SIGINT)
             time.sleep(0.002)
         assert server.stop() == 0
     until(lambda: not Path(f"/proc/{renderer}").exists())
     log = server.log.read_text()
-    assert "Traceback" not in log and "error" not in log, log
+    assert "session ended" in log and "Traceback" not in log and "error" not in log, log
+
+
+def test_a_server_that_is_told_again_ends_at_once(tmp_path: Path) -> None:
+    """At a signal that comes a second after the first."""
+    program = (
+        "import time; from service import app\n"
+        "server = app._Server(app.uvicorn.Config(None), None, '')\n"
+        "server._end(); server._end(); print('told', flush=True)\n"
+        "time.sleep(app.AGAIN_S + 0.1); server._end(); print('went on')\n"
+    )
+    done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=30)
+    assert (done.stdout, done.returncode) == ("told\n", 0), done.stderr
