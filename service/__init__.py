@@ -29,6 +29,7 @@ database           the SQLite file: its version, its connections
 migrations         its tables, as the ordered steps that made them
 data_lock          one server at a time on a data folder
 memory             one budget of memory for all work
+shares             what each caller has of something that all of them share
 quota              room on the disk
 asset_shares       what the assets of one key take
 disk_usage         what files take on a disk: blocks and inodes

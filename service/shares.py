@@ -1,0 +1,82 @@
+"""What each caller has of something that all of them share: nobody can take so much that others are refused."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from service.problems import TooLarge, TooManyRequests, Unavailable
+
+RETRY_S = 5
+
+
+class Shares:
+    """Divides `most` units, of bytes or of requests, among callers, who are told apart by name.
+
+    The rule: a caller may take more as long as it then has no more than is left free, which is half of what others
+    leave [Choudhury and Hahne 1998, dynamic queue length thresholds, alpha = 1]. So a caller that has nothing gets n
+    units wherever 2 n are free; and as one caller alone leaves half of all free, another one's request for up to a
+    quarter of `most` always succeeds beside it. When k callers take as much as they get, and take it again whenever
+    some is released, each has `most` / (k + 1), and as much remains free.
+
+    `what` names the units in errors, as "uploads (SUNBOX_MAX_BODIES)". No caller gets more than `each` where it is
+    given. For the event loop alone: there is no lock.
+    """
+
+    def __init__(self, most: int, what: str, each: int | None = None, retry_s: int = RETRY_S) -> None:
+        self._most = most
+        self._each = most // 2 if each is None else min(each, most // 2)
+        self._what = what
+        self._retry_s = retry_s
+        self._taken: Counter[str] = Counter()
+        self.total = 0  # units that are taken
+
+    def check(self, caller: str, n: int = 1) -> None:
+        """Raise what `take` would raise, and take nothing."""
+        own = self._taken[caller]
+        share = min(self._each, (self._most - self.total + own) // 2)
+        if own + n <= share:
+            return
+        if n > self._each:
+            raise TooLarge(f"This is more than one caller's share of {self._what}.")
+        if n <= share or own + n > self._each:
+            raise TooManyRequests(
+                f"Your own {self._what} take all that one caller may have just now. Wait until some of them end.",
+                self._retry_s,
+            )
+        raise Unavailable(f"There is no room for more {self._what} just now.", self._retry_s)
+
+    def take(self, caller: str, n: int = 1) -> None:
+        """Give `caller` another `n` units, which it has until they are released.
+
+        Raises TooManyRequests where the caller's own units are the cause: without them it would get these. Raises
+        Unavailable where those of others are the cause, and TooLarge where no caller ever gets so many.
+        """
+        self.check(caller, n)
+        self.count(caller, n)
+
+    def count(self, caller: str, n: int = 1) -> None:
+        """Count units that `caller` has anyway, beyond its share too: what a restart found on the disk."""
+        self._taken[caller] += n
+        self.total += n
+
+    def release(self, caller: str, n: int = 1) -> None:
+        """Take back units that `caller` has."""
+        self._taken[caller] -= n
+        self.total -= n
+        if self._taken[caller] <= 0:
+            del self._taken[caller]
+
+    def of(self, caller: str) -> int:
+        """The units that `caller` has."""
+        return self._taken[caller]
+
+    @contextmanager
+    def taken(self, caller: str, n: int = 1) -> Iterator[None]:
+        """A context in which `caller` has another `n` units. Raises what `take` raises."""
+        self.take(caller, n)
+        try:
+            yield
+        finally:
+            self.release(caller, n)
