@@ -11,16 +11,18 @@ from starlette.requests import Request
 
 from service.config import Config
 from service.memory import MemoryBudget
-from service.problems import TooLarge, Unavailable, UnsupportedMedia
+from service.problems import TooLarge, UnsupportedMedia
 from service.rendering.executors import parsing, waiting_for_parsers
 from service.rendering.requests.parser_pool import ParserPool
 from service.rendering.requests.request_parser import PARSERS, Kind
+from service.shares import Shares
 
 # The last three are the defaults of programs that set no content type (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
-SMALL = 64 * 1024  # bytes that are parsed in some ms: handing them to another process would take as long
-AT_ONCE = 4  # as many of the largest bodies may wait
-RETRY_S = 5
+# Bytes that are parsed in some ms: handing them to another process would take as long. So few are not counted either:
+# as many as there may be connections take less than two of the largest bodies.
+SMALL = 64 * 1024
+AT_ONCE = 4  # as many of the largest bodies may wait, two of one caller
 
 
 class Bodies:
@@ -30,7 +32,7 @@ class Bodies:
         self._config = config
         self._memory = memory or MemoryBudget(config.memory)
         self._pool = ParserPool(config, self._memory)
-        self._held = 0  # bytes of large bodies in memory
+        self._shares = Shares(AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")  # bytes in memory
 
     async def parsed(self, kind: Kind, body: bytearray, client: str = "") -> Any:
         """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
@@ -45,28 +47,28 @@ class Bodies:
         self._pool.close()
 
     @asynccontextmanager
-    async def taken(self, request: Request) -> AsyncIterator[bytearray]:
-        """The body, whose bytes count as long as it is needed. Raises UnsupportedMedia, TooLarge, Unavailable."""
+    async def taken(self, request: Request, client: str) -> AsyncIterator[bytearray]:
+        """The body, whose bytes count as long as it is needed.
+
+        Raises UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.
+        """
         told = request.headers.get("content-type", "").partition(";")[0].strip().lower()
         if told not in TAKEN and not told.endswith("+json"):
             raise UnsupportedMedia(f"{told[:100]!r} is not taken here: send application/json")
-        body, received, held = bytearray(), 0, 0
+        body, received = bytearray(), 0
         try:
-            async for chunk in request.stream():
-                received += len(chunk)
-                if received > self._config.max_json:  # received to its end, so that its sender reads the answer
-                    body = bytearray()
-                    continue
-                body += chunk
-                if received > SMALL:
-                    more = received - held
-                    self._held, held = self._held + more, received
-                    self._memory.hold("bodies", self, self._held)
-                    if self._held > AT_ONCE * self._config.max_json:
-                        raise Unavailable("There is no room for this body just now (SUNBOX_MAX_JSON).", RETRY_S)
-            if received > self._config.max_json:
-                raise TooLarge(f"A JSON body holds at most {self._config.max_json} bytes (SUNBOX_MAX_JSON)")
-            yield body
+            with self._shares.growing(client) as have:
+                async for chunk in request.stream():
+                    received += len(chunk)
+                    if received > self._config.max_json:  # received to its end, so that its sender reads the answer
+                        body = bytearray()
+                    else:
+                        body += chunk
+                    if received > SMALL:
+                        have(len(body))
+                        self._memory.hold("bodies", self, self._shares.total)
+                if received > self._config.max_json:
+                    raise TooLarge(f"A JSON body holds at most {self._config.max_json} bytes (SUNBOX_MAX_JSON)")
+                yield body
         finally:
-            self._held -= held
-            self._memory.hold("bodies", self, self._held)
+            self._memory.hold("bodies", self, self._shares.total)

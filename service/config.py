@@ -92,8 +92,17 @@ class Config(BaseSettings):
     )
 
     max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body; it may not be compressed.")
-    max_bodies: int = Field(GIB, ge=1, description="Most bytes of all requests' bodies at a time.")
-    max_json: int = Field(32 * MIB, ge=1, description="Most bytes of a JSON body; of all that wait, four times that.")
+    max_bodies: int = Field(
+        GIB,
+        ge=1,
+        description="Most bytes of all uploads that are being received and parsed, at least four times "
+        "`SUNBOX_MAX_BODY`; one caller has at most half.",
+    )
+    max_json: int = Field(
+        32 * MIB,
+        ge=1,
+        description="Most bytes of a JSON body; of all that wait, four times that, and half of it for one caller.",
+    )
     max_json_memory: int = Field(
         512 * MIB,
         ge=1,

@@ -23,7 +23,6 @@ from service.problems import (
     TimedOut,
     TooLarge,
     Unauthorized,
-    Unavailable,
     UnsupportedMedia,
 )
 
@@ -32,8 +31,7 @@ LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}
 CLOSE_CODES: dict[type[ServiceError], int] = {Unauthorized: 4401, Forbidden: 4403}  # of the stream
 REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
-RETRY_S = 5  # for a client to retry a body for which there is no room
-LEAST_RATE, FREE_S = 1024, 30.0  # bytes a second that a body must come with, once it has taken so long
+LEAST_RATE, WITHIN_S = 1024, 30.0  # bytes a second of a body, on average over so many seconds of waiting for it
 LINGER_S, SILENT_S = 30.0, 2.0  # for a refused body: in all, and without a byte
 # Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are made.
 CONTENT_POLICY = (
@@ -65,7 +63,6 @@ class Guard:
         self._origins = {_origin(origin) for origin in config.allowed_origins}
         self._hosts = LOOPBACK_NAMES | set(config.allowed_hosts) | {host for _, host, _ in self._origins}
         self._refuse = refuse
-        self._held = 0  # bytes of bodies in memory
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
@@ -88,25 +85,10 @@ class Guard:
             return await self._refuse(error)(scope, receive, _secured(patient, granted, close=True))
         if scope["type"] == "websocket":
             return await self._app(scope, receive, send)
-        body = _Body(self, receive)
+        body = _Body(self._config, receive)
         # HEAD is answered as GET is; the server leaves the body out. An answer without an end looks at `bodiless`.
         asked = {**scope, "method": "GET", "bodiless": True} if scope["method"] == "HEAD" else scope
-        try:
-            await self._app(asked, body.receive, _secured(send, granted))
-        finally:
-            self._held -= body.received
-
-    def take(self, received: int, more: int) -> None:
-        """Count `more` bytes of a body that already has `received`. Raises TooLarge, Unavailable."""
-        if received + more > self._config.max_body:
-            raise self._too_large()
-        if self._held + more > self._config.max_bodies:
-            raise Unavailable("There is no room for this body just now (SUNBOX_MAX_BODIES).", RETRY_S)
-        self._held += more
-
-    @property
-    def body_timeout(self) -> float:
-        return self._config.body_timeout
+        await self._app(asked, body.receive, _secured(send, granted))
 
     def _owner(self, scope: Scope, headers: Headers) -> str:
         """The name of the key's owner; "" where no key is needed. Raises Unauthorized."""
@@ -142,45 +124,53 @@ class Guard:
     def _check_body(self, headers: Headers) -> None:
         length = headers.get("content-length", "")
         if length.isdigit() and int(length) > self._config.max_body:
-            raise self._too_large()
+            raise _too_large(self._config)
         if headers.get("content-encoding", "identity").strip().lower() != "identity":
             raise UnsupportedMedia("Compressed bodies are not taken: send it without Content-Encoding")
 
-    def _too_large(self) -> TooLarge:
-        return TooLarge(f"The body is larger than {self._config.max_body} bytes (SUNBOX_MAX_BODY)")
-
 
 class _Body:
-    """Counts a body as it comes in: one of unannounced length is bounded too, and one that stalls is refused."""
+    """Counts a body as it comes in: one of unannounced length is bounded too, and one that stalls is refused.
 
-    def __init__(self, guard: Guard, receive: Receive) -> None:
-        self.received = 0
-        self._guard = guard
+    Whoever stores it bounds the sum of all bodies: of JSON in memory, and of uploads on the disk.
+    """
+
+    def __init__(self, config: Config, receive: Receive) -> None:
+        self._config = config
         self._receive = receive
-        self._waited_s = 0.0
+        self._received = 0  # bytes
+        self._recent, self._waited_s = 0, 0.0  # bytes, and the time that was waited for them
         self._ended = False
 
     async def receive(self) -> Message:
-        """Raises TooLarge, TimedOut, Unavailable."""
+        """Raises TooLarge, TimedOut."""
         if self._ended:
             return await self._receive()  # for the connection's end, which may take long
-        left_s = FREE_S + self.received / LEAST_RATE - self._waited_s
+        left_s = WITHIN_S - self._waited_s
         began = time.monotonic()
         try:
             # Not wait_for: Python 3.11's loses a cancellation that comes together with the message.
-            async with asyncio.timeout(min(self._guard.body_timeout, left_s)):
+            async with asyncio.timeout(min(self._config.body_timeout, left_s)):
                 message = await self._receive()
         except TimeoutError:
             self._ended = True
-            if left_s < self._guard.body_timeout:
+            if left_s < self._config.body_timeout:
                 raise TimedOut(f"The body came too slowly: {LEAST_RATE} bytes a second are the least.") from None
             raise TimedOut("The body did not go on (SUNBOX_BODY_TIMEOUT).") from None
-        self._waited_s += time.monotonic() - began
         more = len(message.get("body", b""))
-        self._guard.take(self.received, more)
-        self.received += more
+        self._received += more
+        if self._received > self._config.max_body:
+            raise _too_large(self._config)
         self._ended = not message.get("more_body", False)
+        self._waited_s += time.monotonic() - began
+        self._recent += more
+        if self._recent >= LEAST_RATE * WITHIN_S:
+            self._recent, self._waited_s = 0, 0.0
         return message
+
+
+def _too_large(config: Config) -> TooLarge:
+    return TooLarge(f"The body is larger than {config.max_body} bytes (SUNBOX_MAX_BODY)")
 
 
 def _secured(send: Send, granted: str | None, close: bool = False) -> Callable[[Message], Awaitable[None]]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
 from service.problems import TooLarge, TooManyRequests, Unavailable
@@ -71,6 +71,27 @@ class Shares:
     def of(self, caller: str) -> int:
         """The units that `caller` has."""
         return self._taken[caller]
+
+    @contextmanager
+    def growing(self, caller: str) -> Iterator[Callable[[int], None]]:
+        """A context in which `caller` has as many units as the function was last called with: 0 at first.
+
+        The function raises what `take` raises, and then changes nothing.
+        """
+        units = 0
+
+        def have(n: int) -> None:
+            nonlocal units
+            if n > units:
+                self.take(caller, n - units)
+            else:
+                self.release(caller, units - n)
+            units = n
+
+        try:
+            yield have
+        finally:
+            self.release(caller, units)
 
     @contextmanager
     def taken(self, caller: str, n: int = 1) -> Iterator[None]:

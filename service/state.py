@@ -33,6 +33,7 @@ from service.rendering.renderers import Member, Renderers
 from service.rendering.requests.request_parser import ParsedRequest, unfolded
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams.sessions import Sessions
+from service.shares import Shares
 from service.traffic import Traffic
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
@@ -58,6 +59,7 @@ class AppState:
     downloads: Downloads = field(init=False)
     memory: MemoryBudget = field(init=False)
     bodies: Bodies = field(init=False)
+    uploads: Shares = field(init=False)  # bytes of files that are being received and parsed, by caller
     readiness: Readiness = field(init=False)
     bsdf: BsdfQuestions = field(init=False)
 
@@ -66,6 +68,8 @@ class AppState:
         self.memory.cache("assets", lambda: self.assets.loader.bytes, self.assets.loader.shrink)
         self.memory.cache("pictures", lambda: 0, self.renders.shrink)  # renders count themselves
         self.bodies = Bodies(self.config, self.memory)
+        most = max(self.config.max_bodies, 4 * self.config.max_body)
+        self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
         self.bsdf = BsdfQuestions(self.renderers)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)

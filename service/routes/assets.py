@@ -16,6 +16,7 @@ from fastapi.responses import JSONResponse
 from service import presets
 from service.assets import AssetInfo
 from service.assets.scene_import import Imported
+from service.bodies import SMALL
 from service.downloads import FileAnswer
 from service.rendering.executors import storing
 from service.routes import answers
@@ -35,14 +36,12 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
     summary="Upload a mesh, an image, or a scene: glTF, or a zip of an OBJ with its materials",
     openapi_extra=answers.ASSET_BODY,
     response_model=None,
-    responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 503),
+    responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
     kind = request.headers.get("content-type")
-    own, whose = app_state(request), owner(request)
+    own, whose, client = app_state(request), owner(request), caller(request)
     file = await asyncio.to_thread(own.assets.incoming)
-    async for chunk in request.stream():
-        await asyncio.to_thread(own.assets.receive, file, chunk)
 
     def add() -> AssetInfo:
         with file:  # here: a request that is cancelled does not wait for this thread
@@ -50,7 +49,14 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
         own.shares.uploaded(whose, own.assets.parts(info))
         return info
 
-    info = await storing(add, caller(request))
+    received = 0
+    with own.uploads.growing(client) as have:
+        async for chunk in request.stream():
+            received += len(chunk)
+            if received > SMALL:
+                have(received)
+            await asyncio.to_thread(own.assets.receive, file, chunk)
+        info = await storing(add, client)
     return {name: value for name, value in asdict(info).items() if value is not None}
 
 

@@ -38,7 +38,7 @@ Arrays = dict[str, np.ndarray]
     f"At most {MOST_PAIRS} pairs.",
     openapi_extra=answers.BSDF_BODY,
     response_class=Response,
-    responses=answers.shaped(answers.BsdfValues) | answers.problems(400, 413, 415, 422, 503),
+    responses=answers.shaped(answers.BsdfValues) | answers.problems(400, 413, 415, 422, 429, 503),
 )
 async def values(request: Request) -> Response:
     return await _answer(request, "bsdf", _values)
@@ -52,7 +52,7 @@ async def values(request: Request) -> Response:
     f"{MOST_WORK} samples, over all cosines.",
     openapi_extra=answers.ALBEDO_BODY,
     response_class=Response,
-    responses=answers.shaped(answers.BsdfAlbedo) | answers.problems(400, 413, 415, 422, 503),
+    responses=answers.shaped(answers.BsdfAlbedo) | answers.problems(400, 413, 415, 422, 429, 503),
 )
 async def albedo(request: Request) -> Response:
     return await _answer(request, "albedo", _albedo)
@@ -65,7 +65,7 @@ async def albedo(request: Request) -> Response:
     f"tangent. Other models are refused. At most {MOST_PAIRS} cosines.",
     openapi_extra=answers.TERMS_BODY,
     response_class=Response,
-    responses=answers.shaped(answers.BsdfTerms) | answers.problems(400, 413, 415, 422, 503),
+    responses=answers.shaped(answers.BsdfTerms) | answers.problems(400, 413, 415, 422, 429, 503),
 )
 async def terms(request: Request) -> Response:
     return await _answer(request, "terms", _terms)
@@ -73,7 +73,7 @@ async def terms(request: Request) -> Response:
 
 async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]) -> Response:
     own = app_state(request)
-    async with own.bodies.taken(request) as body:
+    async with own.bodies.taken(request, caller(request)) as body:
         await own.renderers.able(STARTING_S)
         asked: BsdfRequest = await own.bodies.parsed(kind, body, caller(request))
     material = pack_material(asked.material)

@@ -78,7 +78,7 @@ async def document(
     description="The body is the bare document, and must be valid; one's own document of the same name is replaced. "
     "With keys a document is its key's, unless it is `shared`.",
     openapi_extra=answers.DOCUMENT_BODY,
-    responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 412, 413, 415, 422),
+    responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 412, 413, 415, 422, 429),
 )
 async def put(
     request: Request,
@@ -91,7 +91,7 @@ async def put(
     if_none_match: IfNoneMatch = None,
 ) -> answers.Named:
     own = app_state(request)
-    async with own.bodies.taken(request) as body:
+    async with own.bodies.taken(request, caller(request)) as body:
         checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body, caller(request))
     condition = Condition(_tags(if_match), _tags(if_none_match))
 

@@ -61,7 +61,7 @@ async def submitted(request: Request, key: str | None) -> dict[str, Any]:
 
 async def _parsed(request: Request, kind: Any) -> ParsedRequest:
     own = app_state(request)
-    async with own.bodies.taken(request) as body:
+    async with own.bodies.taken(request, caller(request)) as body:
         if kind != "keyed_render":  # that may be a repetition, which needs no room
             own.renders.admit(owner(request))
         await own.renderers.able(STARTING_S)

@@ -8,6 +8,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -214,24 +215,48 @@ def test_who_rests_makes_room() -> None:
 
 
 def test_a_body_that_drips(monkeypatch: pytest.MonkeyPatch) -> None:
-    """A byte now and then is no pause, and would hold a place for ever."""
-    monkeypatch.setattr(guard, "FREE_S", 0.3)
-    answers: list[Message] = []
+    """A byte now and then is no pause, and would hold a place for ever, however fast the body came before."""
+    now = 0.0
+    monkeypatch.setattr(guard, "time", SimpleNamespace(monotonic=lambda: now))
+    answers, pieces = list[Message](), list[bytes]()
 
     async def receive() -> Message:
-        await asyncio.sleep(0.02)
-        return {"type": "http.request", "body": b"x", "more_body": True}
+        nonlocal now
+        pieces.append(b"x" * (1 << 20) if not pieces else b"x")
+        now += 5
+        await asyncio.sleep(0)
+        return {"type": "http.request", "body": pieces[-1], "more_body": True}
 
     async def send(message: Message) -> None:
         answers.append(message)
 
     async def reading(scope: Scope, receive: Receive, send: Send) -> None:
         with pytest.raises(guard.TimedOut, match="too slowly"):
-            while True:
+            for _ in range(100):
                 await receive()
 
     headers = [(b"host", b"127.0.0.1")]
     scope = {"type": "http", "method": "POST", "path": "/", "headers": headers, "server": ("127.0.0.1", 80)}
-    began = time.monotonic()
     asyncio.run(Guard(reading, config=Config(), refuse=respond)(scope, receive, send))
-    assert time.monotonic() - began < 5
+    assert len(pieces) == 8, "the first, and seven bytes in 30 s"
+
+
+def test_a_slow_body_goes_on(monkeypatch: pytest.MonkeyPatch) -> None:
+    """1 KiB/s is enough, for hours."""
+    now, received = 0.0, 0
+    monkeypatch.setattr(guard, "time", SimpleNamespace(monotonic=lambda: now))
+
+    async def receive() -> Message:
+        nonlocal now
+        now += 10
+        await asyncio.sleep(0)
+        return {"type": "http.request", "body": bytes(10 * guard.LEAST_RATE), "more_body": True}
+
+    async def reading(scope: Scope, receive: Receive, send: Send) -> None:
+        nonlocal received
+        for _ in range(1000):
+            received += len((await receive())["body"])
+
+    scope = {"type": "http", "method": "POST", "path": "/", "headers": [], "server": ("10.0.0.1", 80)}
+    asyncio.run(Guard(reading, config=Config(), refuse=respond)(scope, receive, None))  # type: ignore[arg-type]
+    assert received == 10_000 * guard.LEAST_RATE

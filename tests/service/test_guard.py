@@ -8,7 +8,6 @@ import socket
 import time
 from collections.abc import Iterator
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 from urllib.parse import urlsplit
 
@@ -317,8 +316,7 @@ def test_who_stops_listening_is_let_go_at_any_moment(steps: int) -> None:
         async def receive() -> Any:
             return messages.pop() if messages else await asyncio.sleep(3600)
 
-        guard: Any = SimpleNamespace(body_timeout=30.0, take=lambda received, more: None)
-        body = _Body(guard, receive)
+        body = _Body(Config(), receive)
         listening = asyncio.create_task(disconnected(body.receive))
         for _ in range(steps):
             await asyncio.sleep(0)

@@ -201,7 +201,7 @@ def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
 
     async def take(inner: bool) -> None:
         request = Request({"type": "http", "method": "POST", "headers": []}, receive)
-        async with bodies.taken(request):
+        async with bodies.taken(request, "client"):
             assert budget.used()["bodies"] >= 2 * MIB
             if inner:
                 await take(False)

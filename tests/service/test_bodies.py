@@ -1,0 +1,123 @@
+"""Bodies that are on their way: one caller's never refuse another's."""
+
+from __future__ import annotations
+
+import asyncio
+import json
+from collections.abc import Awaitable, Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.app import create_app
+from service.bodies import SMALL
+from service.config import Config
+from service.state import AppState
+
+MIB = 1 << 20
+GREY = b'{"type": "diffuse", "albedo": 0.5}'
+OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
+
+
+class Call:
+    """A request to an application in this process; `end` lets its body end."""
+
+    def __init__(self, app: Any, key: str, method: str, path: str, body: bytes, half: bool = False) -> None:
+        self._coming = [{"type": "http.request", "body": body, "more_body": half}]
+        self._ending = asyncio.Event()
+        self.status, self.body, self.waiting = 0, b"", asyncio.Event()
+        headers = [(b"host", b"127.0.0.1"), (b"authorization", f"Bearer {key}".encode())]
+        scope = {"type": "http", "method": method, "path": path, "raw_path": path.encode(), "query_string": b""}
+        scope |= {"headers": headers, "server": ("127.0.0.1", 80), "client": ("127.0.0.1", 1), "http_version": "1.1"}
+        self.task = asyncio.create_task(app(scope, self._receive, self._send))
+
+    async def _receive(self) -> Any:
+        if self._coming:
+            return self._coming.pop()
+        self.waiting.set()
+        await self._ending.wait()
+        return {"type": "http.disconnect"}
+
+    async def _send(self, message: Any) -> None:
+        self.status = message.get("status", self.status)
+        self.body += message.get("body", b"")
+
+    async def answered(self) -> int:
+        await self.task
+        return self.status
+
+    async def stalled(self) -> bool:
+        """Whether the body's first half was received, and the rest is waited for; else it was answered."""
+        waiting = asyncio.create_task(self.waiting.wait())
+        await asyncio.wait({waiting, self.task}, return_when=asyncio.FIRST_COMPLETED)
+        waiting.cancel()
+        return self.status == 0
+
+    async def end(self) -> None:
+        self._ending.set()
+        await self.task
+
+
+def calling(folder: Path, test: Callable[[Any], Awaitable[None]], **limits: Any) -> None:
+    """Run a test with an application that asks for the key a or b; nothing renders."""
+
+    async def run() -> None:
+        app = create_app(Config(data_dir=folder, api_key=["a", "b"], **limits))
+        own: AppState = app.state.sunbox
+        own.documents.prepare()
+        try:
+            await test(app)
+            assert own.uploads.total == 0 and own.memory.used()["bodies"] == 0, "something still counts"
+        finally:
+            own.assets.close()
+            own.bodies.close()
+
+    asyncio.run(run())
+
+
+def test_half_sent_uploads_refuse_nobody_else(tmp_path: Path) -> None:
+    async def test(app: Any) -> None:
+        half = [Call(app, "a", "POST", "/v1/assets", bytes(MIB - 60), half=True) for _ in range(4)]
+        assert [await each.stalled() for each in half] == [True, True, False, False]
+        assert half[3].status == 429 and b"SUNBOX_MAX_BODIES" in half[3].body
+        large = OBJ + b"#" * (MIB - 60)
+        for body, status in ((OBJ, 201), (large, 201)):
+            assert await Call(app, "b", "POST", "/v1/assets", body).answered() == status
+        assert await Call(app, "a", "POST", "/v1/assets", OBJ).answered() == 201, "small ones are not counted"
+        for each in half:
+            await each.end()
+
+    calling(tmp_path, test, max_body=MIB, max_bodies=4 * MIB)
+
+
+@pytest.mark.parametrize("size", [100, 3 * SMALL])
+def test_half_sent_json_refuses_nobody_else(tmp_path: Path, size: int) -> None:
+    async def test(app: Any) -> None:
+        address = "/v1/documents/materials/grey"
+        half = [Call(app, "a", "PUT", address, b" " * 4 * SMALL, half=True) for _ in range(4)]
+        assert [await each.stalled() for each in half] == [True, True, False, False]
+        assert half[3].status == 429 and b"SUNBOX_MAX_JSON" in half[3].body
+        other = Call(app, "b", "PUT", address, GREY + b" " * size)
+        assert await other.answered() == 201, other.body
+        for each in half:
+            await each.end()
+
+    calling(tmp_path, test, max_json=4 * SMALL)
+
+
+def test_a_body_counts_while_it_is_in_memory(tmp_path: Path) -> None:
+    """One that is too large is received to its end, but nothing of it is stored."""
+
+    async def test(app: Any) -> None:
+        memory = app.state.sunbox.memory
+        call = Call(app, "a", "PUT", "/v1/documents/materials/grey", b" " * 3 * SMALL, half=True)
+        assert await call.stalled() and memory.used()["bodies"] == 3 * SMALL
+        too_large = Call(app, "b", "PUT", "/v1/documents/materials/grey", b" " * 5 * SMALL, half=True)
+        assert await too_large.stalled() and memory.used()["bodies"] == 3 * SMALL
+        for each in (call, too_large):
+            await each.end()
+        whole = Call(app, "b", "PUT", "/v1/documents/materials/grey", json.dumps({}).encode() + b" " * 5 * SMALL)
+        assert await whole.answered() == 413
+
+    calling(tmp_path, test, max_json=4 * SMALL)
