@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import sqlite3
 from collections.abc import Iterator
-from contextlib import closing, contextmanager
+from contextlib import ExitStack, closing, contextmanager
 from pathlib import Path
 
 from service.disk_usage import Usage
@@ -64,14 +64,27 @@ class Database:
 
     @contextmanager
     def open(self) -> Iterator[sqlite3.Connection]:
-        """A connection to the tables of this version, closed at the end. Raises Unavailable where the disk fails."""
-        try:
-            with self._connected() as database:
+        """A connection to the tables of this version, closed at the end. Raises Unavailable where the disk fails.
+
+        What goes wrong in the caller's own work while it has the connection passes as it is.
+        """
+        with ExitStack() as stack:
+            with self._explained(OSError, sqlite3.Error):
+                database = stack.enter_context(self._connected())
+            with self._explained(sqlite3.Error):
                 yield database
+
+    @contextmanager
+    def _explained(self, *of_the_disk: type[Exception]) -> Iterator[None]:
+        """Raises Unavailable for these."""
+        try:
+            yield
         except DamagedFile as error:
             log.error("could not use the database reason=%s", error)
             raise Unavailable("The server's database was written by a newer version of Sunbox.", 30) from None
-        except (OSError, sqlite3.Error) as error:
+        except (sqlite3.ProgrammingError, sqlite3.InterfaceError):
+            raise  # a mistake of ours, as a connection that another thread uses
+        except of_the_disk as error:
             log.error("could not reach the database file=%s error=%s", self.path, error)
             if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_BUSY:
                 raise Unavailable("Others are writing to the database just now.", 1) from None

@@ -100,8 +100,9 @@ class AppState:
             log.warning("renders will not outlive this server: the data folder cannot be written to")
             self.renders.store = None
             return
+        stored = await asyncio.to_thread(store.load)
         await store.open()
-        self.renders.resume(await asyncio.to_thread(store.load), self._resumed)
+        self.renders.resume(stored, self._resumed)
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
         """A render that is asked for now. Raises TooLarge for one that never fits into the memory."""

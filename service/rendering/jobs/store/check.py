@@ -48,6 +48,9 @@ def check_renders(folder: Path, report: Report) -> int:
 
 
 def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, render: StoredRender) -> Iterator[str]:
+    if render.unfit is not None:
+        yield f"its row cannot be read: {render.unfit}"
+        return
     row = database.execute("SELECT body FROM render_documents WHERE number = ?", (render.number,)).fetchone()
     if row is None:
         yield "its document is not there"

@@ -16,19 +16,19 @@ import tempfile
 import zlib
 from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager, nullcontext, suppress
-from dataclasses import asdict
+from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, BinaryIO, Literal
 
 import numpy as np
 
 from service.disk_usage import Usage, expected, usage
-from service.rendering.ipc.messages import Progress, Restore, SavedPicture
-from service.rendering.jobs.store.record import progress_of
+from service.rendering.ipc.messages import Progress, Reason, Restore, SavedPicture
+from service.rendering.jobs.store.fitting import Unfit, fit
 
 log = logging.getLogger(__name__)
 
-FORMAT = 1
+KEY, FORMAT = "sunbox_picture", 1  # which the first line begins with
 PART = ".tmp"
 LONGEST_LINE = 1 << 16  # bytes of the line of JSON
 PIECE = 8 << 20  # bytes that are written at a time
@@ -40,6 +40,20 @@ Room = Callable[[Usage], AbstractContextManager[None]]
 
 class DamagedPicture(Exception):
     """A file is not what was written; the text says in what."""
+
+
+@dataclass(frozen=True)
+class _Head:
+    """The first line of a file, but for its format."""
+
+    samples: int
+    under_way: tuple[int, int, int]
+    sizes: list[int]  # bytes of each buffer
+    crc32: int  # of all of them
+    reason: Reason | None = None
+    progress: Progress = field(default_factory=Progress)
+    bands: tuple[tuple[int, int, int, int], ...] = ()
+    driver: str = ""
 
 
 class PictureFiles:
@@ -86,18 +100,18 @@ class PictureFiles:
         checksum = 0
         for part in parts:
             checksum = zlib.crc32(part, checksum)
-        head = {
-            "sunbox_picture": FORMAT,
-            "reason": restore.reason,
-            "progress": asdict(restore.progress),
-            "samples": saved.samples,
-            "under_way": saved.under_way,
-            "bands": saved.bands,
-            "driver": saved.driver,
-            "sizes": [part.nbytes for part in parts],
-            "crc32": checksum,
-        }
-        line = json.dumps(head, separators=(",", ":")).encode() + b"\n"
+        sizes = [part.nbytes for part in parts]
+        head = _Head(
+            saved.samples,
+            saved.under_way,
+            sizes,
+            checksum,
+            restore.reason,
+            restore.progress,
+            saved.bands,
+            saved.driver,
+        )
+        line = json.dumps({KEY: FORMAT} | asdict(head), separators=(",", ":")).encode() + b"\n"
         with self._room(expected([len(line) + sum(part.nbytes for part in parts)])):
             self._folder.mkdir(parents=True, exist_ok=True)
             fd, name = tempfile.mkstemp(prefix=".", suffix=PART, dir=self._folder)
@@ -120,22 +134,21 @@ class PictureFiles:
         with open(self.path(id, kind), "rb") as file:
             head = _head(file)
             buffers, checksum = [], 0
-            for size in head["sizes"]:
+            for size in head.sizes:
                 buffer = np.empty(size, np.uint8)
                 if file.readinto(buffer.data) != size:
                     raise DamagedPicture("the file is shorter than what was written")
                 checksum = zlib.crc32(buffer.data, checksum)
                 buffers.append(buffer)
-        if checksum != head["crc32"]:
+        if checksum != head.crc32:
             raise DamagedPicture("its bytes are not those that were written")
-        bands = tuple((first, count, top, rows) for first, count, top, rows in head.get("bands", ()))
-        saved = SavedPicture(head["samples"], tuple(head["under_way"]), buffers, head.get("driver", ""), bands)
-        return Restore(task, 1, saved, head["reason"], progress_of(head["progress"]))
+        saved = SavedPicture(head.samples, head.under_way, buffers, head.driver, head.bands)
+        return Restore(task, 1, saved, head.reason, head.progress)
 
     def progress(self, id: str, kind: Kind) -> Progress:
         """How far the render was. Raises DamagedPicture, and FileNotFoundError."""
         with open(self.path(id, kind), "rb") as file:
-            return progress_of(_head(file)["progress"])
+            return _head(file).progress
 
     def delete(self, id: str, *kinds: Kind) -> None:
         for kind in kinds or KINDS:
@@ -160,15 +173,15 @@ class PictureFiles:
             os.close(fd)
 
 
-def _head(file: BinaryIO) -> dict[str, Any]:
-    line = file.readline(LONGEST_LINE)
+def _head(file: BinaryIO) -> _Head:
+    """Raises DamagedPicture."""
     try:
-        head: dict[str, Any] = json.loads(line)
-        if head["sunbox_picture"] == FORMAT:
-            return head
-    except (ValueError, TypeError, KeyError):
+        values = json.loads(file.readline(LONGEST_LINE))
+        if values.pop(KEY) != FORMAT:
+            raise DamagedPicture("another version of Sunbox wrote it")
+        return fit(_Head, values)
+    except (ValueError, TypeError, KeyError, AttributeError, Unfit):
         raise DamagedPicture("its first line is not that of a picture") from None
-    raise DamagedPicture("another version of Sunbox wrote it")
 
 
 def _write_whole(file: Any, part: memoryview) -> None:

@@ -2,14 +2,16 @@
 
 from __future__ import annotations
 
-import json
+import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
 from typing import Any, Literal
 
 from service.problems import ANSWERS, FieldError, Internal, InvalidDocument, ServiceError, problem
-from service.quality import ResolvedSettings
+from service.quality import ResolvedSettings, resolve
 from service.rendering.ipc.messages import Loaded, Progress, Reason
+from service.rendering.jobs.store.fitting import Unfit, fit, read, stored, unknown
+from service.scene.settings import Settings
 
 State = Literal["queued", "running", "done", "cancelled", "failed"]
 ENDED: tuple[State, ...] = ("done", "cancelled", "failed")
@@ -77,18 +79,7 @@ class Outcome:
         """Everything but the state and the time of its end, which have columns of their own."""
         values = asdict(self)
         del values["state"], values["ended_at"]
-        return json.dumps(values, separators=(",", ":"))
-
-    @classmethod
-    def of(cls, state: State, ended_at: float | None, text: str) -> Outcome:
-        values = json.loads(text)
-        return cls(**values | {"state": state, "ended_at": ended_at, "progress": progress_of(values["progress"])})
-
-
-def progress_of(values: dict[str, Any]) -> Progress:
-    """Progress from JSON, whose keys are texts."""
-    missing = values.get("missing")
-    return Progress(**values | {"missing": missing and {int(bounces): share for bounces, share in missing.items()}})
+        return stored(values)
 
 
 @dataclass(frozen=True)
@@ -99,3 +90,47 @@ class StoredRender:
     order: Order
     outcome: Outcome
     gone: bool = False  # its document and pictures were deleted, and its id is remembered
+    unfit: str | None = None  # why it is failed, though its row says otherwise: this version cannot read that
+    unknown: frozenset[str] = frozenset()  # fields of its row that this version leaves out
+
+
+def settings_json(settings: ResolvedSettings) -> str:
+    return stored(asdict(settings))
+
+
+def stored_render(
+    number: int,
+    id: str,
+    owner: str,
+    label: str | None,
+    priority: int,
+    created_at: float,
+    settings: str,
+    size: int,
+    state: str,
+    ended_at: float | None,
+    outcome: str,
+    gone: int,
+) -> StoredRender:
+    """A render from its row. What cannot be read makes it a failed one, whose row stays as it is."""
+    left_out, faults = set[str](), list[str]()
+    knobs, become = resolve(Settings()), Outcome()
+    try:
+        values = read(settings)
+        left_out |= unknown(ResolvedSettings, values)
+        knobs = fit(ResolvedSettings, values)
+    except Unfit as error:
+        faults.append(f"settings: {error}")
+    try:
+        values = read(outcome)
+        left_out |= unknown(Outcome, values)
+        become = fit(Outcome, values | {"state": state, "ended_at": ended_at})
+        become.error  # noqa: B018 (it reads `problem`)
+    except (Unfit, KeyError, TypeError) as error:
+        faults.append(f"outcome: {error}")
+    unfit = "; ".join(faults) or None
+    if unfit is not None:
+        detail = f"What the server stored of this render cannot be read, so it cannot go on: {unfit}. Send it again."
+        become = become.failed(Internal(detail), ended_at if isinstance(ended_at, float) else time.time())
+    order = Order(id, owner, knobs, label, priority, created_at, size)
+    return StoredRender(number, order, become, bool(gone), unfit, frozenset(left_out))

@@ -2,18 +2,21 @@
 
 from __future__ import annotations
 
-import json
 import sqlite3
 import time
 from collections.abc import Collection
 from contextlib import ExitStack
-from dataclasses import asdict
-from typing import Any
 
 from service.database import Database
 from service.problems import Internal
-from service.quality import ResolvedSettings
-from service.rendering.jobs.store.record import IdempotencyKey, Order, Outcome, StoredRender
+from service.rendering.jobs.store.record import (
+    IdempotencyKey,
+    Order,
+    Outcome,
+    StoredRender,
+    settings_json,
+    stored_render,
+)
 
 KEY_S = 24 * 3600.0  # of the contract: how long an idempotency key counts
 REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
@@ -44,7 +47,7 @@ class RenderRows:
         self, order: Order, outcome: Outcome, document: bytes, uses: Collection[str], key: IdempotencyKey | None
     ) -> int:
         """Store a render that waits; its number. `uses`: the ids of the assets that it refers to."""
-        settings = json.dumps(asdict(order.settings))
+        settings = settings_json(order.settings)
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
             values = (order.id, order.owner, order.label, order.priority, order.created_at, settings, order.bytes)
@@ -96,7 +99,7 @@ class RenderRows:
                 return None
             digest, number = found
             row = database.execute(f"SELECT {_COLUMNS} FROM renders WHERE number = ?", (number,)).fetchone()
-        return None if row is None else (digest, _stored(row))
+        return None if row is None else (digest, stored_render(*row))
 
     def forget(self, numbers: Collection[int]) -> None:
         """Delete the documents of renders, remember their ids, and forget what is too old even for that."""
@@ -117,10 +120,4 @@ class RenderRows:
 def stored_renders(database: sqlite3.Connection) -> list[StoredRender]:
     """Every render, those that are gone included, in the order of arrival. Raises sqlite3.Error."""
     rows = database.execute(f"SELECT {_COLUMNS} FROM renders ORDER BY number").fetchall()
-    return [_stored(row) for row in rows]
-
-
-def _stored(row: tuple[Any, ...]) -> StoredRender:
-    number, id, owner, label, priority, created_at, settings, size, state, ended_at, outcome, gone = row
-    order = Order(id, owner, ResolvedSettings(**json.loads(settings)), label, priority, created_at, size)
-    return StoredRender(number, order, Outcome.of(state, ended_at, outcome), bool(gone))
+    return [stored_render(*row) for row in rows]

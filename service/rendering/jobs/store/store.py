@@ -55,15 +55,25 @@ class RenderStore:
         return True
 
     def load(self) -> list[StoredRender]:
-        """Every render, in the order of arrival, as far as it was stored. Not for an event loop."""
+        """Every render, in the order of arrival, as far as it was stored. Not for an event loop.
+
+        One that this version cannot read is a failed one, which says so; its row and its files stay as they are.
+        """
         stored = self._rows.all()
+        for each in stored:
+            if each.unfit is not None and not each.gone:
+                log.error(
+                    "a stored render cannot be read, so it failed id=%s reason=%s", each.order.id[:6], each.unfit
+                )
+        if left_out := set[str]().union(*(each.unknown for each in stored)):
+            log.warning("left out what this version does not know of renders fields=%s", ",".join(sorted(left_out)))
         self._files.prepare([each.order.id for each in stored if not each.gone])
         return [each if each.gone else self._reached(each) for each in stored]
 
     def _reached(self, render: StoredRender) -> StoredRender:
         """With the progress of the picture that there is of it."""
         id, outcome = render.order.id, render.outcome
-        if self._files.has(id, "picture"):
+        if render.unfit is not None or self._files.has(id, "picture"):
             return render
         return replace(render, outcome=replace(outcome, progress=self._checkpointed(id)))
 

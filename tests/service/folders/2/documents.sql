@@ -24,3 +24,4 @@ CREATE TABLE uses (
 INSERT INTO "uses" VALUES('sha256:697b00ab13410c52a542d2e9c63711fcc04e9cbf6c0d3439a9b43cc812e6e713','scenes','bunny');
 DELETE FROM "sqlite_sequence";
 COMMIT;
+PRAGMA user_version = 2;
