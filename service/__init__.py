@@ -38,7 +38,7 @@ storage            what is kept in the data folder
 data_check         whether that is sound
 logs               a line or a JSON object for each event
 log_output         where log records go
-child_processes    children that parse strangers' files, as the service starts and ends them
+child_processes    children that parse strangers' files, as the service starts and ends them; what children inherit
 confined           what such a child gives up before it reads anything
 cpu_time           how long a process was able to run
 shared_memory      arrays that another process may map

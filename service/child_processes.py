@@ -1,4 +1,5 @@
-"""Children that parse strangers' files and texts, as the service starts, reuses and ends them.
+"""Children that parse strangers' files and texts, as the service starts, reuses and ends them; and the environment of
+every process that the service starts.
 
 `service.confined` is their own side: what they give up before they read anything.
 """
@@ -23,8 +24,24 @@ ROOT = Path(__file__).parents[1]
 START_SECONDS = 30.0  # libraries read from a cold disk
 RIGHTS_BYTES = 4096  # of the message that says what a child gave up
 CLOSING_SECONDS = 5.0  # from a hung-up socket to the end of its process
+SETTINGS = "SUNBOX_"  # what the names of the service's settings begin with
+FOR_CHILDREN = {"SUNBOX_LOG_FORMAT"}  # the settings that a process beside the server reads
+SECRETS = {"RAY_AUTH_TOKEN"}  # whoever has it may run programs on all nodes of a Ray cluster
 # One thread each: a second one gains nothing on files of this size and takes address space from the limit.
 THREADS = {"OPENBLAS_NUM_THREADS": "1", "OMP_NUM_THREADS": "1"}
+
+
+def inherited_environment(*secrets: str) -> dict[str, str]:
+    """This process's environment for a child, without what may be a secret but for those that are named.
+
+    None of the service's settings that the child does not read goes along: the keys are among them, also under a name
+    that somebody misspelt.
+    """
+    return {
+        name: value
+        for name, value in os.environ.items()
+        if name in FOR_CHILDREN or name in secrets or not (name.startswith(SETTINGS) or name in SECRETS)
+    }
 
 
 class Closed(Exception):
@@ -40,12 +57,10 @@ class Child:
     def __init__(self, module: str, environment: dict[str, str], is_quiet: bool) -> None:
         self.link, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
         with theirs:
-            # Nothing of the service's settings: they may hold its key.
-            inherited = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
             self.process = subprocess.Popen(
                 [sys.executable, "-m", module, str(theirs.fileno())],
                 cwd=ROOT,
-                env=inherited | THREADS | environment,
+                env=inherited_environment() | THREADS | environment,
                 pass_fds=[theirs.fileno()],
                 stdin=subprocess.DEVNULL,
                 stdout=subprocess.DEVNULL,

@@ -89,6 +89,15 @@ class Server:
             self.process.kill()
 
 
+def families(pid: int) -> Iterator[int]:
+    """The process and all its descendants."""
+    yield pid
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        with suppress(OSError):
+            for child in task.read_text().split():
+                yield from families(int(child))
+
+
 @dataclass(frozen=True)
 class Picture:
     """A frame as it came."""

@@ -11,6 +11,7 @@ import os
 import subprocess
 import sys
 from collections.abc import Iterator
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
@@ -18,12 +19,12 @@ import pytest
 
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.types import AssetLimits
-from service.child_processes import ROOT, Children
+from service.child_processes import ROOT, Children, inherited_environment
 from service.confined import Rights, seccomp
 from service.confined.landlock import RIGHTS
 from service.confined.system_calls import AUDIT_ARCH, READING, system_calls
 from tests import privileges
-from tests.serving import Server
+from tests.serving import SCENE, SMALL, Server, families
 
 # As what it is started: with the rights of whoever runs the tests, root perhaps, and without any capability.
 PYTHONS = {"as the tests": privileges._own, "without capabilities": None}
@@ -237,10 +238,45 @@ def test_the_server_says_it_and_is_hidden(server: Server) -> None:
     with Sandbox(AssetLimits()) as box:
         assert Rights(**told) == box.rights()
     assert "rights" in server.log.read_text()
-    for name in ("mem", "environ"):  # by another process of this user
-        program = f"open('/proc/{server.process.pid}/{name}', 'rb').read(1)"
-        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True)
-        assert "PermissionError" in done.stderr
+    for name in ("mem", "environ"):
+        assert "PermissionError" in read_by_another(server.process.pid, name)
+
+
+def read_by_another(pid: int, name: str) -> str:
+    """What another process of this user has to say that reads a file in a process's folder of /proc."""
+    program = f"open('/proc/{pid}/{name}', 'rb').read(1)"
+    return subprocess.run([sys.executable, "-c", program], capture_output=True, text=True).stderr
+
+
+def test_no_process_beside_the_server_has_its_keys(tmp_path: Path, server: Server) -> None:
+    """A renderer, whose driver nothing confines, and the denoiser that it starts: other processes of this user read
+    neither their memory nor their environment, and root finds no key there."""
+    keyed = Server(tmp_path, SUNBOX_API_KEY="very-secret", SUNBOX_APIKEY="misspelt-secret")
+    try:
+        keyed.wait()
+        order = {"scene": SCENE, "settings": {**SMALL, "denoise": True}}
+        answer = keyed.http.post("/v1/render", json=order, headers={"authorization": "Bearer very-secret"})
+        assert answer.status_code == 200, answer.text
+        renderer = keyed.renderer()
+        programs = {pid: Path(f"/proc/{pid}/cmdline").read_text() for pid in families(renderer)}
+        (denoiser,) = (pid for pid, program in programs.items() if "denoise_main" in program)
+        for pid in (renderer, denoiser):  # a compiler may just be starting
+            for name in ("mem", "environ"):
+                assert "PermissionError" in read_by_another(pid, name)
+        for pid in programs:
+            with suppress(OSError):  # it has ended, or who runs the tests is not root
+                assert b"secret" not in Path(f"/proc/{pid}/environ").read_bytes()
+    finally:
+        assert keyed.stop() == 0
+
+
+def test_what_a_child_inherits(monkeypatch: pytest.MonkeyPatch) -> None:
+    for name in ("SUNBOX_API_KEY", "SUNBOX_LOG_FORMAT", "RAY_AUTH_TOKEN", "LD_PRELOAD"):
+        monkeypatch.setenv(name, "given")
+    found = inherited_environment()
+    assert found["LD_PRELOAD"] == found["SUNBOX_LOG_FORMAT"] == "given" and found["PATH"]
+    assert not {"SUNBOX_API_KEY", "RAY_AUTH_TOKEN"} & found.keys()
+    assert inherited_environment("RAY_AUTH_TOKEN").items() - found.items() == {("RAY_AUTH_TOKEN", "given")}
 
 
 @pytest.mark.parametrize("machine", AUDIT_ARCH)

@@ -23,7 +23,7 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from gpu import Renderer
-from tests.serving import ENDLESS, SCENE, SMALL, Client, Server, client
+from tests.serving import ENDLESS, SCENE, SMALL, Client, Server, client, families
 
 pytestmark = pytest.mark.calm
 
@@ -36,15 +36,6 @@ CALM_S = 0.5
 GROWTH = 700 * MIB
 LEFT = 250 * MIB  # of that, after the attack: processes for large bodies stay, the values in them do not
 ATTACK_S = 40.0
-
-
-def families(pid: int) -> Iterator[int]:
-    """The process and all its descendants."""
-    yield pid
-    for task in Path(f"/proc/{pid}/task").glob("*/children"):
-        with suppress(OSError):
-            for child in task.read_text().split():
-                yield from families(int(child))
 
 
 def private(pid: int) -> int:

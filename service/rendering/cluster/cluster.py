@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from service import logs
+from service.child_processes import inherited_environment
 from service.rendering.cluster import control
 from service.rendering.cluster.control import Join, Joined, Open, Refused, Release
 from service.rendering.cluster.joining import INSTALL, CannotJoin
@@ -30,7 +31,6 @@ JOIN_S = 40.0  # for the gateway to start and to join, which it gives up itself 
 SILENT_S = 20.0  # without a sign of life, one of which comes every second
 FAREWELL_S = 6.0  # for the gateway to end the actors, and a cluster of its own
 RESTS = "The renderer has been given back to the Ray cluster until there is more work."
-SECRETS = ("SUNBOX_API_KEY",)  # that no process of a cluster needs
 
 # Nothing is reported to Ray's makers. Actors begin at the server's own priority, as renderers of this machine do.
 RAY = {"RAY_USAGE_STATS_ENABLED": "0", "RAY_worker_niceness": "0"}
@@ -149,14 +149,13 @@ class Cluster:
 
 def _start(ask: Join) -> _Gateway:
     ours, theirs = socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
-    environment = {name: value for name, value in os.environ.items() if name not in SECRETS}
     command = [sys.executable, "-m", "service.rendering.cluster.gateway", str(theirs.fileno())]
     with theirs:
         process = subprocess.Popen(
             [*command, "--log-level", str(logs.level())],
             pass_fds=[theirs.fileno()],
             cwd=ROOT,
-            env={**RAY, **_token_mode(), **environment},
+            env={**RAY, **_token_mode(), **inherited_environment("RAY_AUTH_TOKEN")},
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             process_group=0,

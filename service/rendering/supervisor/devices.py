@@ -7,6 +7,7 @@ import subprocess
 import sys
 from dataclasses import replace
 
+from service.child_processes import inherited_environment
 from service.config import Config, cores
 from service.rendering.renderers import Place
 from service.rendering.supervisor.pool import Seat
@@ -48,7 +49,15 @@ def missing_device(config: Config) -> str | None:
         return None
     command = [sys.executable, "-m", LISTING]
     try:
-        listed = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, timeout=LISTING_S, check=True)
+        listed = subprocess.run(
+            command,
+            env=inherited_environment(),
+            cwd=ROOT,
+            capture_output=True,
+            text=True,
+            timeout=LISTING_S,
+            check=True,
+        )
         found = json.loads(listed.stdout)
     except (OSError, subprocess.SubprocessError, ValueError) as error:
         return f"SUNBOX_DEVICES: EGL's devices could not be listed: {error}"

@@ -16,6 +16,7 @@ from pathlib import Path
 from typing import Any, Literal, Protocol
 
 from service import logs
+from service.child_processes import inherited_environment
 from service.cpu_time import RunnableTime
 from service.rendering.ipc import channel, heartbeat
 
@@ -196,17 +197,23 @@ def _spawn(
     command += [] if options.memory is None else ["--memory", str(options.memory)]
     command += [] if options.host_memory is None else ["--host-memory", str(options.host_memory)]
     command += [] if lifeline is None else ["--lifeline", str(lifeline)]
+    # A driver, which nothing confines, works there on strangers' scenes: no key may be in its reach.
     # Its own process group: Ctrl-C in a terminal is for the server, which ends the renderer in good order.
     # stdout is the command line's, who may be read by a script that waits for its end.
     return subprocess.Popen(
         command,
-        env=os.environ | ({} if options.cores is None else dict.fromkeys(THREADS, str(options.cores))),
+        env=_environment(options),
         pass_fds=[end.fileno(), heartbeat_descriptor, *([] if lifeline is None else [lifeline])],
         cwd=ROOT,
         stdin=subprocess.DEVNULL,
         stdout=subprocess.DEVNULL,
         process_group=0,
     )
+
+
+def _environment(options: Options) -> dict[str, str]:
+    own = inherited_environment()
+    return own if options.cores is None else own | dict.fromkeys(THREADS, str(options.cores))
 
 
 async def _reap(process: subprocess.Popen[bytes], patience_s: float) -> int | None:

@@ -11,6 +11,7 @@ import socket
 from pathlib import Path
 
 from service import logs
+from service.confined import hide
 from service.rendering.ipc import channel
 from service.rendering.ipc.heartbeat import Heartbeat
 from service.rendering.ipc.messages import Ready, Unable
@@ -42,6 +43,7 @@ def main() -> int:
     if not end_with(arguments.server):
         return 0
     _offer_itself()
+    hide()  # not before: its /proc folder is root's from then on
     logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     logs.always(renderer=arguments.name)
     try:

@@ -19,6 +19,7 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 from typing import get_args
 
+from service.confined import hide
 from service.rendering.ipc import channel
 from service.rendering.priority import HIGHEST, raise_thread_niceness
 from service.rendering.worker.helpers.compile_client import Compiled, Priority, records
@@ -51,6 +52,7 @@ def main() -> int:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
     if not (end_with(arguments.parent) if arguments.lifeline is None else end_with_pipe(arguments.lifeline)):
         return 0
+    hide()
     from gpu.errors import GpuError
     from gpu.precompile.precompiler import Precompiler
 

@@ -11,6 +11,7 @@ import os
 import select
 import socket
 
+from service.confined import hide
 from service.rendering.ipc import channel
 from service.rendering.worker.helpers.denoise_client import DenoiseRequest, DenoiseResult
 from service.rendering.worker.helpers.lifeline import end_with
@@ -26,6 +27,7 @@ def main() -> int:
     arguments = parser.parse_args()
     if not end_with(arguments.parent):
         return 0
+    hide()
     os.nice(NICENESS)
     with socket.socket(fileno=arguments.descriptor) as end:
         try:

@@ -9,6 +9,7 @@ import sys
 from pathlib import Path
 from typing import Any
 
+from service.child_processes import inherited_environment
 from service.rendering.ipc import channel
 
 ROOT = Path(__file__).parents[4]
@@ -68,6 +69,7 @@ class HelperProcess:
                 self._process = subprocess.Popen(
                     [*command, *self._arguments],
                     pass_fds=[theirs.fileno(), *self._passed],
+                    env=inherited_environment(),
                     cwd=ROOT,
                     stdin=subprocess.DEVNULL,
                     stdout=subprocess.DEVNULL,
