@@ -32,7 +32,7 @@ from service.connections import connection_class, listen
 from service.data_lock import FolderInUse, locked
 from service.database import DamagedFile
 from service.downloads import Pieces
-from service.guard import Guard, turning_away
+from service.guard import Guard, open_for_health, turning_away
 from service.logs import Requests
 from service.memory import MemoryBudget
 from service.problems import Unavailable
@@ -146,10 +146,22 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
     own: AppState = app.state.sunbox
     own.documents.prepare()
     own.quota.clear()
-    full = Requests(turning_away(FULL, respond), refuse=respond, heard=own.traffic.heard)
-    settings = uvicorn.Config(
+    address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+    server = _Server(server_settings(app, config, most), own, address)
+    server.run([listener])
+    return 1 if server.refused else 0
+
+
+def server_settings(app: FastAPI, config: Config, most: int) -> uvicorn.Config:
+    """uvicorn's, with at most that many connections."""
+    heard = app.state.sunbox.traffic.heard
+    full = Requests(turning_away(FULL, respond), refuse=respond, heard=heard)
+    proxies = config.trusted_proxies
+    return uvicorn.Config(
         app,
-        http=connection_class(most, full),
+        http=connection_class(most, open_for_health(app, full), proxies),
+        proxy_headers=bool(proxies),  # by default uvicorn believes what anybody on 127.0.0.1 says
+        forwarded_allow_ips=proxies,
         log_config=None,
         access_log=False,
         server_header=False,
@@ -159,10 +171,6 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
         timeout_keep_alive=KEEP_ALIVE_S,
         timeout_graceful_shutdown=GRACE_S,
     )
-    address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
-    server = _Server(settings, own, address)
-    server.run([listener])
-    return 1 if server.refused else 0
 
 
 def _take_descriptors() -> int:

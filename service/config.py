@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import ipaddress
 import os
 import re
 from pathlib import Path
@@ -56,6 +57,11 @@ class Config(BaseSettings):
     )
     allowed_origins: Words = Field(
         default_factory=list, description="Origins besides the server's own that may call, separated by commas."
+    )
+    trusted_proxies: Words = Field(
+        default_factory=list,
+        description="Addresses and networks of proxies, separated by commas, whose `X-Forwarded-For` says who calls; "
+        "without it that header changes nothing.",
     )
     data_dir: Path = Field(
         default_factory=_default_data_dir,
@@ -204,12 +210,12 @@ class Config(BaseSettings):
         """
         return {name: value for name, value in values.items() if value != "" or name == "api_key"}
 
-    @field_validator("allowed_hosts", "allowed_origins", "api_key", "devices", mode="before")
+    @field_validator("allowed_hosts", "allowed_origins", "api_key", "devices", "trusted_proxies", mode="before")
     @classmethod
     def _split(cls, value: Any) -> Any:
         return [part.strip() for part in value.split(",")] if isinstance(value, str) else value
 
-    @field_validator("allowed_hosts", "allowed_origins")
+    @field_validator("allowed_hosts", "allowed_origins", "trusted_proxies")
     @classmethod
     def _named(cls, names: list[str]) -> list[str]:
         return [name for name in names if name]
@@ -221,6 +227,14 @@ class Config(BaseSettings):
             if not HOST.fullmatch(host):
                 raise ValueError(f"{host!r} is no host name; write it without scheme, port and path")
         return [host.strip("[]").lower() for host in hosts]
+
+    @field_validator("trusted_proxies")
+    @classmethod
+    def _networks(cls, proxies: list[str]) -> list[str]:
+        try:
+            return [str(ipaddress.ip_network(proxy, strict=False)) for proxy in proxies]
+        except ValueError as error:
+            raise ValueError(f"{error}; write addresses like 10.0.0.1, or networks like 10.0.0.0/8") from None
 
     @field_validator("ray")
     @classmethod

@@ -24,7 +24,7 @@ REST_S = 30.0  # for the rest of a body that was answered already
 UNREAD_S = 30.0  # in which an answer must go on by LEAST_RATE: a client that vanished or stalled takes nothing
 LEAST_RATE = 1024  # bytes a second
 SETTLED_S = 1.0  # a head that takes longer makes room for another connection where there is none
-REFUSALS = 64  # connections beyond the most that are still told why they are refused
+REFUSALS = 64  # connections beyond the most that are answered why they are refused, or that the server lives
 NETWORK_BITS = 64  # of an IPv6 address that one customer of a provider has
 
 Owed = Literal["head", "rest", "reading"]
@@ -67,27 +67,47 @@ class Watch:
 
 
 class Room:
-    """Room for `most` connections, of which one address has at most half: it can't keep everybody else out."""
+    """Room for `most` connections, of which one address has at most half: it can't keep everybody else out.
 
-    def __init__(self, most: int) -> None:
+    The addresses in the networks `proxies` have no share of their own: behind a proxy there is everybody, and `Guard`
+    divides what is open among them.
+    """
+
+    def __init__(self, most: int, proxies: Collection[str] = ()) -> None:
         self._most = most
         self._share = max(1, most // 2)
+        self._proxies = [ipaddress.ip_network(each) for each in proxies]
+        self._is_proxy = lru_cache(4096)(self._within_proxies)
 
-    def enter(self, connection: Any, connections: Collection[Any]) -> Literal["welcome", "refused", "ignored"]:
-        """Whether a new one may stay; `connections` has it already. One that rests makes room where there is none."""
+    def enter(self, connection: Any, connections: Collection[Any]) -> bool:
+        """Whether a new one may stay; `connections` has it already. One that rests makes room where there is none.
+
+        False: it is to be refused. The one that was refused first is ended where too many of those are open.
+        """
         if len(connections) <= self._share:
-            return "welcome"
-        network = _network(connection)
-        ours = [each for each in connections if _network(each) == network]
-        if len(ours) <= self._share and len(connections) <= self._most:
-            return "welcome"
-        crowd = ours if len(ours) > self._share else connections
+            return True
+        refused = [each for each in connections if getattr(each, "refused", False)]
+        welcome = [each for each in connections if not getattr(each, "refused", False)]
+        ours = [] if self._is_proxy(_address(connection)) else _beside(connection, welcome)
+        if len(ours) <= self._share and len(welcome) <= self._most:
+            return True
+        crowd = ours if len(ours) > self._share else welcome
         open_ones = (each for each in crowd if each is not connection and not each.transport.is_closing())
         resting = min(open_ones, key=_rest_order, default=None)
         if resting is not None and _rest_order(resting) < BUSY:
             resting.shutdown()
-            return "welcome"
-        return "refused" if len(connections) <= self._most + REFUSALS else "ignored"
+            return True
+        refused = [each for each in refused if not each.transport.is_closing()]
+        if len(refused) >= REFUSALS:
+            min(refused, key=lambda each: each.began).transport.abort()
+        return False
+
+    def _within_proxies(self, address: str) -> bool:
+        try:
+            parsed = ipaddress.ip_address(address.partition("%")[0])
+        except ValueError:
+            return False
+        return any(parsed in network for network in self._proxies)
 
 
 BUSY = (2, 0.0)
@@ -129,16 +149,23 @@ def _delivered(transport: Any) -> int:
     return int(sent) - int(struct.unpack("i", queued)[0])
 
 
-def _network(connection: Any) -> str:
-    """The network of an address: all the addresses that one customer of a provider can use."""
-    return _network_of(connection.client[0] if connection.client else "")
+def _beside(connection: Any, connections: Collection[Any]) -> list[Any]:
+    """Those of the connections that come from the network of this one."""
+    network = network_of(_address(connection))
+    return [each for each in connections if network_of(_address(each)) == network]
+
+
+def _address(connection: Any) -> str:
+    return connection.client[0] if connection.client else ""
 
 
 @lru_cache(4096)
-def _network_of(address: str) -> str:
-    if ":" not in address:
+def network_of(address: str) -> str:
+    """The network of an address: all the addresses that one customer of a provider can use."""
+    try:
+        parsed = ipaddress.IPv6Address(address.partition("%")[0])
+    except ValueError:  # of IPv4, or what a proxy says in place of an address
         return address
-    parsed = ipaddress.IPv6Address(address.partition("%")[0])
     if parsed.ipv4_mapped is not None:
         return str(parsed.ipv4_mapped)
     return str(ipaddress.IPv6Network((parsed, NETWORK_BITS), strict=False))

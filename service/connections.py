@@ -6,6 +6,7 @@ import asyncio
 import socket
 import struct
 import time
+from collections.abc import Collection
 from contextlib import suppress
 from typing import Any
 
@@ -110,18 +111,18 @@ class Connection(H11Protocol):
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         self.began = time.monotonic()
-        self._refused = False
+        self.refused = False
         super().connection_made(JoinedWrites(transport))
-        entered = self.room.enter(self, self.connections)
-        if entered == "ignored":
-            self.transport.abort()
-        elif entered == "refused":
-            self._refused, self.app = True, type(self).refuse
+        if not self.room.enter(self, self.connections):
+            self.refused, self.app = True, type(self).refuse
 
     def _should_upgrade(self) -> bool:
-        return not self._refused and super()._should_upgrade()
+        return not self.refused and super()._should_upgrade()
 
 
-def connection_class(most: int, refuse: ASGIApp) -> type[Connection]:
-    """A protocol for uvicorn that takes `most` connections; `refuse` answers requests on others."""
-    return type("Connection", (Connection,), {"room": Room(most), "refuse": staticmethod(refuse)})
+def connection_class(most: int, refuse: ASGIApp, proxies: Collection[str] = ()) -> type[Connection]:
+    """A protocol for uvicorn that takes `most` connections; `refuse` answers requests on others.
+
+    The networks `proxies` have no share of their own.
+    """
+    return type("Connection", (Connection,), {"room": Room(most, proxies), "refuse": staticmethod(refuse)})

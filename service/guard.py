@@ -9,26 +9,37 @@ import asyncio
 import ipaddress
 import time
 from collections.abc import Awaitable, Callable
-from contextlib import suppress
+from contextlib import ExitStack, suppress
 from urllib.parse import urlsplit
 
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.config import Config
+from service.connection_limits import network_of
 from service.keys import PROTOCOL, Keys
 from service.problems import (
     Forbidden,
     ServiceError,
     TimedOut,
     TooLarge,
+    TooManyRequests,
     Unauthorized,
+    Unavailable,
     UnsupportedMedia,
 )
+from service.shares import Shares
 
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}
-CLOSE_CODES: dict[type[ServiceError], int] = {Unauthorized: 4401, Forbidden: 4403}  # of the stream
+CLOSE_CODES: dict[type[ServiceError], int] = {
+    Unauthorized: 4401,
+    Forbidden: 4403,
+    TooManyRequests: 4429,
+    Unavailable: 4429,
+}  # of the stream
+HEALTH = "/healthz"  # answered always: an orchestrator restarts a server whose health check fails
+OPEN_OF_A_KEY = 128  # requests at a time, of which long-polls, event streams and streams are open for long
 REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
 LEAST_RATE, WITHIN_S = 1024, 30.0  # bytes a second of a body, on average over so many seconds of waiting for it
@@ -63,32 +74,41 @@ class Guard:
         self._origins = {_origin(origin) for origin in config.allowed_origins}
         self._hosts = LOOPBACK_NAMES | set(config.allowed_hosts) | {host for _, host, _ in self._origins}
         self._refuse = refuse
+        # A request counts until it ends, which may be after its client has gone. Those without a key, which everybody
+        # can send, are counted apart from those with one.
+        most, what = config.max_connections, "open requests"
+        self._of_keys, self._of_addresses = Shares(most, what, OPEN_OF_A_KEY), Shares(most, what)
 
     async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
         if scope["type"] == "lifespan":
             return await self._app(scope, receive, send)
         headers = Headers(scope=scope)
         granted = self._grant(headers)
-        try:
-            self._check_host(scope, headers)
-            if scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS:
-                self._check_origin(headers)
-            if scope["type"] == "http":
-                if granted and scope["method"] == "OPTIONS" and "access-control-request-method" in headers:
-                    return await _answer_preflight(send, granted)
-                self._check_body(headers)
-            scope["owner"] = self._owner(scope, headers)
-        except ServiceError as error:
+        with ExitStack() as stack:
+            try:
+                self._check_host(scope, headers)
+                if scope["type"] == "websocket" or scope["method"] not in SAFE_METHODS:
+                    self._check_origin(headers)
+                if scope["type"] == "http":
+                    if granted and scope["method"] == "OPTIONS" and "access-control-request-method" in headers:
+                        return await _answer_preflight(send, granted)
+                    self._check_body(headers)
+                scope["owner"] = self._owner(scope, headers)
+                scope["caller"] = scope["owner"] or network_of((scope.get("client") or ("",))[0])
+                if _route_path(scope) != HEALTH:
+                    shares = self._of_keys if scope["owner"] else self._of_addresses
+                    stack.enter_context(shares.taken(scope["caller"]))
+            except ServiceError as error:
+                if scope["type"] == "websocket":
+                    return await _close(scope, receive, send, CLOSE_CODES[type(error)], str(error))
+                patient = _lingering(send, receive)
+                return await self._refuse(error)(scope, receive, _secured(patient, granted, close=True))
             if scope["type"] == "websocket":
-                return await _close(scope, receive, send, CLOSE_CODES[type(error)], str(error))
-            patient = _lingering(send, receive)
-            return await self._refuse(error)(scope, receive, _secured(patient, granted, close=True))
-        if scope["type"] == "websocket":
-            return await self._app(scope, receive, send)
-        body = _Body(self._config, receive)
-        # HEAD is answered as GET is; the server leaves the body out. An answer without an end looks at `bodiless`.
-        asked = {**scope, "method": "GET", "bodiless": True} if scope["method"] == "HEAD" else scope
-        await self._app(asked, body.receive, _secured(send, granted))
+                return await self._app(scope, receive, send)
+            body = _Body(self._config, receive)
+            # HEAD is answered as GET is, and the server leaves the body out. Answers without an end see `bodiless`.
+            asked = {**scope, "method": "GET", "bodiless": True} if scope["method"] == "HEAD" else scope
+            await self._app(asked, body.receive, _secured(send, granted))
 
     def _owner(self, scope: Scope, headers: Headers) -> str:
         """The name of the key's owner; "" where no key is needed. Raises Unauthorized."""
@@ -219,6 +239,15 @@ def turning_away(error: ServiceError, refuse: Refuse) -> ASGIApp:
         await refuse(error)(scope, receive, _secured(_lingering(send, receive), None, close=True))
 
     return turn_away
+
+
+def open_for_health(app: ASGIApp, refusing: ASGIApp) -> ASGIApp:
+    """An application that answers the health check by `app`, and everything else by `refusing`."""
+
+    async def answering(scope: Scope, receive: Receive, send: Send) -> None:
+        await (app if _route_path(scope) == HEALTH else refusing)(scope, receive, send)
+
+    return answering
 
 
 async def _answer_preflight(send: Send, origin: str) -> None:

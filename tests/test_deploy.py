@@ -70,6 +70,17 @@ def test_a_profile_of_compose_is_a_cluster() -> None:
     assert "SUNBOX_API_KEY" not in worker["environment"]
 
 
+def test_the_proxy_of_compose_is_trusted() -> None:
+    """So that it has no share of its own, and its callers are told apart."""
+    (compose,) = documents(ROOT / "compose.yaml")
+    for name in ("sunbox", "sunbox-gpu", "head"):
+        service = compose["services"][name]
+        given = {key.removeprefix("SUNBOX_").lower(): value for key, value in service["environment"].items()}
+        config = load_config(trusted_proxies=given["trusted_proxies"], max_connections=given["max_connections"])
+        assert "ports" not in service and "172.16.0.0/12" in config.trusted_proxies
+        assert config.max_connections > Config.model_fields["max_connections"].default
+
+
 def test_the_image_with_ray_has_what_was_tested() -> None:
     pins = [
         dict(re.findall(r"^([a-z0-9_.-]+)==(\S+)", (ROOT / name).read_text(), re.MULTILINE))

@@ -19,7 +19,7 @@ from service import connection_limits, guard
 from service.config import Config
 from service.connection_limits import Room, Watch
 from service.connections import connection_class, listen
-from service.guard import Guard, turning_away
+from service.guard import Guard, open_for_health, turning_away
 from service.problems import Unavailable
 from service.routes.errors import respond
 
@@ -54,7 +54,7 @@ def serving(most: int = 100, asgi: Any = app) -> Iterator[tuple[str, int]]:
     listener = listen("127.0.0.1", 0)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_SNDBUF, 1 << 16)
     refuse = turning_away(Unavailable("There is no room.", 5), respond)
-    http = connection_class(most, refuse)
+    http = connection_class(most, open_for_health(asgi, refuse))
     config = uvicorn.Config(asgi, http=http, lifespan="off", log_config=None, access_log=False, timeout_keep_alive=60)
     server = _Server(config)
     thread = threading.Thread(target=server.run, args=([listener],))
@@ -164,6 +164,7 @@ def test_a_full_server_says_so() -> None:
         full = connected(address)
         head, _, body = answer(full, get()).partition(b"\r\n\r\n")
         assert b" 503 " in head and b"retry-after: 5" in head and b"connection: close" in head and b"no room" in body
+        assert answer(connected(address), get("/healthz")).startswith(b"HTTP/1.1 200")
         assert all(each.recv(65536).startswith(b"HTTP/1.1 200") for each in busy)
         # Both rest now: the one that has done so longer makes room.
         assert answer(connected(address), get()).startswith(b"HTTP/1.1 200")
@@ -173,7 +174,15 @@ def test_a_full_server_says_so() -> None:
 class Peer:
     """A connection as uvicorn has it."""
 
-    def __init__(self, address: str, idle_since: float | None = None, began: float = 0.0, cycle: Any = None) -> None:
+    def __init__(
+        self,
+        address: str,
+        idle_since: float | None = None,
+        began: float = 0.0,
+        cycle: Any = None,
+        refused: bool = False,
+    ) -> None:
+        self.refused = refused
         self.client, self.began, self.cycle, self.transport = (address, 1), began, cycle, self
         self.timeout_keep_alive_task = None if idle_since is None else self
         self.when = lambda: idle_since
@@ -185,22 +194,44 @@ class Peer:
     def shutdown(self) -> None:
         self.ended = True
 
+    abort = shutdown
+
 
 def test_one_address_has_half_of_the_room() -> None:
     now = time.monotonic()
     room, crowd = Room(8), [Peer("10.0.0.1", cycle=1) for _ in range(4)]
-    for address, entered in (("10.0.0.1", "refused"), ("::ffff:10.0.0.1", "refused"), ("10.0.0.2", "welcome")):
+    for address, entered in (("10.0.0.1", False), ("::ffff:10.0.0.1", False), ("10.0.0.2", True)):
         newcomer = Peer(address, began=now)
-        assert room.enter(newcomer, [*crowd, newcomer]) == entered
+        assert room.enter(newcomer, [*crowd, newcomer]) is entered
     v6 = [Peer(f"2001:db8::{i}", cycle=1) for i in range(4)]
-    for address, entered in (("2001:db8::99", "refused"), ("2001:db8:0:1::1", "welcome")):
+    for address, entered in (("2001:db8::99", False), ("2001:db8:0:1::1", True)):
         newcomer = Peer(address, began=now)
-        assert room.enter(newcomer, [*v6, newcomer]) == entered
+        assert room.enter(newcomer, [*v6, newcomer]) is entered
     full = [Peer(f"10.0.1.{i}", cycle=1) for i in range(8)]
     newcomer = Peer("10.0.0.3", began=now)
-    assert room.enter(newcomer, [*full, newcomer]) == "refused"
-    flood = [Peer("10.0.0.1", cycle=1) for _ in range(8 + connection_limits.REFUSALS)]
-    assert room.enter(newcomer, [*flood, *full, newcomer]) == "ignored"
+    assert not room.enter(newcomer, [*full, newcomer])
+
+
+def test_the_refused_take_no_room() -> None:
+    """They are answered one after the other: a flood of them does not keep out whoever asks for the health check."""
+    now, room = time.monotonic(), Room(8)
+    crowd = [Peer("10.0.0.1", cycle=1) for _ in range(4)]
+    flood = [Peer("10.0.0.1", began=now + i, cycle=1, refused=True) for i in range(connection_limits.REFUSALS)]
+    newcomer = Peer("10.0.0.2", began=now)
+    assert room.enter(newcomer, [*crowd, *flood, newcomer])
+    newcomer = Peer("10.0.0.1", began=now)
+    assert not room.enter(newcomer, [*crowd, *flood, newcomer])
+    assert [each for each in (*crowd, *flood, newcomer) if each.ended] == flood[:1]
+
+
+def test_a_proxy_has_no_share_of_its_own() -> None:
+    now, room = time.monotonic(), Room(8, ["10.0.0.0/24", "2001:db8::/64"])
+    for address, other in (("10.0.0.1", "10.0.1.1"), ("2001:db8::1", "2001:db9::1")):
+        crowd = [Peer(address, cycle=1) for _ in range(6)]
+        assert room.enter(Peer(address, began=now), [*crowd, Peer(address, began=now)])
+        others = [Peer(other, cycle=1) for _ in range(5)]
+        assert not room.enter(others[0], others)
+        assert not room.enter(Peer(address, began=now), [*crowd, *others[:3]])
 
 
 def test_who_rests_makes_room() -> None:
@@ -210,8 +241,8 @@ def test_who_rests_makes_room() -> None:
     everybody = [Peer("a", cycle=1), resting, fresh, slow, longest, newcomer]
     room = Room(4)
     for first in (longest, resting, slow):
-        assert room.enter(newcomer, everybody) == "welcome" and first.ended
-    assert room.enter(newcomer, everybody) == "refused" and not fresh.ended
+        assert room.enter(newcomer, everybody) and first.ended
+    assert not room.enter(newcomer, everybody) and not fresh.ended
 
 
 def test_a_body_that_drips(monkeypatch: pytest.MonkeyPatch) -> None:
