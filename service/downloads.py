@@ -117,8 +117,12 @@ class Downloads:
         async with mine, self._room:
             yield
 
-    async def answer(self, client: str, data: bytes, media_type: str) -> FileAnswer:
-        """An answer that holds no memory. Raises Unavailable."""
+    async def answer(
+        self, client: str, data: bytes, media_type: str, headers: Mapping[str, str] | None = None
+    ) -> Response:
+        """An answer that holds little memory: large ones come from a file. Raises Unavailable."""
+        if len(data) <= PIECE:
+            return Response(data, media_type=media_type, headers=headers)
 
         def fill(file: BinaryIO) -> None:
             file.write(data)
@@ -126,7 +130,7 @@ class Downloads:
         self.admit(client, len(data))
         written = await asyncio.to_thread(self.write, fill)
         self.keep(client, None, written)
-        return FileAnswer(written.file, media_type, {}, written)
+        return FileAnswer(written.file, media_type, headers or {}, written)
 
     def find(self, key: Hashable) -> Written | None:
         """A picture that is still being sent to somebody."""

@@ -37,6 +37,7 @@ from service.shares import Shares
 from service.traffic import Traffic
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
+MOST_WAITS = 64  # long-polls and event streams of one caller: each takes some 40 KB, and all wake at a render's end
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
 GPU_S = 60.0  # the same at start, where SUNBOX_REQUIRE_GPU is set
 FAREWELL_S = 4.0  # for the farewell to reach a client that reads slowly
@@ -62,6 +63,7 @@ class AppState:
     uploads: Shares = field(init=False)  # bytes of files that are being received and parsed, by caller
     readiness: Readiness = field(init=False)
     bsdf: BsdfQuestions = field(init=False)
+    waits: Shares = field(init=False)
 
     def __post_init__(self) -> None:
         self.memory = self.reader.budget
@@ -71,6 +73,7 @@ class AppState:
         most = max(self.config.max_bodies, 4 * self.config.max_body)
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
         self.bsdf = BsdfQuestions(self.renderers)
+        self.waits = Shares(self.config.max_connections, "long-polls and event streams", MOST_WAITS)
         self.readiness = Readiness(self.renderers, self.reader, self.config.require_gpu)
         self.downloads = Downloads(self.config.data_dir)
         self.sessions = Sessions(self.renderers, self.reader, self.config.max_clients, self.config.max_key_clients)

@@ -2,7 +2,8 @@
 
 renders      renders asked for over REST
 submission   how a request for a render becomes one that waits
-events       a render's progress as server-sent events
+events       the progress of renders as server-sent events
+waiting      waiting as long as whoever asks is there
 stream       the stream's WebSocket
 bsdf         a material's BSDF as numbers
 assets       uploads

@@ -75,7 +75,9 @@ class Render(BaseModel):
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
     elapsed_s: float = Field(description="From the first dispatch to the end of the last sample.")
     setup_s: float = Field(description="Loading, building and compiling before that.")
-    kernel: Kernel | None = Field(description="Null until the scene is loaded.")
+    kernel: Kernel | None = Field(
+        None, description="With `kernel` or `saving` only; null until the scene is loaded, too."
+    )
     eta_s: float | None
     forecast: dict[str, Forecast] | None = Field(description="By quality preset; null until 16 samples tell.")
     warnings: list[str]
@@ -213,6 +215,7 @@ _NAMED = {
     },
 }
 RENDER_BODY = body(_RENDER, sphere=RENDER)
+RENDER_AGAIN: Responses = {200: {"description": "The body.", "content": {"application/json": {"schema": _RENDER}}}}
 LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | _NAMED}, sphere=RENDER)
 EVENTS: Responses = {
     200: {"description": "The events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter, Request, Response
 
-from service.downloads import disconnected
 from service.pack import pack_material
 from service.rendering.executors import packing
 from service.rendering.ipc.messages import EvaluateBsdf
@@ -19,6 +18,7 @@ from service.rendering.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfR
 from service.rendering.requests.request_parser import Kind
 from service.routes import answers
 from service.routes.errors import GONE
+from service.routes.waiting import until
 from service.state import STARTING_S, app_state, caller, owner
 
 router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
@@ -81,15 +81,9 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
         0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner(request)
     )
     answer = asyncio.ensure_future(own.bsdf.ask(question))
-    gone = asyncio.ensure_future(disconnected(request.receive))
-    try:
-        await asyncio.wait({answer, gone}, return_when=asyncio.FIRST_COMPLETED)
-        if not answer.done():
-            return Response(status_code=GONE)
-        arrays = answer.result()
-    finally:
-        answer.cancel()
-        gone.cancel()
+    if not await until(request, answer):
+        return Response(status_code=GONE)
+    arrays = answer.result()
     few = sum(array.size for array in arrays.values()) <= AT_ONCE
     return Response(write(arrays) if few else await packing(partial(write, arrays)), media_type="application/json")
 

@@ -8,7 +8,6 @@ from typing import Annotated
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 
 from service.documents import LONGEST_NAME, CheckedDocument, Condition, check_kind, etag
-from service.downloads import PIECE
 from service.rendering.executors import saving
 from service.routes import answers
 from service.state import app_state, caller, owner
@@ -64,12 +63,7 @@ async def document(
     headers = {"etag": tag, "cache-control": "private, no-cache"}
     if if_none_match is not None and {"*", tag} & set(_tags(if_none_match) or ()):
         return Response(status_code=304, headers=headers)
-    if len(data) <= PIECE:
-        return Response(data, media_type=JSON, headers=headers)
-    # From a file, or else it would stay in memory until it has been fetched.
-    answer = await own.downloads.answer(caller(request), data, JSON)
-    answer.headers.update(headers)
-    return answer
+    return await own.downloads.answer(caller(request), data, JSON, headers)
 
 
 @router.put(

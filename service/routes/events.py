@@ -1,4 +1,4 @@
-"""A render's progress as server-sent events (the HTML standard, section 9.2).
+"""The progress of renders as server-sent events (the HTML standard, section 9.2).
 
 Starlette's StreamingResponse carries them: sse-starlette would add a dependency and a way of its own to watch for the
 server's end, and what is left to do here is to write two lines.
@@ -12,24 +12,53 @@ import time
 from collections.abc import AsyncIterator
 from typing import Any
 
+from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
+from starlette.types import Receive, Scope, Send
 
 from service.rendering.jobs.job import Job
+from service.rendering.jobs.queue import RenderQueue
+from service.routes.waiting import place
+from service.state import app_state, bodiless, caller
 
 MIME = "text/event-stream"
-BETWEEN_S = 0.1  # two events: of the contract, ten a second at most
+BETWEEN_S = 0.1  # two events of one render: of the contract, ten a second at most
+AT_ONCE = 20  # events of several renders within that time: 200 KB/s, 1 % of a core
 KEEP_ALIVE_S = 15.0  # without an event, after which a comment keeps proxies from closing the connection
+KEEP_ALIVE = b": still there\n\n"
 # A client that reads slowly gets fewer events, and the newest: the next one is written when the network has taken the
 # one before. One that takes nothing is ended by the watch on all connections.
 HEADERS = {"cache-control": "no-store", "x-accel-buffering": "no"}
 
 
-def answer(job: Job, bodiless: bool = False) -> Response:
-    """`progress` whenever the status has changed, and once `done`, with which the answer ends; or at once, where it
-    is `bodiless`."""
-    if bodiless:
+class _Counted(StreamingResponse):
+    """Takes one of the caller's places for as long as it is sent."""
+
+    def __init__(self, request: Request, events: AsyncIterator[bytes]) -> None:
+        self._place = place(request)
+        super().__init__(events, media_type=MIME, headers=HEADERS)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        with self._place:
+            await super().__call__(scope, receive, send)
+
+
+def of_one(request: Request, job: Job) -> Response:
+    """`progress` whenever the status has changed, and once `done`, with which the answer ends."""
+    return _answer(request, _events(job))
+
+
+def of_all(request: Request, renders: RenderQueue, owner: str, label: str | None) -> Response:
+    """`progress` and `done` of an owner's renders with that label, or of all; the answer ends with the server."""
+    return _answer(request, _all_events(renders, owner, label))
+
+
+def _answer(request: Request, events: AsyncIterator[bytes]) -> Response:
+    """At once where the request asks for the head only. Raises TooManyRequests, Unavailable."""
+    if bodiless(request):
         return Response(media_type=MIME, headers=HEADERS)
-    return StreamingResponse(_events(job), media_type=MIME, headers=HEADERS)
+    app_state(request).waits.check(caller(request))
+    return _Counted(request, events)
 
 
 async def _events(job: Job) -> AsyncIterator[bytes]:
@@ -44,13 +73,34 @@ async def _events(job: Job) -> AsyncIterator[bytes]:
             while not changed.done():
                 await asyncio.wait({changed}, timeout=KEEP_ALIVE_S)
                 if not changed.done():
-                    yield b": still there\n\n"
+                    yield KEEP_ALIVE
         finally:
             changed.cancel()
         if not changed.result():
             return  # the server ends; the render goes on at its next start
         await asyncio.sleep(max(0.0, began + BETWEEN_S - time.monotonic()))
     yield _event("done", job.status())
+
+
+async def _all_events(renders: RenderQueue, owner: str, label: str | None) -> AsyncIterator[bytes]:
+    said: dict[str, int] = {}  # hashes of the last events of those under way, by id
+    spoke_at = time.monotonic()
+    with renders.follower(owner) as follower:
+        while not follower.closed:
+            events = []
+            changed = await follower.next(AT_ONCE, KEEP_ALIVE_S)
+            began = time.monotonic()
+            for job in (job for job in changed if label in (None, job.order.label)):
+                ended, before = job.finished.is_set(), said.pop(job.id, None)
+                event = _event("done" if ended else "progress", job.status())
+                if not ended:
+                    said[job.id] = hash(event)
+                if hash(event) != before:
+                    events.append(event)
+            if events or began - spoke_at >= KEEP_ALIVE_S:
+                spoke_at = began
+                yield b"".join(events) or KEEP_ALIVE
+            await asyncio.sleep(max(0.0, began + BETWEEN_S - time.monotonic()))
 
 
 def _event(name: str, status: dict[str, Any]) -> bytes:

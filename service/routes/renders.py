@@ -2,43 +2,54 @@
 
 from __future__ import annotations
 
-import asyncio
 import contextlib
+import json
 from dataclasses import replace
 from enum import IntEnum
 from functools import partial
-from typing import Annotated, Any, BinaryIO, get_args
+from typing import Annotated, BinaryIO, get_args
 from urllib.parse import urlencode
 
 import numpy as np
 from fastapi import APIRouter, Header, Query, Request, Response
+from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
 from service import images, recipe, views
-from service.downloads import Downloads, FileAnswer, Written, disconnected, present
+from service.downloads import Downloads, FileAnswer, Written, present
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
 from service.rendering.executors import writing
 from service.rendering.ipc.messages import View
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.store.record import State
 from service.rendering.requests.request_parser import LONGEST_LABEL, unfolded
-from service.routes import answers, events, submission
+from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
-from service.state import app_state, bodiless, caller, owner
+from service.state import MOST_WAITS, app_state, caller, owner
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["renders"])
 
 LONGEST_WAIT_S = 600.0  # many proxies cut idle connections long before
-Wait = Annotated[float, Query(ge=0, le=LONGEST_WAIT_S, allow_inf_nan=False, description="s")]
+Wait = Annotated[
+    float,
+    Query(
+        ge=0,
+        le=LONGEST_WAIT_S,
+        allow_inf_nan=False,
+        description=f"Seconds. One caller has at most {MOST_WAITS} answers that wait, event streams included.",
+    ),
+]
 Saving = Annotated[
     bool,
     Query(
         description="Have measured what this render's kernel saves beside the one with everything on. That happens "
         "once, while nothing is being rendered; the other kernel may have to be compiled for it, in spare time (a "
-        "minute and a half of a core by llvmpipe). Answers bring it from then on."
+        "minute and a half of a core by llvmpipe). Answers with `kernel` bring it from then on."
     ),
 ]
+Kernel = Annotated[bool, Query(description="Answer with what the kernel was compiled for, too; so does `saving`.")]
+Label = Annotated[str | None, Query(max_length=LONGEST_LABEL, description="Exactly this label.")]
 FLOAT_BYTES = 4  # of a number in a layer, as the renderer gives it
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
 
@@ -92,8 +103,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
     view = query.view()
     job = await submission.one_shot(request)
     try:
-        await _finished_or_gone(request, job)
-        if not job.finished.is_set():
+        if not await waiting.until(request, job.finished.wait()):
             return Response(status_code=GONE)
         if job.state == "cancelled":
             raise Unavailable("The server is shutting down.")
@@ -108,31 +118,55 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
     status_code=202,
     summary="Start a render",
     description="It is stored before this answers, and outlives the server. `Idempotency-Key`: for 24 h the same key "
-    "with the same body gives the same render, with another body 409.",
+    "with the same body gives the same render, with another body 409. With `wait`, 200 where the render ends within "
+    "that many seconds; closing the connection does not cancel it.",
     openapi_extra=answers.LASTING_RENDER_BODY,
-    response_model=None,
-    responses=answers.shaped(answers.Render, "It waits for its turn; `Location` leads to it.", 202)
+    response_class=Response,
+    responses=answers.shaped(answers.Render, "It waits for its turn, or goes on; `Location` leads to it.", 202)
+    | answers.shaped(answers.Render, "With `wait`: it has ended.")
     | answers.problems(400, 409, 413, 415, 422, 429, 503),
 )
-async def start(request: Request, response: Response, idempotency_key: IdempotencyHeader = None) -> dict[str, Any]:
-    status = await submission.submitted(request, idempotency_key)
-    response.headers["location"] = f"renders/{status['id']}"
-    return status
+async def start(request: Request, wait: Wait = 0, idempotency_key: IdempotencyHeader = None) -> Response:
+    code = 202
+    with waiting.place(request) if wait else contextlib.nullcontext():
+        found = await submission.submitted(request, idempotency_key)
+        if isinstance(found, Job) and wait:
+            if not await waiting.until(request, found.settled(False), wait):
+                return Response(status_code=GONE)
+            if found.finished.is_set():
+                code = 200
+    status = found.status() if isinstance(found, Job) else found
+    return JSONResponse(status, code, {"location": f"renders/{status['id']}"})
 
 
 @router.get(
     "/renders",
     summary="One's own renders, the newest first",
     description="A page of them; `Link` with `rel=next` leads to the next page while there is one.",
-    response_model=None,
+    response_class=Response,
     responses=answers.shaped(list[answers.Render]) | answers.problems(422),
 )
-async def renders(request: Request, response: Response, query: Annotated[ListQuery, Query()]) -> list[dict[str, Any]]:
+async def renders(request: Request, query: Annotated[ListQuery, Query()]) -> Response:
     page = app_state(request).renders.page(owner(request), query.label, query.state, query.limit, query.after)
+    headers = dict[str, str]()
     if page.more:
         following = query.model_copy(update={"after": page.renders[-1].id})
-        response.headers["link"] = f'<renders?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
-    return [job.status() for job in page.renders]
+        headers["link"] = f'<renders?{urlencode(following.model_dump(exclude_none=True))}>; rel="next"'
+    return JSONResponse([job.status() for job in page.renders], headers=headers)
+
+
+@router.get(
+    "/renders/events",
+    summary="The progress of all of one's own renders as server-sent events",
+    description="`progress` of each render that is under way, of those that are started later, and of each at most "
+    f"ten times a second, {events.AT_ONCE * 10} events a second in all; `done` once a render has ended. Each has the "
+    "render's status as data. Renders that had ended before are not in it: open it first, then start or list them. "
+    "It ends with the server.",
+    response_class=Response,
+    responses=answers.EVENTS | answers.problems(422, 429),
+)
+async def all_progress(request: Request, label: Label = None) -> Response:
+    return events.of_all(request, app_state(request).renders, owner(request), label)
 
 
 @router.get(
@@ -140,19 +174,20 @@ async def renders(request: Request, response: Response, query: Annotated[ListQue
     summary="How far it is",
     description="With `wait`, answers at the render's end, or after that many seconds; with `saving`, once that is "
     "measured as well.",
-    response_model=None,
-    responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422),
+    response_class=Response,
+    responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422, 429),
 )
-async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving: Saving = False) -> dict[str, Any]:
+async def status(
+    request: Request, id: answers.RenderId, wait: Wait = 0, kernel: Kernel = False, saving: Saving = False
+) -> Response:
     renders = app_state(request).renders
     job = renders.get(id, owner(request))
-    with renders.looking(job):
+    with waiting.place(request) if wait else contextlib.nullcontext(), renders.looking(job):
         if saving:
             await job.measure_kernel()
-        if wait:
-            with contextlib.suppress(TimeoutError):
-                await asyncio.wait_for(job.settled(saving), wait)
-    return job.status()
+        if wait and not await waiting.until(request, job.settled(saving), wait):
+            return Response(status_code=GONE)
+    return JSONResponse(job.status(kernel=kernel or saving))
 
 
 @router.get(
@@ -161,10 +196,27 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, saving:
     description="`progress` at most ten times a second and once `done`, each with the status as data; then the "
     "answer ends. When the server ends, it ends without `done`.",
     response_class=Response,
-    responses=answers.EVENTS | answers.problems(404, 410),
+    responses=answers.EVENTS | answers.problems(404, 410, 429),
 )
 async def progress(request: Request, id: answers.RenderId) -> Response:
-    return events.answer(app_state(request).renders.get(id, owner(request)), bodiless(request))
+    return events.of_one(request, app_state(request).renders.get(id, owner(request)))
+
+
+@router.get(
+    "/renders/{id}/scene",
+    summary="Its scene and settings",
+    description="A body that renders the same picture again: the scene as it was sent, the settings as they were "
+    "resolved.",
+    response_class=Response,
+    responses=answers.RENDER_AGAIN | answers.problems(404, 410, 503),
+)
+async def scene(request: Request, id: answers.RenderId) -> Response:
+    own = app_state(request)
+    job = own.renders.get(id, owner(request))
+    document = await job.document()
+    settings = json.dumps({name: value for name, value in job.settings.document().items() if value is not None})
+    body = await writing(lambda: f'{{"scene":{unfolded(document)},"settings":{settings}}}'.encode())
+    return await own.downloads.answer(caller(request), body, "application/json")
 
 
 @router.get(
@@ -191,15 +243,6 @@ async def cancel(request: Request, id: answers.RenderId) -> None:
     job = renders.get(id, owner(request))
     renders.cancel(job)
     await job.recorded()
-
-
-async def _finished_or_gone(request: Request, job: Job) -> None:
-    """Return when the job is finished, or the connection closed."""
-    gone = asyncio.ensure_future(disconnected(request.receive))
-    finished = asyncio.ensure_future(job.finished.wait())
-    await asyncio.wait({gone, finished}, return_when=asyncio.FIRST_COMPLETED)
-    gone.cancel()
-    finished.cancel()
 
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:

@@ -17,7 +17,7 @@ from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quota import Quota
 from service.rendering.executors import packing, storing
 from service.rendering.jobs.job import Job
-from service.rendering.jobs.status import UNASKED, status
+from service.rendering.jobs.status import status
 from service.rendering.jobs.store.record import IdempotencyKey, Order, StoredRender
 from service.rendering.requests.request_parser import ParsedRequest
 from service.state import STARTING_S, AppState, app_state, caller, owner
@@ -37,11 +37,11 @@ async def one_shot(request: Request) -> Job:
     return job
 
 
-async def submitted(request: Request, key: str | None) -> dict[str, Any]:
-    """The status of a render that waits for its turn, or of the one that the idempotency key gave before."""
+async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
+    """A render that waits for its turn, or the one of before with this key: its last status where it is gone."""
     began, own, name = time.monotonic(), app_state(request), owner(request)
     if key is None:
-        return (await _submitted(own, await _parsed(request, "render"), name, began)).status()
+        return await _submitted(own, await _parsed(request, "render"), name, began)
     if not 1 <= len(key) <= LONGEST_KEY:
         raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
     store = own.renders.store
@@ -51,12 +51,11 @@ async def submitted(request: Request, key: str | None) -> dict[str, Any]:
     async with _turn(own, name, key):
         known = await store.keyed(name, key)
         if known is None:
-            job = await _submitted(own, parsed, name, began, IdempotencyKey(key, parsed.digest))
-            return job.status()
+            return await _submitted(own, parsed, name, began, IdempotencyKey(key, parsed.digest))
     digest, stored = known
     if digest != parsed.digest:
         raise Conflict("This Idempotency-Key was used for another request.")
-    return _status(own, stored)
+    return _known(own, stored)
 
 
 async def _parsed(request: Request, kind: Any) -> ParsedRequest:
@@ -87,12 +86,12 @@ async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float)
     return own.job(order, document, packed, time.monotonic() - began)
 
 
-def _status(own: AppState, stored: StoredRender) -> dict[str, Any]:
-    """The status of a render of before, which may be gone."""
+def _known(own: AppState, stored: StoredRender) -> Job | dict[str, Any]:
+    """A render of before; its last status where it is gone."""
     try:
-        return own.renders.get(stored.order.id, stored.order.owner).status()
+        return own.renders.get(stored.order.id, stored.order.owner)
     except ServiceError:
-        return status(stored.order, stored.outcome, UNASKED, renderers=0)
+        return status(stored.order, stored.outcome, renderers=0)
 
 
 def _turn(own: AppState, name: str, key: str) -> asyncio.Lock:

@@ -8,6 +8,7 @@ memory     what a render takes in memory
 retention  which ended renders make room
 recorder   writes what becomes of a render to the store
 waiting    waits for events
+followers  who follows renders, and learns of their changes
 reads      requests for a picture that the renderer has not answered yet
 status     the status of a render, as callers see it
 store      renders on the disk

@@ -30,6 +30,7 @@ from service.rendering.ipc.messages import (
     View,
 )
 from service.rendering.ipc.orders import Stop, TakeCheckpoint
+from service.rendering.jobs.followers import Changes
 from service.rendering.jobs.memory import RenderMemory
 from service.rendering.jobs.ordered import Ordered
 from service.rendering.jobs.reads import Reads
@@ -77,7 +78,7 @@ class Job(Ordered):
             self._memory.check()
         self._over = asyncio.Event()  # finished, or the server ends
         self._lost = asyncio.Event()  # nothing renders any more
-        self._changed = asyncio.Event()
+        self.changes = Changes[Job]()
         self.renderers = renderers
         self._load = load
         self._document = document
@@ -201,12 +202,13 @@ class Job(Ordered):
             await self._kernel.answered.wait()
 
     async def changed(self) -> bool:
-        """Return when the status is another one: True; or when the server ends, and leaves it for its next start."""
-        await self._changed.wait()
+        """Return at the next change of the status: True; or when the server ends, which leaves it as it is."""
+        await self.changes.next()
         return self.finished.is_set() or not self._over.is_set()
 
-    def status(self) -> dict[str, Any]:
-        return status(self.order, self.outcome, self._kernel.known, self.renderers.tracing(self._task))
+    def status(self, kernel: bool = False) -> dict[str, Any]:
+        known = self._kernel.known if kernel else None
+        return status(self.order, self.outcome, self.renderers.tracing(self._task), known)
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
         """The picture so far. Raises Conflict before the first sample, and the render's own error where it failed."""
@@ -395,5 +397,4 @@ class Job(Ordered):
         self._reads.answer_all(error)
 
     def _wake(self) -> None:
-        self._changed.set()
-        self._changed = asyncio.Event()
+        self.changes.tell(self)

@@ -15,6 +15,7 @@ from itertools import islice
 from typing import Any
 
 from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.rendering.jobs.followers import Follower, Followers
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.recorder import Recorder
 from service.rendering.jobs.retention import Retention, superfluous
@@ -60,6 +61,7 @@ class RenderQueue:
         self._limits = limits or QueueLimits()
         self.store = store
         self._jobs: dict[str, Job] = {}  # in the order of arrival
+        self._followers = Followers[Job]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
         self._waiting: Turns[Job] = Turns()
@@ -83,6 +85,7 @@ class RenderQueue:
             job.number = self._number = each.number
             whole = each.outcome.state in ENDED
             job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers)
+            job.changes.followers = self._followers
             self._jobs[job.id] = job
             if not job.finished.is_set():
                 self._waiting.add(job)
@@ -108,6 +111,8 @@ class RenderQueue:
         if listed:
             self._number = job.number = max(job.number, self._number + 1)
             self._jobs[job.id] = job
+            job.changes.followers = self._followers
+            job.changes.tell(job)
         self._waiting.add(job)
         self._dispatch()
         if not job.finished.is_set() and job not in self._running.values():
@@ -159,6 +164,17 @@ class RenderQueue:
         found = list(islice(fits, limit))
         return Page(found, more=len(found) == limit and next(fits, None) is not None)
 
+    @contextmanager
+    def follower(self, owner: str) -> Iterator[Follower[Job]]:
+        """Learns of every change of an owner's renders; first of those that are under way."""
+        with self._followers.follower(owner) as follower:
+            for job in self._jobs.values():
+                if job.owner == owner and not job.finished.is_set():
+                    follower.add(job)
+            if self.closing:
+                follower.close()
+            yield follower
+
     def _place(self, id: str, owner: str) -> int:
         """The number of a render, which may be gone. Raises InvalidDocument."""
         job = self._jobs.get(id)
@@ -191,6 +207,7 @@ class RenderQueue:
         if self.closing:
             return
         self.closing = True
+        self._followers.close()
         if self._timer is not None:
             self._timer.cancel()
         for job in [*self._running.values(), *self._waiting]:

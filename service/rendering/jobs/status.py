@@ -41,8 +41,9 @@ class KernelQuestion:
         self.answered.set()
 
 
-def status(order: Order, outcome: Outcome, kernel: KernelMeasured, renderers: int) -> dict[str, Any]:
-    """As JSON; `kernel` is what is known of the time that the kernel saves, `renderers` how many trace it."""
+def status(order: Order, outcome: Outcome, renderers: int, measured: KernelMeasured | None = None) -> dict[str, Any]:
+    """As JSON; `renderers` is how many trace it. With what is `measured` of its kernel, the kernel as well, whose
+    flags' names are longer than all the rest."""
     progress = outcome.progress
     known: dict[str, Any] = {
         "id": order.id,
@@ -54,7 +55,6 @@ def status(order: Order, outcome: Outcome, kernel: KernelMeasured, renderers: in
         "noise": progress.noise,
         "elapsed_s": progress.elapsed_s,
         "setup_s": outcome.setup_s,
-        "kernel": None if outcome.kernel is None else outcome.kernel | kernel.kernel,
         "eta_s": None if outcome.state in ("cancelled", "failed") else progress.eta_s,
         "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
         "warnings": outcome.warnings,
@@ -62,6 +62,8 @@ def status(order: Order, outcome: Outcome, kernel: KernelMeasured, renderers: in
         "not_divided": undivided(order.settings.adaptive, order.settings.time_limit),
         "settings": order.settings.document(),
     }
+    if measured is not None:
+        known["kernel"] = None if outcome.kernel is None else outcome.kernel | measured.kernel
     return known if outcome.problem is None else known | {"problem": outcome.problem}
 
 

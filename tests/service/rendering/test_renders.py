@@ -11,6 +11,7 @@ from typing import Any
 import pytest
 
 from service.problems import Gone, InvalidDocument, NotFound, TooManyRequests, Unavailable
+from service.rendering.jobs.followers import Changes
 from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.jobs.retention import Retention
 
@@ -24,6 +25,7 @@ class Job:
         self.priority, self.began, self.number, self.resident_bytes = priority, False, 0, 0
         self.state, self.recorder = "queued", None
         self.finished, self.released, self.packed = asyncio.Event(), False, True
+        self.changes = Changes[Any]()
 
     async def run(self) -> None:
         self.state = "running"
