@@ -31,6 +31,7 @@ data_lock          one server at a time on a data folder
 memory             one budget of memory for all work
 shares             what each caller has of something that all of them share
 quota              room on the disk
+lost_pictures      pictures of renders that the database does not know
 asset_shares       what the assets of one key take
 disk_usage         what files take on a disk: blocks and inodes
 garbage            the garbage collector, out of the way of large imports

@@ -1,4 +1,7 @@
-"""Keeps the data folder within its quota: the assets unused for the longest time are deleted, never those in use."""
+"""Keeps the data folder within its quota: the assets unused for the longest time are deleted, never those in use.
+
+Before them go pictures whose renders nobody knows any more.
+"""
 
 from __future__ import annotations
 
@@ -12,6 +15,7 @@ from pathlib import Path
 
 from service.assets.folder import AssetFolder, total
 from service.disk_usage import Usage
+from service.lost_pictures import LostPictures
 from service.problems import TooLarge, Unavailable
 
 log = logging.getLogger(__name__)
@@ -20,7 +24,7 @@ RETRY_S = 60
 
 
 class Quota:
-    """Bounds the assets in `folder` together with what `others` beside them take.
+    """Bounds the assets in `folder` together with what `others` beside them take, `lost` among it.
 
     `in_use` is a context with the ids of the assets that must stay; no other asset comes into use while it lasts.
     """
@@ -31,11 +35,13 @@ class Quota:
         limit: Usage,
         in_use: Callable[[], AbstractContextManager[set[str]]],
         others: Callable[[], Usage] = Usage,
+        lost: LostPictures | None = None,
     ) -> None:
         self._files = AssetFolder(folder / "assets")
         self._limit = limit
         self._in_use = in_use
         self._others = others
+        self._lost = lost
         self._lock = threading.Lock()
         self._promised = Usage()  # what is about to be stored
         self._pinned: Counter[str] = Counter()  # how many contexts keep each id
@@ -114,6 +120,12 @@ class Quota:
         with self._in_use() as in_use, self._files.locked():
             assets = self._files.count()
             left = self._others() + total(assets)
+            lost = []
+            for name, size in (self._lost.spare() if self._lost else {}).items():
+                if not left.exceeds(most):
+                    break
+                left -= size
+                lost.append(name)
             stays = {id.removeprefix("sha256:") for id in (*in_use, *self._pinned)}
             goes = []
             for hash in sorted(assets.keys() - stays, key=lambda hash: assets[hash].used):
@@ -125,6 +137,10 @@ class Quota:
                 name = "SUNBOX_DATA_QUOTA" if left.bytes > most.bytes else "SUNBOX_DATA_FILES"
                 detail = f"The disk quota is used up by saved documents and what they refer to ({name})."
                 raise Unavailable(detail, RETRY_S)
+            for name in lost:
+                assert self._lost is not None
+                self._lost.delete(name)
+                log.info("a picture that no render has made room name=%s", name)
             for hash in goes:
                 self._files.delete(hash)
                 log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)

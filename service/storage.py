@@ -13,6 +13,7 @@ from service.assets import AssetStore
 from service.config import Config
 from service.disk_usage import Usage, usage
 from service.documents import Documents
+from service.lost_pictures import LostPictures
 from service.quota import Quota
 
 
@@ -29,10 +30,17 @@ RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
 
 def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Storage:
     """`pictures`: what the pictures of renders take, for a server that counts them; else they are looked at."""
-    beside = pictures or (lambda: _pictures(config.data_dir / RENDERS))
+    renders = config.data_dir / RENDERS
+    beside, lost = pictures or (lambda: _pictures(renders)), LostPictures(renders)
     # They depend on each other: assets need room, the quota the documents' references, documents the assets.
     limit = Usage(config.data_quota, config.data_files)
-    quota = Quota(config.data_dir, limit, lambda: documents.assets_in_use(), lambda: documents.usage() + beside())
+    quota = Quota(
+        config.data_dir,
+        limit,
+        lambda: documents.assets_in_use(),
+        lambda: documents.usage() + beside() + lost.usage(),
+        lost,
+    )
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota, config.max_key_documents)
     shares = AssetShares(config.data_dir, quota, config.max_key_assets)
@@ -46,7 +54,8 @@ def _pictures(folder: Path) -> Usage:
     with suppress(FileNotFoundError), os.scandir(folder) as entries:
         for entry in entries:
             with suppress(FileNotFoundError):  # a checkpoint that the server replaced just now
-                total += usage(entry.stat(follow_symlinks=False))
+                if entry.is_file(follow_symlinks=False):
+                    total += usage(entry.stat(follow_symlinks=False))
     return total
 
 

@@ -23,6 +23,7 @@ MOST_LINES = 400
 LAYERS = [
     {"service.problems", "service.shared_memory", "service.cpu_time", "service.confined", "service.garbage"},
     {"service.child_processes", "service.disk_usage", "service.memory", "service.shares"},
+    {"service.lost_pictures"},
     {"service.config"},
     {"service.views"},
     {"service.scene", "service.images"},

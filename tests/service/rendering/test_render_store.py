@@ -70,12 +70,12 @@ def test_a_damaged_picture_is_seen(tmp_path: Path, damage: Callable[[bytes], byt
 
 def test_what_a_crash_left_is_deleted(tmp_path: Path) -> None:
     files = PictureFiles(tmp_path)
-    for id in ("known", "unknown"):
+    for id in ("known", "gone"):
         files.write(id, "picture", picture())
     (tmp_path / ".half.tmp").write_bytes(b"half")
     (tmp_path / "notes.txt").write_bytes(b"somebody's")
     again = PictureFiles(tmp_path)
-    again.prepare(["known"])
+    again.prepare(["known"], ["gone"])
     assert sorted(each.name for each in tmp_path.iterdir()) == ["known.picture", "notes.txt"]
     assert again.usage.files == 1 and again.has("known", "picture")
 
@@ -189,7 +189,7 @@ def test_check_data_reads_renders(tmp_path: Path, capsys: pytest.CaptureFixture[
     (tmp_path / "renders" / "c.picture").rename(tmp_path / "renders" / "d.picture")
     assert cli.main(["check-data", str(tmp_path)]) == 1
     said = capsys.readouterr()
-    assert "3 renders" in said.out and "renders/d.picture: left without its render" in said.out
+    assert "3 renders" in said.out and "renders/d.picture: the database does not know its render" in said.out
     faults = [line for line in said.err.splitlines() if line.startswith("fault:")]
     assert len(faults) == 4
     assert "renders/a: its document is damaged" in faults[0] and "renders/b: its picture is damaged" in faults[1]

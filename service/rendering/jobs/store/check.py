@@ -10,8 +10,9 @@ from pathlib import Path
 
 from service.data_check import Report, is_here, reading
 from service.database import FILE
+from service.lost_pictures import FOLDER, KEEP
 from service.problems import ServiceError
-from service.rendering.jobs.store.pictures import KINDS, PART, DamagedPicture, PictureFiles
+from service.rendering.jobs.store.pictures import KINDS, PART, SUFFIXES, DamagedPicture, PictureFiles
 from service.rendering.jobs.store.record import StoredRender
 from service.rendering.jobs.store.rows import stored_renders
 from service.scene import load_json
@@ -22,29 +23,48 @@ def check_renders(folder: Path, report: Report) -> int:
     """How many renders there are; what is wrong with them is added to the report. Raises OSError."""
     if not (folder / FILE).exists():
         return 0
-    count, known = 0, set[str]()
+    count, known, gone = 0, set[str](), set[str]()
     files = PictureFiles(folder / RENDERS)
     try:
         with closing(reading(folder / FILE)) as database:
             if database.execute("SELECT count(*) FROM sqlite_master WHERE name = 'renders'").fetchone() == (0,):
                 return 0  # an earlier version, which is migrated at a start
             for render in stored_renders(database):
+                names = {files.path(render.order.id, kind).name for kind in KINDS}
                 if render.gone:
+                    gone |= names
                     continue
                 count += 1
-                known |= {files.path(render.order.id, kind).name for kind in KINDS}
+                known |= names
                 for fault in _faults(folder, database, files, render):
                     if _is_kept(folder, render):  # it may have made room meanwhile
                         report.faults.append(f"renders/{render.order.id}: {fault}")
     except sqlite3.Error as error:
         report.faults.append(f"{FILE}: the renders cannot be read: {error}")
         return count
-    if report.server is None and (folder / RENDERS).exists():
-        for path in sorted((folder / RENDERS).iterdir()):
-            if path.name not in known:
-                left = "half-written by a crash" if path.name.endswith(PART) else "without its render"
-                report.notes.append(f"{RENDERS}/{path.name}: left {left}; it is deleted at a start")
+    if report.server is None:
+        report.notes += _notes(files, folder / RENDERS, known, gone)
     return count
+
+
+def _notes(files: PictureFiles, folder: Path, known: set[str], gone: set[str]) -> Iterator[str]:
+    """What the next start moves or deletes."""
+    for path in sorted(folder.iterdir() if folder.exists() else ()):
+        if path.name.endswith(PART):
+            yield f"{RENDERS}/{path.name}: left half-written by a crash; it is deleted at a start"
+        elif path.name in gone:
+            yield f"{RENDERS}/{path.name}: left without its render; it is deleted at a start"
+        elif path.name.endswith(SUFFIXES) and path.name not in known:
+            yield (
+                f"{RENDERS}/{path.name}: the database does not know its render; a start moves it to "
+                f"{RENDERS}/{FOLDER}, and back where a backup of the database knows it"
+            )
+    lost = files.lost.names()
+    if back := [name for name in lost if name in known]:
+        yield f"{RENDERS}/{FOLDER}: the renders of {len(back)} pictures are known again; a start moves them back"
+    if left := len(lost) - len(back):
+        stay = "they stay" if (files.lost.path / KEEP).exists() else "they make room where some is needed"
+        yield f"{RENDERS}/{FOLDER}: the database does not know the renders of {left} pictures; {stay}"
 
 
 def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, render: StoredRender) -> Iterator[str]:
@@ -63,7 +83,7 @@ def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, ren
     for (asset,) in uses.fetchall():
         if not is_here(folder, asset):
             yield f"there is no asset {asset}"
-    found = False
+    found = files.path(render.order.id, "picture").name in files.lost.names()  # from where a start brings it back
     for kind in KINDS:
         try:
             files.read(render.order.id, kind, 0)

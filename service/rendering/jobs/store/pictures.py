@@ -3,6 +3,7 @@
     ID.checkpoint  the picture of a render under way: it goes on from there to the same bits
     ID.picture     that of an ended one
     .*.tmp         a file that is being written, or what a crash left of one
+    lost           a folder for pictures of renders that the database does not know
 
 A file is a line of JSON, which tells how far the render was and how the bytes after it are divided, and these bytes.
 """
@@ -23,6 +24,7 @@ from typing import Any, BinaryIO, Literal
 import numpy as np
 
 from service.disk_usage import Usage, expected, usage
+from service.lost_pictures import LostPictures
 from service.rendering.ipc.messages import Progress, Reason, Restore, SavedPicture
 from service.rendering.jobs.store.fitting import Unfit, fit
 
@@ -31,10 +33,12 @@ log = logging.getLogger(__name__)
 KEY, FORMAT = "sunbox_picture", 1  # which the first line begins with
 PART = ".tmp"
 LONGEST_LINE = 1 << 16  # bytes of the line of JSON
+MOST_STRANGERS = 0.1  # of the pictures; where more are unknown, the database may be another one
 PIECE = 8 << 20  # bytes that are written at a time
 
 Kind = Literal["checkpoint", "picture"]
 KINDS: tuple[Kind, ...] = ("picture", "checkpoint")  # the later one first
+SUFFIXES = tuple(f".{kind}" for kind in KINDS)
 Room = Callable[[Usage], AbstractContextManager[None]]
 
 
@@ -67,24 +71,53 @@ class PictureFiles:
         self._room = room
         self._sizes: dict[tuple[str, Kind], Usage] = {}  # on the disk, once `prepare` was called
         self._total = Usage()
+        self.lost = LostPictures(folder)
 
-    def prepare(self, ids: Collection[str]) -> None:
-        """Count what is there, and delete what a crash left and the pictures of others than `ids`."""
+    def prepare(self, ids: Collection[str], gone: Collection[str] = ()) -> None:
+        """Count what is there, and delete what a crash left, half-written or of renders that are `gone`.
+
+        The pictures of others than `ids` are moved to `lost`, from where those of `ids` come back.
+        """
         known = {f"{id}.{kind}": (id, kind) for id in ids for kind in KINDS}
-        deleted = 0
+        leftovers = {f"{id}.{kind}" for id in gone for kind in KINDS}
+        try:
+            if back := self.lost.bring_back(known):
+                log.info("moved pictures back whose renders are known again files=%d", back)
+        except OSError as error:
+            log.error("could not move pictures back folder=%s error=%s", self.lost.path, error)
+        strangers, crashed = list[str](), list[str]()
         with suppress(FileNotFoundError), os.scandir(self._folder) as entries:
             for entry in entries:
                 if (key := known.get(entry.name)) is not None:
                     self._count(key, usage(entry.stat()))
-                elif entry.name.endswith((PART, *(f".{kind}" for kind in KINDS))):
-                    os.unlink(entry.path)
-                    deleted += 1
-        if deleted:
-            log.info("deleted what a crash left of renders files=%d", deleted)
+                elif entry.name.endswith(PART) or entry.name in leftovers:
+                    crashed.append(entry.path)
+                elif entry.name.endswith(SUFFIXES):
+                    strangers.append(entry.name)
+        try:
+            self._tidy(crashed, strangers)
+        except OSError as error:
+            log.error("could not tidy up the pictures of renders folder=%s error=%s", self._folder, error)
+
+    def _tidy(self, crashed: Collection[str], strangers: Collection[str]) -> None:
+        for path in crashed:
+            os.unlink(path)
+        if crashed:
+            log.info("deleted what a crash left of renders files=%d", len(crashed))
+        for name in strangers:
+            self.lost.put(name)
+        if len(strangers) > MOST_STRANGERS * (len(strangers) + self._total.files):
+            self.lost.keep()
+        if strangers:
+            log.warning(
+                "moved pictures of renders that the database does not know files=%d folder=%s",
+                len(strangers),
+                self.lost.path,
+            )
 
     @property
     def usage(self) -> Usage:
-        """Of all files."""
+        """Of all files but the lost ones."""
         return self._total
 
     def size(self, id: str) -> int:
@@ -154,6 +187,11 @@ class PictureFiles:
         for kind in kinds or KINDS:
             self.path(id, kind).unlink(missing_ok=True)
             self._count((id, kind), None)
+
+    def set_aside(self, id: str, kind: Kind) -> None:
+        """Have a file that cannot be read out of the way, for an inspection."""
+        self.lost.put(self.path(id, kind).name, damaged=True)
+        self._count((id, kind), None)
 
     def path(self, id: str, kind: Kind) -> Path:
         return self._folder / f"{id}.{kind}"

@@ -67,7 +67,8 @@ class RenderStore:
                 )
         if left_out := set[str]().union(*(each.unknown for each in stored)):
             log.warning("left out what this version does not know of renders fields=%s", ",".join(sorted(left_out)))
-        self._files.prepare([each.order.id for each in stored if not each.gone])
+        kept, gone = ([each.order.id for each in stored if each.gone is is_gone] for is_gone in (False, True))
+        self._files.prepare(kept, gone)
         return [each if each.gone else self._reached(each) for each in stored]
 
     def _reached(self, render: StoredRender) -> StoredRender:
@@ -109,7 +110,8 @@ class RenderStore:
             return Progress()
         except (DamagedPicture, OSError) as error:
             log.error("could not read a checkpoint, so its render begins again id=%s error=%s", id[:6], error)
-            self._files.delete(id, "checkpoint")
+            with suppress(OSError):
+                self._files.set_aside(id, "checkpoint")
             return Progress()
 
     async def insert(
