@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import asyncio
-from contextlib import nullcontext
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -11,10 +11,12 @@ import numpy as np
 from service.problems import Internal, Unavailable
 from service.rendering.ipc.messages import EvaluateBsdf, Evaluated, Failed, FromRenderer
 from service.rendering.renderers import Renderers
+from service.shares import Shares
 
-MOST = 64  # questions at a time, of all callers together
+MOST = 64  # short questions at a time, of all callers together; as many long ones, most of which wait
 LONG = 1 << 18  # samples: some 50 ms of two cores
-LONG_AT_ONCE = 2  # long questions at a time, as each one takes as much of the renderer's time as a stream does
+# Long questions at a time, of which a caller has one: each takes as much of the renderer's time as a stream does.
+LONG_AT_ONCE = 2
 
 
 class BsdfQuestions:
@@ -22,22 +24,24 @@ class BsdfQuestions:
 
     def __init__(self, renderers: Renderers) -> None:
         self._renderers = renderers
-        self._open = 0
-        self._long = asyncio.Semaphore(LONG_AT_ONCE)
+        self._short = Shares(MOST, "questions about materials", retry_s=1)
+        self._long = Shares(MOST, "long questions about materials")
+        self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()  # by caller
+        self._slots = asyncio.Semaphore(LONG_AT_ONCE)
 
-    async def ask(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:
+    async def ask(self, question: EvaluateBsdf, caller: str = "") -> dict[str, np.ndarray]:
         """The arrays of its Evaluated; whoever asks may be cancelled. The renderers give the task its number.
 
-        Raises Unavailable where too many wait or nothing renders, Internal where the renderer fails.
+        Long questions of one caller are answered one after the other. Raises TooManyRequests or Unavailable where too
+        many wait, Unavailable where nothing renders, and Internal where the renderer fails.
         """
-        if self._open >= MOST:
-            raise Unavailable("There are too many questions about materials just now.")
-        self._open += 1
-        try:
-            async with self._long if question.samples * len(question.wo) > LONG else nullcontext():
+        if question.samples * len(question.wo) <= LONG:
+            with self._short.taken(caller):
                 return await self._answer(question)
-        finally:
-            self._open -= 1
+        with self._long.taken(caller):
+            turn = self._turns.setdefault(caller, asyncio.Lock())
+            async with turn, self._slots:
+                return await self._answer(question)
 
     async def _answer(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:
         waiting = _Waiting(asyncio.get_running_loop().create_future())

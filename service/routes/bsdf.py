@@ -80,7 +80,7 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
     question = EvaluateBsdf(
         0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner(request)
     )
-    answer = asyncio.ensure_future(own.bsdf.ask(question))
+    answer = asyncio.ensure_future(own.bsdf.ask(question, caller(request)))
     if not await until(request, answer):
         return Response(status_code=GONE)
     arrays = answer.result()

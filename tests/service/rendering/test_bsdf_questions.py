@@ -15,7 +15,7 @@ import pytest
 from gpu import Renderer
 from gpu.precompile import kernel_keys
 from service.pack import pack, pack_material
-from service.problems import Unavailable
+from service.problems import TooManyRequests
 from service.rendering.bsdf import LONG_AT_ONCE, MOST, BsdfQuestions
 from service.rendering.ipc.messages import EvaluateBsdf, Image, Loaded, Read, StopRule, Update
 from service.rendering.supervisor.supervisor import Supervisor
@@ -47,6 +47,24 @@ with Renderer() as renderer:
         Steps(renderer.bsdf.albedo(material, up, 64)).finish()
         Steps(renderer.bsdf.terms(material, up, up)).finish()
 """
+
+
+class Silent:
+    """Renderers that never answer."""
+
+    def __init__(self) -> None:
+        self.open_now = 0
+        self.order: list[EvaluateBsdf] = []
+
+    def open(self, listener: Any, kind: str, client: str) -> int:
+        self.open_now += 1
+        return len(self.order)
+
+    def send(self, question: EvaluateBsdf) -> None:
+        self.order.append(LONG if question.samples == LONG.samples else SHORT)
+
+    def drop(self, task: int) -> None:
+        self.open_now -= 1
 
 
 @pytest.fixture
@@ -116,23 +134,38 @@ def test_who_goes_away_takes_the_question_along(gpu: Renderer) -> None:
     with_supervisor(test)
 
 
-def test_no_more_questions_than_can_be_answered_soon(gpu: Renderer) -> None:
-    async def test(supervisor: Supervisor) -> None:
-        questions = BsdfQuestions(supervisor)
-        waiting = [asyncio.ensure_future(questions.ask(LONG)) for _ in range(MOST)]
-        await asyncio.sleep(0)
-        with pytest.raises(Unavailable):
-            await questions.ask(SHORT)
-        for each in waiting[4:]:
-            each.cancel()
-        await asyncio.gather(*waiting[4:], return_exceptions=True)
-        assert (await questions.ask(SHORT))["f"].any()  # it does not wait in the line of the long ones
-        assert not any(each.done() for each in waiting[LONG_AT_ONCE:4])
-        assert len(supervisor._tasks) == LONG_AT_ONCE
-        for each in waiting:
-            each.cancel()
-        await asyncio.gather(*waiting, return_exceptions=True)
-        answer: dict[str, Any] = await questions.ask(SHORT)
-        assert answer["f"].shape == (1, 1, 3)
+def test_a_caller_s_questions_refuse_nobody_else_s() -> None:
+    """Nor do long ones refuse short ones, or wait for those of another caller."""
 
-    with_supervisor(test)
+    async def test() -> None:
+        renderers = Silent()
+        questions = BsdfQuestions(renderers)  # type: ignore[arg-type]
+        asked: list[asyncio.Future[Any]] = []
+
+        async def ask(question: EvaluateBsdf, *callers: str) -> list[type[BaseException] | None]:
+            """What each of these questions ends with; None where it goes on."""
+            mine = [asyncio.ensure_future(questions.ask(question, caller)) for caller in callers]
+            asked.extend(mine)
+            for _ in range(3):
+                await asyncio.sleep(0)
+            return [type(each.exception()) if each.done() else None for each in mine]
+
+        assert await ask(LONG, *["anna"] * MOST) == [None] * (MOST // 2) + [TooManyRequests] * (MOST // 2)
+        assert renderers.open_now == 1, "one of a caller at a time"
+        assert await ask(LONG, "bert") == [None] and renderers.open_now == 2 == LONG_AT_ONCE
+        assert await ask(LONG, "carl") == [None] and renderers.open_now == 2
+        assert await ask(SHORT, *["anna"] * 33) == [None] * 32 + [TooManyRequests]
+        assert await ask(SHORT, *["bert"] * 17) == [None] * 16 + [TooManyRequests]
+        assert renderers.open_now == 2 + 48
+        asked[0].cancel()
+        for _ in range(5):
+            await asyncio.sleep(0)
+        assert renderers.order[-1] == LONG and renderers.open_now == 2 + 48, "the next long one has its turn"
+        for each in asked:
+            each.cancel()
+        await asyncio.gather(*asked, return_exceptions=True)
+        assert renderers.open_now == 0
+        assert await ask(SHORT, "anna") == [None]
+        asked[-1].cancel()
+
+    asyncio.run(test())
