@@ -30,6 +30,7 @@ migrations         its tables, as the ordered steps that made them
 data_lock          one server at a time on a data folder
 memory             one budget of memory for all work
 shares             what each caller has of something that all of them share
+turns              whom the work at hand is for, and turns that go round these callers
 quota              room on the disk
 lost_pictures      pictures of renders that the database does not know
 asset_shares       what the assets of one key take

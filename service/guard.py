@@ -29,6 +29,7 @@ from service.problems import (
     UnsupportedMedia,
 )
 from service.shares import Shares
+from service.turns import CALLER
 
 SAFE_METHODS = {"GET", "HEAD", "OPTIONS"}
 LOOPBACK_NAMES = {"127.0.0.1", "localhost", "::1"}
@@ -95,6 +96,7 @@ class Guard:
                     self._check_body(headers)
                 scope["owner"] = self._owner(scope, headers)
                 scope["caller"] = scope["owner"] or network_of((scope.get("client") or ("",))[0])
+                CALLER.set(scope["caller"])
                 if _route_path(scope) != HEALTH:
                     shares = self._of_keys if scope["owner"] else self._of_addresses
                     stack.enter_context(shares.taken(scope["caller"]))

@@ -22,7 +22,7 @@ MOST_LINES = 400
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
     {"service.problems", "service.shared_memory", "service.cpu_time", "service.confined", "service.garbage"},
-    {"service.child_processes", "service.disk_usage", "service.memory", "service.shares"},
+    {"service.child_processes", "service.disk_usage", "service.memory", "service.shares", "service.turns"},
     {"service.lost_pictures"},
     {"service.config"},
     {"service.views"},

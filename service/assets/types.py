@@ -99,7 +99,7 @@ class AssetLimits:
     seconds: float = 20.0  # wall and processor time for one file
     memory: int = 8 << 30  # bytes, for one file, however much its kind may need
     cache_bytes: int = 512 << 20
-    children: int = 2
+    children: int = 3  # at a time, two of one caller
 
 
 class Assets(Protocol):

@@ -5,13 +5,16 @@ from __future__ import annotations
 import asyncio
 import os
 import threading
-from collections import deque
+from collections import Counter, deque
 from collections.abc import Callable
 from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, TypeVar
 
 from service.rendering.priority import raise_thread_niceness
+from service.turns import CALLER
 
 # Steps of niceness above the event loop and the encoders; the renderer is 10 above.
 NICENESS = 5  # of threads that parse and pack scenes, for which a client waits
@@ -28,46 +31,69 @@ def _yield_to_others(niceness: int = NICENESS) -> None:
 class _Work:
     run: Callable[[], Any]
     result: Future[Any]
+    client: str
 
 
 class Pool:
     """Threads for one kind of work, which waits for no other kind: `await pool(work, client)`.
 
     Turns go round the clients that have work here, and then in the order of arrival: one client with much work delays
-    itself.
+    itself. No client has more than `each` threads at a time: work of minutes is for fewer than all threads, or else
+    nobody had a turn until it ended.
     """
 
-    def __init__(self, name: str, threads: int, niceness: int = 0) -> None:
+    def __init__(self, name: str, threads: int, niceness: int = 0, each: int | None = None) -> None:
         self._threads = ThreadPoolExecutor(threads, name, _yield_to_others, (niceness,))
+        self._most = threads
+        self._each = threads if each is None else each
         self._lock = threading.Lock()
         self._waiting = dict[str, deque[_Work]]()  # by client; the first one's turn is next
+        self._running: Counter[str] = Counter()  # works, by client
+        self._busy = 0  # threads that have work, or look for some
 
-    async def __call__(self, work: Callable[[], T], client: str = "") -> T:
-        result = Future[T]()
+    async def __call__(self, work: Callable[[], T], client: str | None = None) -> T:
+        """The result of `work`, in the caller's context. `client` is by default the caller that it is for."""
+        client = CALLER.get() if client is None else client
+        context, result = copy_context(), Future[T]()
+        context.run(CALLER.set, client)
         with self._lock:
-            self._waiting.setdefault(client, deque()).append(_Work(work, result))
-        self._threads.submit(self._run_next)
+            self._waiting.setdefault(client, deque()).append(_Work(partial(context.run, work), result, client))
+            if self._busy < self._most:
+                self._busy += 1
+                self._threads.submit(self._work)
         return await asyncio.wrap_future(result)
 
-    def _run_next(self) -> None:
+    def _work(self) -> None:
+        while (work := self._next()) is not None:
+            if work.result.set_running_or_notify_cancel():
+                try:
+                    work.result.set_result(work.run())
+                except BaseException as error:
+                    work.result.set_exception(error)
+            with self._lock:
+                self._running[work.client] -= 1
+
+    def _next(self) -> _Work | None:
+        """The work whose turn it is; None where no client may have another thread."""
         with self._lock:
-            client, works = next(iter(self._waiting.items()))
+            client = next((each for each in self._waiting if self._running[each] < self._each), None)
+            if client is None:
+                self._busy -= 1
+                return None
+            works = self._waiting.pop(client)
             work = works.popleft()
-            del self._waiting[client]
             if works:
                 self._waiting[client] = works  # behind the others
-        if not work.result.set_running_or_notify_cancel():
-            return
-        try:
-            work.result.set_result(work.run())
-        except BaseException as error:
-            work.result.set_exception(error)
+            self._running += Counter([client])  # which drops those that have none
+            return work
 
 
 parsing = Pool("parsing", 2, NICENESS)  # small bodies: milliseconds
-waiting_for_parsers = Pool("waiting", 2)  # waits for processes that parse large bodies: seconds
-packing = Pool("packing", 2, NICENESS)  # scenes: seconds for the largest
-storing = Pool("storing", 2, NICENESS)  # assets, which are parsed and hashed first: seconds
+waiting_for_parsers = Pool("waiting", 3, each=2)  # waits for processes that parse large bodies: seconds
+packing = Pool("packing", 3, NICENESS, each=2)  # scenes: seconds for the largest
+storing = Pool("storing", 3, NICENESS, each=2)  # assets, which are parsed and hashed first: minutes for the largest
+storing_small = Pool("small", 3, NICENESS, each=2)  # those of up to a megabyte: milliseconds
+opening = Pool("opening", 3, NICENESS, each=2)  # finds assets and keeps them from being deleted: milliseconds
 saving = Pool("saving", 2)  # documents: the disk's time
 encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, while a person watches
 writing = Pool("writing", 2, WRITING_NICENESS)  # pictures to files: seconds for the largest
@@ -85,7 +111,7 @@ class ClientExecutor:
         self._threads = ThreadPoolExecutor(1, name, _yield_to_others)
 
     async def run(self, work: Callable[[], T]) -> T:
-        return await asyncio.get_running_loop().run_in_executor(self._threads, work)
+        return await asyncio.get_running_loop().run_in_executor(self._threads, copy_context().run, work)
 
     def close(self) -> None:
         self._threads.shutdown(wait=False, cancel_futures=True)

@@ -18,7 +18,7 @@ from service.assets import AssetInfo
 from service.assets.scene_import import Imported
 from service.bodies import SMALL
 from service.downloads import FileAnswer
-from service.rendering.executors import storing
+from service.rendering.executors import opening, storing, storing_small
 from service.routes import answers
 from service.scene.text import dump_json
 from service.state import app_state, caller, owner
@@ -27,6 +27,7 @@ router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
 FOREVER = "public, max-age=31536000, immutable"  # an id is the hash of what it names
 BYTES = "application/octet-stream"
+SMALL_ASSET = 1 << 20  # bytes of a file that seldom takes longer than its hash and its record
 HEADER_BYTES = 4096  # proxies refuse headers not much longer
 
 
@@ -56,7 +57,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
             if received > SMALL:
                 have(received)
             await asyncio.to_thread(own.assets.receive, file, chunk)
-        info = await storing(add, client)
+        info = await (storing_small if received <= SMALL_ASSET else storing)(add, client)
     return {name: value for name, value in asdict(info).items() if value is not None}
 
 
@@ -97,7 +98,7 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
     with ExitStack() as stack:
-        source = await storing(partial(stack.enter_context, app_state(request).assets.opened(id)), caller(request))
+        source = await opening(partial(stack.enter_context, app_state(request).assets.opened(id)), caller(request))
         headers = {"content-disposition": "attachment", "cache-control": FOREVER}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)

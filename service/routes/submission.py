@@ -15,7 +15,7 @@ from starlette.requests import Request
 
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, Unavailable
 from service.quota import Quota
-from service.rendering.executors import packing, storing
+from service.rendering.executors import opening, packing
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.status import status
 from service.rendering.jobs.store.record import IdempotencyKey, Order, StoredRender
@@ -80,7 +80,7 @@ async def _submitted(
 
 async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float) -> Job:
     """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
-    packed = await packing(partial(own.reader.pack, parsed.scene), name)
+    packed = await packing(partial(own.reader.pack, parsed.scene))
     id, document = secrets.token_hex(ID_BYTES), parsed.document
     order = Order(id, name, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
     return own.job(order, document, packed, time.monotonic() - began)
@@ -106,8 +106,8 @@ async def _pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
         yield
         return
     pin = quota.pinned(ids)
-    await storing(pin.__enter__)
+    await opening(pin.__enter__)
     try:
         yield
     finally:
-        await storing(partial(pin.__exit__, None, None, None))
+        await opening(partial(pin.__exit__, None, None, None))

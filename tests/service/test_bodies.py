@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+import threading
 from collections.abc import Awaitable, Callable
 from pathlib import Path
 from typing import Any
@@ -13,6 +14,8 @@ import pytest
 from service.app import create_app
 from service.bodies import SMALL
 from service.config import Config
+from service.rendering.executors import storing
+from service.routes.submission import _pinned
 from service.state import AppState
 
 MIB = 1 << 20
@@ -121,3 +124,26 @@ def test_a_body_counts_while_it_is_in_memory(tmp_path: Path) -> None:
         assert await whole.answered() == 413
 
     calling(tmp_path, test, max_json=4 * SMALL)
+
+
+def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
+    """While one caller's are parsed for minutes: another's files are stored, found and pinned."""
+
+    async def test(app: Any) -> None:
+        own: AppState = app.state.sunbox
+        go_on = threading.Event()
+        large = [asyncio.ensure_future(storing(lambda: go_on.wait(60), name)) for name in ("a", "a", "a", "c")]
+        try:
+            async with asyncio.timeout(50):
+                small = Call(app, "b", "POST", "/v1/assets", OBJ)
+                assert await small.answered() == 201
+                id = json.loads(small.body)["id"]
+                assert await Call(app, "b", "GET", f"/v1/assets/{id}", b"").answered() == 200
+                async with _pinned(own.quota, [id]):
+                    pass
+            assert not any(each.done() for each in large)
+        finally:
+            go_on.set()
+        await asyncio.gather(*large)
+
+    calling(tmp_path, test)

@@ -15,6 +15,7 @@ from service.assets.sandbox.wire import Array, adopt, memory, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
 from service.child_processes import Child, Children, Closed, signal_name
 from service.confined import Rights
+from service.turns import Turns
 
 log = logging.getLogger(__name__)
 
@@ -41,11 +42,14 @@ CRASHES = {
 
 
 class Sandbox:
-    """`parse` from any thread; at most `limits.children` files at once, the others wait. Children start on demand."""
+    """`parse` from any thread; at most `limits.children` files at once, and one less of one caller; the others wait.
+
+    Children start on demand.
+    """
 
     def __init__(self, limits: AssetLimits) -> None:
         self.limits = limits
-        self._turn = threading.BoundedSemaphore(limits.children)
+        self._turns = Turns(limits.children)
         self._asking = threading.Lock()
         self._rights: Rights | None = None
         self.children = Children("service.assets.sandbox.child", FILES, ENVIRONMENT, is_quiet=True)
@@ -90,7 +94,7 @@ class Sandbox:
     def _bounded(self, format: str, source: bytes | int, whole: bool) -> MeshData | ImageData | SceneFile:
         fd = memory(source, "sunbox-source") if isinstance(source, bytes) else source
         try:
-            with self._turn:
+            with self._turns.one():
                 return self._parse(format, fd, whole)
         finally:
             if isinstance(source, bytes):
