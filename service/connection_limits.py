@@ -23,6 +23,9 @@ HEAD_S = 10.0  # for a request's head, from its first byte, or from the connecti
 REST_S = 30.0  # for the rest of a body that was answered already
 UNREAD_S = 30.0  # in which an answer must go on by LEAST_RATE: a client that vanished or stalled takes nothing
 LEAST_RATE = 1024  # bytes a second
+# The part of a WebSocket's unsent bytes that must be delivered within UNREAD_S. A frame is written as a whole, up to
+# 256 MiB, and a client that took it at LEAST_RATE would keep that in memory for days.
+LEAST_PART = 0.25
 SETTLED_S = 1.0  # a head that takes longer makes room for another connection where there is none
 REFUSALS = 64  # connections beyond the most that are answered why they are refused, or that the server lives
 NETWORK_BITS = 64  # of an IPv6 address that one customer of a provider has
@@ -36,7 +39,7 @@ log = logging.getLogger(__name__)
 class _Wait:
     owed: Owed
     since: float
-    delivered: int  # bytes, at that time
+    enough: float  # bytes delivered in all with which it goes on
 
 
 class Watch:
@@ -61,8 +64,8 @@ class Watch:
             return None
         delivered = _delivered(connection.transport) if owed == "reading" else 0
         before = self._waits.get(connection)
-        if before is None or before.owed != owed or delivered - before.delivered >= LEAST_RATE * UNREAD_S:
-            return _Wait(owed, now, delivered)
+        if before is None or before.owed != owed or delivered >= before.enough:
+            return _Wait(owed, now, delivered + _least(connection))
         return before
 
 
@@ -127,12 +130,23 @@ def _owed(connection: Any) -> Owed | None:
     """What uvicorn's connection is waiting for from its client; None: for nothing, or for a next request."""
     if connection.transport.get_write_buffer_size():
         return "reading"
-    if not hasattr(connection, "cycle"):  # a WebSocket's, which has pings
+    if not _is_http(connection):  # a WebSocket has pings
         return None
     cycle, theirs = connection.cycle, connection.conn.their_state
     if cycle is None or (cycle.response_complete and theirs is h11.IDLE and connection.conn.trailing_data[0]):
         return "head"
     return "rest" if cycle.response_complete and theirs is h11.SEND_BODY else None
+
+
+def _least(connection: Any) -> float:
+    """Bytes that must be delivered within UNREAD_S from now on."""
+    part = 0.0 if _is_http(connection) else LEAST_PART * connection.transport.get_write_buffer_size()
+    return max(LEAST_RATE * UNREAD_S, part)
+
+
+def _is_http(connection: Any) -> bool:
+    """Whether it is no WebSocket's, as uvicorn has them."""
+    return hasattr(connection, "cycle")
 
 
 def _limit_s(owed: Owed) -> float:

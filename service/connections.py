@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import logging
 import socket
 import struct
 import time
@@ -17,9 +18,14 @@ from service.connection_limits import Room
 
 BACKLOG = 2048
 JOINED = 16 * 1024  # bytes; longer pieces are written as they are, as joining them would copy them
+# Bytes that may wait beside the largest piece. Answers and frames wait until what is before them was sent, but pongs
+# don't: uvicorn answers each ping at once, also those of a client that reads nothing.
+MOST_BESIDE = 1 << 20
 # TCP's probes of a silent peer: one that vanished without a word is noticed after two minutes.
 PROBE_AFTER_S, PROBE_EVERY_S, PROBES = 60, 15, 4
 RESET = struct.pack("ii", 1, 0)  # SO_LINGER: closed at once, with a reset
+
+log = logging.getLogger(__name__)
 
 
 def listen(host: str, port: int) -> socket.socket:
@@ -45,11 +51,18 @@ class JoinedWrites(asyncio.Transport):
         self._pending: list[bytes] = []
         self._size = 0  # bytes of these
         self.written = 0  # bytes since the connection began
+        self._largest = 0  # bytes of one piece, of those since the buffer was empty
+        self._aborted = False
         self._loop = asyncio.get_running_loop()
 
     def write(self, data: Any) -> None:
-        if not data:
+        if not data or self._aborted:
             return
+        waiting = self.get_write_buffer_size()
+        self._largest = max(len(data), self._largest if waiting else 0)
+        if waiting + len(data) > self._largest + MOST_BESIDE:
+            log.info("connection ended unread=%d", waiting)
+            return self.abort()
         self.written += len(data)
         if self._size + len(data) > JOINED:
             self._flush()
@@ -72,6 +85,7 @@ class JoinedWrites(asyncio.Transport):
 
     def abort(self) -> None:
         """Drop unsent bytes, also in the kernel, which would go on offering them for minutes."""
+        self._aborted = True
         self._pending.clear()
         self._size = 0
         with suppress(OSError):

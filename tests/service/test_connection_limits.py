@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import base64
 import socket
 import threading
 import time
@@ -156,6 +157,61 @@ def test_a_download_that_nobody_reads(piece: int) -> None:
         with pytest.raises(ConnectionError):  # a reset: what waited in the kernel is gone, too
             while left > 0:
                 left -= len(connection.recv(1 << 20)) or LARGE
+
+
+def test_pings_of_a_client_that_reads_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Each is answered at once; unread, the answers took a hundred megabytes in ten seconds."""
+    monkeypatch.setattr(connection_limits, "UNREAD_S", 1000.0)
+
+    async def stream(scope: Scope, receive: Receive, send: Send) -> None:
+        await receive()
+        await send({"type": "websocket.accept"})
+        while (await receive())["type"] != "websocket.disconnect":
+            pass
+
+    upgrade = b"Upgrade: websocket\r\nConnection: Upgrade\r\nSec-WebSocket-Version: 13\r\n"
+    upgrade += b"Sec-WebSocket-Key: " + base64.b64encode(bytes(16)) + b"\r\n"
+    pings = (b"\x89\xfd" + bytes(4) + b"x" * 125) * 1000
+    with serving(asgi=stream) as address:
+        connection = connected(address)
+        assert b" 101 " in answer(connection, get(extra=upgrade))
+        with pytest.raises(ConnectionError):
+            for _ in range(500):  # 65 MB
+                connection.sendall(pings)
+
+
+def test_a_frame_goes_on() -> None:
+    """A stream's is in memory as a whole, so a quarter of it must be taken in the time of 30 KiB of an answer."""
+    least = connection_limits.LEAST_RATE * connection_limits.UNREAD_S
+    stream, download = Frame(1 << 20), Frame(1 << 20)
+    download.cycle = download.conn = SimpleNamespace(response_complete=False, their_state=None)  # type: ignore[attr-defined]
+    assert connection_limits._least(stream) == 1 << 18 and connection_limits._least(download) == least
+    assert connection_limits._least(Frame(100)) == least
+
+    watch = Watch()
+    with pytest.MonkeyPatch.context() as patch:
+        now = 0.0
+        patch.setattr(connection_limits, "time", SimpleNamespace(monotonic=lambda: now))
+        patch.setattr(connection_limits, "_delivered", lambda transport: transport.read)
+        for _ in range(3):
+            for connection in (stream, download):
+                connection.read += int(least)
+            watch.look([stream, download])
+            now += 0.9 * connection_limits.UNREAD_S
+        assert stream.ended and not download.ended
+
+
+class Frame:
+    """A WebSocket's connection with so many unsent bytes."""
+
+    def __init__(self, unsent: int) -> None:
+        self.transport, self.unsent, self.read, self.ended = self, unsent, 0, False
+
+    def get_write_buffer_size(self) -> int:
+        return self.unsent - self.read
+
+    def abort(self) -> None:
+        self.ended = True
 
 
 def test_a_full_server_says_so() -> None:

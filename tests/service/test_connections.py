@@ -15,7 +15,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service.connections import JOINED, JoinedWrites
+from service.connections import JOINED, MOST_BESIDE, JoinedWrites
 from tests.serving import Server, client
 
 
@@ -67,6 +67,7 @@ class Written:
 
     def __init__(self) -> None:
         self.writes: list[bytes] = []
+        self.unsent = 0
         self.ended = ""
 
     def write(self, data: bytes) -> None:
@@ -80,7 +81,7 @@ class Written:
         self.ended = "aborted"
 
     def get_write_buffer_size(self) -> int:
-        return 0
+        return self.unsent
 
     def get_extra_info(self, name: str, default: Any) -> Any:
         return self
@@ -117,6 +118,35 @@ def test_what_is_aborted_writes_nothing() -> None:
         await asyncio.sleep(0)
         assert written.writes == [] and written.ended == "aborted"
         assert written.options[1] == socket.SO_LINGER
+
+    asyncio.run(run())
+
+
+def test_what_nobody_reads_has_an_end() -> None:
+    """Pongs to a client that sends pings and reads nothing; a frame of any size may be on its way beside some."""
+
+    async def run() -> None:
+        written: Any = Written()
+        joined = JoinedWrites(written)
+        joined.write(bytes(8 * MOST_BESIDE))
+        written.unsent = 8 * MOST_BESIDE
+        count = 0
+        while not written.ended:
+            joined.write(bytes(JOINED + 1))
+            written.unsent += JOINED + 1
+            count += 1
+        assert written.ended == "aborted" and count == MOST_BESIDE // (JOINED + 1) + 1
+        joined.write(bytes(JOINED))  # the rest of the pings that came together
+        written.ended = ""
+        await asyncio.sleep(0)
+        assert len(written.writes) == count
+
+        written = Written()
+        joined = JoinedWrites(written)
+        for _ in range(100):  # a client that reads takes any number of frames
+            joined.write(bytes(MOST_BESIDE))
+            joined.write(bytes(125))
+        assert not written.ended
 
     asyncio.run(run())
 
