@@ -144,7 +144,7 @@ class Config(BaseSettings):
     checkpoint_s: Seconds = Field(
         4.0,
         description="How often a render is stored, to go on after the loss of its renderer or of all processes; "
-        "after 17 minutes less often: every 0.4 % of its time.",
+        "less often where it takes longer than 1 % of that, and after 17 minutes: every 0.4 % of its time.",
     )
     max_pixels: int = Field(MAX_PIXELS, ge=1, description="Most pixels of a picture: width times height.")
     max_triangles: int = Field(

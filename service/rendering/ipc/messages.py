@@ -10,7 +10,7 @@ import numpy as np
 
 from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
-from service.rendering.ipc.orders import Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.rendering.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.views import DEFAULT_TONE_MAP, Encoding
 
 BsdfQuestion = Literal["values", "albedo", "terms"]
@@ -73,6 +73,10 @@ class SavedPicture:
     # Bands that were done of blocks that were not merged yet: first sample, number of samples, first row, number of
     # rows. Their values are the last ones of `buffers`.
     bands: tuple[tuple[int, int, int, int], ...] = ()
+
+    @property
+    def nbytes(self) -> int:
+        return sum(buffer.nbytes for buffer in self.buffers)
 
 
 def driver_of(info: Mapping[str, Any]) -> str:
@@ -341,6 +345,7 @@ ToRenderer = (
     | Drop
     | Settle
     | TakeCheckpoint
+    | CheckpointStored
     | Restore
     | MeasureKernel
     | EvaluateBsdf

@@ -46,6 +46,14 @@ class TakeCheckpoint:
 
 
 @dataclass(frozen=True)
+class CheckpointStored:
+    """Says that the last Checkpoint is on the disk, and the seconds from its arrival until it was."""
+
+    task: int
+    took_s: float
+
+
+@dataclass(frozen=True)
 class Settle:
     """Asks to apply the updates so far before the next one, which may be too much and fall back to them."""
 

@@ -84,7 +84,7 @@ class RenderQueue:
             job = make(each)
             job.number = self._number = each.number
             whole = each.outcome.state in ENDED
-            job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers)
+            job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers, job.owner)
             job.changes.followers = self._followers
             self._jobs[job.id] = job
             if not job.finished.is_set():
@@ -106,7 +106,7 @@ class RenderQueue:
         self.admit(job.owner)
         if listed and self.store is not None:
             job.number = await self._stored(job, uses, key)
-            job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers)
+            job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
             job.forget_document()
         if listed:
             self._number = job.number = max(job.number, self._number + 1)

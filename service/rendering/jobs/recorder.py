@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import logging
+import time
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
 from service.problems import Internal, ServiceError
 from service.rendering.ipc.messages import Checkpoint, Done, Restore
+from service.rendering.ipc.orders import CheckpointStored
 from service.rendering.jobs.store.pictures import Kind
 from service.rendering.jobs.store.record import Outcome
 from service.rendering.jobs.store.store import RenderStore
@@ -26,15 +28,24 @@ class Recorder:
     """For the event loop. `whole` says that everything about an ended render is on the disk."""
 
     def __init__(
-        self, store: RenderStore, number: int, id: str, whole: bool = False, renderers: Renderers | None = None
+        self,
+        store: RenderStore,
+        number: int,
+        id: str,
+        whole: bool = False,
+        renderers: Renderers | None = None,
+        owner: str = "",
     ) -> None:
-        """`renderers` are told where the pictures that they keep can be read from."""
+        """`renderers` learn where the pictures that they keep can be read from. Turns on the disk go round the
+        owners."""
         self.store = store
         self._renderers = renderers
         self.number = number
         self.whole = whole
         self.id = id
-        self._checkpoint: Restore | None = None  # to be written next
+        self._owner = owner
+        self._checkpoint: Restore | None = None  # to be written next ...
+        self._came_at = 0.0  # ... and when it came
         self._writing: Writing | None = None
         self._written = asyncio.Event()  # set by the next checkpoint that is on the disk
         self._closed = False
@@ -42,6 +53,7 @@ class Recorder:
     def checkpoint(self, checkpoint: Checkpoint) -> None:
         """Write a checkpoint as soon as the one before it is on the disk; if another one comes first, that one."""
         self._checkpoint = Restore(checkpoint.task, 1, checkpoint.saved, None, checkpoint.progress)
+        self._came_at = time.monotonic()
         if self._writing is None and not self._closed:
             self._writing = asyncio.get_running_loop().create_task(self._write_checkpoints())
 
@@ -78,7 +90,7 @@ class Recorder:
             picture = Restore(done.task, 1, done.saved, done.reason, done.progress)
         try:
             if picture is not None:
-                await self.store.write(self.id, "picture", picture)
+                await self.store.write(self.id, "picture", picture, self._owner)
             await self.store.update(self.number, outcome)
             if picture is not None:
                 await self.store.delete(self.id, "checkpoint")
@@ -100,10 +112,12 @@ class Recorder:
     async def _write_checkpoints(self) -> None:
         while (restore := self._checkpoint) is not None:
             self._checkpoint = None
-            last = [restore]
+            last, came_at = [restore], self._came_at
             try:
-                await self.store.write(self.id, "checkpoint", restore)
+                await self.store.write(self.id, "checkpoint", restore, self._owner)
                 self._written.set()
+                if self._renderers is not None:
+                    self._renderers.send(CheckpointStored(restore.task, time.monotonic() - came_at))
                 self._let_go("checkpoint", restore)
             except Exception as error:
                 self._failed("checkpoint", error)

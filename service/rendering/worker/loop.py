@@ -29,7 +29,7 @@ from service.rendering.ipc.messages import (
     Usage,
     Want,
 )
-from service.rendering.ipc.orders import Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.rendering.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.rendering.worker.bsdf_task import BsdfTask
 from service.rendering.worker.context import WorkerContext
 from service.rendering.worker.device.loaded_scene import begin_key, slider_keys
@@ -222,6 +222,8 @@ class Loop:
             self._work(task, lambda: task.restore(message))
         elif isinstance(message, TakeCheckpoint):
             task.take_checkpoint()
+        elif isinstance(message, CheckpointStored):
+            task.checkpoint_stored(message.took_s)
         elif isinstance(message, MeasureKernel):
             task.savings.ask()
         elif isinstance(message, Pause):

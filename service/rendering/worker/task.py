@@ -312,6 +312,10 @@ class Task:
         """Save the picture in the next turn."""
         self._ending.checkpoints.hasten()
 
+    def checkpoint_stored(self, took_s: float) -> None:
+        """The server has the last checkpoint on the disk, that many seconds after it came."""
+        self._ending.checkpoints.stored(took_s)
+
     def measure_kernel(self) -> None:
         """A step of `savings`."""
         self._residency.wake()

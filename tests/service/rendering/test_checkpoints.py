@@ -7,8 +7,9 @@ import os
 import signal
 from collections.abc import Generator
 from dataclasses import replace
+from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -27,7 +28,9 @@ from service.rendering.ipc.messages import (
     StopRule,
     Update,
 )
-from service.rendering.ipc.orders import Stop
+from service.rendering.ipc.orders import CheckpointStored, Stop
+from service.rendering.jobs.recorder import Recorder
+from service.rendering.jobs.store.store import RenderStore
 from service.rendering.supervisor.supervisor import Supervisor
 from service.rendering.worker.device import checkpoints
 from tests.gpu.test_precompile import LINEAR, arrays_of
@@ -160,6 +163,19 @@ def test_what_is_cancelled_meanwhile_stays_as_it_was(gpu: Renderer) -> None:
     with_supervisor(test, checkpoint_s=0.05)
 
 
+class Heard:
+    """The renderers, and the seconds that they hear of."""
+
+    def __init__(self, to: Supervisor, heard: list[float]) -> None:
+        self._to, self._heard = to, heard
+
+    def send(self, message: Any) -> None:
+        self._heard.append(message.took_s)
+        self._to.send(message)
+
+    def stored(self, *what: Any) -> None: ...
+
+
 def test_a_short_render_has_none(gpu: Renderer) -> None:
     async def test(supervisor: Supervisor) -> None:
         _, ears = await begun(supervisor, 20)
@@ -200,7 +216,7 @@ def test_one_descriptor_goes_with_a_picture(gpu: Renderer) -> None:
     scene.release()
 
 
-def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_it_costs_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypatch: pytest.MonkeyPatch) -> None:
     now, step_s = 0.0, 0.005
 
     def slow(room: Any) -> Generator[None, None, str]:
@@ -210,9 +226,13 @@ def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
             yield
         return "saved"
 
-    def saved(kept: checkpoints.Checkpointer) -> None:
+    def saved(kept: checkpoints.Checkpointer, turns_s: float = 0.0) -> None:
+        nonlocal now
         kept.begin(picture)
-        assert [kept.step() for _ in range(5)] == [None] * 4 + ["saved"] and not kept.under_way
+        for expected in [None] * 4 + ["saved"]:
+            assert kept.step() == expected
+            now += turns_s if expected is None else 0.0  # of other tasks
+        assert not kept.under_way
 
     def pause_s(kept: checkpoints.Checkpointer, elapsed_s: float) -> float:
         nonlocal now
@@ -221,18 +241,37 @@ def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
             now += 0.125
         return now - began
 
+    def lost_s(kept: checkpoints.Checkpointer, elapsed_s: float, stored_s: float, turns_s: float = 0.0) -> float:
+        """What would be lost at most: since the last one began to be read until the next one is on the disk."""
+        began = now
+        saved(kept, turns_s)
+        kept.stored(stored_s)
+        pause_s(kept, elapsed_s)
+        saved(kept, turns_s)
+        return now - began + stored_s
+
     monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
     picture: Any = SimpleNamespace(samples=0, under_way=(1, 0, 8), state_sizes=[], save=slow)
     kept = checkpoints.Checkpointer(1.0)
     assert pause_s(kept, 1.0) == 1.0
     saved(kept)
     assert pause_s(kept, 20.0) == pytest.approx(2.0, abs=0.2)
-    step_s = 0.5  # a large picture: a hundredth would be 200 s, and at most 10 s may be lost
     saved(kept)
-    assert pause_s(kept, 20.0) <= 4.0
+    kept.stored(0.03)  # writing is work, too
+    assert pause_s(kept, 20.0) == pytest.approx(5.0, abs=0.2)
+    step_s = 0.125  # a large picture: a hundredth would be 50 s and more, and at most 10 s may be lost
+    for stored_s in (0.5, 2.0, 5.0):
+        assert 8.0 < lost_s(kept, 20.0, stored_s) <= 10.0
+    assert 8.0 < lost_s(kept, 20.0, 1.0, turns_s=0.25) <= 10.0
+    assert 80.0 < lost_s(kept, 10_000.0, 2.0) <= 100.0  # 1 % of the render may be lost
+    step_s = 0.0
+    saved(kept)
+    kept.stored(0.0)
+    assert pause_s(kept, 10_000.0) == pytest.approx(40.0, abs=0.2)  # a small one needs none more often than that
     assert pause_s(kept, 20.0) == 0.0  # it is due until it is taken
     saved(kept)
-    assert pause_s(kept, 10_000.0) == pytest.approx(40.0, abs=0.2)  # 1 % of the render may be lost
+    kept.stored(60.0)  # a disk that is too slow for all that: as often as it was asked for, and no oftener
+    assert pause_s(kept, 20.0) == 1.0
     saved(kept)
     kept.hasten()
     assert pause_s(kept, 10_000.0) == 0.0
@@ -240,3 +279,29 @@ def test_it_takes_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
     assert not kept.due(picture, 10_000.0)  # nothing was traced
     picture.samples = 1
     assert kept.due(picture, 10_000.0)
+
+
+def test_the_renderer_hears_how_long_the_disk_took(gpu: Renderer, tmp_path: Path) -> None:
+    """From the store that a render is recorded in, on the way that it goes in a server."""
+
+    async def test(supervisor: Supervisor) -> None:
+        task, ears = await begun(supervisor, ENDLESS)
+        heard: list[float] = []
+        recorder = Recorder(RenderStore(tmp_path), 1, "a", renderers=cast(Any, Heard(supervisor, heard)))
+        recorder.checkpoint(await ears.next(Checkpoint))
+        await recorder.checkpointed()
+        await recorder.close()
+        assert len(heard) == 1 and heard[0] > 0
+        await ears.next(Checkpoint)  # the disk is fast, and they go on
+        supervisor.send(CheckpointStored(task, 2.0))
+        for _ in range(3):
+            await ears.next(Progressed)
+        while not ears.messages.empty():
+            ears.messages.get_nowait()
+        reports = 0
+        while reports < 3:  # 0.1 s apart: without it several checkpoints would come
+            message = await ears.messages.get()
+            assert not isinstance(message, Checkpoint)
+            reports += isinstance(message, Progressed)
+
+    with_supervisor(test, checkpoint_s=0.05)

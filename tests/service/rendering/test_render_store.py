@@ -5,8 +5,10 @@ from __future__ import annotations
 import asyncio
 import errno
 import os
+import threading
 import zlib
 from collections.abc import Callable, Coroutine
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +22,7 @@ from service.problems import FieldError, Internal, InvalidDocument, Unavailable
 from service.quality import resolve
 from service.rendering.ipc.messages import Progress, Restore, SavedPicture
 from service.rendering.jobs.store import rows
+from service.rendering.jobs.store import store as store_module
 from service.rendering.jobs.store.pictures import DamagedPicture, PictureFiles
 from service.rendering.jobs.store.record import IdempotencyKey, Order, Outcome
 from service.rendering.jobs.store.store import RenderStore
@@ -95,6 +98,39 @@ def test_a_full_disk_leaves_the_picture_before(tmp_path: Path, monkeypatch: pyte
         back = await store.read("a", "checkpoint", 7)
         assert back is not None and back.saved.buffers[0][0] == 1
         assert os.listdir(tmp_path / "renders") == ["a.checkpoint"]
+
+    run(test)
+
+
+def test_no_small_render_waits_for_a_large_one(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its end is written, read and deleted while a large one's checkpoint is on its way to the disk."""
+    monkeypatch.setattr(store_module, "LARGE", 5000)
+    began, go_on = threading.Event(), threading.Event()
+    write = PictureFiles.write
+
+    def slow(self: PictureFiles, id: str, kind: Any, restore: Restore) -> None:
+        if id == "large":
+            began.set()
+            assert go_on.wait(60)
+        write(self, id, kind, restore)
+
+    monkeypatch.setattr(PictureFiles, "write", slow)
+
+    async def test() -> None:
+        store = RenderStore(tmp_path)
+        large = replace(picture(), saved=SavedPicture(8, (2, 1, 0), [np.zeros(10_000, np.uint8)]))
+        await store.write("before", "picture", large)
+        writing = asyncio.ensure_future(store.write("large", "checkpoint", large, "anna"))
+        try:
+            await asyncio.to_thread(began.wait, 60)
+            await store.write("small", "picture", picture(), "bert")
+            assert await store.read("small", "picture", 7) is not None
+            assert await store.read("before", "picture", 7) is not None  # and a large one is read
+            await store.delete("small", "picture")
+            assert not writing.done()
+        finally:
+            go_on.set()
+            await writing
 
     run(test)
 

@@ -14,6 +14,7 @@ import json
 import logging
 import os
 import tempfile
+import threading
 import zlib
 from collections.abc import Callable, Collection
 from contextlib import AbstractContextManager, nullcontext, suppress
@@ -71,6 +72,7 @@ class PictureFiles:
         self._room = room
         self._sizes: dict[tuple[str, Kind], Usage] = {}  # on the disk, once `prepare` was called
         self._total = Usage()
+        self._lock = threading.Lock()  # of these two
         self.lost = LostPictures(folder)
 
     def prepare(self, ids: Collection[str], gone: Collection[str] = ()) -> None:
@@ -198,9 +200,10 @@ class PictureFiles:
 
     def _count(self, key: tuple[str, Kind], size: Usage | None) -> None:
         """Note what a file takes; None: it is not there any more."""
-        self._total += (size or Usage()) - self._sizes.pop(key, Usage())
-        if size is not None:
-            self._sizes[key] = size
+        with self._lock:
+            self._total += (size or Usage()) - self._sizes.pop(key, Usage())
+            if size is not None:
+                self._sizes[key] = size
 
     def _sync(self) -> None:
         """Have the disk know the files' names."""

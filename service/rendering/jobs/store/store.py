@@ -1,7 +1,8 @@
 """The renders' store for the event loop: whatever touches the disk runs in threads.
 
-Rows are written in the order in which they are handed over, by one thread; pictures by another, as a large one takes
-seconds. Methods raise Unavailable where the disk takes no more.
+Rows are written in the order in which they are handed over, by one thread. Small pictures have another, and large
+ones two more, as they take seconds: no small render waits for them when it ends. Methods raise Unavailable where the
+disk takes no more.
 """
 
 from __future__ import annotations
@@ -19,7 +20,13 @@ from typing import TypeVar
 from service.database import Database
 from service.disk_usage import Usage, expected
 from service.problems import ServiceError, Unavailable
-from service.rendering.executors import recording, saving_pictures
+from service.rendering.executors import (
+    Pool,
+    reading_large_pictures,
+    recording,
+    saving_large_pictures,
+    saving_pictures,
+)
 from service.rendering.ipc.messages import Progress, Restore
 from service.rendering.jobs.store.pictures import KINDS, DamagedPicture, Kind, PictureFiles
 from service.rendering.jobs.store.record import IdempotencyKey, Order, Outcome, StoredRender
@@ -29,6 +36,7 @@ from service.storage import RENDERS
 log = logging.getLogger(__name__)
 
 RETRY_S = 30
+LARGE = 16 << 20  # bytes of a picture, which take 0.1 s of a middling disk
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
 T = TypeVar("T")
@@ -141,9 +149,10 @@ class RenderStore:
         """The digest and the render of a key that was taken lately, also where the render is gone."""
         return await recording(partial(self._rows.keyed, owner, key))
 
-    async def write(self, id: str, kind: Kind, restore: Restore) -> None:
-        """Store a picture in the place of the one before it."""
-        await self._on_disk(partial(self._files.write, id, kind, restore))
+    async def write(self, id: str, kind: Kind, restore: Restore, owner: str = "") -> None:
+        """Store a picture in the place of the one before it. Turns go round the owners."""
+        pool = _pool(restore.saved.nbytes)
+        await self._on_disk(partial(self._files.write, id, kind, restore), pool, owner)
 
     async def read(self, id: str, kind: Kind, task: int) -> Restore | None:
         """A picture for a task; None where there is none, or it is damaged."""
@@ -157,7 +166,8 @@ class RenderStore:
                 log.error("a stored picture is damaged id=%s kind=%s error=%s", id[:6], kind, error)
                 return None
 
-        return await self._on_disk(read)
+        large = self._files.size(id) > LARGE
+        return await self._on_disk(read, reading_large_pictures if large else saving_pictures)
 
     def read_now(self, id: str, kind: Kind, task: int) -> Restore:
         """As `read`, in this thread. Raises OSError, DamagedPicture."""
@@ -165,20 +175,20 @@ class RenderStore:
 
     async def free(self, last: list[Restore]) -> None:
         """Forget a picture, to which the list has the last reference: unmapping a gigabyte takes 0.2 s."""
-        await saving_pictures(last.clear)
+        await _pool(sum(each.saved.nbytes for each in last))(last.clear)
 
     async def delete(self, id: str, kind: Kind) -> None:
-        await self._on_disk(partial(self._files.delete, id, kind))
+        await self._on_disk(partial(self._files.delete, id, kind), _pool(self._files.size(id)))
 
     async def forget(self, stored: Collection[tuple[int, str]]) -> None:
         """Delete all but the ids of renders, which are given by number and id."""
         await recording(partial(self._rows.forget, [number for number, _ in stored]))
         for _, id in stored:
-            await self._on_disk(partial(self._files.delete, id))
+            await self._on_disk(partial(self._files.delete, id), _pool(self._files.size(id)))
 
-    async def _on_disk(self, work: Callable[[], T]) -> T:
+    async def _on_disk(self, work: Callable[[], T], pool: Pool, client: str = "") -> T:
         try:
-            return await saving_pictures(work)
+            return await pool(work, client)
         except ServiceError:
             raise
         except OSError as error:
@@ -186,3 +196,8 @@ class RenderStore:
             raise Unavailable(
                 "The picture can't be stored: the server's disk is full or has a problem.", RETRY_S
             ) from None
+
+
+def _pool(size: int) -> Pool:
+    """The thread that writes and deletes pictures of that many bytes."""
+    return saving_large_pictures if size > LARGE else saving_pictures

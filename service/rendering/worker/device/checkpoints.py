@@ -14,11 +14,12 @@ from service import shared_memory
 if TYPE_CHECKING:
     from gpu import Picture, Saved
 
-REST = 100  # times the duration of a checkpoint pass until the next one: they cost 1 % at most, up to LONGEST_S
-# Seconds between two checkpoints, however long they take. When all processes end, at most 10 s of a render are to be
-# lost, and until a checkpoint of a gigabyte is on the disk some of these have passed.
-LONGEST_S = 4.0
-SHARE = 0.004  # of the time that a render has taken, and so of what would be lost; 1 % may be
+REST = 100  # times what a checkpoint costs until the next one: they cost 1 % at most, unless too much could be lost
+# Seconds of a render, and a share of its time: the larger of them may be lost when all processes end. What is lost
+# begins where the last checkpoint that is on the disk was read from the device.
+MOST_LOST_S, MOST_LOST = 10.0, 0.01
+MARGIN = 0.9  # of that; the next checkpoint may take longer than the last one did
+SHARE = 0.004  # of the time that a render has taken, at least; of a long one so much may be lost, however small it is
 
 
 class Checkpointer:
@@ -28,13 +29,16 @@ class Checkpointer:
         """`every_s`: between two of a picture under way, at least."""
         self._every_s = every_s
         self._steps: Steps[Saved] | None = None
-        self._took_s = 0.0
+        self._began_at = 0.0
+        self._took_s = 0.0  # to read it from the device, without the turns of other tasks between
+        self._stored_s = 0.0  # from then until it was on the disk, which also costs the machine something
+        self._read_s = 0.0  # the same with them
         self._ended_at = 0.0
         self.restart()
 
     def restart(self) -> None:
         """Begin anew: the picture is another one, or no longer wanted."""
-        self._steps, self._took_s = None, 0.0
+        self._steps, self._took_s, self._read_s, self._stored_s = None, 0.0, 0.0, 0.0
         self._ended_at = time.monotonic()
 
     @property
@@ -52,15 +56,22 @@ class Checkpointer:
 
     def due(self, picture: Picture, elapsed_s: float) -> bool:
         """Whether the picture under way, which has taken that many seconds, is to be saved as it is now."""
-        pause_s = max(self._every_s, min(REST * self._took_s, LONGEST_S), SHARE * elapsed_s)
+        # From when the last one began to be read until the next one is on the disk.
+        beside_s = 2 * self._read_s + self._stored_s
+        most_s = MARGIN * max(MOST_LOST_S, MOST_LOST * elapsed_s) - beside_s
+        pause_s = max(self._every_s, SHARE * elapsed_s, min(REST * (self._took_s + self._stored_s), most_s))
         begun = picture.samples > 0 or picture.under_way[0] > 0  # the first sample of a large picture takes seconds
         return begun and time.monotonic() >= self._ended_at + pause_s
+
+    def stored(self, took_s: float) -> None:
+        """The last one is on the disk, that many seconds after it was read."""
+        self._stored_s = took_s
 
     def begin(self, picture: Picture) -> None:
         # One descriptor goes with the picture.
         arena = shared_memory.SharedArena(*picture.state_sizes)
         self._steps = Steps(picture.save(lambda size: arena.room((size,), np.dtype(np.uint8))))
-        self._took_s = 0.0
+        self._took_s, self._began_at = 0.0, time.monotonic()
 
     def step(self) -> Saved | None:
         """Do a step; the saved picture with the last one, else None."""
@@ -71,4 +82,5 @@ class Checkpointer:
             self._steps = None
         self._ended_at = time.monotonic()
         self._took_s += self._ended_at - began
+        self._read_s = self._ended_at - self._began_at
         return saved
