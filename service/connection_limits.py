@@ -70,7 +70,7 @@ class Watch:
 
 
 class Room:
-    """Room for `most` connections, of which one address has at most half: it can't keep everybody else out.
+    """Room for `most` connections, of which one address has at most half of what others leave, as in `Shares`.
 
     The addresses in the networks `proxies` have no share of their own: behind a proxy there is everybody, and `Guard`
     divides what is open among them.
@@ -78,7 +78,6 @@ class Room:
 
     def __init__(self, most: int, proxies: Collection[str] = ()) -> None:
         self._most = most
-        self._share = max(1, most // 2)
         self._proxies = [ipaddress.ip_network(each) for each in proxies]
         self._is_proxy = lru_cache(4096)(self._within_proxies)
 
@@ -87,14 +86,15 @@ class Room:
 
         False: it is to be refused. The one that was refused first is ended where too many of those are open.
         """
-        if len(connections) <= self._share:
+        if len(connections) <= self._most // 2:
             return True
         refused = [each for each in connections if getattr(each, "refused", False)]
         welcome = [each for each in connections if not getattr(each, "refused", False)]
         ours = [] if self._is_proxy(_address(connection)) else _beside(connection, welcome)
-        if len(ours) <= self._share and len(welcome) <= self._most:
+        share = max(1, (self._most - len(welcome) + len(ours)) // 2)
+        if len(ours) <= share and len(welcome) <= self._most:
             return True
-        crowd = ours if len(ours) > self._share else welcome
+        crowd = ours if len(ours) > share else welcome
         open_ones = (each for each in crowd if each is not connection and not each.transport.is_closing())
         resting = min(open_ones, key=_rest_order, default=None)
         if resting is not None and _rest_order(resting) < BUSY:

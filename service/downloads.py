@@ -12,7 +12,6 @@ import logging
 import os
 import tempfile
 import weakref
-from collections import Counter
 from collections.abc import AsyncIterator, Callable, Hashable, Mapping
 from contextlib import asynccontextmanager
 from pathlib import Path
@@ -22,10 +21,11 @@ from starlette.responses import Response
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import Unavailable
+from service.shares import Shares
 
 PIECE = 1 << 18  # bytes that are read and sent at a time
 AT_ONCE = 2  # pictures that are fetched from the renderer and written
-ROOM = 4 << 30  # bytes on the disk of pictures that are being sent; one client has at most half
+ROOM = 4 << 30  # bytes on the disk of pictures that are being sent, of all clients
 RETRY_S = 10
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
 
@@ -108,7 +108,7 @@ class Downloads:
         self._room = asyncio.Semaphore(AT_ONCE)
         self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
         self._written: weakref.WeakValueDictionary[Hashable, Written] = weakref.WeakValueDictionary()
-        self._held: Counter[str] = Counter()  # bytes, by client
+        self._shares = Shares(ROOM, "pictures that are being sent", retry_s=RETRY_S)  # bytes on the disk
 
     @asynccontextmanager
     async def turn(self, client: str) -> AsyncIterator[None]:
@@ -137,10 +137,11 @@ class Downloads:
         return self._written.get(key)
 
     def admit(self, client: str, most_bytes: int) -> None:
-        """Raise Unavailable where that many more bytes would be too much, for the client or for all."""
-        held, total = self._held[client], self._held.total()
-        if (held and held + most_bytes > ROOM // 2) or (total and total + most_bytes > ROOM):
-            raise Unavailable("Too much is being sent already, to clients that take it slowly.", RETRY_S)
+        """Raise TooManyRequests or Unavailable where that many more bytes are too much, for the client or for all.
+
+        What is more than a quarter of the room is admitted like a quarter, so that a picture of any size can be sent.
+        """
+        self._shares.check(client, min(most_bytes, ROOM // 4))
 
     def write(self, fill: Callable[[BinaryIO], None]) -> Written:
         """A file that `fill` has written. For any thread. Raises Unavailable where the disk takes no more."""
@@ -167,10 +168,5 @@ class Downloads:
         """Count a picture while it is being sent; with `key`, `find` leads other requests to it."""
         if key is not None:
             self._written[key] = written
-        self._held[client] += written.bytes
-        weakref.finalize(written, self._let_go, client, written.bytes)
-
-    def _let_go(self, client: str, size: int) -> None:
-        self._held[client] -= size
-        if not self._held[client]:
-            del self._held[client]
+        self._shares.count(client, written.bytes)
+        weakref.finalize(written, self._shares.release, client, written.bytes)

@@ -223,7 +223,7 @@ async def scene(request: Request, id: answers.RenderId) -> Response:
     "/renders/{id}/image",
     summary="The image so far",
     response_class=Response,
-    responses=FILES | answers.problems(404, 409, 410, 422, 503),
+    responses=FILES | answers.problems(404, 409, 410, 422, 429, 503),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
     renders = app_state(request).renders

@@ -259,6 +259,10 @@ def test_one_address_has_half_of_the_room() -> None:
     for address, entered in (("10.0.0.1", False), ("::ffff:10.0.0.1", False), ("10.0.0.2", True)):
         newcomer = Peer(address, began=now)
         assert room.enter(newcomer, [*crowd, newcomer]) is entered
+    second = [Peer("10.0.0.2", cycle=1) for _ in range(2)]  # half of what is left
+    for address, entered in (("10.0.0.2", False), ("10.0.0.3", True)):
+        newcomer = Peer(address, began=now)
+        assert room.enter(newcomer, [*crowd, *second, newcomer]) is entered
     v6 = [Peer(f"2001:db8::{i}", cycle=1) for i in range(4)]
     for address, entered in (("2001:db8::99", False), ("2001:db8:0:1::1", True)):
         newcomer = Peer(address, began=now)

@@ -18,7 +18,7 @@ from starlette.types import Message, Receive, Scope, Send
 
 from service import downloads
 from service.downloads import PIECE, Downloads, FileAnswer, Pieces
-from service.problems import Unavailable
+from service.problems import TooManyRequests, Unavailable
 from tests.service.test_operation import metrics, wait_until
 from tests.serving import SCENE, Server
 
@@ -117,7 +117,7 @@ def test_there_is_room_for_others(tmp_path: Path, monkeypatch: pytest.MonkeyPatc
     room.admit("many", 5000)  # whatever its size, one goes
     room.keep("many", "key", one)
     assert room.find("key") is one and not list(tmp_path.iterdir())
-    with pytest.raises(Unavailable):
+    with pytest.raises(TooManyRequests):
         room.admit("many", 101)
     room.admit("few", 600)
     two = room.write(lambda file: file.write(b"x" * 600) and None)

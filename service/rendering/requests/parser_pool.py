@@ -6,6 +6,7 @@ import logging
 import pickle
 import signal
 import threading
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import Any
@@ -68,17 +69,25 @@ class ParserPool:
 
 
 class _Room:
-    """A budget of bytes: a thread that finds too few left waits until others return theirs."""
+    """A budget of bytes: a thread that finds too few left waits until others return theirs, in the order of arrival.
+
+    Smaller ones that overtake it would keep a large one waiting for ever.
+    """
 
     def __init__(self, size: int) -> None:
         self._left = size
         self._changed = threading.Condition()
+        self._waiting: deque[object] = deque()
 
     @contextmanager
     def taken(self, size: int) -> Iterator[None]:
+        me = object()
         with self._changed:
-            self._changed.wait_for(lambda: self._left >= size)
+            self._waiting.append(me)
+            self._changed.wait_for(lambda: self._waiting[0] is me and self._left >= size)
+            self._waiting.popleft()
             self._left -= size
+            self._changed.notify_all()  # there may be room for the next one
         try:
             yield
         finally:

@@ -156,3 +156,27 @@ def test_memory_is_never_taken_for_less_than_it_is(text: str) -> None:
         tracemalloc.stop()
     assert taken < most_bytes(text) == most_bytes(text.encode())
     assert taken < weigh(value) + 20_000 < 8 * taken + 40_000
+
+
+def test_nobody_overtakes_a_body_that_waits_for_memory() -> None:
+    """Small ones that always find room would keep a large one waiting for ever."""
+    room, order = parser_pool._Room(10), list[str]()
+    large_waits = threading.Event()
+
+    def take(name: str, size: int) -> None:
+        with room.taken(size):
+            order.append(name)
+
+    with room.taken(5):
+        threads = [threading.Thread(target=take, args=("large", 10))]
+        threads[0].start()
+        while not room._waiting:
+            large_waits.wait(0.001)
+        threads.append(threading.Thread(target=take, args=("small", 1)))
+        threads[1].start()
+        while len(room._waiting) < 2 and not order:
+            large_waits.wait(0.001)
+        assert order == []
+    for thread in threads:
+        thread.join(30)
+    assert order == ["large", "small"]

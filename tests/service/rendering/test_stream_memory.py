@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 import json
+from contextvars import copy_context
 from typing import Any, cast
 
 import numpy as np
@@ -12,12 +13,13 @@ import pytest
 from service.assets import Assets
 from service.config import Config
 from service.pack import CacheBudget, PackCache
-from service.problems import InvalidDocument, TooLarge, Unavailable
+from service.problems import InvalidDocument, TooLarge, TooManyRequests
 from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams import edit_session, protocol
 from service.rendering.streams.edit_session import EditSession
 from service.rendering.streams.stream import WAITING_CHARACTERS, Stream
 from service.rendering.supervisor.supervisor import Supervisor
+from service.turns import CALLER
 from tests.serving import SCENE, SMALL
 
 KIB = 1 << 10
@@ -64,16 +66,27 @@ def test_what_is_refused_does_not_count() -> None:
 
 
 def test_all_scenes_together_have_a_bound() -> None:
+    """And a caller a share, so that the streams of one refuse no other one's."""
     of = reader(max_stream_memory=8 * 16 * KIB)
-    clients = [started(of)]
-    with pytest.raises(Unavailable, match="SUNBOX_MAX_STREAM_MEMORY") as refused:
-        for _ in range(200):
-            clients.append(EditSession(of, 1))
-            say(clients[-1], 1, "start", scene=SCENE, settings=SMALL)
-    assert refused.value.retry_after
-    assert len(clients) > 10
-    clients[0].close()
-    say(clients[-1], 2, "start", scene=SCENE, settings=SMALL)
+
+    def crowd(caller: str) -> list[EditSession]:
+        """As many streams of a caller as there may be, and the one that was refused."""
+        CALLER.set(caller)
+        clients: list[EditSession] = []
+        with pytest.raises(TooManyRequests, match="SUNBOX_MAX_STREAM_MEMORY") as refused:
+            for _ in range(200):
+                clients.append(EditSession(of, 1))
+                say(clients[-1], 1, "start", scene=SCENE, settings=SMALL)
+        assert refused.value.retry_after
+        return clients
+
+    first, second = copy_context().run(crowd, "first"), copy_context().run(crowd, "second")
+    assert len(first) > len(second) > 3
+    second[0].close()
+    copy_context().run(lambda: (CALLER.set("second"), say(second[-1], 2, "start", scene=SCENE, settings=SMALL)))
+    for client in (*first, *second):
+        client.close()
+    copy_context().run(crowd, "third")
 
 
 def test_versions_that_nobody_has_seen_are_not_all_kept() -> None:
