@@ -146,6 +146,7 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
     own: AppState = app.state.sunbox
     own.documents.prepare()
     own.quota.clear()
+    own.shares.clear()
     address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
     server = _Server(server_settings(app, config, most), own, address)
     server.run([listener])

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import threading
 from collections import Counter
 from collections.abc import Collection, Iterator
@@ -12,6 +13,8 @@ from service.database import Database
 from service.disk_usage import Usage
 from service.problems import TooLarge, Unavailable
 from service.quota import RETRY_S, Quota
+
+log = logging.getLogger(__name__)
 
 
 class AssetShares:
@@ -54,6 +57,24 @@ class AssetShares:
         with self._database.open() as database, database:
             database.executemany("INSERT OR REPLACE INTO asset_owners VALUES (?, ?, ?)", rows)
 
+    def clear(self) -> None:
+        """Forget the assets that are not there any more: to be called once, as they may have gone in any way."""
+        if self._database.exists():
+            try:
+                with self._database.open() as database:
+                    ids = [id for (id,) in database.execute("SELECT DISTINCT asset FROM asset_owners")]
+                self.forget(ids)
+            except Unavailable as error:
+                log.warning("could not look for uploads that are deleted error=%s", error)
+
+    def forget(self, ids: Collection[str]) -> None:
+        """Delete what is noted of those of these assets that are deleted. Raises Unavailable."""
+        if self._database.exists():
+            with self._database.open() as database, database:
+                database.execute("BEGIN IMMEDIATE")  # who uploads one again notes that afterwards
+                gone = [(id,) for id in set(ids) - self._quota.sizes(ids).keys()]
+                database.executemany("DELETE FROM asset_owners WHERE asset = ?", gone)
+
     def _make_room(self, owner: str, size: int) -> None:
         assert self._each is not None
         if size > self._each:
@@ -66,10 +87,10 @@ class AssetShares:
             mine = [id for (id,) in database.execute("SELECT asset FROM asset_owners WHERE owner = ?", (owner,))]
             others = "SELECT asset FROM asset_owners WHERE owner <> ?"
             shared = {id for (id,) in database.execute(others, (owner,))}
-        self._forget(owner, set(mine) - self._quota.sizes(mine).keys())  # they made room for somebody
+        self.forget(mine)  # as far as they are deleted, for whatever reason
         over = self._over(owner, size)
         if over > 0:
-            self._forget(owner, self._quota.evict([id for id in mine if id not in shared], over))
+            self._quota.evict([id for id in mine if id not in shared], over)
         if self._over(owner, size) > 0:
             detail = "Your assets that saved documents and renders use take all that one key's may"
             raise Unavailable(f"{detail} (SUNBOX_MAX_KEY_ASSETS).", RETRY_S)
@@ -80,8 +101,3 @@ class AssetShares:
         with self._database.open() as database:
             row = database.execute("SELECT total(bytes) FROM asset_owners WHERE owner = ?", (owner,)).fetchone()
         return int(row[0]) + self._promised[owner] + size - self._each
-
-    def _forget(self, owner: str, ids: Collection[str]) -> None:
-        with self._database.open() as database, database:
-            gone = [(owner, id) for id in ids]
-            database.executemany("DELETE FROM asset_owners WHERE owner = ? AND asset = ?", gone)

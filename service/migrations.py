@@ -90,5 +90,13 @@ MIGRATIONS = (
             ) WITHOUT ROWID""",
         ),
     ),
+    Migration(
+        "small rows of renders that are gone, and old keys and assets that are found at once",
+        (
+            "UPDATE renders SET settings = '{}', outcome = '{}' WHERE gone",
+            "CREATE INDEX render_keys_by_age ON render_keys (owner, taken_at)",
+            "CREATE INDEX asset_owners_by_asset ON asset_owners (asset)",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

@@ -36,12 +36,15 @@ class Quota:
         in_use: Callable[[], AbstractContextManager[set[str]]],
         others: Callable[[], Usage] = Usage,
         lost: LostPictures | None = None,
+        gone: Callable[[list[str]], None] = lambda ids: None,
     ) -> None:
+        """`gone` hears the ids of assets that were deleted, when nothing is locked any more that it could need."""
         self._files = AssetFolder(folder / "assets")
         self._limit = limit
         self._in_use = in_use
         self._others = others
         self._lost = lost
+        self._gone = gone
         self._lock = threading.Lock()
         self._promised = Usage()  # what is about to be stored
         self._pinned: Counter[str] = Counter()  # how many contexts keep each id
@@ -99,6 +102,7 @@ class Quota:
                 self._files.delete(hash)
                 log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)
                 goes.append(f"sha256:{hash}")
+        self._say_gone(goes)
         return goes
 
     def used(self) -> Usage:
@@ -144,3 +148,11 @@ class Quota:
             for hash in goes:
                 self._files.delete(hash)
                 log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)
+        self._say_gone([f"sha256:{hash}" for hash in goes])
+
+    def _say_gone(self, ids: list[str]) -> None:
+        if ids:
+            try:
+                self._gone(ids)
+            except Unavailable as error:  # they are deleted all the same
+                log.warning("could not note which assets were deleted error=%s", error)

@@ -40,6 +40,7 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
         lambda: documents.assets_in_use(),
         lambda: documents.usage() + beside() + lost.usage(),
         lost,
+        lambda ids: shares.forget(ids),
     )
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota, config.max_key_documents)

@@ -8,6 +8,7 @@ import time
 import weakref
 from collections.abc import AsyncIterator, Collection
 from contextlib import asynccontextmanager
+from dataclasses import replace
 from functools import partial
 from typing import Any
 
@@ -38,7 +39,7 @@ async def one_shot(request: Request) -> Job:
 
 
 async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
-    """A render that waits for its turn, or the one of before with this key: its last status where it is gone."""
+    """A render that waits for its turn, or the one of before with this key: a status where it is gone."""
     began, own, name = time.monotonic(), app_state(request), owner(request)
     if key is None:
         return await _submitted(own, await _parsed(request, "render"), name, began)
@@ -55,7 +56,7 @@ async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
     digest, stored = known
     if digest != parsed.digest:
         raise Conflict("This Idempotency-Key was used for another request.")
-    return _known(own, stored)
+    return _known(own, stored, parsed)
 
 
 async def _parsed(request: Request, kind: Any) -> ParsedRequest:
@@ -86,12 +87,12 @@ async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float)
     return own.job(order, document, packed, time.monotonic() - began)
 
 
-def _known(own: AppState, stored: StoredRender) -> Job | dict[str, Any]:
-    """A render of before; its last status where it is gone."""
+def _known(own: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job | dict[str, Any]:
+    """A render that the same request gave before. Where it is gone, only its state is stored."""
     try:
         return own.renders.get(stored.order.id, stored.order.owner)
     except ServiceError:
-        return status(stored.order, stored.outcome, renderers=0)
+        return status(replace(stored.order, settings=parsed.settings), stored.outcome, renderers=0)
 
 
 def _turn(own: AppState, name: str, key: str) -> asyncio.Lock:

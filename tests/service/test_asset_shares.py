@@ -10,6 +10,8 @@ from pathlib import Path
 import pytest
 
 from service.config import Config
+from service.database import Database
+from service.disk_usage import Usage
 from service.documents import checked
 from service.problems import TooLarge, Unavailable
 from service.storage import Storage, storage
@@ -70,3 +72,37 @@ def test_the_parts_of_a_scene_are_its_owner_s(shared: Storage, tmp_path: Path) -
     assert upload(shared, tmp_path, "anna", 1) and shared.assets.holds(scene.id)
     upload(shared, tmp_path, "anna", 2, 1000)
     assert not all(here(shared, parts))
+
+
+def noted(folder: Path) -> list[tuple[str, str]]:
+    with Database(folder).open() as database:
+        return database.execute("SELECT owner, asset FROM asset_owners ORDER BY owner, asset").fetchall()
+
+
+def test_nothing_is_noted_of_what_is_deleted(tmp_path: Path) -> None:
+    """Without a bound of one key, too, when assets make room for any others."""
+    kept = storage(Config(data_dir=tmp_path, data_quota=80 * ASSET))
+    first = [upload(kept, tmp_path, owner, number) for owner in ("anna", "bert") for number in (1, 2)]
+    stays = upload(kept, tmp_path, "anna", 3)
+    assert len(noted(tmp_path)) == 5
+    with kept.quota.room(Usage(80 * ASSET - kept.quota.used().bytes + 2 * ASSET)):
+        assert not any(here(kept, first)) and noted(tmp_path) == [("anna", stays)]
+    kept.assets.close()
+
+
+def test_a_start_forgets_what_was_deleted_by_hand(tmp_path: Path) -> None:
+    kept = storage(Config(data_dir=tmp_path))
+    kept.shares.clear()  # where there is no database yet
+    ids = [upload(kept, tmp_path, "anna", number) for number in (1, 2)]
+    file(tmp_path, ids[0]).unlink()
+    kept.shares.clear()
+    assert noted(tmp_path) == [("anna", ids[1])]
+    kept.assets.close()
+
+
+def test_what_is_uploaded_again_meanwhile_stays_noted(tmp_path: Path) -> None:
+    kept = storage(Config(data_dir=tmp_path))
+    id = upload(kept, tmp_path, "anna", 1)
+    kept.shares.forget([id])  # it had been deleted, and is there again
+    assert noted(tmp_path) == [("anna", id)]
+    kept.assets.close()

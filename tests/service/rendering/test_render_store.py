@@ -188,6 +188,65 @@ def test_what_is_gone_is_remembered_and_its_key_too(tmp_path: Path, monkeypatch:
     run(test)
 
 
+def test_rows_of_gone_renders_are_small(tmp_path: Path) -> None:
+    """Only the id and the state stay, which the key of a request may still ask for."""
+
+    async def test() -> None:
+        store = RenderStore(tmp_path)
+        warned = Outcome("done", "max_samples", PROGRESS, warnings=["w" * 1000], ended_at=200.0)
+        number = await store.insert(order("a"), Outcome(), DOCUMENT, [], IdempotencyKey("k", "digest"))
+        await store.update(number, warned)
+        await store.forget([(number, "a")])
+        with Database(tmp_path).open() as database:
+            assert database.execute("SELECT settings, outcome FROM renders").fetchall() == [("{}", "{}")]
+        known = await store.keyed("", "k")
+        assert known is not None and known[1].outcome == Outcome("done", ended_at=200.0)
+        assert known[1].order.label == "label" and known[1].unfit is None
+
+    run(test)
+
+
+def test_a_start_reads_only_the_gone_ones_that_are_remembered(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(rows, "REMEMBERED", 2)
+
+    async def test() -> None:
+        store = RenderStore(tmp_path)
+        numbers = [await store.insert(order(id), Outcome(), DOCUMENT, [], IdempotencyKey(id, "d")) for id in "abcde"]
+        await store.forget([(number, id) for number, id in zip(numbers[:4], "abcd", strict=True)])
+        assert [(each.order.id, each.gone) for each in RenderStore(tmp_path).load()] == [
+            ("c", True),
+            ("d", True),
+            ("e", False),
+        ]
+        assert await store.keyed("", "a") is not None  # by its key it is still known
+
+    run(test)
+
+
+def test_keys_of_one_owner_are_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The oldest go first, and with them what is remembered of their renders; another owner's stay."""
+    monkeypatch.setattr(rows, "MOST_KEYS", 3)
+    monkeypatch.setattr(rows, "REMEMBERED", 0)
+
+    async def test() -> None:
+        store = RenderStore(tmp_path)
+        await store.insert(order("bert's", "bert"), Outcome(), DOCUMENT, [], IdempotencyKey("0", "d"))
+        numbers = [
+            await store.insert(order(key, "anna"), Outcome(), DOCUMENT, [], IdempotencyKey(key, "d"))
+            for key in "01234"
+        ]
+        known = [await store.keyed("anna", key) is not None for key in "01234"]
+        assert known == [False, False, True, True, True] and await store.keyed("bert", "0") is not None
+        await store.forget([(number, key) for number, key in zip(numbers, "01234", strict=True)])
+        with Database(tmp_path).open() as database:
+            ids = {id for (id,) in database.execute("SELECT id FROM renders")}
+        assert ids == {"bert's", "2", "3", "4"}
+
+    run(test)
+
+
 def test_assets_of_stored_renders_stay(tmp_path: Path) -> None:
     async def test() -> None:
         kept = storage(Config(data_dir=tmp_path, data_quota=400_000))

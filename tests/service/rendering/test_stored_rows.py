@@ -59,6 +59,7 @@ def test_renders_of_every_released_revision_are_read(name: str, tmp_path: Path) 
     assert {label: each.outcome.state for label, each in found.items()} == STATES
     assert [label for label, each in found.items() if each.gone] == ["gone"]
     assert not any(each.unfit or each.unknown for each in found.values())
+    assert column(folder, "gone", "settings") == "{}"
     assert all(each.order.settings.width == 8 for each in found.values() if not each.gone)
     assert found["running"].outcome.progress.samples > 0 and found["failed"].outcome.error is not None
     store = RenderStore(folder)

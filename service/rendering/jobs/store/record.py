@@ -89,7 +89,7 @@ class StoredRender:
     number: int
     order: Order
     outcome: Outcome
-    gone: bool = False  # its document and pictures were deleted, and its id is remembered
+    gone: bool = False  # all but its id and its state was deleted
     unfit: str | None = None  # why it is failed, though its row says otherwise: this version cannot read that
     unknown: frozenset[str] = frozenset()  # fields of its row that this version leaves out
 
@@ -112,13 +112,17 @@ def stored_render(
     outcome: str,
     gone: int,
 ) -> StoredRender:
-    """A render from its row. What cannot be read makes it a failed one, whose row stays as it is."""
+    """A render from its row. What cannot be read makes it a failed one, whose row stays as it is.
+
+    Of one that is gone only the state is known: its settings are the default ones.
+    """
     left_out, faults = set[str](), list[str]()
     knobs, become = resolve(Settings()), Outcome()
     try:
-        values = read(settings)
-        left_out |= unknown(ResolvedSettings, values)
-        knobs = fit(ResolvedSettings, values)
+        if not gone:
+            values = read(settings)
+            left_out |= unknown(ResolvedSettings, values)
+            knobs = fit(ResolvedSettings, values)
     except Unfit as error:
         faults.append(f"settings: {error}")
     try:

@@ -19,6 +19,7 @@ from service.rendering.jobs.store.record import (
 )
 
 KEY_S = 24 * 3600.0  # of the contract: how long an idempotency key counts
+MOST_KEYS = 10_000  # of one owner; the oldest go first
 REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
 
 _COLUMNS = "number, id, owner, label, priority, created_at, settings, bytes, state, ended_at, outcome, gone"
@@ -64,6 +65,11 @@ class RenderRows:
             if key is not None:
                 taken = (order.owner, key.key, key.digest, number, time.time())
                 database.execute("INSERT OR REPLACE INTO render_keys VALUES (?, ?, ?, ?, ?)", taken)
+                database.execute(
+                    "DELETE FROM render_keys WHERE owner = ?1 AND taken_at <= (SELECT taken_at FROM render_keys "
+                    "WHERE owner = ?1 ORDER BY taken_at DESC LIMIT 1 OFFSET ?2)",
+                    (order.owner, MOST_KEYS),
+                )
         return number
 
     def update(self, number: int, outcome: Outcome) -> None:
@@ -80,7 +86,7 @@ class RenderRows:
         return bytes(row[0])
 
     def all(self) -> list[StoredRender]:
-        """Every render, those that are gone included, in the order of arrival."""
+        """Every render, in the order of arrival; those that are gone as far as their ids are remembered."""
         if not self._database.exists():
             return []
         with self._database.open() as database:
@@ -102,11 +108,11 @@ class RenderRows:
         return None if row is None else (digest, stored_render(*row))
 
     def forget(self, numbers: Collection[int]) -> None:
-        """Delete the documents of renders, remember their ids, and forget what is too old even for that."""
+        """Delete renders but for their ids, and forget what is too old even for that."""
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
             ids = [(number,) for number in numbers]
-            database.executemany("UPDATE renders SET gone = 1 WHERE number = ?", ids)
+            database.executemany("UPDATE renders SET gone = 1, settings = '{}', outcome = '{}' WHERE number = ?", ids)
             database.executemany("DELETE FROM render_documents WHERE number = ?", ids)
             database.executemany("DELETE FROM render_uses WHERE number = ?", ids)
             database.execute("DELETE FROM render_keys WHERE taken_at <= ?", (time.time() - KEY_S,))
@@ -118,6 +124,10 @@ class RenderRows:
 
 
 def stored_renders(database: sqlite3.Connection) -> list[StoredRender]:
-    """Every render, those that are gone included, in the order of arrival. Raises sqlite3.Error."""
-    rows = database.execute(f"SELECT {_COLUMNS} FROM renders ORDER BY number").fetchall()
+    """As `RenderRows.all`. Raises sqlite3.Error."""
+    rows = database.execute(
+        f"SELECT {_COLUMNS} FROM renders WHERE NOT gone OR number IN "
+        "(SELECT number FROM renders WHERE gone ORDER BY number DESC LIMIT ?) ORDER BY number",
+        (REMEMBERED,),
+    )
     return [stored_render(*row) for row in rows]
