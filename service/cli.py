@@ -59,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
     _render(commands.add_parser("render", help="render a scene to a file"))
     _renders(commands.add_parser("renders", help="submit renders to a server, list them, wait for them, fetch them"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
-    _import(commands.add_parser("import", help="turn a glTF or OBJ model into a scene's JSON and its assets"))
+    _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
     _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
     _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
     _bench(commands.add_parser("bench", help="measure"))
@@ -74,7 +74,8 @@ def _serve(command: argparse.ArgumentParser) -> None:
 
 def _render(command: argparse.ArgumentParser) -> None:
     add = command.add_argument
-    add("input", metavar="INPUT", help="a scene's JSON, a glTF or OBJ model, or a PNG or EXR that Sunbox made")
+    text = "a scene's JSON, a glTF, OBJ, PLY or STL model, or a PNG or EXR that Sunbox made"
+    add("input", metavar="INPUT", help=text)
     _picture(command)
     _settings(command)
     add("--stats", metavar="FILE", help="also write samples, noise, times, warnings and settings, as JSON")
@@ -144,7 +145,7 @@ def _any_of(names: Sequence[str]) -> str:
 
 
 def _info(command: argparse.ArgumentParser) -> None:
-    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF or OBJ model")
+    command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF, OBJ, PLY or STL model")
     _asset_root(command)
 
 
@@ -162,7 +163,7 @@ def _import(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "model",
         metavar="MODEL",
-        help="a .glb; a .gltf or .obj with its files beside it; or a .zip of an .obj and its files",
+        help="a .glb, .ply or .stl; a .gltf or .obj with its files beside it; or a .zip of an .obj and its files",
     )
     text = "the scene; its meshes and images go into a folder beside it, named like it and ending in .assets"
     command.add_argument("-o", "--output", required=True, metavar="SCENE.json", help=text)

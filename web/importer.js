@@ -4,23 +4,19 @@
 import { fetchAssetScene, upload } from "./api.js";
 import { question } from "./ask.js";
 import { measure, remember } from "./bounds.js";
-import { frame } from "./camera.js";
 import { browse } from "./files.js";
 import { isUnderNoSky, studio } from "./lighting.js";
 import { PLAIN } from "./materials.js";
 import { pointer } from "./patch.js";
-import { ballOf } from "./placing.js";
 import { fileValueWords, problemText, warningText } from "./problem-text.js";
 import { readRecipe } from "./recipe.js";
 import { fields, materialModels } from "./schema.js";
 import { revived } from "./share.js";
 import { pictured } from "./textures.js";
-import { add } from "./vector.js";
 import { inWords } from "./format-text.js";
 
 const ENDINGS = { gltf: "scene", glb: "scene", zip: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
-const FROM = [0.5, 0.4, 1]; // where a single mesh is looked at from: a little from the right and above
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
 
 const accepted = (kinds) => Object.keys(ENDINGS).filter((ending) => kinds.includes(ENDINGS[ending])).map((ending) => `.${ending}`).join(",");
@@ -165,21 +161,16 @@ export class Importer {
   async #takeMesh({ id, bounds, warnings = [] }, file, way) {
     measure(id, bounds);
     const isOpened = way === "open";
-    if (isOpened) this.acts.openScene(await this.#around(id, stem(file), bounds), stem(file));
+    if (isOpened) this.acts.openScene(await this.#alone(id, stem(file)), stem(file));
     else await this.adder.addMesh(id, stem(file));
     this.#tell(file, warnings, "taken as it is.");
     return isOpened;
   }
 
-  // A scene of one mesh alone, in the studio.
-  async #around(asset, material, [low, high]) {
-    const { center, radius } = ballOf({ low, high });
-    const { vfov } = this.acts.camera;
-    const view = frame({ position: add(center, FROM), target: center, vfov }, { center, radius: radius || 1 }, this.controller.aspect);
-    return {
-      version: 1, camera: { ...view, vfov }, environment: await studio(), materials: { [material]: PLAIN },
-      shapes: [{ type: "mesh", asset, material }],
-    };
+  // A scene of one mesh alone, as the server frames and lights it, of a material that is named like the file.
+  async #alone(id, material) {
+    const document = await fetchAssetScene(id);
+    return { ...document, materials: { [material]: PLAIN }, shapes: document.shapes.map((shape) => ({ ...shape, material })) };
   }
 
   #colorField() {

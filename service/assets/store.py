@@ -18,6 +18,7 @@ from service.assets.folder import DAMAGED, RECORD, SCENE, AssetFolder
 from service.assets.formats import KINDS, sniff
 from service.assets.integrity import Integrity, damaged
 from service.assets.scene_import import Imported, take_apart
+from service.assets.scenes.plain_mesh import plain_scene
 from service.assets.source import Source, digest, format_of, handed, length
 from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
 from service.confined import Rights
@@ -93,11 +94,12 @@ class AssetStore:
         content_type: str | None = None,
         filename: str | None = None,
         room: Room | None = None,
+        title: str | None = None,
     ) -> AssetInfo:
         """Parse the bytes, and store them; they replace damaged ones of the same id.
 
-        `room` is used instead of the store's own. Raises UnsupportedMedia, AssetError, Unavailable, and what
-        `room` raises.
+        `room` is used instead of the store's own; errors call a scene's file `title`. Raises UnsupportedMedia,
+        AssetError, Unavailable, and what `room` raises.
         """
         id, size = "sha256:" + digest(data), length(data)
         known = self._known(id)
@@ -109,20 +111,22 @@ class AssetStore:
         if format is None:
             raise UnsupportedMedia(f"the format is not supported; supported are {FORMATS}")
         if KINDS[format] == "scene":
-            return self._import(id, format, data, True, room)[0]
+            return self._import(id, format, data, True, room, title)[0]
         info = self._described(id, format, data)
         with (room or self._room)(expected((size, RECORD_BYTES))):
             self._store(info, data)
         return info
 
     def scene(self, id: str) -> Imported:
-        """A glTF file or a zipped OBJ as a document whose references are assets here.
+        """A glTF file, a zipped OBJ or a mesh as a document whose references are assets here.
 
         Raises NotFound, AssetError, Unavailable.
         """
         info = self.info(id)
-        if info.kind != "scene":
-            raise NotFound(f"{id[:100]} is not a scene but {'an image' if info.kind == 'image' else 'a mesh'}")
+        if info.kind == "image":
+            raise NotFound(f"{id[:100]} is an image: only meshes and scene files can be shown as a scene")
+        if info.kind == "mesh":
+            return Imported(plain_scene(id, self.mesh(id)), list(info.warnings or ()), lit=False)
         imported = self._imported(id)
         if imported is None:  # the file itself still exists: import it again
             with self.opened(id) as source:
@@ -190,17 +194,21 @@ class AssetStore:
         self.loader.close()
 
     def _import(
-        self, id: str, format: str, data: Source, new: bool, room: Room | None = None
+        self, id: str, format: str, data: Source, new: bool, room: Room | None = None, title: str | None = None
     ) -> tuple[AssetInfo, Imported]:
         with collector_paused():
-            return self._import_whole(id, format, data, new, room or self._room)
+            return self._import_whole(
+                id, format, data, new, room or self._room, title or f"the {format.upper()} file"
+            )
 
-    def _import_whole(self, id: str, format: str, data: Source, new: bool, room: Room) -> tuple[AssetInfo, Imported]:
+    def _import_whole(
+        self, id: str, format: str, data: Source, new: bool, room: Room, title: str
+    ) -> tuple[AssetInfo, Imported]:
         """Store the parts of a scene and its document, and the file itself if it is `new`."""
         try:
             file = self.loader.sandbox.parse_scene(format, handed(data))
         except ParseError as error:
-            raise refused(f"the {format.upper()} file", error) from None
+            raise refused(title, error) from None
         size = length(data)
         # References to the parts, which are about as long as a record, are added to the document.
         text = len(json.dumps(file.document)) + RECORD_BYTES * len(file.document["shapes"])

@@ -25,6 +25,14 @@ class MeshData:
     warnings: tuple[str, ...] = ()  # oddities, for the author of the file
     tangents: Floats | None = None  # (n, 4), as glTF's TANGENT: a direction of any length, zero for none; handedness
 
+    @property
+    def bounds(self) -> tuple[Doubles, Doubles]:
+        """The least and the greatest coordinates of its triangles; a vertex of none does not count."""
+        used = np.zeros(len(self.vertices), bool)
+        used[self.faces] = True
+        corners = self.vertices[used]
+        return corners.min(axis=0), corners.max(axis=0)
+
 
 @dataclass(frozen=True)
 class ImageData:

@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
     from service.commands.models import import_model, is_model
 
     if not is_model(source, data) and not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
-        raise BadInput(f"{str(source)!r}: is no model: neither a GLB, nor JSON, nor an OBJ, nor a zip")
+        raise BadInput(f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, nor a zip")
     folder = target.with_suffix(".assets")
     with (
         tempfile.TemporaryDirectory(prefix="sunbox-") as scratch,

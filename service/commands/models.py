@@ -1,4 +1,5 @@
-"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, or a zip of these.
+"""Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY or
+an STL.
 
 What the importer gets is always one file: a .gltf with its files put into it, an OBJ and its files as a zip.
 """
@@ -26,13 +27,14 @@ if TYPE_CHECKING:
     from service.assets.scene_import import Imported
 
 
-SUFFIXES = (".glb", ".gltf", ".obj", ".zip")
+SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip")
+WHOLE = ("glb", "zip", "ply", "stl")  # formats of which nothing lies in other files
 MTLLIB = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^#\r\n]*)")
 
 
 def is_model(path: Path, data: bytes) -> bool:
     """By its name or its bytes; of JSON by the object `asset` at its root, which no scene's document has."""
-    if path.suffix.lower() in SUFFIXES or sniff(data) in ("glb", "zip", "obj"):
+    if path.suffix.lower() in SUFFIXES or sniff(data) in (*WHOLE, "obj"):
         return True
     try:
         tree = load(data) if b'"asset"' in data else None
@@ -44,11 +46,12 @@ def is_model(path: Path, data: bytes) -> bool:
 def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) -> Imported:
     """The model as a document whose references are assets of `store`. Tells its warnings. Raises ServiceError."""
     format = sniff(data, filename=path.name)
+    title = None
     if format == "obj":
-        data = _zipped(path, data, files)
-    elif format not in ("glb", "zip"):
+        data, title = _zipped(path, data, files), "the OBJ file"
+    elif format not in WHOLE:
         data, format = _embedded(data, files), "gltf"
-    imported = store.scene(store.add(data, filename=f"model.{format}").id)
+    imported = store.scene(store.add(data, filename=f"model.{format}", title=title).id)
     for warning in imported.warnings:
         place = f"{warning['pointer']}: " if warning["pointer"] else ""
         print(f"warning: {place}{warning['detail']}", file=sys.stderr)

@@ -63,7 +63,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
 
 @router.get(
     "/{id}/scene",
-    summary="A glTF file or a zipped OBJ as a scene document",
+    summary="A glTF file, a zipped OBJ or a mesh as a scene document with a camera that shows it",
     response_class=JSONResponse,
     responses=answers.DOCUMENT | answers.problems(404, 422),
 )

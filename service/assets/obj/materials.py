@@ -7,6 +7,7 @@ from typing import Any
 from service.assets.obj.mtl import Map, MtlMaterial
 from service.assets.obj.textures import Textures
 from service.assets.scenes.names import unique
+from service.assets.scenes.plain_mesh import GREY, NAME
 from service.assets.scenes.warnings import Warnings
 
 BRIGHTEST = 1e20  # the contract's range of radiometric values
@@ -15,7 +16,6 @@ SPECULAR_F0 = 0.08  # reflectance head-on of principled's specular 1
 # The illumination models of `illum`: 0 and 1 have no highlight; 3 and 5 are mirrors; 4, 6, 7 and 9 are glass.
 WITHOUT_HIGHLIGHT, MIRRORS, GLASS, REFRACTS = (0, 1), (3, 5), (4, 6, 7, 9), (6, 7)
 DARK = 0.1  # share of Ks: a mirror whose Kd is darker than that is a metal of colour Ks
-UNKNOWN = {"type": "diffuse", "albedo": 0.8}  # the material of a face without one
 PBR = ("pr", "pm", "ps", "pc", "pcr", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr")
 
 
@@ -32,8 +32,8 @@ class Materials:
         material = self.library.get(name)
         if material is None and name:
             self.notes.add(place, f"the material {name[:80]!r} is not defined; a grey one is shown in its place")
-        found = unique(name or "default", self.documents)
-        self.documents[found] = dict(UNKNOWN) if material is None else _Converter(self, material).document()
+        found = unique(name or NAME, self.documents)
+        self.documents[found] = dict(GREY) if material is None else _Converter(self, material).document()
         return found
 
 

@@ -3,6 +3,7 @@
 part_files  meshes and images that become assets of their own, equal ones once
 ply_writer  a mesh as a PLY file, which the store keeps
 framing     a camera that shows everything
+plain_mesh  the scene around a single mesh
 names       names for materials and textures
 warnings    what is said about a file, equal things once
 """

@@ -58,10 +58,9 @@ def test_over_rest(server: Server) -> None:
     settings = {"width": 16, "height": 16, "max_samples": 1}
     rendered = http.post("/v1/render?format=npy", json={"scene": document, "settings": settings})
     assert rendered.status_code == 200, rendered.text
-    # What has no such document says so.
     part = document["shapes"][0]["asset"]
     assert http.get(f"/v1/assets/{part}").content.startswith(b"ply\n")
-    assert http.get(f"/v1/assets/{part}/scene").status_code == 404
+    assert http.get(f"/v1/assets/{part}/scene").json()["shapes"][0]["asset"] == part  # a mesh alone
     assert http.get(f"/v1/assets/sha256:{'0' * 64}/scene").status_code == 404
 
 
