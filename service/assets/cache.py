@@ -16,17 +16,29 @@ Parsed = MeshData | ImageData
 
 
 class ParsedCache:
-    """Parsed assets by key, as many as fit. It may be used by any number of threads."""
+    """Parsed assets by key, as many as fit, and one larger than that which was parsed ahead of its use.
+
+    It may be used by any number of threads.
+    """
 
     def __init__(self, limits: AssetLimits) -> None:
         self.sandbox = Sandbox(limits)
         self._lock = threading.Lock()
         self._kept: OrderedDict[str, Parsed] = OrderedDict()
+        self._large: tuple[str, Parsed] | None = None  # which goes with its first use
         self._pending: dict[str, Future[Parsed]] = {}
 
-    def load(self, key: str, parse: Callable[[], Parsed]) -> Parsed:
-        """The result of `parse` for this key, now or before. Raises what it raises; failures are not cached."""
+    def load(self, key: str, parse: Callable[[], Parsed], ahead: bool = False) -> Parsed:
+        """The result of `parse` for this key, now or before. Raises what it raises; failures are not cached.
+
+        `ahead`: it will be used by the next call with this key, for which it stays however large it is.
+        """
         with self._lock:
+            if self._large is not None and self._large[0] == key:
+                parsed = self._large[1]
+                if not ahead:
+                    self._large = None
+                return parsed
             if key in self._kept:
                 self._kept.move_to_end(key)
                 return self._kept[key]
@@ -43,12 +55,15 @@ class ParsedCache:
             mine.set_exception(error)
             raise
         with self._lock:
-            self._keep(key, parsed)
+            self._keep(key, parsed, ahead)
             del self._pending[key]
         mine.set_result(parsed)
         return parsed
 
-    def _keep(self, key: str, parsed: Parsed) -> None:
+    def _keep(self, key: str, parsed: Parsed, ahead: bool) -> None:
+        if _bytes(parsed) > self.sandbox.limits.cache_bytes:
+            self._large = (key, parsed) if ahead else self._large
+            return
         self._kept[key] = parsed
         room = self.sandbox.limits.cache_bytes - sum(map(_bytes, self._kept.values()))
         while room < 0:
@@ -57,13 +72,15 @@ class ParsedCache:
     @property
     def bytes(self) -> int:
         with self._lock:
-            return sum(map(_bytes, self._kept.values()))
+            return sum(map(_bytes, self._kept.values())) + (_bytes(self._large[1]) if self._large else 0)
 
     def shrink(self, size: int) -> None:
         """Free that many bytes, or all that there are, beginning with the asset that was loaded longest ago."""
         with self._lock:
             while size > 0 and self._kept:
                 size -= _bytes(self._kept.popitem(last=False)[1])
+            if size > 0:
+                self._large = None
 
     def close(self) -> None:
         self.sandbox.close()

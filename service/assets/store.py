@@ -284,19 +284,21 @@ class AssetStore:
         except NotFound as error:
             raise AssetError(error.detail) from None
 
-    def _parse(self, id: str, format: str, opened: Callable[[], AbstractContextManager[Source]]) -> Parsed:
+    def _parse(
+        self, id: str, format: str, opened: Callable[[], AbstractContextManager[Source]], ahead: bool = False
+    ) -> Parsed:
         def parse() -> Parsed:
             with opened() as source:
                 return self.loader.sandbox.parse(format, handed(source))
 
         try:
-            return self.loader.load(id, parse)
+            return self.loader.load(id, parse, ahead)
         except ParseError as error:
             raise refused(f"the {format.upper()} file", error) from None
 
     def _described(self, id: str, format: str, data: Source) -> AssetInfo:
-        """The record of a mesh or an image. Raises AssetError."""
-        return describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data)))
+        """The record of a mesh or an image, which stays parsed for its first scene. Raises AssetError."""
+        return describe(id, format, length(data), self._parse(id, format, lambda: nullcontext(data), ahead=True))
 
     def _is_whole(self, info: AssetInfo) -> bool:
         """Whether all that was stored of an asset is intact, with the parts of a scene."""

@@ -8,6 +8,7 @@ import struct
 import threading
 import time
 from collections.abc import Iterator
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
@@ -151,6 +152,42 @@ def test_what_is_kept_stays_below_its_bound() -> None:
     for key in "abacab":
         loader.load(key, partial(parse, key))
     assert calls == ["a", "b", "c", "b"]  # a was used last when c came
+
+
+def test_a_large_file_stays_for_its_first_use() -> None:
+    """It is larger than all that may be kept; else it would be parsed for its upload, and again for its scene."""
+    small, large = (MeshData(np.zeros((size, 3)), np.zeros((0, 3), np.int32), None) for size in (10, 30))
+    loader = ParsedCache(AssetLimits(cache_bytes=500))
+    calls: list[str] = []
+
+    def load(key: str, mesh: MeshData, ahead: bool = False) -> None:
+        assert loader.load(key, lambda: calls.append(key) or mesh, ahead) is mesh  # type: ignore[func-returns-value]
+
+    load("large", large, ahead=True)
+    load("small", small, ahead=True)
+    load("large", large, ahead=True)  # it is uploaded again
+    assert loader.bytes == 720 + 240
+    load("large", large)
+    assert calls == ["large", "small"] and loader.bytes == 240
+    load("large", large)  # nobody knows whether there will be another use
+    load("small", small)
+    assert calls == ["large", "small", "large"] and loader.bytes == 240
+    load("large", large, ahead=True)
+    loader.shrink(200)
+    assert loader.bytes == 720
+    loader.shrink(200)
+    assert loader.bytes == 0
+
+
+def test_an_uploaded_mesh_is_parsed_once_for_its_first_scene(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    store = AssetStore(tmp_path)
+    parsed = []
+    parse = store.loader.sandbox.parse
+    monkeypatch.setattr(store.loader.sandbox, "parse", lambda *given: parsed.append(1) or parse(*given))
+    monkeypatch.setattr(store.loader.sandbox, "limits", replace(store.loader.sandbox.limits, cache_bytes=10))
+    id = store.add(OBJ).id
+    assert len(store.mesh(id).faces) == 1 and parsed == [1]
+    store.close()
 
 
 def test_a_file_that_many_want_is_parsed_once() -> None:
