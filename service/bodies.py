@@ -15,6 +15,7 @@ from service.problems import TooLarge, UnsupportedMedia
 from service.rendering.executors import parsing, waiting_for_parsers
 from service.rendering.requests.parser_pool import ParserPool
 from service.rendering.requests.request_parser import PARSERS, Kind
+from service.scene.text import most_bytes
 from service.shares import Shares
 
 # The last three are the defaults of programs that set no content type (curl, urllib, fetch).
@@ -34,14 +35,19 @@ class Bodies:
         self._pool = ParserPool(config, self._memory)
         self._shares = Shares(AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")  # bytes in memory
 
-    async def parsed(self, kind: Kind, body: bytearray, client: str = "") -> Any:
+    async def parsed(self, kind: Kind, body: bytearray, client: str = "", counted: bool = False) -> Any:
         """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
 
-        Turns go round the clients.
+        Turns go round the clients. `counted`: the caller has counted what `memory_for` says.
         """
         if len(body) <= SMALL:
             return await parsing(partial(PARSERS[kind], self._config, body), client)
-        return await waiting_for_parsers(partial(self._pool.parse, kind, body), client)
+        return await waiting_for_parsers(partial(self._pool.parse, kind, body, counted), client)
+
+    @staticmethod
+    def memory_for(body: bytearray) -> int:
+        """The bytes of memory that parsing a body takes at most; 0 for small ones, which are not counted."""
+        return most_bytes(body) if len(body) > SMALL else 0
 
     def close(self) -> None:
         self._pool.close()

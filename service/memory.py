@@ -9,7 +9,7 @@ import os
 import threading
 import weakref
 from collections import Counter
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
@@ -55,14 +55,29 @@ class MemoryBudget:
 
         As before where it raises TooLarge, for what could never be, or Unavailable.
         """
-        self.check(size)
-        over = self._take(owner, holder, size)
+        self.hold_all(holder, {owner: size})
+
+    def hold_all(self, holder: object, sizes: Mapping[Owner, int]) -> None:
+        """As `hold`, for several kinds of bytes: all of them are counted, or none."""
+        self.check(sum(sizes.values()))
+        over = self._take(holder, sizes)
         if over > 0:
             for cache in self._caches:
                 cache.shrink(over)
-            over = self._take(owner, holder, size)
+            over = self._take(holder, sizes)
         if over > 0:
             raise Unavailable("There is no memory for this just now (SUNBOX_MEMORY).", RETRY_S)
+
+    def lacks(self, size: int) -> int:
+        """The bytes that are missing for so many more, once caches have given way; 0 where there is room."""
+        if (over := self._over(size)) > 0:
+            for cache in self._caches:
+                cache.shrink(over)
+        return max(0, self._over(size))
+
+    def _over(self, size: int) -> int:
+        with self._lock:
+            return self._used().total() + size - self.limit
 
     def check(self, size: int) -> None:
         """Raises TooLarge for what could never be held, however much others give back."""
@@ -89,15 +104,15 @@ class MemoryBudget:
         with self._lock:
             return dict(self._used())
 
-    def _take(self, owner: Owner, holder: object, size: int) -> int:
+    def _take(self, holder: object, sizes: Mapping[Owner, int]) -> int:
         """The bytes that are too many: where there are any, nothing has changed. Less than before is always fine."""
         with self._lock:
             mine = self._held.setdefault(holder, {})
-            more = size - mine.get(owner, 0)
+            more = sum(size - mine.get(owner, 0) for owner, size in sizes.items())
             over = self._used().total() + more - self.limit
             if more > 0 and over > 0:
                 return over
-            mine[owner] = size
+            mine.update(sizes)
             return 0
 
     def _used(self) -> Counter[str]:

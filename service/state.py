@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
 from functools import partial
 from importlib import metadata
@@ -115,10 +116,13 @@ class AppState:
     def _resumed(self, stored: StoredRender) -> Job:
         return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)
 
-    async def _pack(self, document: bytes) -> Packed:
-        """The scene of a folded document, which was valid when it was stored. Raises what reading it raises."""
+    async def _pack(self, document: bytes, count: Callable[[int], None]) -> Packed:
+        """The scene of a folded document, which was valid when it was stored. Raises what reading it raises.
+
+        `count` is called with the bytes of memory that parsing takes, before that is done."""
         body = await packing(lambda: bytearray(f'{{"scene":{unfolded(document)}}}', "ascii"))
-        parsed: ParsedRequest = await self.bodies.parsed("request", body)
+        count(await packing(partial(self.bodies.memory_for, body)))
+        parsed: ParsedRequest = await self.bodies.parsed("request", body, counted=True)
         return await packing(partial(self.reader.pack, parsed.scene))
 
     async def gpu_missing(self) -> str | None:

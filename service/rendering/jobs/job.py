@@ -3,11 +3,10 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 import logging
 import time
-from collections.abc import Awaitable, Callable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -26,71 +25,53 @@ from service.rendering.ipc.messages import (
     Progress,
     Progressed,
     Restore,
-    Update,
     View,
 )
 from service.rendering.ipc.orders import Stop, TakeCheckpoint
 from service.rendering.jobs.followers import Changes
-from service.rendering.jobs.memory import RenderMemory
-from service.rendering.jobs.ordered import Ordered
-from service.rendering.jobs.reads import Reads
 from service.rendering.jobs.recorder import Recorder, Writing
-from service.rendering.jobs.status import KernelQuestion, error_of, status
+from service.rendering.jobs.resident import Resident
+from service.rendering.jobs.scene import Load, RenderScene
+from service.rendering.jobs.status import error_of, status
 from service.rendering.jobs.store.record import Order, Outcome, State
 from service.rendering.jobs.waiting import first_of, within
 from service.rendering.renderers import Renderers
-from service.rendering.requests.request_reader import stop_rule
 
 PATIENCE_S = 30.0  # for the first sample after the renderer was lost
-AGAIN_S = 5.0  # between two attempts to begin a render where nothing renders, or the disk fails
+GIVING_WAY_S = 10.0  # for the checkpoint of a render that gives its slot to another one
+ASK_AGAIN_S = 5  # for a client whose picture was lost with a renderer
 
 log = logging.getLogger(__name__)
 
 
-class Job(Ordered):
+class Job(Resident):
     """A render, on the event loop.
 
     With a `recorder` it outlives the server, and its picture comes back from the disk when somebody looks at it.
     Without one it keeps its picture in the renderer until `release`."""
 
-    recorder: Recorder | None = None
-    number = 0  # rises in the order of arrival
-
     def __init__(
         self,
         renderers: Renderers,
         order: Order,
-        load: Callable[[bytes], Awaitable[Packed]],
+        load: Load,
         document: bytes | None = None,
         packed: Packed | None = None,
         outcome: Outcome | None = None,
         budget: MemoryBudget | None = None,
     ) -> None:
-        """`load` packs the scene of a folded `document`, which may be left out where there is a recorder. Raises
-        TooLarge for a render that never fits into the `budget`."""
-        super().__init__(order, outcome or Outcome())
-        self.began = self.outcome.state == "running"  # when the server ended before
+        """The folded `document` may be left out where there is a recorder. Raises TooLarge for a render that never
+        fits into the `budget`."""
+        scene = RenderScene(order.settings, load, packed, budget)
+        super().__init__(renderers, order, outcome or Outcome(), scene, document)
         self.ended_at = 0.0  # by the monotonic clock, once it is finished
-        self.finished = asyncio.Event()
-        self._memory = RenderMemory(order.settings, budget)
-        if packed is not None:
-            self._memory.packed(packed)
-            self._memory.check()
         self._over = asyncio.Event()  # finished, or the server ends
         self._lost = asyncio.Event()  # nothing renders any more
+        self._gave_way = asyncio.Event()
+        self._gives_way = False  # its checkpoint is being stored for that; it may go on
+        self._started = False  # this server began it, which is stored
         self.changes = Changes[Job]()
-        self.renderers = renderers
-        self._load = load
-        self._document = document
-        self._packed = packed
-        self._kernel = KernelQuestion()
-        self._error: ServiceError | None = None
-        self._task: int | None = None
-        self._shown = False  # the task only shows what was stored, and renders nothing
-        self._loading = asyncio.Lock()
         self._least_samples = 0  # of the checkpoint that it goes on from: the renderer may report fewer before that
-        self._reads = Reads()
-        self._looking = 0  # how many wait for an image
         self._ending: Writing | None = None
         self._sampled = asyncio.Event()  # cleared while there are no samples any more, the renderer having been lost
         self._sampled.set()
@@ -100,54 +81,64 @@ class Job(Ordered):
             self._error = self.outcome.error
             self._finish()
 
-    @property
-    def resident_bytes(self) -> int:
-        """About the memory that its scene and its picture take while the renderer has them; 0 otherwise."""
-        return 0 if self._task is None else self._memory.bytes
-
-    @property
-    def size(self) -> int:
-        """The bytes that it keeps: on the disk, or in memory where it is not stored."""
-        if self.recorder is not None and self.recorder.whole:
-            return self.recorder.store.size(self.order)
-        return self.resident_bytes + self.order.bytes
-
-    def set_aside(self) -> None:
-        """Forget the packed scene: it waits as a document, and is packed again when its turn comes."""
-        self._packed = None
-
-    def forget_document(self) -> None:
-        """The store has it from now on."""
-        self._document = None
-
-    async def document(self) -> bytes:
-        """The folded document. Raises Unavailable, Internal."""
-        if self._document is not None:
-            return self._document
-        assert self.recorder is not None
-        return await self.recorder.store.document(self.recorder.number)
-
     async def run(self) -> None:
-        """Take the render from queued to finished, however it ends; return early when the server ends."""
+        """Render until it has ended, however it ends, or until the server ends.
+
+        A stored one returns unfinished as well, without its memory, where it has to go back in line: it gave way to
+        another render, or it `waits` for memory, for the disk, or for a renderer.
+        """
         try:
-            if self.recorder is not None:
-                starts = await self.recorder.start(self.outcome)
-                self.outcome = replace(self.outcome, starts=starts)  # which may have been cancelled meanwhile
-            while not await self._ended():
-                self.outcome = replace(self.outcome, state="queued")
-                await within(self._over, AGAIN_S)
+            await self._begin()
+            self.waits = False
+            await first_of(self._over, self._lost, self._gave_way)
+            if self._lost.is_set():
+                self.wait(Unavailable("No renderer could be started."))
         except ServiceError as error:
-            self._fail(error)
+            if isinstance(error, Unavailable) and self.recorder is not None:
+                self.wait(error)
+            else:
+                self._fail(error)
         except Exception:
             log.exception("could not begin a render id=%s", self.id[:6])
             self._fail(Internal("The server made a mistake; its log says which."))
-        await self._over.wait()
+        if self._over.is_set() or not (self.waits or self._gave_way.is_set()):
+            await self._over.wait()
+            return
+        if not self._shown:
+            self.release()
+        if self._gave_way.is_set():
+            self._reads.answer_all(Unavailable("The render has just given way to another one: ask again.", 1))
+        self.outcome = replace(self.outcome, state="queued")
+        self._wake()
+
+    @property
+    def can_give_way(self) -> bool:
+        """Whether another render may have its slot: it has got on since it began, and its samples can be stored."""
+        runs = self._task is not None and self._ending is None and not (self._over.is_set() or self._gives_way)
+        got_on = self.state == "running" and self.outcome.progress.samples > self._least_samples
+        return self.recorder is not None and runs and got_on
+
+    async def give_way(self) -> bool:
+        """Store the samples so far and have `run` return, to go on later to the same bits. Whether it does: not where
+        the render ends meanwhile, or the disk fails."""
+        recorder, asked = self.recorder, self.outcome.progress
+        if recorder is None or self._task is None:
+            return False
+        take = partial(self.renderers.send, TakeCheckpoint(self._task))
+        self._gives_way = True
+        stored = await recorder.store_now(take, asked.samples, GIVING_WAY_S)
+        self._gives_way = False
+        if not stored or self._task is None or self._over.is_set() or self._ending is not None:
+            return False
+        self.began, self.outcome = True, replace(self.outcome, progress=recorder.reached)
+        self._gave_way.set()
+        return True
 
     def cancel(self) -> None:
         """Stop at once; the image so far stays."""
         if self.finished.is_set() or self._ending is not None:
             return
-        self._packed = None
+        self._scene.set_aside()
         self.outcome = replace(self.outcome, state="cancelled", ended_at=time.time())
         if self._task is not None:
             self.renderers.send(Stop(self._task))
@@ -166,34 +157,8 @@ class Job(Ordered):
         self._over.set()
         self._wake()
         if self.recorder is not None and self.state == "running" and self._task is not None:
-            self.recorder.expect()
-            self.renderers.send(TakeCheckpoint(self._task))
-            await self.recorder.checkpointed()
+            await self.recorder.store_now(partial(self.renderers.send, TakeCheckpoint(self._task)))
         await self.recorded()
-
-    def release(self) -> None:
-        """Forget the picture in the renderer."""
-        if self._task is not None:
-            self.renderers.drop(self._task)
-            self._task, self._shown = None, False
-        self._memory.release()
-
-    def rest(self) -> bool:
-        """Release what can be brought back from the disk, if nobody waits for it; whether that was possible."""
-        possible = self.recorder is not None and self.recorder.whole and self.finished.is_set()
-        possible = possible and not self._reads and not self._looking and not self._kernel.awaited
-        if possible:
-            self.release()
-        return possible
-
-    async def measure_kernel(self) -> None:
-        """Have the renderer measure what the kernel saves, when it has nothing else to do."""
-        if self._error is None and self._kernel.ask():
-            if self.finished.is_set():
-                with contextlib.suppress(Conflict):
-                    await self._bring_back()
-            if self.outcome.kernel is not None and self._task is not None:
-                self.renderers.send(MeasureKernel(self._task))
 
     async def settled(self, measured: bool) -> None:
         """Return when the render is finished (`measured`: its kernel measured, too), or the server ends."""
@@ -243,7 +208,7 @@ class Job(Ordered):
             if self._kernel.awaited and self._task is not None:
                 self.renderers.send(MeasureKernel(self._task))
         elif isinstance(message, Progressed):
-            if message.progress.samples >= self._least_samples:
+            if message.progress.samples >= self._least_samples and not self._gives_way:
                 self._progressed(message.progress)
         elif isinstance(message, Checkpoint):
             if self.recorder is not None and not self.finished.is_set():
@@ -267,7 +232,7 @@ class Job(Ordered):
         self._shown = False
         self._memory.release()
         if shown or (self.recorder is not None and (self.recorder.whole or self._over.is_set())):
-            self._reads.answer_all(Unavailable("The renderer was lost: ask again.", int(AGAIN_S)))
+            self._reads.answer_all(Unavailable("The renderer was lost: ask again.", ASK_AGAIN_S))
         elif self.recorder is not None and self.renderers.hopeless and not self.finished.is_set():
             self._lost.set()  # which was not its fault: it goes on when something renders again
         elif self.finished.is_set():
@@ -275,35 +240,24 @@ class Job(Ordered):
         else:
             self._fail(Internal(detail))
 
-    async def _ended(self) -> bool:
-        """Render; False: something is missing that may come back. Raises what loading the scene raises."""
-        self._lost.clear()
-        try:
-            await self._begin()
-        except Unavailable as error:
-            if self.recorder is None:
-                raise
-            if not self.waits:  # it is tried again every few seconds
-                log.warning("a render has to wait id=%s reason=%s", self.id[:6], error)
-            self.waits = True
-        else:
-            self.waits = False
-            await first_of(self._over, self._lost)
-        return self._over.is_set()
-
     async def _begin(self) -> None:
         """Raises what loading the scene raises, and Unavailable where nothing renders."""
-        packed, self._packed = self._packed, None
-        self._memory.hold()  # as far as it is known, so that no scene is packed for nothing
-        if packed is None:
-            packed = await self._load(await self.document())
-        self._memory.packed(packed)
+        self._lost.clear()
+        self._gave_way.clear()
+        if self.recorder is not None and not self._started:
+            starts = await self.recorder.start(self.outcome)
+            self._started, self.outcome = True, replace(self.outcome, starts=starts)  # it may be cancelled by now
         async with self._loading:
-            self.release()
-            if self._over.is_set():
-                return
-            self._memory.hold()
-            self._task = task = self.renderers.open(self, "render", self.owner)
+            try:
+                packed = None if self._over.is_set() else await self._scene.load(self.document)
+                if packed is None or self._over.is_set():
+                    return
+                self._memory.hold()
+                self._drop()  # somebody may look at its checkpoint
+                self._task = task = self.renderers.open(self, "render", self.owner)
+            finally:
+                if self._task is None:
+                    self._memory.release()
             restore = await self._checkpoint(task)
             await self._send_scene(task, packed, restore)
         if self.finished.is_set():  # cancelled meanwhile: that message went ahead of the scene
@@ -316,34 +270,6 @@ class Job(Ordered):
         progress = Progress() if restore is None else restore.progress
         self.outcome, self._least_samples = replace(self.outcome, progress=progress), progress.samples
         return restore
-
-    async def _bring_back(self) -> None:
-        """Have the renderer show what was stored last. Raises Conflict where nothing was."""
-        async with self._loading:
-            recorder = self.recorder
-            if self._task is not None:
-                return
-            if recorder is None or (kind := recorder.store.latest(self.id)) is None:
-                raise Conflict("There is no sample yet.")
-            packed = await self._load(await self.document())
-            self._memory.packed(packed)
-            self._memory.hold()
-            self._task = task = self.renderers.open(self, "render", self.owner)
-            self._shown = True
-            try:
-                restore = await recorder.store.read(self.id, kind, task)
-                if restore is None:
-                    raise Internal("The stored picture is damaged.")
-                await self._send_scene(task, packed, replace(restore, reason=restore.reason or "stopped"))
-            except BaseException:  # the client may go away meanwhile, too
-                self.release()
-                raise
-
-    async def _send_scene(self, task: int, packed: Packed, restore: Restore | None) -> None:
-        settings = self.settings
-        update = Update(task, 1, packed.arrays, settings.for_gpu(), stop_rule(settings), denoise=settings.denoise)
-        await self.renderers.send_scene(update, restore)
-        self._reads.ask_again(task, self.renderers.send)
 
     def _progressed(self, progress: Progress) -> None:
         self.outcome = replace(self.outcome, progress=progress)
@@ -390,7 +316,8 @@ class Job(Ordered):
         self._end_with(self.outcome.failed(error, time.time()))
 
     def _forget(self, error: ServiceError) -> None:
-        self._error, self._packed = error, None
+        self._error = error
+        self._scene.set_aside()
         self._memory.release()
         self._sampled.set()
         self._kernel.answered.set()

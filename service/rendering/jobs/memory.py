@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from service.memory import MemoryBudget
 from service.pack import Packed
-from service.problems import ServiceError
 from service.quality import ResolvedSettings
 from service.rendering.requests.request_reader import weight
 
@@ -26,6 +25,7 @@ class RenderMemory:
     def __init__(self, settings: ResolvedSettings, budget: MemoryBudget | None = None) -> None:
         """Without a budget nothing is counted."""
         self.scene_bytes = 0  # as far as it is known
+        self.reading_bytes = 0  # that parsing its document takes, as far as it is known
         self._budget = budget
         self._settings = settings
 
@@ -48,17 +48,37 @@ class RenderMemory:
         if self._budget is not None:
             self._budget.check(self.bytes)
 
-    def hold(self) -> None:
-        """Count all of it, or nothing where that raises TooLarge or Unavailable."""
-        if self._budget is None:
-            return
-        try:
+    def needed(self, reads: bool) -> int:
+        """The bytes that it takes at most, where its document is still to be read or not.
+
+        Reading ends before the renderer makes a picture, so these two never add up.
+        """
+        return max(self.bytes, self.reading_bytes) if reads else self.bytes
+
+    def lacks(self, reads: bool) -> int:
+        """The bytes that are missing for it to begin."""
+        return 0 if self._budget is None else self._budget.lacks(self.needed(reads))
+
+    @property
+    def share(self) -> float:
+        """The part of all memory that it takes."""
+        return 0.0 if self._budget is None else self.bytes / self._budget.limit
+
+    def hold(self, reads: bool = False) -> None:
+        """Count all of it in one step. As before where it raises TooLarge or Unavailable.
+
+        A render that counted its picture first and what reading takes later would wait for others that do the same.
+        """
+        if self._budget is not None:
             self.check()
-            self._budget.hold("pictures", self, self._pictures)
-            self._budget.hold("scenes", self, COPIES * self.scene_bytes)
-        except ServiceError:
-            self.release()
-            raise
+            reading = self.needed(reads) - self.bytes
+            scenes = COPIES * self.scene_bytes
+            self._budget.hold_all(self, {"pictures": self._pictures, "scenes": scenes, "bodies": reading})
+
+    def read(self, size: int) -> None:
+        """Count that parsing the document takes so many bytes. Raises TooLarge, Unavailable."""
+        self.reading_bytes = size
+        self.hold(reads=True)
 
     def release(self) -> None:
         if self._budget is not None:

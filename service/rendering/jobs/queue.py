@@ -19,10 +19,10 @@ from service.rendering.jobs.followers import Follower, Followers
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.recorder import Recorder
 from service.rendering.jobs.retention import Retention, superfluous
+from service.rendering.jobs.slots import Slots
 from service.rendering.jobs.store.record import ENDED, IdempotencyKey, State, StoredRender
 from service.rendering.jobs.store.rows import REMEMBERED
 from service.rendering.jobs.store.store import RenderStore
-from service.rendering.jobs.turns import Turns
 
 RETRY_S = 5  # when to ask again where there is no room
 # Bytes of scenes and pictures of ended renders that stay with the renderer, so that looking at them takes no time;
@@ -56,7 +56,12 @@ class Page:
 class RenderQueue:
     """The renders of all owners. An owner is a text that the caller chooses; nobody else learns of its renders."""
 
-    def __init__(self, limits: QueueLimits | None = None, store: RenderStore | None = None) -> None:
+    def __init__(
+        self,
+        limits: QueueLimits | None = None,
+        store: RenderStore | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
         """With a `store` renders outlive the server."""
         self._limits = limits or QueueLimits()
         self.store = store
@@ -64,8 +69,8 @@ class RenderQueue:
         self._followers = Followers[Job]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
-        self._waiting: Turns[Job] = Turns()
-        self._running: dict[asyncio.Task[None], Job] = {}
+        self._slots = Slots(self._limits.running, self._ran, clock)
+        self._waiting = self._slots.waiting
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
         self._resting: OrderedDict[str, Job] = OrderedDict()  # ended ones, the last one looked at last
         self._chores: set[asyncio.Task[None]] = set()
@@ -88,11 +93,11 @@ class RenderQueue:
             job.changes.followers = self._followers
             self._jobs[job.id] = job
             if not job.finished.is_set():
-                self._waiting.add(job)
+                self._slots.add(job)
         if self._jobs:
             log.info("took up stored renders waiting=%d ended=%d", len(self._waiting), self.kept)
         self._evict()
-        self._dispatch()
+        self._slots.dispatch()
 
     async def submit(
         self, job: Job, uses: Collection[str] = (), key: IdempotencyKey | None = None, listed: bool = True
@@ -113,9 +118,9 @@ class RenderQueue:
             self._jobs[job.id] = job
             job.changes.followers = self._followers
             job.changes.tell(job)
-        self._waiting.add(job)
-        self._dispatch()
-        if not job.finished.is_set() and job not in self._running.values():
+        self._slots.add(job)
+        self._slots.dispatch()
+        if job in self._waiting:
             job.set_aside()
 
     def admit(self, owner: str) -> None:
@@ -123,12 +128,12 @@ class RenderQueue:
         if self.closing:
             raise Unavailable("The server is shutting down.", RETRY_S)
         own = self._waiting.count(owner) + self._storing[owner]
-        active = own + sum(job.owner == owner for job in self._running.values())
+        active = own + sum(job.owner == owner for job in self._slots.running)
         if active >= self._limits.each:
             detail = f"{active} renders of yours are under way: no more than {self._limits.each} (SUNBOX_MAX_JOBS)"
             raise TooManyRequests(detail, RETRY_S)
         # A queue that is full still takes renders of owners with less than their share of it.
-        share = self._limits.waiting // max(1, self._waiting.owners + (own == 0))
+        share = self._limits.waiting // max(1, len(self._waiting.owners) + (own == 0))
         if self.queued >= self._limits.waiting and own >= share:
             raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
 
@@ -189,7 +194,7 @@ class RenderQueue:
 
     @property
     def running(self) -> int:
-        return len(self._running)
+        return len(self._slots.running)
 
     @property
     def kept(self) -> int:
@@ -198,9 +203,11 @@ class RenderQueue:
     @contextmanager
     def looking(self, job: Job) -> Iterator[None]:
         """Somebody looks at a render's picture: it stays with the renderer for a while."""
-        yield
-        if job.finished.is_set():
-            self._rest(job)
+        try:
+            yield
+        finally:
+            if job.finished.is_set() or job.shown:
+                self._rest(job)
 
     async def close(self) -> None:
         """Have the last samples of what runs stored, for the next start; what is not stored is cancelled."""
@@ -208,9 +215,10 @@ class RenderQueue:
             return
         self.closing = True
         self._followers.close()
+        self._slots.close()
         if self._timer is not None:
             self._timer.cancel()
-        for job in [*self._running.values(), *self._waiting]:
+        for job in [*self._slots.running, *self._waiting]:
             if job.recorder is None:
                 job.cancel()
         with contextlib.suppress(TimeoutError):
@@ -227,28 +235,14 @@ class RenderQueue:
         finally:
             self._storing[job.owner] -= 1
 
-    def _dispatch(self) -> None:
-        while len(self._running) < self._limits.running and not self.closing:
-            job = self._waiting.next(Counter(job.owner for job in self._running.values()))
-            if job is None:
-                break
-            task = asyncio.get_running_loop().create_task(self._run(job))
-            self._running[task] = job
-            task.add_done_callback(self._ran)
-
-    async def _run(self, job: Job) -> None:
-        await job.run()
+    def _ran(self, job: Job) -> None:
         if job.finished.is_set() and job.id in self._jobs:
             self._rest(job)
-
-    def _ran(self, task: asyncio.Task[None]) -> None:
-        del self._running[task]
-        self._dispatch()
         self._evict()
 
     def cancel(self, job: Job) -> None:
         """Cancel a job; one that waits leaves the queue."""
-        self._waiting.remove(job)
+        self._slots.remove(job)
         job.cancel()
         self._evict()
 
@@ -281,6 +275,8 @@ class RenderQueue:
         """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""
         self._resting.pop(job.id, None)
         self._resting[job.id] = job
+        for each in [each for each in self._resting.values() if not (each.finished.is_set() or each.shown)]:
+            del self._resting[each.id]  # it waited, and runs by now
         total = sum(each.resident_bytes for each in self._resting.values())
         for each in list(self._resting.values())[:-1]:
             if total <= RESTING_BYTES:

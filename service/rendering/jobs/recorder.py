@@ -5,12 +5,13 @@ from __future__ import annotations
 import asyncio
 import logging
 import time
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from functools import partial
 
 from service.problems import Internal, ServiceError
-from service.rendering.ipc.messages import Checkpoint, Done, Restore
+from service.rendering.ipc.messages import Checkpoint, Done, Progress, Restore
 from service.rendering.ipc.orders import CheckpointStored
 from service.rendering.jobs.store.pictures import Kind
 from service.rendering.jobs.store.record import Outcome
@@ -44,6 +45,7 @@ class Recorder:
         self.whole = whole
         self.id = id
         self._owner = owner
+        self.reached = Progress()  # of the last checkpoint that is on the disk
         self._checkpoint: Restore | None = None  # to be written next ...
         self._came_at = 0.0  # ... and when it came
         self._writing: Writing | None = None
@@ -57,14 +59,19 @@ class Recorder:
         if self._writing is None and not self._closed:
             self._writing = asyncio.get_running_loop().create_task(self._write_checkpoints())
 
-    async def checkpointed(self) -> None:
-        """Return when another checkpoint is on the disk, or there will be none."""
-        await self._written.wait()
+    async def store_now(self, take: Callable[[], None], samples: int = 0, patience_s: float | None = None) -> bool:
+        """Have a checkpoint on the disk that `take` asks the renderer for, with at least so many samples.
 
-    def expect(self) -> None:
-        """Forget the checkpoints so far for `checkpointed`."""
-        if not self._closed:
-            self._written.clear()
+        False where the render ends meanwhile, or that takes longer than `patience_s`."""
+        with suppress(TimeoutError):
+            async with asyncio.timeout(patience_s):
+                while not self._closed:
+                    self._written.clear()
+                    take()
+                    await self._written.wait()
+                    if self.reached.samples >= samples:  # one from before may just have been being written
+                        return not self._closed
+        return False
 
     async def start(self, outcome: Outcome) -> int:
         """Write that this server begins to render it; the number of servers that did. Raises Internal where others
@@ -115,6 +122,7 @@ class Recorder:
             last, came_at = [restore], self._came_at
             try:
                 await self.store.write(self.id, "checkpoint", restore, self._owner)
+                self.reached = restore.progress
                 self._written.set()
                 if self._renderers is not None:
                     self._renderers.send(CheckpointStored(restore.task, time.monotonic() - came_at))

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-import heapq
 import itertools
-from collections import Counter, defaultdict
-from collections.abc import Iterator
+from bisect import bisect_left, insort
+from collections import Counter
+from collections.abc import Callable, Collection, Iterator, Sequence
 from typing import Generic, Protocol, TypeVar
 
 REMEMBERED = 1000  # owners whose last turn counts
 
 
 class Waiting(Protocol):
+    place: int  # in the order of arrival; 0 before it came
+
     @property
     def owner(self) -> str: ...
 
@@ -20,7 +22,7 @@ class Waiting(Protocol):
 
     @property
     def began(self) -> bool:
-        """Whether it was running when the server ended: it goes on before others begin."""
+        """Whether it was running when the server ended, or gave way: it goes on before its owner's others begin."""
 
 
 T = TypeVar("T", bound=Waiting)
@@ -30,66 +32,72 @@ class Turns(Generic[T]):
     """Renders that wait. An owner of whose renders fewer run goes first, then the one whose turn is longer ago."""
 
     def __init__(self) -> None:
-        self._queues: dict[str, list[tuple[int, int, int, T]]] = defaultdict(list)  # heaps; the last number is unique
-        self._counts: Counter[str] = Counter()
-        self._left: set[int] = set()  # numbers of those that were removed, and are still in a heap
-        self._numbers: dict[int, int] = {}  # by the identity of those that wait
-        self._arrivals, self._turns = itertools.count(), itertools.count()
+        self._queues: dict[str, list[T]] = {}  # by owner, in the order of `_key`
+        self._arrivals, self._turns = itertools.count(1), itertools.count()
         self._last: dict[str, int] = {}  # the turn that each owner had last, the longest ago first
 
     def __len__(self) -> int:
-        return self._counts.total()
+        return sum(map(len, self._queues.values()))
 
     def __iter__(self) -> Iterator[T]:
-        entries = [entry for queue in self._queues.values() for entry in queue]
-        return (render for _, _, number, render in entries if number not in self._left)
+        return itertools.chain.from_iterable(list(self._queues.values()))
+
+    def __contains__(self, render: T) -> bool:
+        return self._find(render) is not None
 
     def count(self, owner: str) -> int:
-        return self._counts[owner]
+        return len(self._queues.get(owner, ()))
 
     @property
-    def owners(self) -> int:
-        """How many owners wait."""
-        return len(self._queues)
+    def owners(self) -> Collection[str]:
+        """Those who wait."""
+        return self._queues.keys()
+
+    def line(self, owner: str) -> Sequence[T]:
+        """An owner's renders that wait, in the order in which they begin."""
+        return self._queues.get(owner, [])
 
     def add(self, render: T) -> None:
-        number = next(self._arrivals)
-        self._numbers[id(render)] = number
-        heapq.heappush(self._queues[render.owner], (not render.began, -render.priority, number, render))
-        self._counts[render.owner] += 1
+        """Have a render wait; one that has waited before has the same place again."""
+        render.place = render.place or next(self._arrivals)
+        insort(self._queues.setdefault(render.owner, []), render, key=_key)
 
     def remove(self, render: T) -> bool:
         """Whether it was waiting."""
-        number = self._numbers.pop(id(render), None)
-        if number is not None:
-            self._left.add(number)
-            self._subtract(render.owner)
-        return number is not None
+        index = self._find(render)
+        if index is not None:
+            queue = self._queues[render.owner]
+            del queue[index]
+            if not queue:
+                del self._queues[render.owner]
+        return index is not None
 
-    def next(self, running: Counter[str]) -> T | None:
-        """Take the next one; `running` counts the owners' renders that run."""
-        heads = {owner: head for owner in list(self._queues) if (head := self._head(owner)) is not None}
-        if not heads:
-            return None
-        # What was running goes on first, whoever's it is; of these the owners go round as well.
-        owner = min(heads, key=lambda name: (heads[name][0], running[name], self._last.get(name, -1), heads[name][2]))
-        _, _, _, render = heapq.heappop(self._queues[owner])
-        del self._numbers[id(render)]
-        self._subtract(owner)
-        self._last.pop(owner, None)
-        self._last[owner] = next(self._turns)
+    def _find(self, render: T) -> int | None:
+        queue = self._queues.get(render.owner, [])
+        index = bisect_left(queue, _key(render), key=_key)
+        return index if index < len(queue) and queue[index] is render else None
+
+    def next(self, running: Counter[str], fits: Callable[[T], bool] = lambda render: True) -> T | None:
+        """Take the next one that `fits`; `running` counts the owners' renders that run."""
+        for owner in sorted(self._queues, key=lambda owner: self._turn(owner, running)):
+            for render in self._queues[owner]:
+                if fits(render):
+                    self.take(render)
+                    return render
+        return None
+
+    def take(self, render: T) -> None:
+        """Let a render have its owner's turn."""
+        self.remove(render)
+        self._last.pop(render.owner, None)
+        self._last[render.owner] = next(self._turns)
         if len(self._last) > REMEMBERED:
             del self._last[next(iter(self._last))]
-        return render
 
-    def _head(self, owner: str) -> tuple[int, int, int, T] | None:
-        queue = self._queues[owner]
-        while queue and queue[0][2] in self._left:
-            self._left.discard(heapq.heappop(queue)[2])
-        return queue[0] if queue else None
+    def _turn(self, owner: str, running: Counter[str]) -> tuple[int, bool, int, int]:
+        first = self._queues[owner][0]
+        return running[owner], not first.began, self._last.get(owner, -1), first.place
 
-    def _subtract(self, owner: str) -> None:
-        self._counts[owner] -= 1
-        if not self._counts[owner]:
-            del self._counts[owner]
-            self._left.difference_update(number for _, _, number, _ in self._queues.pop(owner))
+
+def _key(render: Waiting) -> tuple[bool, int, int]:
+    return not render.began, -render.priority, render.place

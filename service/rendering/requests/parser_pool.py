@@ -8,7 +8,7 @@ import signal
 import threading
 from collections import deque
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from typing import Any
 
 from service.child_processes import Child, Children, Closed
@@ -40,8 +40,10 @@ class ParserPool:
         self._memory = memory or MemoryBudget(config.memory)
         self._room = _Room(config.max_json_memory)
 
-    def parse(self, kind: Kind, body: bytearray) -> Any:
-        """What PARSERS[kind] makes of it, or raises; TooLarge where that takes too much memory or time."""
+    def parse(self, kind: Kind, body: bytearray, counted: bool = False) -> Any:
+        """What PARSERS[kind] makes of it, or raises; TooLarge where that takes too much memory or time.
+
+        `counted`: the caller has counted the memory that it takes."""
         needed, most = most_bytes(body), self._config.max_json_memory
         if needed > most:
             detail = f"What this body holds may take {needed // MIB} MiB of memory: no more than {most // MIB} MiB"
@@ -51,7 +53,7 @@ class ParserPool:
         try:
             with (
                 self._room.taken(needed),
-                self._memory.held("bodies", needed),
+                nullcontext() if counted else self._memory.held("bodies", needed),
                 self._children.one() as child,
             ):
                 answer = _ask(child, work)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import os
 import signal
@@ -15,10 +16,17 @@ from pathlib import Path
 from typing import Any
 
 import httpx
+import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.config import MIB, Config
 from service.database import FILE
+from service.quality import resolve
+from service.rendering.jobs.store.record import Order, Outcome
+from service.rendering.jobs.store.store import RenderStore
+from service.rendering.requests.request_parser import folded
+from service.scene import parse_settings
 from tests.serving import ENDLESS, SCENE, SMALL
 from tests.serving import Server as AnyServer
 
@@ -119,6 +127,33 @@ def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: b
         assert pixels(fourth, cancelled)
     finally:
         assert fourth.stop() == 0
+
+
+def test_renders_with_large_documents_share_little_memory_after_a_restart(gpu: Renderer, tmp_path: Path) -> None:
+    """All pictures would fit into the memory, but no document could be read beside them. What they wait for stops
+    nobody else."""
+    rng = np.random.default_rng(1)
+    faces = rng.integers(0, 3000, (3000, 3))
+    mesh = {"type": "mesh", "vertices": rng.random((3000, 3)).round(6).tolist(), "faces": faces.tolist()}
+    document = folded({**SCENE, "shapes": [*SCENE["shapes"], {**mesh, "material": "ball"}]})
+    settings = resolve(parse_settings({"width": 170, "height": 170, "max_samples": 2}, "", Config()))
+    store, ids = RenderStore(tmp_path / "data"), [f"{number:032x}" for number in range(8)]
+
+    async def stored() -> None:
+        for id in ids:
+            order = Order(id, "", settings, created_at=time.time(), bytes=len(document))
+            await store.insert(order, Outcome("running"), document, [])
+        await store.close()
+
+    asyncio.run(stored())
+    server = Server(tmp_path, SUNBOX_MEMORY=str(64 * MIB))
+    try:
+        image = server.http.post("/v1/render", json={"scene": SCENE, "settings": SMALL})
+        assert image.status_code == 200
+        assert {status(server, id, 60)["state"] for id in ids} == {"done"}
+        assert "has to wait" in server.log.read_text()
+    finally:
+        kill(server)
 
 
 def test_time_counts_while_the_server_is_down(tmp_path: Path) -> None:

@@ -28,7 +28,6 @@ from service.rendering.ipc.messages import (
     View,
 )
 from service.rendering.ipc.orders import Stop, TakeCheckpoint
-from service.rendering.jobs import job as jobs
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.recorder import MOST_STARTS, Recorder
 from service.rendering.jobs.store.record import Order, Outcome
@@ -72,7 +71,7 @@ class Renderers:
         self.sent.append((update, restore))
 
 
-async def load(document: bytes) -> Packed:
+async def load(document: bytes, count: Callable[[int], None]) -> Packed:
     return PACKED
 
 
@@ -88,20 +87,24 @@ def scenario(test: Callable[[Any, RenderStore], Awaitable[None]], folder: Path) 
     asyncio.run(test(Renderers(), RenderStore(folder)))  # type: ignore[arg-type]
 
 
+async def in_line(job: Job) -> None:
+    """Give it a slot whenever it wants one, until it has ended."""
+    while not job.finished.is_set():
+        if job.reserve():
+            await job.run()
+        await asyncio.sleep(0.001)
+
+
 async def until(condition: Callable[[], object]) -> None:
     async with asyncio.timeout(10):
         while not condition():
             await asyncio.sleep(0.005)
 
 
-def test_it_goes_on_from_its_checkpoint_when_something_renders_again(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(jobs, "AGAIN_S", 0.02)
-
+def test_it_goes_on_from_its_checkpoint_when_something_renders_again(tmp_path: Path) -> None:
     async def test(renderers: Any, store: RenderStore) -> None:
         job = await stored(renderers, store)
-        running = asyncio.create_task(job.run())
+        running = asyncio.create_task(in_line(job))
         await until(lambda: renderers.sent)
         assert renderers.sent[0][1] is None
         job.heard(Checkpoint(1, 1, Progress(4, None, 2.0), SAVED))
@@ -126,20 +129,14 @@ def test_it_goes_on_from_its_checkpoint_when_something_renders_again(
     scenario(test, tmp_path)
 
 
-def test_that_it_waits_is_logged_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
-) -> None:
-    monkeypatch.setattr(jobs, "AGAIN_S", 0.001)
-    tries: list[None] = []
-
+def test_that_it_waits_is_logged_once(tmp_path: Path, caplog: pytest.LogCaptureFixture) -> None:
     async def test(renderers: Any, store: RenderStore) -> None:
-        monkeypatch.setattr(renderers, "open", lambda *_: tries.append(None) or Renderers.open(renderers, *_))
         renderers.hopeless = True
         job = await stored(renderers, store)
-        running = asyncio.create_task(job.run())
+        running = asyncio.create_task(in_line(job))
         for waits in (1, 2):  # where nothing renders again, that is news
-            before = len(tries)
-            await until(lambda before=before: len(tries) >= before + 3)  # type: ignore[misc]
+            await until(lambda waits=waits: "has to wait" in caplog.text and job.waits)  # type: ignore[misc]
+            await asyncio.sleep(0.02)
             assert [record.levelname for record in caplog.records if "has to wait" in record.message] == (
                 ["WARNING"] * waits
             )
@@ -192,12 +189,12 @@ def test_a_render_that_servers_do_not_survive_fails(tmp_path: Path) -> None:
 
 
 def test_an_unexpected_error_fails_the_one_render(tmp_path: Path) -> None:
-    async def broken(document: bytes) -> Packed:
+    async def broken(document: bytes, count: Callable[[int], None]) -> Packed:
         raise MemoryError
 
     async def test(renderers: Any, store: RenderStore) -> None:
         job = await stored(renderers, store)
-        job._load = broken
+        job._scene._load = broken
         await asyncio.wait_for(job.run(), 10)
         assert job.state == "failed"
 

@@ -23,7 +23,8 @@ class Job:
         self.id, self.owner, self.size, self.ended_at = id, owner, size, 0.0
         self.order = SimpleNamespace(label=label)
         self.priority, self.began, self.number, self.resident_bytes = priority, False, 0, 0
-        self.state, self.recorder = "queued", None
+        self.state, self.recorder, self.lasting, self.shown = "queued", None, True, False
+        self.place, self.memory_share, self.lacks, self.can_give_way = 0, 0.0, 0, False
         self.finished, self.released, self.packed = asyncio.Event(), False, True
         self.changes = Changes[Any]()
 
@@ -31,6 +32,9 @@ class Job:
         self.state = "running"
         await self.finished.wait()
         self.ended_at, self.state = time.monotonic(), "done"
+
+    def reserve(self) -> bool:
+        return True
 
     def set_aside(self) -> None:
         self.packed = False
