@@ -10,6 +10,7 @@ import pytest
 ROOT = Path(__file__).parents[1]
 PAGES = [
     ROOT / "README.md",
+    ROOT / "CHANGELOG.md",
     ROOT / ".github" / "SECURITY.md",
     ROOT / "shaders" / "README.md",
     *(ROOT / "docs").glob("*.md"),
