@@ -63,9 +63,9 @@ bool direct_arrives(SurfacePoint at, LightSample light, inout vec3 c) {
     vec3 o = shapes_leave(at, light.wi);
 #if HAS_OPACITY
     c *= transparency_share(o, light.wi, light.t, skip);
-    return true;
+    return budget_lasts();
 #else
-    return !shapes_occluded(o, light.wi, light.t, skip);
+    return !shapes_occluded(o, light.wi, light.t, skip) && budget_lasts();
 #endif
 }
 

@@ -26,7 +26,9 @@ void main() {
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
         SurfacePoint at;
+        budget_begin();
         Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
+        if (!budget_lasts()) hit.id = NONE;
         if (frame.sample_first + i == 0u) {
             uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
             met[slot].xy = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);

@@ -45,7 +45,7 @@ Medium medium_at_camera() {
     do {
         Hit hit = shapes_nearest(o, d, skip);
         SurfacePoint at = shapes_point(hit, o, d);
-        more = hit.id != NONE && layer < MEDIUM_LAYERS;
+        more = hit.id != NONE && layer < MEDIUM_LAYERS && budget_lasts();
 #if HAS_TEXTURES
         vec4 texels[max(TEXTURE_SURFACE_SLOTS, 1)];
         texture_look(at, texels);
@@ -70,7 +70,7 @@ Medium medium_at_camera() {
         } else {
             sum.rate = sum.depth > 0.5 ? max(sum.rate, vec3(0.0)) + MEDIUM_WALL * max(walls, vec3(0.0)) : vec3(0.0);
             sum.depth = max(sum.depth, 0.0);
-            more = side == 0u && sum.depth > 0.5;
+            more = side == 0u && sum.depth > 0.5 && budget_lasts();
             if (side == 0u) first = sum;
             side++;
             o = camera_origin();

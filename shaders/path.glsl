@@ -16,10 +16,12 @@
 #include "path_trace.glsl"
 #include "delta_chain.glsl"
 
-bool path_was_cut; // the driver has ended the last path before its time
+bool path_was_cut;   // the last path's budget did not last
+bool path_was_lost;  // the driver has ended the last path before its time
 
 // Begins a path that leaves the camera from o along d.
 Path path_begin(vec3 o, vec3 d, Medium medium) {
+    budget_begin();
     Path path;
     path.o = o;
     path.d = d;
@@ -38,10 +40,11 @@ Path path_begin(vec3 o, vec3 d, Medium medium) {
 // Ends a path: adds what it finds at infinity, where it has left the scene. Returns its radiance and its alpha.
 vec4 path_finish(Path path) {
     path_add_escaped(path);
-    // llvmpipe ends every loop of an invocation after 65 535 turns in all, without an error. The last hit of such a
-    // path may be wrong.
-    path_was_cut = path.alive;
-    return vec4(path_was_cut ? path.radiance_before : path.radiance, path.alpha);
+    path_was_cut = !budget_lasts();
+    // Mesa 22 may still end the loops first, without an error, where lanes have waited for each other. The last hit of
+    // such a path may be wrong.
+    path_was_lost = path.alive;
+    return vec4(path_was_lost ? path.radiance_before : path.radiance, path.alpha);
 }
 
 // The radiance that a path brings to o from the direction d, and its alpha.

@@ -19,7 +19,8 @@ void path_add_emission(inout Path path) {
 // Follows the path's ray to what it meets, and adds what shines there.
 void path_trace(Sampler rng, inout Path path) {
     path.hit = transparency_nearest(path.o, path.d, path.at.flat_id, path.bounce, rng, path.at);
-    if (!path.alive) path.hit.id = NONE; // the last surface has ended it
+    path.alive = path.alive && budget_lasts();
+    if (!path.alive) path.hit.id = NONE; // the last surface has ended it, or this ray its budget
     bool met = path.hit.id != NONE;
     path.throughput *= medium_share(path.medium, path.hit.t);
     path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || arriving_background());

@@ -7,7 +7,7 @@ layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 co
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };
 layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
     uint path_ended; // paths that their throughput has ended
-    uint path_cut;   // samples that the driver has cut: see path.glsl
+    uint path_cut;   // samples that are short: see path.glsl
 };
 #include "constants.glsl"
 #include "sobol.glsl"
@@ -58,15 +58,17 @@ void main() {
     uint first = frame.sample_first, count = frame.sample_count;
 #endif
     Medium medium = medium_at_camera();
-    uint i = 0u;
+    uint i = 0u, cut = 0u;
     do {
         vec3 o, d;
         Sampler rng = sobol_begin(pixel, first + i, replicate);
         camera_ray(pixel, rng, o, d);
         add(path_radiance(rng, o, d, medium));
-        if (path_was_cut) break; // the driver has ended this loop as well
+        if (path_was_lost) break; // the driver has ended this loop as well
+        if (path_was_cut) cut++;
     } while (++i < count);
-    if (i < count) atomicAdd(path_cut, count - i);
+    cut += count - i;
+    if (cut > 0u) atomicAdd(path_cut, cut);
     sums[slot] = sum;
     compensations[slot] = lost;
     moments[slot] = moment;

@@ -5,16 +5,23 @@ const uint TRANSPARENCY_MAX = 4096u;    // layers that a ray passes at most; it 
 
 #include "transparency_walk.glsl"
 
+// Counts a surface that the ray has come to; whether the ray may pass it.
+bool transparency_counts(inout uint layer) {
+    budget_left -= BUDGET_LAYER;
+    return layer++ < TRANSPARENCY_MAX && budget_lasts();
+}
+
 #if HAS_OPACITY
 // Whether the ray passes the surface. Each one that it comes to takes the next number, whether it comes to them in
 // their order or not: a number that nothing else depended on makes the chance right.
 bool transparency_passes(SurfacePoint at, uint bounce, Sampler rng, inout uint layer) {
     float u = sobol_pair(rng, PAIR_TRANSPARENCY + bounce * TRANSPARENCY_MAX + layer).x;
-    return layer++ < TRANSPARENCY_MAX && u >= transparency_opacity(at, bounce == 0u);
+    return transparency_counts(layer) && u >= transparency_opacity(at, bounce == 0u);
 }
 
 // The next layer: a shape that stands in a loop. Kernels without OPACITY_WALK look for those of the tree here, too.
 void transparency_next(vec3 o, vec3 d, uvec2 skip, inout Hit hit) {
+    budget_left -= int(uint(SPHERE_LOOP) + uint(QUAD_LOOP) + uint(BOX_LOOP) + uint(ELLIPSOID_LOOP) + uint(TRIANGLE_LOOP));
 #if OPACITY_WALK
     shapes_loops(o, d, triangle_shear(o, d), skip, hit);
 #else
@@ -66,7 +73,7 @@ void transparency_nearest_tree(vec3 o, vec3 d, uvec2 skip, uint bounce, Sampler 
         } else {
             more = transparency_change_tree(o, d, on);
         }
-    } while (more);
+    } while (more && budget_lasts());
 }
 #endif
 
@@ -80,7 +87,7 @@ float transparency_share_loop(vec3 o, vec3 d, float t_max, uvec2 skip, inout uin
         SurfacePoint at = shapes_point(hit, o, d);
         more = hit.id != NONE;
         if (more) {
-            share *= layer++ < TRANSPARENCY_MAX ? 1.0 - transparency_opacity(at, false) : 0.0;
+            share *= transparency_counts(layer) ? 1.0 - transparency_opacity(at, false) : 0.0;
             o = shapes_leave(at, d);
             skip.x = at.flat_id;
             t_max -= hit.t;
@@ -105,7 +112,7 @@ float transparency_share_tree(vec3 o, vec3 d, float t_max, uvec2 skip, inout uin
             vec3 from = o;
             do {
                 SurfacePoint at = shapes_veil(veil, from, d);
-                share *= layer++ < TRANSPARENCY_MAX ? 1.0 - transparency_opacity(at, false) : 0.0;
+                share *= transparency_counts(layer) ? 1.0 - transparency_opacity(at, false) : 0.0;
                 left -= veil.t;
                 from = shapes_leave(at, d);
                 veil = transparency_again(on, veil.id, from, skip, left);
@@ -113,7 +120,7 @@ float transparency_share_tree(vec3 o, vec3 d, float t_max, uvec2 skip, inout uin
         } else {
             more = transparency_change_tree(o, d, on);
         }
-    } while (more && share > 0.0);
+    } while (more && share > 0.0 && budget_lasts());
     return share;
 }
 #endif
@@ -155,7 +162,7 @@ Hit transparency_nearest(vec3 o, vec3 d, uint skip, uint bounce, Sampler rng, ou
     do {
         hit = shapes_nearest(from, d, skip);
         at = shapes_point(hit, from, d);
-        passes = bounce == 0u && (at.shape & HIDDEN) != 0u && hit.id != NONE && layer++ < TRANSPARENCY_MAX;
+        passes = bounce == 0u && (at.shape & HIDDEN) != 0u && hit.id != NONE && transparency_counts(layer);
         hit.t += before;
         if (passes) {
             before = hit.t;

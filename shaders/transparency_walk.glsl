@@ -94,6 +94,7 @@ void transparency_test(uvec2 skip, bool hides, inout Passage on, inout Hit hit, 
         else veil = next;
     }
     on.range.index++;
+    budget_left--;
     if (on.range.index == on.range.end) {
         on.found.leaf = on.found.earlier;
         on.found.earlier = 0u;

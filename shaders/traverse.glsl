@@ -17,6 +17,8 @@ const float TRAVERSE_SLACK = 1.0000007;
 // lamps. A shape nearer to a lamp than 2^-16 of the distance casts no shadow.
 const float TRAVERSE_REACH = 0.9999847;
 
+#include "budget.glsl"
+
 struct Hit {
     float t;
     uint id; // kind << 28 | index; in an instance: see instance_id
@@ -138,6 +140,7 @@ Found traverse_boxes(Tree tree, TreeRay ray, float t_max, inout Walk walk) {
             found.leaf = node.w;
         }
         traverse_step(node.w, hits, walk);
+        budget_left--;
     } while (found.earlier == 0u && found.instance == NONE && traverse_more(walk));
     return found;
 }
@@ -186,6 +189,7 @@ void traverse_leaves(Tree tree, TreeRay ray, Found found, uvec2 skip, bool any, 
         do {
             traverse_test(tree, ray, range.kind, range.index, skip, hit);
             range.index++;
+            budget_left--;
             if (range.index == range.end) {
                 found.leaf = found.earlier;
                 found.earlier = 0u;
@@ -232,7 +236,8 @@ void traverse_scene(vec3 o, vec3 d, Shear shear, uvec2 skip, bool any, inout Hit
         do {
             found = traverse_boxes(tree, ray, hit.t * reach, walk);
             traverse_leaves(tree, ray, found, skip, any, start, hit);
-        } while (traverse_more(walk) && found.instance == NONE && !(any && hit.t < start));
-    } while (traverse_change_tree(found.instance, o, d, tree, ray, walk, scene_walk) && !(any && hit.t < start));
+        } while (traverse_more(walk) && found.instance == NONE && !(any && hit.t < start) && budget_lasts());
+    } while (budget_lasts() && traverse_change_tree(found.instance, o, d, tree, ray, walk, scene_walk)
+             && !(any && hit.t < start));
 }
 #endif

@@ -76,7 +76,7 @@ class Dispatcher:
 
     @property
     def counts(self) -> tuple[int, int]:
-        """Paths that the kernel has ended for their throughput, and samples that the driver has cut."""
+        """Paths that the kernel has ended for their throughput, and samples that were cut short."""
         ended, cut = np.frombuffer(self.counters.read(8), np.uint32).tolist()
         return ended, cut
 
@@ -90,7 +90,10 @@ class Dispatcher:
         ended, cut = self.counts
         out = [f"{ended} paths ended because their throughput passed 1e6"] if ended else []
         if cut:
-            out.append(f"{cut} paths are short: this driver ends the loops of a kernel after 65 535 turns")
+            out.append(
+                f"{cut} paths were cut short and lack light: they came to too many shapes or transparent layers; "
+                "lower max_bounces, or take layers away"
+            )
         return out
 
     def release(self) -> None:

@@ -234,6 +234,21 @@ def test_long_turns_do_not_pay() -> None:
     assert greedy.account.used_s <= mean_s + MOST_OWED_S + CATCH_UP_S / 8 + 1.0
 
 
+def test_a_turn_of_many_seconds_is_waited_for_in_full() -> None:
+    """Whoever took 20 s waits until another has had as much, but for what may be owed."""
+    scheduler, greedy, other = Scheduler(), Turn(), Turn()
+    waits_s, since_s = [], 0.0
+    for _ in range(6000):
+        task = scheduler.choose([greedy, other])
+        assert task is not None
+        scheduler.charge(task, 20.0 if task is greedy else 0.02)
+        since_s += 0.02
+        if task is greedy:
+            waits_s.append(since_s)
+            since_s = 0.0
+    assert len(waits_s) > 4 and min(waits_s[1:]) >= 20.0 - MOST_OWED_S - CATCH_UP_S
+
+
 def test_who_comes_during_a_long_turn_is_level_with_whoever_had_it() -> None:
     scheduler, first, others = Scheduler(), Turn(), [Turn() for _ in range(31)]
     assert scheduler.choose([first]) is first
