@@ -288,8 +288,8 @@ def test_the_renderer_hears_how_long_the_disk_took(gpu: Renderer, tmp_path: Path
         task, ears = await begun(supervisor, ENDLESS)
         heard: list[float] = []
         recorder = Recorder(RenderStore(tmp_path), 1, "a", renderers=cast(Any, Heard(supervisor, heard)))
-        recorder.checkpoint(await ears.next(Checkpoint))
-        await recorder.checkpointed()
+        checkpoint = await ears.next(Checkpoint)
+        assert await recorder.store_now(lambda: recorder.checkpoint(checkpoint))
         await recorder.close()
         assert len(heard) == 1 and heard[0] > 0
         await ears.next(Checkpoint)  # the disk is fast, and they go on

@@ -29,7 +29,7 @@ from service.rendering.executors import (
 )
 from service.rendering.ipc.messages import Progress, Restore
 from service.rendering.jobs.store.pictures import KINDS, DamagedPicture, Kind, PictureFiles
-from service.rendering.jobs.store.record import IdempotencyKey, Order, Outcome, StoredRender
+from service.rendering.jobs.store.record import ENDED, IdempotencyKey, Order, Outcome, StoredRender
 from service.rendering.jobs.store.rows import RenderRows
 from service.storage import RENDERS
 
@@ -82,7 +82,12 @@ class RenderStore:
     def _reached(self, render: StoredRender) -> StoredRender:
         """With the progress of the picture that there is of it."""
         id, outcome = render.order.id, render.outcome
-        if render.unfit is not None or self._files.has(id, "picture"):
+        if render.unfit is not None:
+            return render
+        if self._files.has(id, "picture"):
+            if outcome.state in ENDED and self._files.has(id, "checkpoint"):
+                with suppress(OSError):  # a crash came before that was done
+                    self._files.delete(id, "checkpoint")
             return render
         return replace(render, outcome=replace(outcome, progress=self._checkpointed(id)))
 

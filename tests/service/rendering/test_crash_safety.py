@@ -1,0 +1,121 @@
+"""Whatever step of its end is the last one before a crash, the next start has the render whole or goes on with it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from service.rendering.ipc.messages import Checkpoint, Done, Progress
+from service.rendering.jobs.recorder import Recorder
+from service.rendering.jobs.store.pictures import PictureFiles
+from service.rendering.jobs.store.record import Outcome, StoredRender
+from service.rendering.jobs.store.rows import RenderRows
+from service.rendering.jobs.store.store import RenderStore
+from tests.service.rendering.test_render_store import DOCUMENT, order, picture
+
+HALF, WHOLE = Progress(8, 0.2, 1.0), Progress(64, 0.1, 4.0)
+ENDED = Outcome("done", "max_samples", WHOLE, ended_at=200.0)
+
+
+class Crash(BaseException):
+    """Nothing after it happens."""
+
+
+def crash(monkeypatch: pytest.MonkeyPatch, where: Any, name: str, after: bool = True) -> None:
+    """Have the process end as soon as that was done, or just before it."""
+    does = getattr(where, name)
+
+    def last(*given: Any) -> None:
+        if after:
+            does(*given)
+        raise Crash
+
+    monkeypatch.setattr(where, name, last)
+
+
+async def under_way(store: RenderStore) -> Recorder:
+    """A render that has a checkpoint."""
+    number = await store.insert(order("a"), Outcome(), DOCUMENT, [])
+    recorder = Recorder(store, number, "a")
+    await recorder.start(Outcome())
+    assert await recorder.store_now(lambda: recorder.checkpoint(Checkpoint(1, 1, HALF, picture().saved)))
+    return recorder
+
+
+def next_start(folder: Path) -> tuple[StoredRender, list[str]]:
+    """The render, and the names of its files, all of which can be read."""
+    store = RenderStore(folder)
+    (render,) = store.load()
+    files = sorted(os.listdir(folder / "renders"))
+    assert all(store.read_now("a", name.partition(".")[2], 1) for name in files)  # type: ignore[arg-type]
+    assert store.pictures.files == len(files)
+    return render, files
+
+
+@pytest.mark.parametrize(
+    ("where", "name", "after", "files"),
+    [
+        (os, "replace", False, ["a.checkpoint"]),  # the picture is half-written
+        (PictureFiles, "write", True, ["a.checkpoint", "a.picture"]),
+        (RenderRows, "update", False, ["a.checkpoint", "a.picture"]),
+        (RenderRows, "update", True, ["a.picture"]),  # the checkpoint is deleted at the next start
+        (PictureFiles, "delete", True, ["a.picture"]),
+    ],
+)
+def test_the_end_of_a_render(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: Any, name: str, after: bool, files: list[str]
+) -> None:
+    async def test() -> None:
+        recorder = await under_way(RenderStore(tmp_path))
+        crash(monkeypatch, where, name, after)
+        with pytest.raises(Crash):
+            await recorder.end(ENDED, Done(1, 1, "max_samples", WHOLE, [], picture(2).saved))
+        monkeypatch.undo()
+
+    asyncio.run(test())
+    render, found = next_start(tmp_path)
+    assert found == files
+    if "a.checkpoint" in files:  # it goes on from there, and ends once more with the same bits
+        assert render.outcome.state == "running"
+    else:
+        assert render.outcome == ENDED
+
+
+@pytest.mark.parametrize(("after", "gone"), [(False, False), (True, True)])
+def test_the_deletion_of_a_render(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, after: bool, gone: bool) -> None:
+    async def test() -> None:
+        store = RenderStore(tmp_path)
+        recorder = await under_way(store)
+        crash(monkeypatch, RenderRows, "forget", after)
+        with pytest.raises(Crash):
+            await store.forget([(recorder.number, "a")])
+        monkeypatch.undo()
+
+    asyncio.run(test())
+    render, files = next_start(tmp_path)
+    assert render.gone is gone and files == ([] if gone else ["a.checkpoint"])
+
+
+@pytest.mark.parametrize(
+    ("where", "name"), [(PictureFiles, "write"), (RenderRows, "update"), (PictureFiles, "delete")]
+)
+def test_a_disk_that_fails_at_the_end(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, where: Any, name: str) -> None:
+    """The render ends for whoever waits for it, and is not taken for stored whole."""
+
+    def fail(*given: Any) -> None:
+        raise OSError(28, "No space left on device")
+
+    async def test() -> None:
+        recorder = await under_way(RenderStore(tmp_path))
+        monkeypatch.setattr(where, name, fail)
+        assert not await recorder.end(ENDED, Done(1, 1, "max_samples", WHOLE, [], picture(2).saved))
+        assert not recorder.whole and recorder.store.failures == 1
+        monkeypatch.undo()
+
+    asyncio.run(test())
+    render, files = next_start(tmp_path)
+    assert render.outcome.state == "running" if "a.checkpoint" in files else render.outcome == ENDED
