@@ -206,6 +206,11 @@ class Picture:
         """Whether the rows of its own have all their samples of the block that it shares."""
         return self._sharing is None or self._sharing.own_done
 
+    def allocate_block(self) -> None:
+        """Take the memory of the block under way, unless it is there, so that `share` needs none. Raises OutOfMemory."""
+        contexts.use(self.context)
+        self._sums.allocate_block()
+
     def share(self, rows: int, end: int) -> None:
         """Have `trace` add the samples up to `end` to rows [0, rows) only; the others come by `write_band` and
         `trace_band`. Until `complete`, `samples` stays and nothing of them is seen, read or saved.

@@ -181,7 +181,10 @@ class Task:
         tracker.clock.start()
         before = picture.samples
         if scale == 1.0 and self._divides:
-            cap = self.home.cap(picture, cap, tracker.generation, self._divided_from, tracker.interactive)
+            watched, most = tracker.interactive, cap
+            cap = residency.insist(
+                lambda: self.home.cap(picture, most, tracker.generation, self._divided_from, watched)
+            )
         budget_s = FULL_S if self.unseen else SLICE_S
         sharers = self._sharers(self.client) if tracker.interactive else 1  # nobody waits for a render's next pass
         if picture.sharing:
@@ -284,7 +287,7 @@ class Task:
             if restore.reason is None:
                 self._send(Discarded(self.number))
             return
-        full.restore(saved)
+        self._residency.insist(lambda: full.restore(saved))
         self.home.resume(saved_bands(restore.saved, full.settings))
         tracker.reason, self._frames.scale = restore.reason, 1.0
         tracker.clock.set(restore.progress.elapsed_s)

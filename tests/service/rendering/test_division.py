@@ -12,13 +12,19 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from gpu import Band, RenderSettings, Saved, border_after
+from gpu import Band, OutOfMemory, Renderer, RenderSettings, Saved, Steps, border_after
+from gpu.picture.accumulators import Accumulators
 from service.rendering.ipc.leases import Lease, LeaseDone
-from service.rendering.ipc.messages import Progress, Restore
+from service.rendering.ipc.messages import Failed, Progress, Restore, StopRule, Update, driver_of
 from service.rendering.jobs.store.pictures import PictureFiles
+from service.rendering.worker.context import WorkerContext
+from service.rendering.worker.division.assistant import Assistant
 from service.rendering.worker.division.home import Home
 from service.rendering.worker.division.ledger import MOST_BYTES, PIXEL_BYTES, Ledger
+from service.rendering.worker.helpers.denoise_client import DenoiseClient
 from service.rendering.worker.payloads import saved_bands, saved_picture, sent_picture
+from service.rendering.worker.task import Task
+from tests.gpu.test_precompile import arrays_of
 
 FIRST, SIZE = 8, 64  # samples: the first border, and the distance of the others
 WIDTH, HEIGHT = 512, 300
@@ -31,6 +37,7 @@ class _Picture:
     samples: int = FIRST
     sharing: bool = False
     cost_s: float = 1e-7
+    short: int = 0  # how many times there is no memory for a block
     settings: RenderSettings = field(default_factory=lambda: RenderSettings(WIDTH, HEIGHT))
 
     def __post_init__(self) -> None:
@@ -43,7 +50,13 @@ class _Picture:
     def own_done(self) -> bool:
         return bool((self.block[: self.own] == self.end - self.samples).all())
 
+    def allocate_block(self) -> None:
+        self.short -= 1
+        if self.short >= 0:
+            raise OutOfMemory("the device has no 1 MiB left")
+
     def share(self, rows: int, end: int) -> None:
+        assert self.short < 0, "no memory, and nobody asked for it"
         assert border_after(self.samples - 1) == self.samples and not self.sharing and not self.under_way[0]
         assert self.samples < end <= border_after(self.samples)
         self.sharing, self.own, self.end = True, rows, end
@@ -229,6 +242,78 @@ def test_paths_that_were_cut_elsewhere_are_counted_once() -> None:
     for _ in range(2):
         home.heard(LeaseDone(1, 1, leases[0].number, np.zeros(0), (3, 2)))
     assert picture.counts == (3, 2)
+
+
+@pytest.mark.parametrize("progressive", [False, True])
+def test_a_block_without_memory_is_begun_again_and_lacks_nothing(progressive: bool) -> None:
+    picture = _Picture(short=2)
+    home, leases = _home(picture, (1,))
+    for _ in range(2):
+        with pytest.raises(OutOfMemory):
+            _turn(home, picture, 200, progressive)
+    answered = 0
+    for _ in range(3000):
+        _turn(home, picture, 200, progressive)
+        for lease in leases[answered:]:
+            home.heard(LeaseDone(1, 1, lease.number, np.zeros(0)))
+        answered = len(leases)
+    assert picture.samples == 200 and answered
+
+
+def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
+    gpu: Renderer, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Where the driver has less memory than is allowed, at home, at an assistant and where a picture comes back."""
+    sent: list[Any] = []
+    context = WorkerContext(gpu, sent.append, DenoiseClient())
+    arrays = arrays_of("plain")
+
+    def begun(number: int) -> Update:
+        return Update(number, 1, arrays, {"width": 32, "height": 32}, StopRule(1 if number == 9 else 72))
+
+    def resting() -> Task:
+        idle = Task(context, 9)
+        idle.update(begun(9))
+        while idle.ready:
+            idle.turn()
+        context.memory._holders = lambda: [idle]
+        assert idle.bytes and idle.idle
+        return idle
+
+    def scarce(self: Accumulators) -> None:
+        if idle.bytes and not self.block:
+            raise OutOfMemory("the device has no 1 MiB left")
+        allocate(self)
+
+    allocate, idle = Accumulators.allocate_block, resting()
+    home = Task(context, 1)
+    home.update(begun(1))
+    home.home.assist((7,))
+    monkeypatch.setattr(Accumulators, "allocate_block", scarce)
+    while not home.home.sharing and home.ready:
+        home.turn()
+    assert home.home.sharing and not idle.bytes
+
+    lease = next(message for message in sent if isinstance(message, Lease))
+    idle, helper = resting(), Assistant(context, 1)
+    helper.update(begun(1))
+    helper.lease(lease)
+    while helper.ready:
+        helper.turn()
+    assert isinstance(sent[-1], LeaseDone) and not idle.bytes
+
+    full = home._residency.full
+    full.unshare()
+    full.trace(600.0, 16)
+    picture = sent_picture(Steps(full.save()).finish(), driver_of(gpu.info))
+    idle, back = resting(), Task(context, 2)
+    back.update(begun(2))
+    back.settle()
+    back.restore(Restore(2, 1, picture, None, Progress(16, None, 0.0, None)))
+    assert back._residency.full.samples == 16 and not idle.bytes
+    assert not any(isinstance(message, Failed) for message in sent)
+    for each in (home, helper, idle, back):
+        each.release()
 
 
 def test_a_result_is_never_too_large() -> None:

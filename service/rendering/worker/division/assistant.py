@@ -89,7 +89,7 @@ class Assistant:
 
     def _trace(self, picture: Picture, lease: Lease) -> None:
         band = Band(lease.first, lease.count, lease.top, lease.rows)
-        if picture.trace_band(band, SLICE_S):
+        if self._residency.insist(lambda: picture.trace_band(band, SLICE_S)):
             self._leases.popleft()
             self.traced += band.rows * band.count * picture.settings.width
             values, counts = picture.read_band(band), picture.take_counts()

@@ -90,7 +90,7 @@ class Home:
         may be. To be asked before each slice, of a render that ends at `end` samples.
 
         `since`: the first sample that may be shared. `progressive`: a person looks on, so that a block of which
-        nobody else has anything is traced here.
+        nobody else has anything is traced here. Raises OutOfMemory, and can be called again.
         """
         if picture.sharing:
             current = None if self._ledger is None else self._ledger.current
@@ -120,6 +120,7 @@ class Home:
     def _begin(self, picture: Picture, end: int, progressive: bool) -> None:
         ledger = self._ledger
         assert ledger is not None
+        picture.allocate_block()  # before anything is taken from the ledger: the caller may try again
         parked = list(ledger.begin(picture.samples))
         if ledger.untouched and (progressive or not self._assistants):
             ledger.finished()
