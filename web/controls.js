@@ -128,7 +128,9 @@ function toggle(field, id, { input, commit }) {
   const box = element("input", {
     type: "checkbox", id, class: "toggle", onchange: () => { input(box.checked); commit(); },
   });
-  return { element: box, show: (value) => { box.checked = Boolean(value); } };
+  // Neither on nor off where neither document nor schema says: the server decides.
+  const show = (value) => { Object.assign(box, { checked: Boolean(value), indeterminate: (value ?? null) === null }); };
+  return { element: box, show };
 }
 
 // Numbers in a row, three or as two for u and v; a single one stands for all, in the document and where none is set.

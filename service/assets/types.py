@@ -24,6 +24,14 @@ class MeshData:
     colors: Floats | None = None  # (n, 3), linear, 0..1; or (n, 4), with an alpha that multiplies the material's
     warnings: tuple[str, ...] = ()  # oddities, for the author of the file
     tangents: Floats | None = None  # (n, 4), as glTF's TANGENT: a direction of any length, zero for none; handedness
+    # (m,) the smoothing group of each triangle: computed normals are shared within a group, and 0 has facets. None:
+    # one group, or normals from the file.
+    groups: Indices | None = None
+
+    @property
+    def smoothing(self) -> Indices | bool:
+        """How the file asks to be shaded: by vertex normals or not, or by groups of triangles."""
+        return True if self.groups is None else self.groups
 
     @property
     def bounds(self) -> tuple[Doubles, Doubles]:

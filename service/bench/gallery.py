@@ -37,7 +37,13 @@ def bunny() -> dict[str, Any]:
             "table": {"type": "disney", "base_color": "#b9a58c", "roughness": 0.7, "specular": 0.3},
         },
         "shapes": [
-            {"type": "mesh", "asset": "mesh/stanford-bunny.obj", "material": "glaze", "transform": place},
+            {
+                "type": "mesh",
+                "asset": "mesh/stanford-bunny.obj",
+                "smooth": True,
+                "material": "glaze",
+                "transform": place,
+            },
             {"type": "quad", "origin": [-40, 0, 40], "u": [80, 0, 0], "v": [0, 0, -80], "material": "table"},
         ],
     }

@@ -116,7 +116,11 @@ class MeshShape(_Placed):
             widget="number",
         ),
     ] = None
-    smooth: Annotated[bool, hint("Smooth", "Interpolates vertex normals; off shows the facets.")] = True
+    smooth: Annotated[
+        bool | None,
+        OMITTABLE,
+        hint("Smooth", "On: vertex normals; off: facets; neither: as the file says, which for STL is facets."),
+    ] = None
     double_sided: Annotated[bool, hint("Double-sided", "Off: from behind it is not there, for any ray.")] = True
 
     @model_validator(mode="after")

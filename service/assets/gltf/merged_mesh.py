@@ -47,15 +47,18 @@ def _joined(parts: list[Primitive], warnings: list[str]) -> RawMesh:
     for rows in uvs:
         if rows is not None:
             rows[:, 1] = 1 - rows[:, 1]  # glTF's v points down
+    faces = np.concatenate([p.faces + np.int64(at) for p, at in zip(parts, first, strict=False)])
+    normals = _rows([p.normals for p in parts], parts, 3)
     return RawMesh(
         np.concatenate([p.vertices for p in parts]),
-        np.concatenate([p.faces + np.int64(at) for p, at in zip(parts, first, strict=False)]),
-        _rows([p.normals for p in parts], parts, 3),
+        faces,
+        normals,
         uvs[0],
         uvs[1],
         _rows([None if p.colors is None else p.colors[:, :3] for p in parts], parts, 3, 1.0),
         warnings,
         _rows([p.tangents for p in parts], parts, 4),
+        np.zeros(len(faces), np.int32) if normals is None else None,  # the specification demands flat triangles then
     )
 
 

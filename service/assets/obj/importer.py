@@ -9,6 +9,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Mapping
+from typing import Any
 
 import numpy as np
 
@@ -22,12 +23,13 @@ from service.assets.obj.textures import Textures
 from service.assets.readers.mesh_checks import mesh_warnings
 from service.assets.readers.obj import MaterialMesh, read_obj, read_obj_with_materials
 from service.assets.readers.obj_lines import Named
+from service.assets.readers.polygons import Longs
 from service.assets.readers.raw_mesh import RawMesh, check_raw_mesh
 from service.assets.scenes.framing import framed
 from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.ply_writer import ply
 from service.assets.scenes.warnings import Warnings
-from service.assets.types import AssetLimits, Indices, SceneFile
+from service.assets.types import AssetLimits, SceneFile
 
 MOST_MATERIALS = 10_000  # materials that faces use
 MOST_LIBRARIES = 1_000
@@ -51,8 +53,8 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     textures = Textures(archive, files, notes, limits)
     materials = Materials(library, textures, mesh.uvs is not None, notes)
     shapes = [
-        {"type": "mesh", "asset": _keep(files, mesh, faces, worn or name), "material": materials.add(worn, name)}
-        for worn, faces in _by_material(read)
+        _keep(files, mesh, which, worn or name) | {"material": materials.add(worn, name)}
+        for worn, which in _by_material(read)
     ]
     used = mesh.vertices[np.unique(mesh.faces)]
     bounds = used.min(axis=0), used.max(axis=0)
@@ -113,24 +115,30 @@ def _library(model: str, statements: list[Named], archive: Archive, notes: Warni
     return found
 
 
-def _by_material(read: MaterialMesh) -> list[tuple[str, Indices]]:
-    """The materials that triangles use, in the order in which the file first uses them, and those triangles."""
+def _by_material(read: MaterialMesh) -> list[tuple[str, Longs]]:
+    """The materials that triangles use, in the order in which the file first uses them, and the numbers of those
+    triangles."""
     counts = np.bincount(read.of_triangle, minlength=len(read.materials))
     if np.count_nonzero(counts) > MOST_MATERIALS:
         raise ParseError(f"its faces wear {np.count_nonzero(counts)} materials; {MOST_MATERIALS} are allowed")
     order = np.argsort(read.of_triangle, kind="stable")
-    faces = read.mesh.faces.astype(np.int32)[order]
     ends = np.cumsum(counts)
-    return [(read.materials[k], faces[ends[k] - counts[k] : ends[k]]) for k in np.flatnonzero(counts)]
+    return [(read.materials[k], order[ends[k] - counts[k] : ends[k]]) for k in np.flatnonzero(counts)]
 
 
-def _keep(files: PartFiles, mesh: RawMesh, faces: Indices, pointer: str) -> str:
-    """The reference of these triangles with the vertices that they use, as a mesh of their own."""
-    used, corners = np.unique(faces, return_inverse=True)
+def _keep(files: PartFiles, mesh: RawMesh, which: Longs, pointer: str) -> dict[str, Any]:
+    """The shape, without its material, of these triangles with the vertices that they use: a mesh of their own."""
+    used, corners = np.unique(mesh.faces[which], return_inverse=True)
     normals, uvs, colors = (None if rows is None else rows[used] for rows in (mesh.normals, mesh.uvs, mesh.colors))
     if normals is not None and not normals.any():
         normals = None
     if colors is not None:
         colors = np.clip(colors, 0, 1)
     triangles = corners.reshape(-1, 3).astype(np.int32)
-    return files.keep(ply(mesh.vertices[used], triangles, normals, [uvs], colors), pointer, len(used), len(triangles))
+    groups = None if mesh.groups is None or normals is not None else mesh.groups[which]
+    is_flat = groups is not None and not groups.any()
+    if groups is not None and groups.min() == groups.max():
+        groups = None
+    data = ply(mesh.vertices[used], triangles, normals, [uvs], colors, groups=groups)
+    shape = {"type": "mesh", "asset": files.keep(data, pointer, len(used), len(triangles))}
+    return shape | ({"smooth": False} if is_flat else {})

@@ -56,33 +56,47 @@ class MaterialMesh:
 
 def read_obj(data: bytes | memoryview) -> RawMesh:
     """The mesh of an OBJ file. Its vertices are the file's, or one for each distinct set of a corner's indices."""
-    return _joined(_found(data, with_names=False))
+    return _joined(_found(data))
 
 
 def read_obj_with_materials(data: bytes | memoryview) -> MaterialMesh:
     """The mesh of `read_obj`, with the material of each triangle."""
-    found = _found(data, with_names=True)
+    found = _found(data)
     counts = np.concatenate(found.counts)
-    numbers = {"": 0}
+    names, of_face = _in_force([one for one in found.named if one.keyword == "usemtl"], len(counts))
     libraries: dict[str, Named] = {}
-    starts, worn = [0], [0]
     for one in found.named:
-        if one.keyword == "usemtl":
-            starts.append(one.faces)
-            worn.append(numbers.setdefault(one.name, len(numbers)))
-        else:
+        if one.keyword == "mtllib":
             libraries.setdefault(one.name, one)
-    # The last of several statements before the same face counts.
-    use = np.searchsorted(np.array(starts), np.arange(len(counts)), "right") - 1
-    of_face = np.array(worn, np.int32)[use]
-    return MaterialMesh(_joined(found), list(numbers), np.repeat(of_face, counts - 2), list(libraries.values()))
+    return MaterialMesh(_joined(found), names, np.repeat(of_face, counts - 2), list(libraries.values()))
 
 
-def _found(data: bytes | memoryview, with_names: bool) -> Found:
+def _in_force(statements: list[Named], faces: int) -> tuple[list[str], Ints]:
+    """The distinct names of these statements, the first being "", and the number of the one that is in force at each
+    of so many faces: the last before it."""
+    numbers = {"": 0}
+    chosen = [0, *(numbers.setdefault(one.name, len(numbers)) for one in statements)]
+    starts = np.array([0, *(one.faces for one in statements)])
+    use = np.searchsorted(starts, np.arange(faces), "right") - 1
+    return list(numbers), np.array(chosen, np.int32)[use]
+
+
+def _groups(found: Found, counts: Longs) -> Ints | None:
+    """The smoothing group of each triangle, from 1 on, 0 where smoothing is off; None where all share one group."""
+    said = [one for one in found.named if one.keyword == "s"]
+    off = {"off", "0", ""}
+    _, of_face = _in_force(
+        [replace(one, name="" if one.name.lower() in off else one.name) for one in said], len(counts)
+    )
+    if of_face.min() == of_face.max() > 0:
+        return None
+    return np.repeat(of_face, counts - 2)
+
+
+def _found(data: bytes | memoryview) -> Found:
     found, faces = Found(), 0
     for block in blocks(data):
-        if with_names:
-            found.named += [replace(one, faces=one.faces + faces) for one in block.named]
+        found.named += [replace(one, faces=one.faces + faces) for one in block.named]
         faces += len(block.before)
         rows_before = [found.rows(k) for k in WIDTHS]
         for keyword, width in WIDTHS.items():
@@ -104,7 +118,7 @@ def _found(data: bytes | memoryview, with_names: bool) -> Found:
                     raise block.rows["f"].error(row, f"{one} {index[bad]} does not exist; there are {have} {many}")
                 found.corners[keyword].append(index.astype(np.int32))
         if len(found.named) > MOST_NAMED:
-            raise ParseError(f"it has more than {MOST_NAMED} `usemtl` and `mtllib` statements")
+            raise ParseError(f"it has more than {MOST_NAMED} `usemtl`, `mtllib` and `s` statements")
     if not found.counts:
         raise ParseError("it has no faces")
     return found
@@ -158,7 +172,10 @@ def _joined(found: Found) -> RawMesh:
         rows = {k: table[places[k][first]] for k, table in rows.items()}
         corner = joined
     faces = corner.reshape(-1, 3) if triangles is None else corner[triangles]
-    return RawMesh(rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings)
+    groups = None if "vn" in rows else _groups(found, counts)
+    return RawMesh(
+        rows["v"], faces, rows.get("vn"), rows.get("vt"), None, rows.get("colors"), warnings, groups=groups
+    )
 
 
 def _distinct(corner: Ints, have: int, others: list[tuple[Ints, int]]) -> tuple[Longs, Ints]:

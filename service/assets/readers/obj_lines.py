@@ -21,7 +21,7 @@ from service.assets.readers.polygons import Longs
 Letters = npt.NDArray[np.uint8]
 
 BLOCK = 1 << 19  # bytes; what is made of a block is some forty times as large
-NAMING = (b"usemtl", b"mtllib")
+NAMING = (b"usemtl", b"mtllib", b"s")
 NEWLINE, BLANK = 10, 32  # the latter and all below separate words
 NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
 CORNERS = rb"\s*(?:[-+]?\d+(?:/(?:[-+]?\d+)?)*(?:\s+|$))+"
@@ -61,7 +61,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Named:
-    """A `usemtl` or `mtllib` with what follows it; `faces` is how many faces of its block precede it."""
+    """A `usemtl`, `mtllib` or `s` with what follows it; `faces` is how many faces of its block precede it."""
 
     keyword: str
     name: str
@@ -120,19 +120,20 @@ def _plain(text: bytes) -> bytes:
         text = text.replace(b"\\\n", b" ")
     if b"#" in text:
         text = re.sub(rb"#[^\n]*+", b"", text)
-    if re.search(rb"(?:\A|\n)[\x00-\x09\x0b-\x20]++[vfum]", text):
+    if re.search(rb"(?:\A|\n)[\x00-\x09\x0b-\x20]++[vfums]", text):
         text = re.sub(rb"(?m)^[\x00-\x09\x0b-\x20]++", b"", text)
     return text if text.endswith(b"\n") else text + b"\n"
 
 
 def _classified(text: bytes) -> tuple[Longs, dict[str, npt.NDArray[np.bool_]], npt.NDArray[np.bool_]]:
-    """Where lines start, which are of each keyword, and which may be a usemtl or mtllib."""
+    """Where lines start, which are of each keyword, and which may be a usemtl, mtllib or s."""
     letters = np.frombuffer(text + b"\n\n\n", np.uint8)
     ends = np.flatnonzero(letters[: len(text)] == NEWLINE)
     starts = np.concatenate([[0], ends[:-1] + 1])
     first, second, third = (letters[starts + k] for k in range(3))
     v = first == ord("v")
-    others = ((first == ord("u")) & (second == ord("s"))) | ((first == ord("m")) & (second == ord("t")))
+    naming = ((first == ord("u")) & (second == ord("s"))) | ((first == ord("m")) & (second == ord("t")))
+    others = naming | ((first == ord("s")) & (second <= BLANK))
     keywords = {
         "v": v & (second <= BLANK),
         "vt": v & (second == ord("t")) & (third <= BLANK),
@@ -143,7 +144,7 @@ def _classified(text: bytes) -> tuple[Longs, dict[str, npt.NDArray[np.bool_]], n
 
 
 def _named(text: bytes, starts: Longs, numbers: Longs, rows: Longs, faces: npt.NDArray[np.bool_]) -> Iterator[Named]:
-    """The statements of `rows` that name a material or a library."""
+    """The statements of `rows` that name a material, a library or a smoothing group."""
     before = np.cumsum(faces) if len(rows) else faces
     for row in rows:
         start = int(starts[row])

@@ -25,13 +25,16 @@ TYPES = {
 HEADER_BYTES = 1 << 20
 CODES = {"i1": "b", "u1": "B", "i2": "h", "u2": "H", "i4": "i", "u4": "I", "f4": "f", "f8": "d"}
 FACE_LISTS = ("vertex_indices", "vertex_index")
-# As Blender, pbrt, MeshLab and others write them; the second set, tangents and the alpha are our own: what others
-# call alpha is seldom meant.
+STRIPS = "tristrips"  # an element whose lists are strips of triangles, as Stanford's scans have them
+RESTART = -1  # between two strips of one list
+# As Blender, pbrt, MeshLab and others write them; the second set, tangents, the alpha and a face's smoothing group
+# are our own: what others call alpha is seldom meant.
 UVS = (("s", "t"), ("u", "v"), ("texture_u", "texture_v"))
 UVS_1 = (("s1", "t1"),)
 TANGENTS = (("tx", "ty", "tz", "tw"),)
 ALPHA = "vertex_alpha"
-COLORS = (("red", "green", "blue"), ("r", "g", "b"))
+GROUP = "smoothing_group"
+COLORS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 
 
 Columns = dict[str, npt.NDArray[Any]]
@@ -77,12 +80,17 @@ def read_ply(data: memoryview) -> RawMesh:
     declared: dict[str, str] = {}
     counts = np.empty(0, np.int64)
     corners: Corners = np.empty(0, np.int64)
+    groups: Corners | None = None
     for element in elements:
-        if element.name == "face" and element.lists():
-            wanted = next((p for p in element.lists() if p.name in FACE_LISTS), None)
-            if wanted is None:
-                raise ParseError("its faces have no list called vertex_indices")
-            counts, corners = body.lists(element, wanted)
+        if element.name in ("face", STRIPS) and element.lists():
+            more, indices, beside = body.lists(element, _indices(element), GROUP)
+            if element.name == STRIPS:
+                indices, beside = _strips(more, indices), None
+                more = np.full(len(indices) // 3, 3)
+            elif beside is not None:
+                groups = np.repeat(beside, np.maximum(more - 2, 0))
+            counts = np.concatenate([counts, more]) if len(counts) else more
+            corners = np.concatenate([corners, indices]) if len(corners) else indices
         elif element.lists():
             body.lists(element, element.lists()[0])
         else:
@@ -109,7 +117,30 @@ def read_ply(data: memoryview) -> RawMesh:
         _named(vertex, UVS_1),
         _colors(vertex, declared),
         tangents=_named(vertex, TANGENTS),
+        groups=groups if groups is not None and len(groups) == (counts - 2).sum() else None,
     )
+
+
+def _indices(element: Element) -> Property:
+    """The list of vertices of a face; where none has a usual name, the only list."""
+    lists = element.lists()
+    named = next((p for p in lists if p.name in FACE_LISTS), lists[0] if len(lists) == 1 else None)
+    if named is None:
+        raise ParseError(f"element {element.name} has several lists, and none is called vertex_indices")
+    return named
+
+
+def _strips(counts: Longs, values: Corners) -> Corners:
+    """The corners of the triangles of strips, every other one turned; a list may hold several, with RESTART between
+    them."""
+    apart = np.insert(values, np.cumsum(counts), RESTART)
+    starts = np.maximum.accumulate(np.where(apart == RESTART, np.arange(1, len(apart) + 1), 0))
+    at = np.arange(max(len(apart) - 2, 0))
+    a, b, c = apart[at], apart[at + 1], apart[at + 2]
+    # Strips turn round corners by repeating a vertex, which makes triangles without area.
+    real = (a != RESTART) & (b != RESTART) & (c != RESTART) & (a != b) & (b != c) & (c != a)
+    turned = (at - starts[at]) % 2 == 1
+    return np.stack([np.where(turned, b, a), np.where(turned, a, b), c], axis=1)[real].reshape(-1)
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> Doubles:
@@ -122,13 +153,14 @@ def _named(columns: Columns, choices: tuple[tuple[str, ...], ...]) -> Floats | N
 
 
 def _colors(columns: Columns, declared: dict[str, str]) -> Floats | None:
-    """Linear: whole numbers are sRGB, as in an image of 8 bits; floats are taken as they are."""
+    """Linear: whole numbers are sRGB, as in an image of 8 bits, whatever their type; floats are taken as they are."""
     names = next((names for names in COLORS if columns.keys() >= set(names)), None)
     if names is None:
         return None
     found = _stack(columns, names)
     kind = declared[names[0]]
-    colors = found.astype(np.float32) if kind[0] == "f" else linear(found / np.iinfo(kind).max)
+    most = 255 if kind[0] == "f" or found.max(initial=0) <= 255 else np.iinfo(kind).max
+    colors = found.astype(np.float32) if kind[0] == "f" else linear(found / most)
     return np.column_stack([colors, columns[ALPHA].astype(np.float32)]) if ALPHA in columns else colors
 
 
@@ -138,7 +170,7 @@ def _header(view: memoryview) -> tuple[list[Element], str, int]:
     if not data.startswith((b"ply\n", b"ply\r")):
         raise ParseError("not a PLY file: it does not begin with `ply`")
     end = data.find(b"end_header")
-    newline = data.find(b"\n", end)
+    newline = data.find(b"\n" if b"\n" in data[:end] else b"\r", end)
     if end < 0 or newline < 0:
         raise ParseError("the header is cut off: no `end_header`")
     elements: list[Element] = []
@@ -187,25 +219,34 @@ class Body:
         self.at += rows.nbytes
         return rows
 
-    def lists(self, element: Element, wanted: Property) -> tuple[Longs, Corners]:
-        """The lengths of the wanted list, and all its values, one row after the other."""
+    def lists(self, element: Element, wanted: Property, beside: str = "") -> tuple[Longs, Corners, Corners | None]:
+        """The lengths of the wanted list, all its values, one row after the other, and the whole number `beside` it
+        in each row, where there is one."""
         if not element.length:
-            return np.empty(0, np.int64), np.empty(0, np.int64)
+            return np.empty(0, np.int64), np.empty(0, np.int64), None
+        other = next((p for p in element.properties if p.name == beside and p.count is None), None)
         start = self.at
-        lengths = self._walk(element, wanted, 1)[1]
+        lengths = self._walk(element, wanted, None, 1)[1]
         self.at = start
         if element.length * element.row(lengths).itemsize <= len(self.data) - start:
             rows = self.rows(element, lengths)
             if all((rows[_count_of(p)] == lengths[p.name]).all() for p in element.lists()):
                 values = rows[wanted.name]
-                return np.full(len(rows), values.shape[1]), _whole(values).reshape(-1)
+                return (
+                    np.full(len(rows), values.shape[1]),
+                    _whole(values).reshape(-1),
+                    None if other is None else _whole(rows[other.name]),
+                )
             self.at = start
-        counts, lengths, values = self._walk(element, wanted, element.length)
-        return np.array(counts), values
+        counts, lengths, values, numbers = self._walk(element, wanted, other, element.length)
+        return np.array(counts), values, numbers
 
-    def _walk(self, element: Element, wanted: Property, rows: int) -> tuple[list[int], dict[str, int], Corners]:
-        """Row by row, for lists that differ: the wanted list's lengths, all lengths of the last row, the values."""
-        counts, pieces, lengths = [], [], {}
+    def _walk(
+        self, element: Element, wanted: Property, other: Property | None, rows: int
+    ) -> tuple[list[int], dict[str, int], Corners, Corners | None]:
+        """Row by row, for lists that differ: the wanted list's lengths, all lengths of the last row, the values, and
+        the numbers of the other property."""
+        counts, pieces, lengths, others = [], [], {}, []
         counters = [p.count and Struct(p.count[0] + CODES[p.count[1:]]) for p in element.properties]
         sizes = [int(p.dtype[-1]) for p in element.properties]
         for _ in range(rows):
@@ -220,8 +261,11 @@ class Body:
                 if p is wanted:
                     counts.append(n)
                     pieces.append(self.data[self.at : self.at + n * size])
+                elif p is other:
+                    others.append(self.data[self.at : self.at + size])
                 self.at += n * size
-        return counts, lengths, _whole(np.frombuffer(b"".join(pieces), wanted.dtype))
+        numbers = None if other is None else _whole(np.frombuffer(b"".join(others), other.dtype))
+        return counts, lengths, _whole(np.frombuffer(b"".join(pieces), wanted.dtype)), numbers
 
     def _length(self, written: float, element: Element) -> int:
         if not written >= 0 or written != written // 1:

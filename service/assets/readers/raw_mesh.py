@@ -24,6 +24,7 @@ class RawMesh:
     colors: Numbers | None = None  # (n, 3 or 4), linear
     warnings: list[str] = field(default_factory=list)
     tangents: Numbers | None = None  # (n, 4), as glTF's TANGENT; zero: none
+    groups: npt.NDArray[np.integer] | None = None  # (m,) smoothing groups, 0 for facets; None: one for all
 
 
 def check_raw_mesh(parts: RawMesh, max_triangles: int) -> None:

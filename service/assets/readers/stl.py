@@ -35,4 +35,7 @@ def read_stl(view: memoryview, limits: AssetLimits) -> RawMesh:
     vertices = np.concatenate([solid["vertices"] for solid in solids] or [np.empty((0, 3))])
     if len(vertices) != 3 * promised:
         raise ParseError(f"{promised} facets were begun, {len(vertices) / 3:g} triangles can be read")
-    return RawMesh(vertices, np.arange(len(vertices)).reshape(-1, 3))
+    faces = np.arange(len(vertices)).reshape(-1, 3)
+    return RawMesh(
+        vertices, faces, groups=np.zeros(len(faces), np.int32)
+    )  # a normal for each facet, none for vertices

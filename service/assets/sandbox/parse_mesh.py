@@ -21,12 +21,13 @@ def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     parts.vertices, parts.faces = vertices, faces
     normals = None if parts.normals is None else unit_normals(vertices, faces, parts.normals)
     parts.normals = None
+    groups = None if parts.groups is None or normals is not None else np.ascontiguousarray(parts.groups, np.int32)
     uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
     tangents = _floats(parts.tangents)
     parts.uvs = parts.uvs_1 = parts.tangents = None
     parts.warnings += mesh_warnings(vertices, faces)
     colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
-    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents)
+    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents, groups)
 
 
 def _floats(rows: Numbers | None) -> Floats | None:

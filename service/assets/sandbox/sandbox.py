@@ -185,7 +185,7 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
     get = arrays.get
     return MeshData(
         arrays["vertices"], arrays["faces"], get("normals"), get("uvs"), get("uvs_1"), get("colors"),
-        tuple(map(str, reply["warnings"])), get("tangents"),
+        tuple(map(str, reply["warnings"])), get("tangents"), get("groups"),
     )  # fmt: skip
 
 

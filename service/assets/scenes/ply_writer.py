@@ -5,8 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
+import numpy.typing as npt
 
-from service.assets.readers.ply import ALPHA
+from service.assets.readers.ply import ALPHA, GROUP
 from service.assets.readers.raw_mesh import Numbers
 from service.assets.types import Indices
 
@@ -18,10 +19,12 @@ def ply(
     uvs: Sequence[Numbers | None] = (),
     colors: Numbers | None = None,
     tangents: Numbers | None = None,
+    groups: npt.NDArray[np.integer] | None = None,
 ) -> bytes:
     """A binary, little-endian file of vertices (n, 3), triangles (m, 3) and attributes of the vertices.
 
-    `uvs` are at most two sets (n, 2), v pointing up; `colors` (n, 3 or 4) linear; `tangents` (n, 4).
+    `uvs` are at most two sets (n, 2), v pointing up; `colors` (n, 3 or 4) linear; `tangents` (n, 4); `groups` (m,)
+    the smoothing group of each triangle.
     """
     columns = {"x": vertices[:, 0], "y": vertices[:, 1], "z": vertices[:, 2]}
     if normals is not None:
@@ -37,11 +40,16 @@ def ply(
     rows = np.empty(len(vertices), [(name, "<f4") for name in columns])
     for name, column in columns.items():
         rows[name] = column
-    triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", 3)])
+    beside = [] if groups is None else [("group", "<i4")]
+    triangles = np.empty(len(faces), [("count", "u1"), ("corners", "<i4", (3,)), *beside])
     triangles["count"], triangles["corners"] = 3, faces
+    if groups is not None:
+        triangles["group"] = groups
     header = (
         f"ply\nformat binary_little_endian 1.0\nelement vertex {len(rows)}\n"
         + "".join(f"property float {name}\n" for name in columns)
-        + f"element face {len(triangles)}\nproperty list uchar int vertex_indices\nend_header\n"
+        + f"element face {len(triangles)}\nproperty list uchar int vertex_indices\n"
+        + ("" if groups is None else f"property int {GROUP}\n")
+        + "end_header\n"
     )
     return b"".join([header.encode(), rows.data, triangles.data])

@@ -11,7 +11,7 @@ import numpy as np
 from gpu import layout
 from service.pack.geometry.parallel import chunks, in_threads
 from service.pack.geometry.tangents import Tangents, codes, tangents
-from service.pack.geometry.vertex_normals import corner_normals, encode
+from service.pack.geometry.vertex_normals import corner_normals, encode, split
 
 # Sine of an angle below which a triangle's area is rounding noise in float32, whatever its size.
 FLAT = 4 * float(np.finfo(np.float32).eps)
@@ -47,17 +47,29 @@ class Chart:
     uvs: np.ndarray | None
     given: np.ndarray | None
 
+    def of(self, which: np.ndarray) -> Chart:
+        """The chart of these vertices."""
+        return Chart(*(None if rows is None else rows[which] for rows in (self.uvs, self.given)))
+
 
 def place(
-    vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, smooth: bool,
+    vertices: np.ndarray, faces: np.ndarray, normals: np.ndarray | None, smooth: bool | np.ndarray,
     matrix: np.ndarray | None, single_sided: bool, used: tuple[int, int],
     uvs: np.ndarray | None = None, uvs_1: np.ndarray | None = None, colors: np.ndarray | None = None,
     chart: Chart | None = None,
 ) -> PlacedMesh:  # fmt: skip
     """The mesh under its transform; a smooth one without normals gets them here, in its own space, and one with a
-    `chart` its tangents."""
+    `chart` its tangents. `smooth` may be the smoothing groups of the faces (m,), of which 0 has facets."""
+    groups = smooth if isinstance(smooth, np.ndarray) and normals is None and np.any(smooth) else None
+    if groups is not None:
+        which, group, faces = split(faces, groups)
+        vertices, uvs, uvs_1, colors = (row if row is None else row[which] for row in (vertices, uvs, uvs_1, colors))
+        chart = None if chart is None else chart.of(which)
+        found, places = corner_normals(vertices, faces, group)
+        normals = np.empty((len(vertices), 3))
+        normals[faces] = found[places]
     normal_faces = faces
-    if not smooth:
+    if not np.any(smooth):
         normals = None
     elif normals is None:
         normals, normal_faces = corner_normals(vertices, faces)

@@ -43,14 +43,16 @@ def decode(codes: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return n / np.linalg.norm(n, axis=1, keepdims=True), below
 
 
-def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def corner_normals(
+    vertices: np.ndarray, faces: np.ndarray, groups: np.ndarray | None = None
+) -> tuple[np.ndarray, np.ndarray]:
     """(normals (k, 3) of the distinct positions, faces (m, 3) counting in them).
 
     A position's normal is the mean of its faces', weighted by their angles there [Thuermer and Wuethrich 1998], so
     that it depends on neither the tessellation nor on vertices that a file repeats along its seams. Zero where the
-    faces cancel.
+    faces cancel. Positions of different `groups` (n,) are distinct.
     """
-    place = same(vertices)
+    place = same(vertices) if groups is None else same(vertices, groups[:, None])
     sums = np.zeros((3, int(place.max(initial=-1)) + 1))
     joined = np.empty((len(faces), 3), np.int32)
 
@@ -74,6 +76,18 @@ def corner_normals(vertices: np.ndarray, faces: np.ndarray) -> tuple[np.ndarray,
     cancelled = length < 1e-9  # where faces are back to back, only rounding is left
     sums /= np.where(cancelled, np.inf, length)
     return np.ascontiguousarray(sums.T), joined  # rows: what takes some of them would copy all of them first
+
+
+def split(faces: np.ndarray, groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Vertices of their own for each smoothing group: (the former vertex of each, its group, faces (m, 3) in them).
+
+    `groups` (m,) are those of the faces; a face of group 0 is a group by itself.
+    """
+    first = int(groups.max()) + 1
+    own = np.where(groups > 0, groups, first + np.arange(len(faces), dtype=np.int64))
+    keys, corners = np.unique(faces.astype(np.int64) * (first + len(faces)) + own[:, None], return_inverse=True)
+    which, group = np.divmod(keys, first + len(faces))
+    return which, group, corners.reshape(-1, 3).astype(np.int32)
 
 
 def add_up(sums: np.ndarray, which: np.ndarray, rows: np.ndarray) -> None:

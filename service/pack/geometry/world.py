@@ -127,8 +127,9 @@ def _matrix(shape: Shape) -> np.ndarray | None:
 
 def _mesh(each: MeshRequest, matrix: np.ndarray | None) -> PlacedMesh:
     data, shape, read = each.data, each.shape, each.read
+    smooth = data.smoothing if shape.smooth is None else shape.smooth
     return meshes.place(
-        data.vertices, data.faces, data.normals, shape.smooth, matrix, not shape.double_sided, each.used,
+        data.vertices, data.faces, data.normals, smooth, matrix, not shape.double_sided, each.used,
         data.uvs if read.uv_sets else None, data.uvs_1 if 1 in read.uv_sets else None,
         None if data.colors is None or (data.colors == 1).all() else data.colors,
         None if read.tangents is None else Chart(data.uvs_1 if read.tangents else data.uvs, data.tangents),

@@ -42,7 +42,8 @@ def test_defaults() -> None:
         "normal_map": None,
     }  # fmt: skip
     mesh = scene({"type": "mesh", "asset": "bunny.obj", "material": "a"}).shapes[0]
-    assert isinstance(mesh, MeshShape) and mesh.smooth and mesh.double_sided and mesh.transform is None
+    assert isinstance(mesh, MeshShape) and mesh.double_sided and mesh.transform is None
+    assert mesh.smooth is None, "the file decides"
 
 
 @pytest.mark.parametrize(
