@@ -10,7 +10,7 @@ import argparse
 import os
 import sys
 from collections.abc import Callable, Sequence
-from importlib import import_module
+from importlib import import_module, metadata
 
 from service.commands import CommandError
 from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
@@ -54,13 +54,14 @@ def main(arguments: Sequence[str] | None = None) -> int:
 
 def parser() -> argparse.ArgumentParser:
     top = argparse.ArgumentParser("sunbox", description="A progressive path tracer: JSON scenes in, pictures out.")
+    top.add_argument("--version", action="version", version=f"sunbox {metadata.version('sunbox')}")
     commands = top.add_subparsers(dest="command", required=True, metavar="COMMAND")
     _serve(commands.add_parser("serve", help="serve the editor and the API"))
     _render(commands.add_parser("render", help="render a scene to a file"))
     _renders(commands.add_parser("renders", help="submit renders to a server, list them, wait for them, fetch them"))
     _bsdf(commands.add_parser("bsdf", help="draw a material's BSDF, or write it as a table"))
     _import(commands.add_parser("import", help="turn a model into a scene's JSON and its assets"))
-    _info(commands.add_parser("info", help="say what would render, and what a scene contains"))
+    _info(commands.add_parser("info", help="say what would render, and what a scene contains and needs"))
     _check_data(commands.add_parser("check-data", help="say whether the data folder is sound"))
     _bench(commands.add_parser("bench", help="measure"))
     return top
@@ -146,6 +147,8 @@ def _any_of(names: Sequence[str]) -> str:
 
 def _info(command: argparse.ArgumentParser) -> None:
     command.add_argument("scene", nargs="?", metavar="SCENE", help="a scene's JSON, or a glTF, OBJ, PLY or STL model")
+    text = "also compile the scene's kernel and one with every feature, and measure both: a minute or more at first"
+    command.add_argument("--measure", action="store_true", help=text)
     _asset_root(command)
 
 

@@ -1,15 +1,16 @@
-"""`sunbox info [SCENE.json]`: what would render here, within which limits, and what a scene asks of it."""
+"""`sunbox info [SCENE.json] [--measure]`: what a scene contains and needs, and what would render it here."""
 
 from __future__ import annotations
 
 import argparse
+import sys
 from collections import Counter
 from collections.abc import Iterable
 from importlib import metadata
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from service.commands import Failed
+from service.commands import BadInput, Failed
 from service.commands.configuration import configuration
 from service.commands.documents import pack_scene, read_source, source_assets
 
@@ -18,32 +19,37 @@ if TYPE_CHECKING:
     from service.pack import Packed
     from service.scene import Scene
 
+WIDTH = len("most triangles")  # of the names of rows
+
 
 def run(arguments: argparse.Namespace) -> int:
-    rows = [("sunbox", metadata.version("sunbox"))]
+    if arguments.measure and not arguments.scene:
+        raise BadInput("--measure: name the scene whose kernel is to be measured")
     config = configuration()
     packed = None
     if arguments.scene:
         source = read_source(Path(arguments.scene), arguments.asset_root, config)
         with source_assets(source, arguments.asset_root, config) as assets:
             packed = pack_scene(source, assets, config)
-        rows += [("scene", str(source.path)), *contents(source.scene, packed)]
+        _print([("scene", str(source.path)), *contents(source.scene, packed)])
     from gpu import GpuError, Renderer
 
     try:
         with Renderer(config.device) as renderer:
             if packed is not None:
-                rows += kernel(renderer, packed, config.device)
+                _print(kernel(renderer, packed))
+            if packed is not None and arguments.measure:
+                _print(measured(renderer, packed, config.device))
+            rows = [("sunbox", metadata.version("sunbox"))]
             rows += [(name, str(renderer.info[name])) for name in ("renderer", "version", "vendor")]
     except GpuError as error:
         raise Failed(str(error)) from None
-    rows += [("most pixels", f"{config.max_pixels:,}"), ("most triangles", f"{config.max_triangles:,}")]
-    _print(rows)
+    _print([*rows, ("most pixels", f"{config.max_pixels:,}"), ("most triangles", f"{config.max_triangles:,}")])
     return 0
 
 
 def contents(scene: Scene, packed: Packed) -> list[tuple[str, str]]:
-    """What the scene is made of, a row for each kind of thing, and the kernel flags that it raises."""
+    """What the scene is made of, a row for each kind of thing."""
     rows = [
         ("shapes", _counted(shape.type for shape in scene.shapes)),
         ("triangles", _triangles(packed)),
@@ -59,18 +65,27 @@ def _triangles(packed: Packed) -> str:
     return f"{held}, shared by {shown} instances" if shown else str(held)
 
 
-def kernel(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple[str, str]]:
-    """What the scene's kernel is compiled for, what not, and what that saves; measured here and now."""
+def kernel(renderer: Renderer, packed: Packed) -> list[tuple[str, str]]:
+    """The features that the scene's kernel is compiled for; nothing is compiled."""
+    scene = renderer.load(packed.arrays)
+    try:
+        return [("features", " ".join(scene.features) or "none")]
+    finally:
+        scene.release()
+
+
+def measured(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple[str, str]]:
+    """What the scene's kernel saves beside one with every feature; both are compiled, and measured here and now."""
     from gpu import RenderSettings
     from gpu.analysis.kernel_cost import SIZE, full_kernel, kernel_cost
     from service.rendering.worker.helpers.compile_client import CompileClient
 
     settings = RenderSettings(SIZE, SIZE)
+    print("compiling and measuring; the kernel with every feature may take minutes", file=sys.stderr)
     price = kernel_cost(renderer, packed.arrays, settings)
     CompileClient(renderer.info, device, crowded=lambda: False).met(full_kernel(packed.arrays, settings))
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
-        ("features", " ".join(price.raised) or "none"),
         ("not needed", " ".join(price.spared)),
         ("its kernel", f"compiled in {price.compile_ms:.0f} ms, {own} at 8 bounces"),
         ("one with all", f"compiled in {price.full_compile_ms:.0f} ms, {full}: {price.saving:.0%} is saved"),
@@ -82,6 +97,6 @@ def _counted(kinds: Iterable[str]) -> str:
 
 
 def _print(rows: list[tuple[str, Any]]) -> None:
-    width = max(len(name) for name, _ in rows)
+    """Print rows at once, as what follows may take long."""
     for name, value in rows:
-        print(f"{name:{width}}  {value}")
+        print(f"{name:{WIDTH}}  {value}", flush=True)

@@ -9,6 +9,7 @@ import signal
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,7 @@ from gpu import settings as gpu_settings
 from service import images, views
 from service.cli import main
 from service.commands.progress import ProgressLine, describe
+from service.config import load_config
 from service.images import read_metadata
 from service.rendering.ipc.messages import Progress
 from service.rendering.worker.progress import truncated_light
@@ -253,13 +255,31 @@ def test_interrupt_keeps_the_image_so_far(gpu: Any, scene: Path, tmp_path: Path)
     assert json.loads(stats.read_text())["state"] == "cancelled"
 
 
+def test_info_compiles_nothing_unless_told_to_measure(
+    gpu: Any, scene: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    compiled: list[str] = []
+    monkeypatch.setattr("gpu.kernels.cache.KernelCache.get", lambda self, entry, defines: compiled.append(entry))
+    assert main(["info", str(scene)]) == 0
+    said = capsys.readouterr().out
+    assert "1 sphere" in said and " spheres" in said and "renderer" in said
+    assert not compiled and "is saved" not in said
+    assert main(["info", "--measure"]) == 2 and "--measure" in capsys.readouterr().err
+
+
+def test_version_is_printed(capsys: pytest.CaptureFixture[str]) -> None:
+    with pytest.raises(SystemExit) as end:
+        main(["--version"])
+    assert end.value.code == 0 and capsys.readouterr().out == f"sunbox {version('sunbox')}\n"
+
+
 def test_info_names_the_renderer_and_the_scene(gpu: Any, scene: Path, capsys: pytest.CaptureFixture[str]) -> None:
     # With a floor: the kernel with everything, 10 s of compiling, is then the one of tests/gpu/test_flags.py.
     floor = {"type": "quad", "origin": [-4, -1, 4], "u": [8, 0, 0], "v": [0, 0, -8], "material": "a"}
     scene.write_text(json.dumps({**SCENE, "shapes": [*SCENE["shapes"], floor]}))
-    assert main(["info", str(scene)]) == 0
-    said = capsys.readouterr().out
-    assert "1 sphere" in said and " spheres" in said.split("not needed")[0] and "is saved" in said
+    assert main(["info", str(scene), "--measure"]) == 0
+    said = capsys.readouterr()
+    assert "1 sphere" in said.out and "is saved" in said.out and "compiling" in said.err
     assert main(["info"]) == 0
     assert "renderer" in capsys.readouterr().out
 
@@ -274,8 +294,22 @@ def test_configuration_mistake_is_named(
 ) -> None:
     monkeypatch.setenv("SUNBOX_MAX_PIXELS", "many")
     assert "SUNBOX_MAX_PIXELS" in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "out.npy"))
+    monkeypatch.delenv("SUNBOX_MAX_PIXELS")
+    monkeypatch.setenv("SUNBOX_MAX_BODY", "5 parsecs")
+    assert "SUNBOX_MAX_BODY: '5 parsecs' is no size" in refused(
+        capsys, tmp_path, str(scene), "-o", str(tmp_path / "out.npy")
+    )
+    monkeypatch.delenv("SUNBOX_MAX_BODY")
     monkeypatch.setenv("SUNBOX_MAX_PIXELS", "100")
     assert "/width" in refused(capsys, tmp_path, str(scene), "-o", str(tmp_path / "out.npy"))
+
+
+@pytest.mark.parametrize(
+    ("written", "size"), [("512 MiB", 2**29), ("1.5GB", 1_500_000_000), ("2 tib", 2**41), ("1048576", 2**20)]
+)
+def test_sizes_may_have_units(written: str, size: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("SUNBOX_DATA_QUOTA", written)
+    assert load_config().data_quota == size
 
 
 def test_picture_says_what_it_was_made_from(gpu: Any, scene: Path, tmp_path: Path) -> None:
