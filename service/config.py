@@ -8,7 +8,16 @@ import re
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
-from pydantic import Field, ValidationError, ValidationInfo, field_validator, model_validator
+from pydantic import (
+    BeforeValidator,
+    ByteSize,
+    Field,
+    TypeAdapter,
+    ValidationError,
+    ValidationInfo,
+    field_validator,
+    model_validator,
+)
 from pydantic_settings import BaseSettings, NoDecode, SettingsConfigDict
 
 MAX_PIXELS = 16_777_216  # 4096 x 4096: the accumulators of one picture stay below 2 GiB
@@ -24,6 +33,20 @@ NUMBER = re.compile(r"[0-9]{1,6}")
 ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
 
 Words = Annotated[list[str], NoDecode]
+
+
+def _size(value: Any) -> Any:
+    """The bytes that a size with a unit stands for, as "512 MiB" or "10GB"; anything else as it is."""
+    if not isinstance(value, str) or not re.search("[A-Za-z]", value):
+        return value
+    try:
+        return int(_SIZE.validate_python(value))
+    except ValidationError:
+        raise ValueError(f"{value!r} is no size; write bytes, or a number with a unit, as 512 MiB or 10 GB") from None
+
+
+_SIZE = TypeAdapter(ByteSize)
+Bytes = Annotated[int, BeforeValidator(_size)]
 Seconds = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
 
@@ -67,7 +90,7 @@ class Config(BaseSettings):
         default_factory=_default_data_dir,
         description="Folder of assets, documents and renders (default: `sunbox` in `$XDG_CACHE_HOME` or `~/.cache`).",
     )
-    data_quota: int = Field(
+    data_quota: Bytes = Field(
         10 * GIB,
         ge=1,
         description="Most bytes of assets, documents and renders, in whole blocks; assets unused longest make room, "
@@ -97,19 +120,19 @@ class Config(BaseSettings):
         "info", description="The least level that is logged: debug, info, warning or error."
     )
 
-    max_body: int = Field(256 * MIB, ge=1, description="Most bytes of a request's body; it may not be compressed.")
-    max_bodies: int = Field(
+    max_body: Bytes = Field(256 * MIB, ge=1, description="Most bytes of a request's body; it may not be compressed.")
+    max_bodies: Bytes = Field(
         GIB,
         ge=1,
         description="Most bytes of all uploads that are being received and parsed, at least four times "
         "`SUNBOX_MAX_BODY`; one caller has at most half.",
     )
-    max_json: int = Field(
+    max_json: Bytes = Field(
         32 * MIB,
         ge=1,
         description="Most bytes of a JSON body; of all that wait, four times that, and half of it for one caller.",
     )
-    max_json_memory: int = Field(
+    max_json_memory: Bytes = Field(
         512 * MIB,
         ge=1,
         description="Most bytes of memory that JSON bodies take as values: one, and all that are read at a time.",
@@ -122,16 +145,16 @@ class Config(BaseSettings):
     max_key_clients: int | None = Field(
         None, ge=1, description="Most streams at a time of one key (default: no limit)."
     )
-    max_stream_memory: int = Field(
+    max_stream_memory: Bytes = Field(
         512 * MIB, ge=8, description="Most bytes of memory that the streams' scenes take as values; one's, an eighth."
     )
-    memory: int | None = Field(
+    memory: Bytes | None = Field(
         None,
         ge=64 * MIB,
         description="Most bytes of memory that all work takes together, queued, running and kept, beside what idle "
         "processes take (default: half of the machine's, or of the container's limit).",
     )
-    gpu_memory: int | None = Field(
+    gpu_memory: Bytes | None = Field(
         None,
         ge=1,
         description="Most bytes of scenes and pictures on each device; the renderers of `llvmpipe:N` divide them "
@@ -160,11 +183,15 @@ class Config(BaseSettings):
     max_texels: int = Field(
         2**26, ge=1, le=2**27, description="Most texels of an image, and of a scene's textures: four of 4096 x 4096."
     )
-    max_asset: int = Field(GIB, ge=1, description="Most bytes of one asset; over HTTP `SUNBOX_MAX_BODY` counts too.")
+    max_asset: Bytes = Field(
+        GIB, ge=1, description="Most bytes of one asset; over HTTP `SUNBOX_MAX_BODY` counts too."
+    )
     parse_seconds: Seconds = Field(
         20.0, description="Longest that parsing an asset takes, and 0.25 s more for each MiB of it."
     )
-    parse_memory: int = Field(8 * GIB, ge=256 * MIB, description="Most bytes of memory that parsing an asset takes.")
+    parse_memory: Bytes = Field(
+        8 * GIB, ge=256 * MIB, description="Most bytes of memory that parsing an asset takes."
+    )
     max_seconds: Seconds | None = Field(None, description="Longest that a picture is rendered (default: no limit).")
     max_running: int = Field(8, ge=1, description="Most renders at a time; others wait in line.")
     max_queue: int = Field(
@@ -173,18 +200,18 @@ class Config(BaseSettings):
         description="Most renders that wait in line; a key with less than its share may add more.",
     )
     max_jobs: int = Field(2_000, ge=1, description="Most renders, running and waiting, of one key.")
-    max_key_assets: int | None = Field(
+    max_key_assets: Bytes | None = Field(
         None,
         ge=1,
         description="Most bytes of the assets that one key has uploaded, of which those unused longest make room "
         "(default: no limit).",
     )
-    max_key_documents: int | None = Field(
+    max_key_documents: Bytes | None = Field(
         None, ge=1, description="Most bytes of the documents that one key has saved (default: no limit)."
     )
     keep_renders: int = Field(2_000, ge=1, description="Most ended renders that are kept for each key.")
-    keep_bytes: int = Field(4 * GIB, ge=1, description="Most bytes on the disk of the ended renders of all keys.")
-    keep_packed: int = Field(
+    keep_bytes: Bytes = Field(4 * GIB, ge=1, description="Most bytes on the disk of the ended renders of all keys.")
+    keep_packed: Bytes = Field(
         GIB, ge=1, description="Most bytes of packed scenes that are kept for the next edits of all streams."
     )
     keep_seconds: Seconds = Field(
