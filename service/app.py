@@ -38,7 +38,7 @@ from service.memory import MemoryBudget
 from service.problems import Unavailable
 from service.rendering.cluster.joining import CannotJoin
 from service.rendering.cluster.pool import cluster_pool
-from service.rendering.first_frame import warm_up
+from service.rendering.first_frame import foresee, warm_up
 from service.rendering.jobs.queue import QueueLimits, RenderQueue
 from service.rendering.jobs.retention import Retention
 from service.rendering.jobs.store.store import RenderStore
@@ -147,8 +147,8 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
     own.documents.prepare()
     own.quota.clear()
     own.shares.clear()
-    address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
-    server = _Server(server_settings(app, config, most), own, address)
+    own.address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+    server = _Server(server_settings(app, config, most), own)
     server.run([listener])
     return 1 if server.refused else 0
 
@@ -189,10 +189,9 @@ def _take_descriptors() -> int:
 class _Server(uvicorn.Server):
     """Prints its address once it answers; at its end it closes clients as going away, with exit code 0."""
 
-    def __init__(self, config: uvicorn.Config, state: AppState, address: str) -> None:
+    def __init__(self, config: uvicorn.Config, state: AppState) -> None:
         super().__init__(config)
         self._state = state
-        self._address = address
         self._watch = Watch()
         self._told_at: float | None = None
         self.refused = False
@@ -209,9 +208,8 @@ class _Server(uvicorn.Server):
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
-        log.info("started address=%s version=%s", self._address, metadata.version("sunbox"))
-        sys.stdout.write(f"Sunbox is at {self._address}\n")
-        sys.stdout.flush()
+        log.info("started address=%s version=%s", self._state.address, metadata.version("sunbox"))
+        _announce(self._state.address)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
         log.info("shutting down connections=%d", len(self.server_state.connections))
@@ -246,9 +244,7 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own.assets.warm()
     asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
     await own.resume_renders()
-    first = presets.get("scenes", presets.DEFAULT_SCENE)
-    others = (presets.get("scenes", entry["name"]) for entry in presets.names("scenes"))
-    warming = asyncio.create_task(warm_up(own.renderers, own.reader, first, others))
+    warming = asyncio.create_task(_warm(app))
     yield
     warming.cancel()
     asking.cancel()
@@ -258,6 +254,22 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own.bodies.close()
     if own.renders.store is not None:
         await own.renders.store.close()
+
+
+async def _warm(app: FastAPI) -> None:
+    """Render a first frame, repeat the address below what was logged meanwhile, and prepare for changes of scene."""
+    own: AppState = app.state.sunbox
+    if not await warm_up(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)):
+        return
+    _announce(own.address)
+    scenes = (presets.get("scenes", each["name"]) for each in presets.names("scenes"))
+    await foresee(own.renderers, own.reader, scenes)
+
+
+def _announce(address: str) -> None:
+    if address:
+        sys.stdout.write(f"Ctrl-C stops the server. Sunbox is at {address}\n")
+        sys.stdout.flush()
 
 
 def _limits(config: Config) -> QueueLimits:

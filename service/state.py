@@ -57,6 +57,7 @@ class AppState:
     shares: AssetShares
     renders: RenderQueue = field(default_factory=RenderQueue)
     traffic: Traffic = field(default_factory=Traffic)
+    address: str = ""  # of the server; "" where there is none, as under a test's client
     sessions: Sessions = field(init=False)
     downloads: Downloads = field(init=False)
     memory: MemoryBudget = field(init=False)

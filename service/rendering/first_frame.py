@@ -43,12 +43,11 @@ async def first_frame(
         listener.frame.cancel()
 
 
-async def warm_up(renderers: Renderers, reader: RequestReader, document: Any, others: Iterable[Any] = ()) -> None:
-    """Do what the first client would have to wait for: import modules, compile kernels and the builder's code.
+async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) -> bool:
+    """Do what the first client would have to wait for: import modules, compile kernels; whether that succeeded.
 
-    `document` is the scene that a client is likely to begin with; kernels of the `others`, to which it may change,
-    are compiled afterwards, without hurry. An error is logged and not raised: a client that comes later meets it as
-    well.
+    `document` is the scene that a client is likely to begin with. An error is logged and not raised: a client that
+    comes later meets it as well.
     """
     began = time.monotonic()
     try:
@@ -61,25 +60,27 @@ async def warm_up(renderers: Renderers, reader: RequestReader, document: Any, ot
                 raise error
     except ServiceError as error:
         log.warning("did not warm up error=%s", error)
-        return
+        return False
     log.info("warmed up seconds=%.2f", time.monotonic() - began)
+    return True
+
+
+async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterable[Any]) -> None:
+    """Compile the builders' code, and without hurry the kernels of scenes to which a client may change.
+
+    An error is logged and not raised.
+    """
     await packing(warm_builder)
     await packing(warm_light_tree)
-    log.info("loaded the builders seconds=%.2f", time.monotonic() - began)
-    try:
-        await _foresee(renderers, reader, others, settings.for_gpu())
-    except ServiceError as error:
-        log.warning("did not foresee scenes error=%s", error)
-
-
-async def _foresee(
-    renderers: Renderers, reader: RequestReader, documents: Iterable[Any], settings: dict[str, Any]
-) -> None:
+    log.debug("loaded the builders")
     task = renderers.open(_Listener(), "server")
     try:
+        settings = (await packing(partial(reader.settings, WARM_UP_SETTINGS))).for_gpu()
         for document in documents:
             packed = await packing(partial(_packed, reader, document))
             renderers.send(Foresee(task, packed.arrays, settings))
+    except ServiceError as error:
+        log.warning("did not foresee scenes error=%s", error)
     finally:
         renderers.drop(task)
 

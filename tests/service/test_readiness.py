@@ -15,7 +15,7 @@ from service.assets import Assets
 from service.config import Config
 from service.problems import Unavailable
 from service.readiness import Readiness
-from service.rendering.first_frame import warm_up
+from service.rendering.first_frame import foresee, warm_up
 from service.rendering.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, Update, Want
 from service.rendering.renderers import Listener
 from service.rendering.requests.request_reader import RequestReader
@@ -124,7 +124,12 @@ def test_warming_up_leaves_no_task_and_raises_nothing(
 ) -> None:
     caplog.set_level(logging.INFO, logger=warm_up.__module__)
     renderers = StandIn(answer)
-    asyncio.run(warm_up(renderers, READER, readiness.SCENE, [readiness.SCENE] * 2))
+    assert asyncio.run(warm_up(renderers, READER, readiness.SCENE)) == (logged == "warmed up")
     assert renderers.frames == len(renderers.members) and not renderers.open_tasks
-    assert renderers.foreseen == (2 if logged == "warmed up" else 0)
     assert [record.message for record in caplog.records if record.message.startswith(logged)]
+
+
+def test_scenes_that_may_follow_are_foreseen() -> None:
+    renderers = StandIn(grey(0.5, 64))
+    asyncio.run(foresee(renderers, READER, [readiness.SCENE] * 2))
+    assert renderers.foreseen == 2 and not renderers.open_tasks

@@ -13,7 +13,7 @@ from service.rendering.cluster.control import Join, Joined
 from service.rendering.cluster.renderers import plan, room
 
 ANSWER_S = 5.0  # for the head to accept a connection; Ray itself waits for two minutes
-INSTALL = "SUNBOX_RAY is set, and Ray is not installed here: pip install 'sunbox[ray]'"
+INSTALL = "SUNBOX_RAY is set, and Ray is not installed here (extra sunbox[ray]): pip install 'ray>=2.60,<2.61'"
 
 
 log = logging.getLogger(__name__)

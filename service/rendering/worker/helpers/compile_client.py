@@ -180,9 +180,9 @@ class CompileClient:
             if not answer.cached:
                 log.warning("compiled ahead in vain: the driver has no disk cache to write to")
             if answer.detail:
-                log.info("could not compile ahead error=%s ms=%.0f", answer.detail, answer.milliseconds)
+                log.debug("could not compile ahead error=%s ms=%.0f", answer.detail, answer.milliseconds)
             else:
-                log.info("compiled ahead ms=%.0f", answer.milliseconds)
+                log.debug("compiled ahead ms=%.0f", answer.milliseconds)
             if answer.cached and not answer.detail:
                 self._record(self._orders[0].key)
             self._tell(answer.milliseconds)
