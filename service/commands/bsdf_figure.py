@@ -45,7 +45,7 @@ def draw(materials: Mapping[str, Curves], format: str) -> bytes:
     else:
         _plain(sheet.add_subplot(), kind, materials)
     out = io.BytesIO()
-    with matplotlib.rc_context({"svg.hashsalt": "sunbox", "svg.fonttype": "path"}):
+    with matplotlib.rc_context({"svg.hashsalt": "sunbox", "svg.fonttype": "none"}):
         sheet.savefig(out, format=format, dpi=150, metadata={"Date": None} if format == "svg" else None)
     return out.getvalue()
 

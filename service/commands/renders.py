@@ -20,7 +20,7 @@ from service.views import LOSSLESS_FORMATS
 AGAIN_S = 2.0  # between two attempts to hear of a render whose server was restarted
 PATIENCE_S = 60.0  # for a server that is away
 PAGE = 200
-COLUMNS = "{:<22}  {:<9}  {:>8}  {:>7}  {:>4}  {}"
+COLUMNS = "{:<32}  {:<9}  {:>8}  {:>7}  {:>4}  {}"
 
 
 def run(arguments: argparse.Namespace) -> int:

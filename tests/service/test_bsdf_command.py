@@ -8,6 +8,7 @@ import json
 import math
 from pathlib import Path
 from typing import Any
+from xml.etree import ElementTree
 
 import numpy as np
 import pytest
@@ -71,7 +72,8 @@ def test_polar_by_lobe(write: Any, tmp_path: Path) -> None:
     assert "gold:f_45_diffuse_g" not in both, "a metal has none"
     out = tmp_path / "lobes.svg"
     assert main(["bsdf", plastic, "--with", write("glass", FROSTED), "--lobes", "-o", str(out)]) == 0
-    assert b"</svg>" in out.read_bytes()
+    texts = [text.text for text in ElementTree.parse(out).iter("{http://www.w3.org/2000/svg}text")]
+    assert any("glass" in (text or "") for text in texts), "text is text: it can be read, searched and styled"
 
 
 def test_transmitted_light_is_below(write: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
