@@ -193,7 +193,12 @@ class Config(BaseSettings):
         8 * GIB, ge=256 * MIB, description="Most bytes of memory that parsing an asset takes."
     )
     max_seconds: Seconds | None = Field(None, description="Longest that a picture is rendered (default: no limit).")
-    max_running: int = Field(8, ge=1, description="Most renders at a time; others wait in line.")
+    max_running: int = Field(
+        8,
+        ge=1,
+        description="Most renders at a time; others wait in line, and have [their turn](docs/operation.md#fairness) "
+        "also where these are endless.",
+    )
     max_queue: int = Field(
         10_000,
         ge=1,
