@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from typing import TYPE_CHECKING
@@ -66,6 +67,13 @@ class Ending:
             picture, self._saved_bands = sent_picture(saved, self._driver, self._saved_bands), ()
             self._send(Checkpoint(self._number, self._tracker.generation, progress, picture))
         return True
+
+    @property
+    def border(self) -> float:
+        """The number of samples at which the picture is to be saved, and not traced further before; inf: at any."""
+        if not self.kept or self._tracker.reason is not None:
+            return math.inf
+        return self.checkpoints.border(self._residency.full, self._tracker.clock.elapsed_s)
 
     def end_if_reached(self) -> bool:
         """End where the first limit is reached; whether it is."""

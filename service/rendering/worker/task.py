@@ -190,7 +190,8 @@ class Task:
         if picture.sharing:
             self.home.trace(budget_s)
         else:
-            residency.insist(lambda: picture.trace(budget_s, cap, sharers))  # the second block takes memory
+            most = int(min(cap, self._ending.border)) if scale == 1.0 else cap
+            residency.insist(lambda: picture.trace(budget_s, most, sharers))  # the second block takes memory
         tracker.clock.lap()
         if picture.samples != before:
             pixels = picture.settings.width * picture.settings.height

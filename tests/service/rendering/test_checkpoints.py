@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+import math
 import os
 import signal
 from collections.abc import Generator
@@ -251,7 +252,7 @@ def test_it_costs_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
         return now - began + stored_s
 
     monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
-    picture: Any = SimpleNamespace(samples=0, under_way=(1, 0, 8), state_sizes=[], save=slow)
+    picture: Any = SimpleNamespace(samples=0, under_way=(1, 0, 8), state_sizes=[], save=slow, at_border=False)
     kept = checkpoints.Checkpointer(1.0)
     assert pause_s(kept, 1.0) == 1.0
     saved(kept)
@@ -279,6 +280,46 @@ def test_it_costs_a_hundredth_of_the_time_until_too_much_could_be_lost(monkeypat
     assert not kept.due(picture, 10_000.0)  # nothing was traced
     picture.samples = 1
     assert kept.due(picture, 10_000.0)
+
+
+def test_a_picture_at_a_border_has_half_the_bytes(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """So one that reaches one when it is nearly due stops there, and is saved."""
+    now = 0.0
+    monkeypatch.setattr(checkpoints.time, "monotonic", lambda: now)
+    scene = gpu.load(arrays_of("plain"))
+    picture = gpu.picture(scene, RenderSettings(16, 16))
+    kept = checkpoints.Checkpointer(4.0)
+    picture.trace(60.0, 20)
+    now = 2.9
+    assert kept.border(picture, 10.0) == math.inf
+    now = 3.1
+    large = sum(picture.state_sizes)
+    assert kept.border(picture, 10.0) == 64 and not kept.due(picture, 10.0)
+    picture.trace(60.0, 64)
+    small = sum(picture.state_sizes)
+    assert kept.due(picture, 10.0) and large - small > 47 * 16 * 16  # bytes of the block's pixels
+    picture.trace(60.0, 65)
+    assert kept.border(picture, 10.0) == 128 and not kept.due(picture, 10.0)
+    now = 4.1
+    assert kept.due(picture, 10.0)  # wherever it is
+    picture.release()
+    scene.release()
+
+
+def test_checkpoints_wait_for_a_border(gpu: Renderer) -> None:
+    """Where one is near: a block of a picture of 32 x 32 takes some milliseconds."""
+
+    async def test(supervisor: Supervisor) -> None:
+        ears = Ears()
+        task = supervisor.open(ears, "render")
+        update = Update(task, 1, arrays_of("plain"), settings(32, seed=4), StopRule(ENDLESS))
+        await supervisor.send_scene(update)
+        saved = [(await ears.next(Checkpoint)).saved for _ in range(4)]
+        sizes = [sum(buffer.nbytes for buffer in each.buffers) for each in saved]
+        at_border = [each.samples % 64 == 0 and not each.under_way[0] for each in saved]
+        assert at_border.count(True) >= 2, (sizes, at_border)
+
+    with_supervisor(test, checkpoint_s=0.4)
 
 
 def test_the_renderer_hears_how_long_the_disk_took(gpu: Renderer, tmp_path: Path) -> None:

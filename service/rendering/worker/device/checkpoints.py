@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import Steps
+from gpu import Steps, border_after
 from service import shared_memory
 
 if TYPE_CHECKING:
@@ -20,6 +20,7 @@ REST = 100  # times what a checkpoint costs until the next one: they cost 1 % at
 MOST_LOST_S, MOST_LOST = 10.0, 0.01
 MARGIN = 0.9  # of that; the next checkpoint may take longer than the last one did
 SHARE = 0.004  # of the time that a render has taken, at least; of a long one so much may be lost, however small it is
+EARLY = 0.75  # of the pause, after which a picture is saved that is at the border of a block: it has half the bytes
 
 
 class Checkpointer:
@@ -56,12 +57,22 @@ class Checkpointer:
 
     def due(self, picture: Picture, elapsed_s: float) -> bool:
         """Whether the picture under way, which has taken that many seconds, is to be saved as it is now."""
+        begun = picture.samples > 0 or picture.under_way[0] > 0  # the first sample of a large picture takes seconds
+        pause_s = self._pause_s(elapsed_s) * (EARLY if _is_small(picture) else 1.0)
+        return begun and time.monotonic() >= self._ended_at + pause_s
+
+    def border(self, picture: Picture, elapsed_s: float) -> float:
+        """The number of samples at which it will be saved, so that no more are traced before that; inf: at any."""
+        if self.under_way or time.monotonic() < self._ended_at + EARLY * self._pause_s(elapsed_s):
+            return math.inf
+        return border_after(picture.samples)
+
+    def _pause_s(self, elapsed_s: float) -> float:
+        """Seconds between two of them at most."""
         # From when the last one began to be read until the next one is on the disk.
         beside_s = 2 * self._read_s + self._stored_s
         most_s = MARGIN * max(MOST_LOST_S, MOST_LOST * elapsed_s) - beside_s
-        pause_s = max(self._every_s, SHARE * elapsed_s, min(REST * (self._took_s + self._stored_s), most_s))
-        begun = picture.samples > 0 or picture.under_way[0] > 0  # the first sample of a large picture takes seconds
-        return begun and time.monotonic() >= self._ended_at + pause_s
+        return max(self._every_s, SHARE * elapsed_s, min(REST * (self._took_s + self._stored_s), most_s))
 
     def stored(self, took_s: float) -> None:
         """The last one is on the disk, that many seconds after it was read."""
@@ -84,3 +95,9 @@ class Checkpointer:
         self._took_s += self._ended_at - began
         self._read_s = self._ended_at - self._began_at
         return saved
+
+
+def _is_small(picture: Picture) -> bool:
+    """Whether no block of samples is under way, whose sums would be saved beside those of the whole blocks."""
+    ended = picture.samples > 0 and border_after(picture.samples - 1) == picture.samples
+    return ended and picture.at_border and not picture.settings.adaptive
