@@ -34,7 +34,7 @@ extremes: setup
 
 hostile:
 	@.ci/setup test
-	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/service/test_hostile.py
+	HOSTILE_DOCUMENTS=10000 HOSTILE_FILES=1000 HOSTILE_EXAMPLES=100 .venv/bin/pytest -s tests/service/test_hostile.py tests/service/test_one_client.py
 
 image-test: setup
 	SUNBOX_IMAGE=1 .venv/bin/pytest -s -rs tests/test_image.py

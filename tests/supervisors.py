@@ -8,6 +8,7 @@ from typing import Any
 
 from service.rendering.supervisor.process import Options
 from service.rendering.supervisor.supervisor import Supervisor
+from tests.serving import PATIENCE_S
 
 
 def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], **options: Any) -> None:
@@ -15,7 +16,7 @@ def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], **options: An
         supervisor = Supervisor(Options(**options))
         supervisor.start()
         try:
-            await supervisor.ready(30)
+            await supervisor.ready(PATIENCE_S)
             await test(supervisor)
         finally:
             await supervisor.close()

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import asyncio
 import json
-import time
 from collections.abc import AsyncIterator
 from typing import Any
 
@@ -62,11 +61,11 @@ def _answer(request: Request, events: AsyncIterator[bytes]) -> Response:
 
 
 async def _events(job: Job) -> AsyncIterator[bytes]:
-    said = None
+    said, clock = None, asyncio.get_running_loop().time
     while not job.finished.is_set():
         changed = asyncio.ensure_future(job.changed())
         try:
-            began, status = time.monotonic(), job.status()
+            began, status = clock(), job.status()
             if status != said:
                 said = status
                 yield _event("progress", status)
@@ -78,18 +77,19 @@ async def _events(job: Job) -> AsyncIterator[bytes]:
             changed.cancel()
         if not changed.result():
             return  # the server ends; the render goes on at its next start
-        await asyncio.sleep(max(0.0, began + BETWEEN_S - time.monotonic()))
+        await asyncio.sleep(max(0.0, began + BETWEEN_S - clock()))
     yield _event("done", job.status())
 
 
 async def _all_events(renders: RenderQueue, owner: str, label: str | None) -> AsyncIterator[bytes]:
     said: dict[str, int] = {}  # hashes of the last events of those under way, by id
-    spoke_at = time.monotonic()
+    clock = asyncio.get_running_loop().time
+    spoke_at = clock()
     with renders.follower(owner) as follower:
         while not follower.closed:
             events = []
             changed = await follower.next(AT_ONCE, KEEP_ALIVE_S)
-            began = time.monotonic()
+            began = clock()
             for job in (job for job in changed if label in (None, job.order.label)):
                 ended, before = job.finished.is_set(), said.pop(job.id, None)
                 event = _event("done" if ended else "progress", job.status())
@@ -100,7 +100,7 @@ async def _all_events(renders: RenderQueue, owner: str, label: str | None) -> As
             if events or began - spoke_at >= KEEP_ALIVE_S:
                 spoke_at = began
                 yield b"".join(events) or KEEP_ALIVE
-            await asyncio.sleep(max(0.0, began + BETWEEN_S - time.monotonic()))
+            await asyncio.sleep(max(0.0, began + BETWEEN_S - clock()))
 
 
 def _event(name: str, status: dict[str, Any]) -> bytes:

@@ -19,7 +19,7 @@ from gpu.picture.sample_plan import DECISIONS, LEAST, MOST, SamplePlan, pixels_o
 from service.cli import main
 from tests.gpu.test_noise_meter import SCENES, SHAPES, luminance
 from tests.rendering import Images, document, picture
-from tests.serving import SCENE, SMALL, Client, Server
+from tests.serving import PATIENCE_S, SCENE, SMALL, Client, Server
 from tests.serving import client as opened
 
 RAW = {"format": "rgba32f"}
@@ -220,7 +220,7 @@ def test_a_render_stops_at_its_noise_and_comes_again(server: Server, tmp_path: P
     settings = {"width": 64, "height": 48, "target_noise": 0.02, "adaptive": True}
     answer = server.http.post("/v1/renders", json={"scene": SCENE, "settings": settings})
     address = f"/v1/{answer.headers['location']}"
-    done = server.http.get(address, params={"wait": 60}).json()
+    done = server.http.get(address, params={"wait": PATIENCE_S}).json()
     assert done["reason"] == "target_noise" and done["noise"] <= 0.02 and done["settings"]["adaptive"] is True
     png = server.http.get(f"{address}/image").content
     (tmp_path / "a.png").write_bytes(png)

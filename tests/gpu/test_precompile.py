@@ -7,7 +7,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from service.rendering.worker.helpers.compile_client import CompileClient, Compi
 from service.rendering.worker.helpers.compile_main import LOCKS
 from service.scene import parse_scene
 from tests.documents import Shelf
-from tests.serving import SCENE
+from tests.serving import PATIENCE_S, SCENE, wait_until
 from tests.supervisors import with_supervisor
 
 SIZE = {"width": 32, "height": 32}
@@ -96,7 +95,7 @@ class Ears:
 
     async def next(self, task: int, *kinds: type) -> Any:
         while True:
-            message = await asyncio.wait_for(self.messages.get(), 60)
+            message = await asyncio.wait_for(self.messages.get(), PATIENCE_S)
             assert not isinstance(message, str), message
             if message.task == task and isinstance(message, kinds):
                 return message
@@ -355,10 +354,7 @@ def test_a_kernel_under_way_ends_with_the_server(gpu: Renderer, arrays: Any, col
         left.append((await compiled_for(supervisor, arrays))[1])
 
     with_supervisor(test)
-    until = time.monotonic() + 30
-    while is_there(left[0]):
-        assert time.monotonic() < until
-        time.sleep(0.02)
+    wait_until(lambda: not is_there(left[0]))
 
 
 async def compiled_for(supervisor: Supervisor, arrays: Any) -> tuple[int, int]:
@@ -390,7 +386,7 @@ def test_the_other_end_of_a_pipe_is_a_lifeline() -> None:
     for each in both:
         assert each.stdout is not None and each.stdout.readline() == "True\n"
     os.close(write)
-    assert [each.wait(30) for each in both] == [-signal.SIGIO] * 2
+    assert [each.wait(PATIENCE_S) for each in both] == [-signal.SIGIO] * 2
     late = subprocess.Popen(command, pass_fds=[read], stdout=subprocess.PIPE, text=True)
     assert late.stdout is not None and late.stdout.readline() == "False\n"
     late.kill()

@@ -11,19 +11,21 @@ import sys
 from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
 import pytest
 
 from gpu import settings as gpu_settings
+from gpu.picture import passes
 from service import images, views
 from service.cli import main
 from service.commands.progress import ProgressLine, describe
 from service.config import load_config
 from service.images import read_metadata
 from service.rendering.ipc.messages import Progress
-from service.rendering.worker.progress import truncated_light
+from service.rendering.worker.progress import stop_rules, truncated_light
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -183,14 +185,35 @@ def test_stats_say_what_became_of_it(gpu: Any, scene: Path, tmp_path: Path) -> N
     assert (settings["width"], settings["max_samples"], settings["filter"]) == (16, 4, "blackman_harris")
 
 
-@pytest.mark.calm
-def test_time_limit_ends_a_render_without_sample_limit(gpu: Any, scene: Path, tmp_path: Path) -> None:
-    stats = tmp_path / "stats.json"
-    size = ["--set", "width=64", "--set", "height=64", "--set", "time_limit=0.5"]
-    assert main(["render", str(scene), "-o", str(tmp_path / "out.png"), "--stats", str(stats), *size]) == 0
-    told = json.loads(stats.read_text())
-    # A picture may end up to a sample before the limit; the contract allows .15 s after it.
-    assert 0.45 <= told["elapsed_s"] <= 0.65 and told["samples"] > 1
+@pytest.mark.parametrize("limit_s", [0.2, 0.5])
+def test_time_limit_is_kept_and_ends_between_samples(
+    gpu: Any, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, limit_s: float
+) -> None:
+    """On a machine where a sample of a pixel takes a microsecond, and nothing else takes time."""
+    now_s, trace = 1000.0, passes.Passes._trace
+
+    def traced(*arguments: Any) -> None:
+        nonlocal now_s
+        _, _, _, _, (width, height), _, samples, _ = arguments
+        trace(*arguments)
+        now_s += width * height * samples * 1e-6
+
+    clock = SimpleNamespace(monotonic=lambda: now_s, perf_counter=lambda: now_s)
+    monkeypatch.setattr(passes.Passes, "_trace", traced)
+    for module in (passes, stop_rules):
+        monkeypatch.setattr(module, "time", clock)
+
+    def rendered(name: str, limit: str) -> tuple[dict[str, Any], bytes]:
+        out, stats = tmp_path / f"{name}.npy", tmp_path / f"{name}.json"
+        size = ["--set", "width=64", "--set", "height=64", "--set", limit]
+        assert main(["render", str(scene), "-o", str(out), "--stats", str(stats), *size]) == 0
+        return json.loads(stats.read_text()), out.read_bytes()
+
+    told, picture = rendered("by-time", f"time_limit={limit_s}")
+    assert told["reason"] == "time_limit" and told["settings"]["max_samples"] is None
+    # A picture may end up to a sample before the limit; the contract allows a tenth of it and 0.1 s after it.
+    assert 0.9 * limit_s <= told["elapsed_s"] <= 1.1 * limit_s + 0.1 and told["samples"] > 1
+    assert rendered("by-samples", f"max_samples={told['samples']}")[1] == picture
 
 
 def test_an_ended_render_leaves_no_measurement_under_way(

@@ -25,7 +25,7 @@ from service.keys import Keys
 from service.problems import Unauthorized
 from service.routes.errors import respond
 from tests.service.test_rest import OBJ, is_problem
-from tests.serving import ENDLESS, SCENE, SMALL, Server
+from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Server
 
 ANNA, BERT = {"authorization": "Bearer anna-1"}, {"authorization": "bearer  bert-2"}
 BODY = {"scene": SCENE, "settings": SMALL}
@@ -71,7 +71,7 @@ def test_a_key_is_asked_for(http: httpx.Client, shown: dict[str, str]) -> None:
 def test_renders_belong_to_their_key(http: httpx.Client) -> None:
     answer = http.post("/v1/renders", json=BODY, headers=ANNA)
     address = "/v1/" + answer.headers["location"]
-    assert http.get(address, params={"wait": 20}, headers=ANNA).json()["state"] == "done"
+    assert http.get(address, params={"wait": PATIENCE_S}, headers=ANNA).json()["state"] == "done"
     for method, under in (("GET", ""), ("DELETE", ""), ("GET", "/image")):
         assert is_problem(http.request(method, address + under, headers=BERT), 404)
     assert http.get(address + "/image", headers=ANNA).status_code == 200
@@ -82,7 +82,7 @@ def test_renders_belong_to_their_key(http: httpx.Client) -> None:
     assert http.get(address, headers=ANNA).status_code == 200
     newer = [http.post("/v1/renders", json=BODY, headers=ANNA).headers["location"] for _ in range(2)]
     for location in newer:
-        http.get(f"/v1/{location}", params={"wait": 20}, headers=ANNA)
+        http.get(f"/v1/{location}", params={"wait": PATIENCE_S}, headers=ANNA)
     assert is_problem(http.get(address, headers=ANNA), 410)
     assert is_problem(http.get(address, headers=BERT), 404)
 

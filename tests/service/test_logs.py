@@ -16,8 +16,8 @@ from urllib.parse import urlsplit
 import pytest
 
 from service import log_output, logs
-from tests.service.test_operation import metrics, wait_until
-from tests.serving import Client, Server
+from tests.service.test_operation import metrics
+from tests.serving import PATIENCE_S, Client, Server, wait_until
 
 ROOT = Path(__file__).parents[2]
 
@@ -75,7 +75,7 @@ def test_who_logs_does_not_wait(untouched: None, monkeypatch: pytest.MonkeyPatch
     let_go = threading.Event()
 
     def write(self: log_output.Output, record: logging.LogRecord) -> None:
-        let_go.wait(10)
+        let_go.wait(PATIENCE_S)
         written.append((threading.current_thread().name, self.format(record)))
 
     monkeypatch.setattr(logging.StreamHandler, "emit", write)
@@ -88,7 +88,7 @@ def test_who_logs_does_not_wait(untouched: None, monkeypatch: pytest.MonkeyPatch
     assert isinstance(queued, log_output.Queued) and not written
     let_go.set()
     queued.records.put(None)
-    until = time.monotonic() + 10
+    until = time.monotonic() + PATIENCE_S
     while len(written) < 2:
         assert time.monotonic() < until
         time.sleep(0.01)
@@ -137,9 +137,9 @@ def test_libraries_speak_of_what_matters(untouched: None, capfd: pytest.CaptureF
     assert lines == ["Task exception was never retrieved; future: <Task>", "detail"]
 
 
-@pytest.mark.calm
 def test_a_sender_that_goes_away_is_no_error(server: Server) -> None:
-    """Twenty of them once stopped the service for a minute: each cost seconds for a traceback with all locals."""
+    """Twenty of them once stopped the service for a minute, as each cost seconds for a traceback with all locals. Now
+    there is none."""
     written = server.log.read_text()
     address = urlsplit(server.url)
     refused = 'sunbox_requests_total{method="POST",route="%s",status="%d"}'
@@ -149,9 +149,7 @@ def test_a_sender_that_goes_away_is_no_error(server: Server) -> None:
         with socket.create_connection((address.hostname, address.port), 10) as connection:
             head = f"POST {routes[i % 3]} HTTP/1.1\r\nHost: {address.netloc}\r\nContent-Length: 100000\r\n\r\n"
             connection.sendall(head.encode() + b"{" * 1000)
-    began = time.monotonic()
     assert server.http.get("/healthz").status_code == 200
-    assert time.monotonic() - began < 0.5
     for route in routes:
         wait_until(lambda name=refused % (route, 499): metrics(server).get(name, 0) == before.get(name, 0) + 7)
         assert metrics(server).get(refused % (route, 500)) == before.get(refused % (route, 500))

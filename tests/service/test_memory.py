@@ -259,7 +259,7 @@ def test_renders_wait_for_memory(tmp_path: Path) -> None:
         assert pictures() == each
         assert server.http.get(f"/v1/renders/{second}").json()["state"] == "queued"
         server.http.delete(f"/v1/renders/{first}")  # it rests with the renderer, and makes room
-        assert server.http.get(f"/v1/renders/{second}?wait=30").json()["state"] == "done"
+        assert server.http.get(f"/v1/renders/{second}?wait={PATIENCE_S}").json()["state"] == "done"
         assert pictures() == each
         for id in (first, second):  # from the disk, one after the other
             assert server.http.get(f"/v1/renders/{id}/image").status_code == 200

@@ -1,16 +1,19 @@
 """What one client sends to be parsed costs the others nothing: they are answered meanwhile, and memory comes back.
 
 A victim asks whether the server is alive, posts a document with a mistake and watches a stream, while one attacker at
-a time sends what used to stop them all. The bounds are those of a quiet machine with a margin for a busy one with two
-cores; without the limits under test the same figures were 3 to 28 s and 0.6 to 1 GiB.
+a time sends what used to stop them all: without the limits under test no answer came for 3 to 28 s, and memory grew
+by 0.6 to 1 GiB. The victim's answers are counted, as seconds say nothing on a busy machine; `make hostile` bounds the
+seconds.
 """
 
 from __future__ import annotations
 
 import json
 import math
+import os
 import threading
 import time
+from collections import Counter
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
@@ -23,16 +26,17 @@ import pytest
 from websockets.exceptions import ConnectionClosed
 
 from gpu import Renderer
-from tests.serving import ENDLESS, SCENE, SMALL, Client, Server, client, families
-
-pytestmark = pytest.mark.calm
+from tests.serving import ENDLESS, SCENE, SMALL, Client, Server, client, families, wait_until
 
 MIB = 1 << 20
 PAGE = 4096
-# How long the others may have to wait, s: for an answer to /healthz, to a bad request, for their next frame.
+# How long the others may have to wait on a machine that does nothing else, s: for an answer to /healthz, to a bad
+# request, for their next frame.
 BOUNDS = {"alive": 1.0, "refused": 2.0, "frame": 2.5}
+IS_CALM = "HOSTILE_DOCUMENTS" in os.environ
 TRIES = 3
-CALM_S = 0.5
+FEW = 6  # answers before the attack: by then it is known how fast they come on this machine just now
+LEAST_RATE = 0.1  # of that, while somebody attacks
 GROWTH = 700 * MIB
 LEFT = 250 * MIB  # of that, after the attack: processes for large bodies stay, the values in them do not
 ATTACK_S = 40.0
@@ -50,10 +54,11 @@ def private(pid: int) -> int:
 
 @dataclass
 class Victim:
-    """The longest of each wait, s, and of memory, bytes, since it was entered."""
+    """How many answers came, the longest wait for one, s, and the most memory, bytes, since it was entered."""
 
     server: Server
-    waits: dict[str, float] = field(default_factory=lambda: {"alive": 0.0, "refused": 0.0, "frame": 0.0})
+    answers: Counter[str] = field(default_factory=Counter)
+    waits: dict[str, float] = field(default_factory=lambda: dict.fromkeys(BOUNDS, 0.0))
     memory: int = 0
     _ended: threading.Event = field(default_factory=threading.Event)
 
@@ -75,6 +80,7 @@ class Victim:
         self._stream.close()
 
     def _took(self, what: str, began: float) -> None:
+        self.answers[what] += 1
         self.waits[what] = max(self.waits[what], time.monotonic() - began)
 
     def _ask(self, what: str, request: Callable[[httpx.Client], httpx.Response], status: int) -> None:
@@ -231,15 +237,20 @@ def test_others_are_served_meanwhile(alone: Server, attack: Callable[[Server], N
     seen = []
     for _ in range(TRIES):
         with Victim(alone) as victim:
-            time.sleep(CALM_S)
-            calm = dict(victim.waits)  # without anybody else, on this machine just now
-            began = time.monotonic()
+            entered = time.monotonic()
+            wait_until(lambda victim=victim: min(victim.answers[what] for what in BOUNDS) >= FEW)
+            began, calm, longest = time.monotonic(), victim.answers.copy(), dict(victim.waits)
             attack(alone)
-            took_s = time.monotonic() - began
+            took_s, during = time.monotonic() - began, victim.answers - calm
         waits, most = victim.waits, victim.memory
         left = private(alone.process.pid) - victim.before
-        seen.append(f"{took_s:.1f} s, {waits}, +{most / MIB:.0f} MiB, {left / MIB:.0f} MiB stay")
-        served = all(waits[what] < bound + 3 * calm[what] for what, bound in BOUNDS.items())
+        expected = {what: calm[what] * took_s / (began - entered) for what in BOUNDS}
+        seen.append(
+            f"{took_s:.1f} s, {waits}, {dict(during)} of {expected}, +{most / MIB:.0f} MiB, {left / MIB:.0f} MiB stay"
+        )
+        served = all(during[what] >= int(LEAST_RATE * expected[what]) for what in BOUNDS)
+        if IS_CALM:
+            served = served and all(waits[what] < bound + 3 * longest[what] for what, bound in BOUNDS.items())
         if served and most < GROWTH and left < LEFT:
             break
     else:

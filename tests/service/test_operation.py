@@ -8,7 +8,6 @@ import os
 import re
 import subprocess
 import sys
-import time
 from pathlib import Path
 from typing import Any
 
@@ -19,7 +18,7 @@ import uvicorn
 from service import app, config, logs
 from service.config import Config
 from service.logs import _fields
-from tests.serving import ENDLESS, SCENE, SMALL, Server, client
+from tests.serving import ENDLESS, SCENE, SMALL, Server, client, wait_until
 
 ROOT = Path(__file__).parents[2]
 
@@ -28,13 +27,6 @@ def metrics(server: Server) -> dict[str, float]:
     """Values by name and labels, as they are written."""
     lines = [line for line in server.http.get("/metrics").text.splitlines() if not line.startswith("#")]
     return {name: float(value) for name, value in (line.rsplit(" ", 1) for line in lines)}
-
-
-def wait_until(reached: Any) -> None:
-    until = time.monotonic() + 60  # three renderers in a row may fail to start on a busy machine
-    while not reached():
-        assert time.monotonic() < until
-        time.sleep(0.05)
 
 
 def test_metrics_tell_what_happens(server: Server) -> None:

@@ -13,7 +13,7 @@ from urllib.parse import urljoin, urlsplit
 import httpx
 import pytest
 
-from tests.serving import SCENE, SMALL, Client, Server
+from tests.serving import PATIENCE_S, SCENE, SMALL, Client, Server
 
 PREFIX = "/deep/sunbox"
 
@@ -90,7 +90,7 @@ def test_a_render_is_found_where_it_is_said_to_be(proxy: Proxy) -> None:
         body = {"scene": SCENE, "settings": SMALL}
         answer = http.post(f"{proxy.url}/v1/renders", json=body, headers={"origin": origin})
         address = urljoin(str(answer.url), answer.headers["location"])
-        assert http.get(address, params={"wait": 20}, timeout=30).json()["state"] == "done"
+        assert http.get(address, params={"wait": PATIENCE_S}, timeout=PATIENCE_S).json()["state"] == "done"
         assert http.get(f"{address}/image").content.startswith(b"\x89PNG")
         assert http.get(f"{proxy.url}/openapi.json").json().get("servers") is None, "relative to itself"
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import copy
 import random
 import re
-import time
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -14,6 +13,7 @@ import numpy as np
 import pytest
 
 from service.assets import AssetStore
+from service.config import Config
 from service.problems import AssetError, UnsupportedMedia
 from service.scene import parse_scene
 from tests import asset_files as make
@@ -21,7 +21,7 @@ from tests.gltf_files import QUAD, QUAD_UVS, Gltf
 from tests.parsing import one_child
 
 FILES = 200
-SECONDS, MEGABYTES = 5, 1024  # of processor time in all for the worst of them; of memory
+SECONDS, MEGABYTES = 5, 1024  # what reading any file may cost; after more a child is ended, and another is there
 VALUES: list[Any] = [
     *(None, True, False, -1, 0, 1, 2, 3, 7, 255, 2**31, 2**32 - 1, 2**53, 2**62, -(2**40), 0.5, -0.25, 1e300, 1e-300),
     *(
@@ -138,7 +138,7 @@ def mutated(file: Gltf, rng: random.Random) -> bytes:
 @pytest.fixture(scope="module")
 def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
     with one_child():
-        store = AssetStore(tmp_path_factory.mktemp("data"))
+        store = AssetStore(tmp_path_factory.mktemp("data"), Config(parse_seconds=SECONDS))
         yield store
         store.close()
 
@@ -160,14 +160,12 @@ def test_the_sound_file_is_read(store: AssetStore) -> None:
 
 def test_files_with_a_mistake_are_read_or_refused(store: AssetStore) -> None:
     file, rng, read = sound(), random.Random(6), 0
-    began = time.process_time()
     for _ in range(FILES):
         reason = tried(store, mutated(file, rng))
         read += not reason
         # A library's own words, or none at all, are no help to whoever made the file.
         assert "Traceback" not in reason and "Error:" not in reason, reason
     assert 0.05 * FILES < read < 0.9 * FILES
-    assert time.process_time() - began < SECONDS * FILES / 10
     (child,) = store.loader.sandbox.children.idle  # nothing crashed or had to be killed
     peak = re.search(r"VmHWM:\s+(\d+) kB", Path(f"/proc/{child.process.pid}/status").read_text())
     assert peak is not None and int(peak[1]) < MEGABYTES << 10
@@ -190,9 +188,7 @@ def test_one_buffer_in_very_many_views(store: AssetStore) -> None:
         primitives.append({"attributes": {"POSITION": file.add("accessors", view)}})
     assert position == 0
     file.node(mesh=file.mesh(*primitives))
-    began = time.monotonic()
     assert "allowed" in tried(store, file.glb())
-    assert time.monotonic() - began < 60
 
 
 def test_nested_without_end(store: AssetStore) -> None:

@@ -24,6 +24,7 @@ from service.assets.sandbox.wire import adopt, memory, publish
 from service.assets.types import AssetLimits
 from service.child_processes import Children
 from tests.asset_files import OBJ, TRIANGLE, exr
+from tests.serving import wait_until
 
 
 @pytest.fixture
@@ -50,13 +51,6 @@ def running(pid: int) -> bool:
         return Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0] != "Z"
     except OSError:
         return False
-
-
-def gone_within(pid: int, seconds: float) -> bool:
-    until = time.monotonic() + seconds
-    while running(pid) and time.monotonic() < until:
-        time.sleep(0.01)
-    return not running(pid)
 
 
 def test_arrays_cross_the_border(box: Sandbox) -> None:
@@ -114,10 +108,8 @@ def test_too_long(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(sandbox, "SECONDS_PER_BYTE", 0)
     with Sandbox(AssetLimits(seconds=0.5)) as box:
         pid = pid_of(box)
-        began = time.monotonic()
         with pytest.raises(ParseError, match=r"longer than the 0\.5 s|processor time than the 0\.5 s"):
-            box.parse("obj", endless())
-        assert time.monotonic() - began < 15  # alone one second
+            box.parse("obj", endless())  # alone one second
         assert not running(pid)
         assert pid_of(box) != pid
 
@@ -239,7 +231,7 @@ def test_children_end_with_a_parent_that_is_killed(busy: bool, tmp_path: Path) -
     parent.kill()
     parent.wait()
     parent.stdout.close()
-    assert gone_within(pid, 3)
+    wait_until(lambda: not running(pid))
 
 
 def test_closing_ends_the_children() -> None:

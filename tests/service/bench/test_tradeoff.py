@@ -16,7 +16,7 @@ from service.cli import main
 from service.pack import pack
 from service.rendering.worker.progress.truncated_light import LIMITS
 from service.scene import parse_scene
-from tests.serving import SCENE, Server
+from tests.serving import PATIENCE_S, SCENE, Server
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
@@ -101,7 +101,7 @@ def test_the_light_that_a_preset_misses_is_measured_on_the_scene(server: Server)
     scene = {**SCENE, "materials": {"m": material}, "shapes": [sphere], "lights": []}
     settings = {"width": 64, "height": 64, "max_samples": 5200, "estimator": "bsdf", "max_bounces": 1}
     id = server.http.post("/v1/renders", json={"scene": scene, "settings": settings}).json()["id"]
-    status = server.http.get(f"/v1/renders/{id}", params={"wait": 30}).json()
+    status = server.http.get(f"/v1/renders/{id}", params={"wait": PATIENCE_S}).json()
     assert status["state"] == "done", status
     for name, preset in quality.PRESETS.items():
         share = status["forecast"][name]["missing_light"]

@@ -306,21 +306,19 @@ def test_cache_forgets_the_oldest_and_trusts_no_path():
 
 
 def test_small_scenes_load_no_compiler():
+    """Nor does it take more than the 3700 lines of Python that it takes now, and a third."""
     code = """
-import sys, time
+import sys
+from tests.counting import python_lines
 from service.pack import pack
 from service.scene import parse_scene
 scene = parse_scene({"version": 1, "camera": {"position": [0, 0, 5], "target": [0, 0, 0]},
     "environment": {"type": "constant", "radiance": 1}, "materials": {"a": {"type": "diffuse", "albedo": 0.5}},
     "shapes": [{"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "a"}]})
-times = []
-for _ in range(20):
-    began = time.process_time()
-    pack(scene, None)
-    times.append(time.process_time() - began)
-print(sorted({"numba", "trimesh", "scipy", "moderngl"} & set(sys.modules)), min(times))
+pack(scene, None)
+print(sorted({"numba", "trimesh", "scipy", "moderngl"} & set(sys.modules)), python_lines(lambda: pack(scene, None)))
 """
     result = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    loaded, seconds = result.stdout.rsplit(" ", 1)
+    loaded, lines = result.stdout.rsplit(" ", 1)
     assert loaded == "[]"
-    assert float(seconds) < 0.006
+    assert int(lines) < 5000

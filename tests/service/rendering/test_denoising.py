@@ -18,7 +18,7 @@ import pytest
 
 from service.cli import main
 from service.rendering.worker.helpers.denoise_client import DIED, DenoiseClient, DenoiseResult, denoise_request
-from tests.serving import SCENE, Client, Server
+from tests.serving import PATIENCE_S, SCENE, Client, Server
 from tests.serving import client as opened
 
 FEW = {"width": 96, "height": 64, "max_samples": 4, "max_bounces": 4}
@@ -35,7 +35,7 @@ def client(server: Server) -> Iterator[Client]:
 def finished(server: Server, settings: Any) -> tuple[dict[str, Any], np.ndarray, np.ndarray]:
     """Its last status, colour and variance."""
     id = server.http.post("/v1/renders", json={"scene": SCENE, "settings": settings}).json()["id"]
-    status = server.http.get(f"/v1/renders/{id}", params={"wait": 30}).json()
+    status = server.http.get(f"/v1/renders/{id}", params={"wait": PATIENCE_S}).json()
     return status, *(image(server, id, aov) for aov in ("color", "variance"))
 
 

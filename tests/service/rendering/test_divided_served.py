@@ -52,7 +52,7 @@ def test_what_is_not_divided_names_the_setting(two: Server, setting: str, value:
     ask = {"scene": SCENE, "settings": {**SETTINGS, setting: value}}
     before = _leases(two)
     id = two.http.post("/v1/renders", json=ask).json()["id"]
-    status = two.http.get(f"/v1/renders/{id}", params={"wait": 60}).json()
+    status = two.http.get(f"/v1/renders/{id}", params={"wait": PATIENCE_S}).json()
     assert status["state"] == "done" and f"settings.{setting}" in status["not_divided"]
     assert _leases(two) == before
 

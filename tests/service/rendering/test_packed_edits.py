@@ -38,10 +38,10 @@ def test_a_held_task_stands_still_for_a_moment_or_until_its_update(arrays: Any) 
         supervisor.send(Want(task, 1, View()))
         await ears.next(Frame)
         for serial, ended_by in enumerate(("time", "an update"), 2):
+            began = time.monotonic()
             supervisor.send(Hold(task))
             supervisor.send(Want(task, 2 * serial, View(), anyway=True))
             held = await ears.next(Frame)
-            began = time.monotonic()
             if ended_by == "an update":
                 supervisor.send(Update(task, 2, camera=arrays.camera, base=1))
             supervisor.send(Want(task, 2 * serial + 1, View()))
@@ -49,7 +49,7 @@ def test_a_held_task_stands_still_for_a_moment_or_until_its_update(arrays: Any) 
             stood_s = time.monotonic() - began
             if ended_by == "time":
                 assert frame.generation == 1 and frame.progress.samples > held.progress.samples
-                assert stood_s > 0.5 * HOLD_S
+                assert stood_s >= HOLD_S
             else:
                 assert frame.generation == 2
         supervisor.drop(task)

@@ -16,7 +16,8 @@ from service.rendering.requests.request_reader import RequestReader
 from service.rendering.streams import sessions
 from service.rendering.streams.sessions import Sessions
 from service.rendering.supervisor.supervisor import Supervisor
-from tests.serving import ENDLESS, SMALL, Client, Picture, Server
+from tests.service.test_operation import metrics
+from tests.serving import ENDLESS, PATIENCE_S, SMALL, Client, Picture, Server, wait_until
 
 READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
 
@@ -42,9 +43,12 @@ def pictures(heard: list[Any]) -> list[Picture]:
 def test_a_dropped_connection_is_taken_up_with_its_samples(server: Server) -> None:
     first, session = entered(server)
     first.acknowledges = False
+    began, waiting = time.monotonic(), 'sunbox_streams{state="waiting"}'
     first.start(settings={**ENDLESS, "width": 64, "height": 64})
     frames = [first.frame(), first.frame()]
+    before = metrics(server)[waiting]
     first.socket.socket.close()  # no farewell
+    wait_until(lambda: metrics(server)[waiting] > before)
     time.sleep(1.0)
     second, again = entered(server, session)
     with second:
@@ -53,8 +57,8 @@ def test_a_dropped_connection_is_taken_up_with_its_samples(server: Server) -> No
         assert taken.generation == 1 and taken.seq == frames[-1].seq + 1 and taken.samples >= frames[-1].samples
         more = [second.frame() for _ in range(4)]  # the old frames' credits are free
         assert more[-1].samples > taken.samples and more[-1].seq == taken.seq + 4
-        rendered_s, passed_s = more[-1].elapsed_s - frames[-1].elapsed_s, more[-1].at - frames[-1].at
-        assert rendered_s < passed_s - 0.4, "it was not paused meanwhile"
+        rendered_s, passed_s = more[-1].elapsed_s - frames[-1].elapsed_s, more[-1].at - began
+        assert rendered_s <= passed_s - 1.0, "it was not paused meanwhile"
         second.say("update", generation=2, settings={"seed": 1})
         assert second.frame(generation=2)
 
@@ -202,10 +206,9 @@ def test_too_many_clients_and_going_away(gpu: object, tmp_path_factory: pytest.T
     assert closed_with(first) == 4409
     second.start(settings={**SMALL, "max_samples": 1 << 24})
     second.frame()
-    began = time.monotonic()
     server.process.terminate()
     assert closed_with(second) == 1001
-    assert server.process.wait(15) == 0 and time.monotonic() - began < 15
+    assert server.process.wait(PATIENCE_S) == 0
     server.http.close()
 
 

@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from tests.serving import ENDLESS, SCENE, SMALL, Picture, Server
+from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Picture, Server
 from tests.serving import client as opened
 
 RAW = {"format": "rgba32f"}
@@ -44,7 +44,7 @@ def started(server: Server, **settings: Any) -> str:
 
 
 def ended(server: Server, id: str) -> dict[str, Any]:
-    told: dict[str, Any] = server.http.get(f"/v1/renders/{id}?wait=25").raise_for_status().json()
+    told: dict[str, Any] = server.http.get(f"/v1/renders/{id}?wait={PATIENCE_S}").raise_for_status().json()
     return told
 
 

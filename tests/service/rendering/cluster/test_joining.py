@@ -8,7 +8,6 @@ import os
 import socket
 import subprocess
 import sys
-import time
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -30,6 +29,7 @@ from service.rendering.supervisor.process import Waiting
 from service.state import AppState
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.cluster.clusters import OPTIONS, until
+from tests.serving import PATIENCE_S
 
 HAS_RAY = importlib.util.find_spec("ray") is not None
 needs_ray = pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'sunbox[ray]'")
@@ -88,12 +88,11 @@ def closed_port() -> int:
 def test_a_server_does_not_start_without_its_cluster(tmp_path: Path, variable: str) -> None:
     address = f"127.0.0.1:{closed_port()}"
     environment = os.environ | {"SUNBOX_DATA_DIR": str(tmp_path), "SUNBOX_RAY": "auto", variable: address}
-    began = time.monotonic()
     command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
-    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=60)
+    ended = subprocess.run(command, env=environment, capture_output=True, text=True, timeout=PATIENCE_S)
     assert ended.returncode == 1 and ended.stdout == ""
     assert f"no Ray cluster answers at {address}" in ended.stderr and f"{variable}" in ended.stderr
-    assert "Traceback" not in ended.stderr and time.monotonic() - began < 30
+    assert "Traceback" not in ended.stderr
 
 
 @needs_ray
