@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from pathlib import Path
 from typing import Any
 
@@ -26,11 +27,12 @@ from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.gpu.test_flags import IMAGES, SCENES
 from tests.gpu.test_precompile import Ears
-from tests.serving import PATIENCE_S, SCENE
+from tests.serving import SCENE
 from tests.supervisors import with_supervisor
 
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}
+BUILT_S = 60.0  # until all that is compiled in idle time is there
 KEPT = 4  # disk caches
 AHEAD = """
 from gpu import RenderSettings
@@ -157,6 +159,7 @@ def compiled_ahead(digest: str) -> Path:
     return folder
 
 
+@pytest.mark.calm  # the kernel is asked for in time that nobody else wants
 def test_a_stream_sees_at_once_what_is_compiled_for(
     gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
@@ -166,9 +169,6 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
     digest = wanted.digest(f"{gpu.info['renderer']} {gpu.info['version']}")
     shutil.copytree(compiled_ahead(digest), tmp_path / "cache")
     monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path / "cache"))
-    # On a busy machine there is no time that nobody else wants, in which the kernel is asked for.
-    (tmp_path / "sitecustomize.py").write_text("import os\nos.sched_setscheduler = lambda *_: None\n")
-    monkeypatch.setenv("PYTHONPATH", os.pathsep.join([str(tmp_path), os.environ.get("PYTHONPATH", os.getcwd())]))
     record = records() / digest
     assert not record.exists()
 
@@ -177,9 +177,10 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         task = supervisor.open(ears)
         await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(64), interactive=True))
         await ears.next(task, Loaded)
-        async with asyncio.timeout(PATIENCE_S):
-            while not record.exists():
-                await asyncio.sleep(0.1)
+        until = time.monotonic() + BUILT_S
+        while not record.exists():
+            assert time.monotonic() < until
+            await asyncio.sleep(0.1)
 
         supervisor.send(Update(task, 2, settings={**SIZE, "clamp": 5.0}, base=1))
         told = await shown(supervisor, ears, task, 2)
