@@ -25,7 +25,7 @@ from starlette.responses import FileResponse, Response
 from starlette.staticfiles import StaticFiles
 
 from service import presets
-from service.config import Config, unknown_variables
+from service.config import Config, cores, unknown_variables
 from service.confined import hide
 from service.connection_limits import Watch
 from service.connections import connection_class, listen
@@ -66,6 +66,10 @@ SWITCH_S = 0.001
 OPEN_TO_ALL = (
     "serving without a key: whoever reaches this address can render, and can read, replace and delete what is saved; "
     "set SUNBOX_API_KEY, or listen on 127.0.0.1 (in a container: publish the port on 127.0.0.1) host=%s"
+)
+CROWDED = (
+    "SUNBOX_DEVICES asks for more renderers on the processor than it has cores: together they are slower than one "
+    "for each core renderers=%d cores=%d"
 )
 
 FULL = Unavailable("There is no room for another connection just now (SUNBOX_MAX_CONNECTIONS).", 5)
@@ -122,6 +126,8 @@ def run(config: Config) -> int:
     if (reason := missing_device(config)) is not None:
         log.error("did not start reason=%s", reason)
         return 1
+    if config.software_renderers > cores():
+        log.warning(CROWDED, config.software_renderers, cores())
     most = min(config.max_connections, _take_descriptors() // 2)  # files, scenes and images take others
     try:
         listener = listen(config.host, config.port)

@@ -28,6 +28,7 @@ LIMITS = ("max_", "keep_", "parse_", "body_", "data_quota", "data_files")  # how
 HOST = re.compile(r"[A-Za-z0-9._-]+|\[?[0-9A-Fa-f:.]+\]?")  # a name, an IPv4 or an IPv6 address
 
 LLVMPIPE = "llvmpipe:"  # before the number of renderers, in SUNBOX_DEVICES
+MOST_CROWDED = 16  # renderers on a processor with fewer cores: a test of several may want them, more are a slip
 NUMBER = re.compile(r"[0-9]{1,6}")
 
 ADDRESS = re.compile(rf"(?:{HOST.pattern}):[0-9]{{1,5}}")
@@ -297,10 +298,12 @@ class Config(BaseSettings):
         if devices and info.data.get("device") is not None:
             raise ValueError("cannot be set together with SUNBOX_DEVICE; keep one of the two")
         if len(devices) == 1 and devices[0].startswith(LLVMPIPE):
-            count, most = devices[0].removeprefix(LLVMPIPE), cores()
+            count, most = devices[0].removeprefix(LLVMPIPE), max(cores(), MOST_CROWDED)
             if not NUMBER.fullmatch(count) or not 1 <= int(count) <= most:
                 wrong = f"{devices[0]!r} is not possible"
-                raise ValueError(f"{wrong}: the number after {LLVMPIPE} is from 1 to {most}, as there are cores")
+                raise ValueError(
+                    f"{wrong}: the number after {LLVMPIPE} is from 1 to {most}; one for each core is fastest"
+                )
             return [f"{LLVMPIPE}{int(count)}"]
         for device in devices:
             if not NUMBER.fullmatch(device):

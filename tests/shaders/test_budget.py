@@ -49,7 +49,9 @@ def _cut(warnings: list[str]) -> int:
 
 def test_a_path_among_many_shapes_ends_and_keeps_what_it_found(gpu: Renderer) -> None:
     """In a mesh that reflects all light and glows with 1, a path's light is the number of surfaces that it has met."""
-    scene = document([{**icosphere("m", 1), "smooth": False}], {"m": GLOW}, camera={**INSIDE, "position": [0, 0, 0.5]})
+    scene = document(
+        [{**icosphere("m", 1), "smooth": False}], {"m": GLOW}, camera={**INSIDE, "position": [0, 0, 0.5]}
+    )
     made = picture(gpu, scene, 1, estimator="bsdf", **DEEP)
     met = made.read()[..., :3]
     assert _cut(made.warnings) == 64

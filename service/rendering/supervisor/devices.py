@@ -30,7 +30,7 @@ def seats(config: Config, host_memory: int) -> list[Seat]:
     if (count := config.software_renderers) > 0:
         memory = None if config.gpu_memory is None else config.gpu_memory // count
         options = replace(options, software=True, memory=memory)
-        shares = [cores() // count + (i < cores() % count) for i in range(count)]
+        shares = [max(1, cores() // count + (i < cores() % count)) for i in range(count)]
         return [Seat(Place(str(i), "llvmpipe"), replace(options, cores=share)) for i, share in enumerate(shares)]
     if config.devices:
         return [

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import subprocess
 import sys
@@ -12,6 +13,7 @@ from typing import Any
 import pytest
 
 from gpu import Renderer, devices, software_device
+from service import app
 from service import config as configs
 from service.child_processes import inherited_environment
 from service.config import Config, ConfigError, load_config
@@ -30,6 +32,7 @@ GPU, PROCESSOR = {"name": "/dev/dri/card0", "software": False}, {"name": "softwa
 def five_cores(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(configs, "cores", lambda: 5)
     monkeypatch.setattr(seating, "cores", lambda: 5)
+    monkeypatch.setattr(app, "cores", lambda: 5)
 
 
 def test_one_renderer_where_nothing_is_said() -> None:
@@ -54,6 +57,22 @@ def test_renderers_on_the_processor_divide_it(five_cores: None) -> None:
     assert {(seat.options.memory, seat.options.host_memory) for seat in found} == {(200, 333)}
 
 
+def test_more_renderers_than_cores_are_slow_and_have_one_each(
+    five_cores: None, monkeypatch: pytest.MonkeyPatch, caplog: pytest.LogCaptureFixture
+) -> None:
+    def taken(*_: object) -> None:
+        raise OSError(errno.EADDRINUSE, "Address already in use")
+
+    config = load_config(devices="llvmpipe:7")
+    assert [seat.options.cores for seat in seats(config, 1000)] == [1] * 7
+    monkeypatch.setattr(app, "missing_device", lambda config: None)
+    monkeypatch.setattr(app, "listen", taken)
+    for value, warned in (("llvmpipe:7", True), ("llvmpipe:5", False), ("0,1", False)):
+        caplog.clear()
+        assert app.run(load_config(devices=value)) == 1
+        assert ("more renderers on the processor than it has cores" in caplog.text) is warned
+
+
 @pytest.mark.parametrize(
     ("value", "told"),
     [
@@ -63,9 +82,9 @@ def test_renderers_on_the_processor_divide_it(five_cores: None) -> None:
         ("0,", "'' is no device"),
         ("-1", "'-1' is no device"),
         ("0,1,00", "device 0 is named twice"),
-        ("llvmpipe:0", "from 1 to 5, as there are cores"),
-        ("llvmpipe:6", "from 1 to 5, as there are cores"),
-        ("llvmpipe:two", "from 1 to 5, as there are cores"),
+        ("llvmpipe:0", "from 1 to 16; one for each core"),
+        ("llvmpipe:17", "from 1 to 16; one for each core"),
+        ("llvmpipe:two", "from 1 to 16; one for each core"),
     ],
 )
 def test_what_is_no_device_is_named(value: str, told: str, five_cores: None, monkeypatch: pytest.MonkeyPatch) -> None:
