@@ -240,6 +240,8 @@ def test_whatever_is_described(api: Any) -> None:
     """Statuses, content types and shapes are the described ones, whatever is asked for."""
     asked = 0
     for operation in (found.ok() for found in api.get_all_operations()):
+        if operation.path == "/v1/renders/events":  # an answer without an end, of which test_watching.py reads some
+            continue
 
         @settings(
             max_examples=EXAMPLES,
