@@ -125,10 +125,10 @@ class Quota:
             assets = self._files.count()
             left = self._others() + total(assets)
             lost = []
-            for name, size in (self._lost.spare() if self._lost else {}).items():
+            for name, takes in (self._lost.spare() if self._lost else {}).items():
                 if not left.exceeds(most):
                     break
-                left -= size
+                left -= takes
                 lost.append(name)
             stays = {id.removeprefix("sha256:") for id in (*in_use, *self._pinned)}
             goes = []
