@@ -16,6 +16,7 @@ import threading
 import time
 from collections.abc import AsyncIterator, Iterator
 from contextlib import asynccontextmanager
+from functools import partial
 from importlib import metadata
 from pathlib import Path
 
@@ -82,7 +83,7 @@ log = logging.getLogger(__name__)
 def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
     kept = storage(config, lambda: store.pictures)
-    store = RenderStore(config.data_dir, kept.quota.room)
+    store = RenderStore(config.data_dir, kept.quota.room, partial(kept.quota.room, reserved=True))
     memory = MemoryBudget(config.memory)
     own = AppState(
         config,
@@ -280,7 +281,7 @@ def _announce(address: str) -> None:
 
 def _limits(config: Config) -> QueueLimits:
     retention = Retention(config.keep_renders, config.keep_bytes, config.keep_seconds)
-    return QueueLimits(config.max_running, config.max_queue, config.max_jobs, retention)
+    return QueueLimits(config.max_running, config.max_queue, config.max_jobs, retention, config.data_quota)
 
 
 async def _docs() -> Response:

@@ -57,6 +57,13 @@ class AssetShares:
         with self._database.open() as database, database:
             database.executemany("INSERT OR REPLACE INTO asset_owners VALUES (?, ?, ?)", rows)
 
+    def owned(self) -> list[tuple[str, str, int]]:
+        """Who uploaded what: owner, id and bytes. Raises Unavailable."""
+        if not self._database.exists():
+            return []
+        with self._database.open() as database:
+            return database.execute("SELECT owner, asset, bytes FROM asset_owners").fetchall()
+
     def clear(self) -> None:
         """Forget the assets that are not there any more: to be called once, as they may have gone in any way."""
         if self._database.exists():

@@ -122,7 +122,8 @@ def _renders(command: argparse.ArgumentParser) -> None:
         ("show", "its status, as JSON"),
         ("wait", "show its progress until it ends; exit code 1 unless it is done"),
         ("fetch", "write the image so far to a file"),
-        ("cancel", "end it; the image so far stays"),
+        ("cancel", "end it; the image so far stays. One that has ended stays as it is"),
+        ("delete", "end it, and delete it and its image"),
     ):
         action = actions.add_parser(name, help=text)
         action.add_argument("id", metavar="ID")

@@ -14,7 +14,7 @@ from service.config import Config
 from service.disk_usage import Usage, usage
 from service.documents import Documents
 from service.lost_pictures import LostPictures
-from service.quota import Quota
+from service.quota import Quota, reserve_bytes
 
 
 @dataclass(frozen=True)
@@ -41,6 +41,8 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
         lambda: documents.usage() + beside() + lost.usage(),
         lost,
         lambda ids: shares.forget(ids),
+        lambda: shares.owned(),
+        reserve_bytes(config.data_quota),
     )
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota, config.max_key_documents)

@@ -1,4 +1,4 @@
-"""`sunbox renders`: the renders of a server, submitted, listed, shown, waited for, fetched and cancelled.
+"""`sunbox renders`: the renders of a server, submitted, listed, shown, waited for, fetched, cancelled and deleted.
 
 Only `submit` reads files; the server checks the rest and says what is wrong.
 """
@@ -20,6 +20,7 @@ from service.views import LOSSLESS_FORMATS
 AGAIN_S = 2.0  # between two attempts to hear of a render whose server was restarted
 PATIENCE_S = 60.0  # for a server that is away
 PAGE = 200
+ENDED = ("done", "cancelled", "failed")
 COLUMNS = "{:<32}  {:<9}  {:>8}  {:>7}  {:>4}  {}"
 
 
@@ -31,6 +32,7 @@ def run(arguments: argparse.Namespace) -> int:
         "wait": _wait,
         "fetch": _fetch,
         "cancel": _cancel,
+        "delete": _delete,
     }
     return actions[arguments.action](Api(arguments.server), arguments)
 
@@ -132,8 +134,20 @@ def _fetch(api: Api, arguments: argparse.Namespace) -> int:
 
 
 def _cancel(api: Api, arguments: argparse.Namespace) -> int:
+    """Of one that has ended DELETE would delete the picture."""
+    if (state := api.json("GET", _path(arguments.id))["state"]) in ENDED:
+        print(f"it is {state} already; `sunbox renders delete` deletes it", file=sys.stderr)
+        return 0
     api.json("DELETE", _path(arguments.id))
-    print("cancelled, unless it had ended before", file=sys.stderr)
+    print("cancelled", file=sys.stderr)
+    return 0
+
+
+def _delete(api: Api, arguments: argparse.Namespace) -> int:
+    if api.json("GET", _path(arguments.id))["state"] not in ENDED:
+        api.json("DELETE", _path(arguments.id))
+    api.json("DELETE", _path(arguments.id))
+    print("deleted", file=sys.stderr)
     return 0
 
 

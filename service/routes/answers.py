@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from datetime import datetime
 from typing import Annotated, Any, Literal
 
 from fastapi import Path
@@ -70,6 +71,9 @@ class Render(BaseModel):
     state: Literal["queued", "running", "done", "cancelled", "failed"]
     label: str | None
     priority: int
+    created: datetime | None = Field(description="When it was sent, by the server's clock; UTC.")
+    started: datetime | None = Field(description="When it first left the line; null while it waits for that.")
+    ended: datetime | None = Field(description="When it was done, cancelled or failed; null before.")
     reason: Literal["max_samples", "time_limit", "target_noise", "stopped"] | None
     samples: int = Field(description="Complete ones per pixel; with `adaptive` their mean over the pixels.")
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")

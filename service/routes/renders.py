@@ -235,14 +235,19 @@ async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQu
 @router.delete(
     "/renders/{id}",
     status_code=204,
-    summary="Cancel; the image so far stays",
-    responses=answers.problems(404, 410),
+    summary="Cancel; delete what has ended",
+    description="A render that waits or runs is cancelled, and its image so far stays. One that has ended is deleted "
+    "with its image, and answered 410 from then on. So the second call deletes what the first one cancelled.",
+    responses=answers.problems(404, 410, 503),
 )
-async def cancel(request: Request, id: answers.RenderId) -> None:
+async def delete(request: Request, id: answers.RenderId) -> None:
     renders = app_state(request).renders
     job = renders.get(id, owner(request))
-    renders.cancel(job)
-    await job.recorded()
+    if job.finished.is_set():
+        await renders.delete(job)
+    else:
+        renders.cancel(job)
+        await job.recorded()
 
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:

@@ -48,7 +48,7 @@ async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
     store = own.renders.store
     if store is None:
         raise Unavailable("Idempotency-Key needs the data folder, which cannot be written to.", 60)
-    parsed = await _parsed(request, "keyed_render")
+    parsed = await _parsed(request, "keyed_render", key)
     async with _turn(own, name, key):
         known = await store.keyed(name, key)
         if known is None:
@@ -59,11 +59,12 @@ async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
     return _known(own, stored, parsed)
 
 
-async def _parsed(request: Request, kind: Any) -> ParsedRequest:
-    own = app_state(request)
+async def _parsed(request: Request, kind: Any, key: str | None = None) -> ParsedRequest:
+    own, name = app_state(request), owner(request)
     async with own.bodies.taken(request, caller(request)) as body:
-        if kind != "keyed_render":  # that may be a repetition, which needs no room
-            own.renders.admit(owner(request))
+        store = own.renders.store
+        if key is None or store is None or await store.keyed(name, key) is None:  # a repetition needs no room
+            own.renders.admit(name)
         await own.renderers.able(STARTING_S)
         parsed: ParsedRequest = await own.bodies.parsed(kind, body, caller(request))
     return parsed

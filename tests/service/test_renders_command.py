@@ -97,6 +97,13 @@ def test_a_cancelled_render_is_not_done(command: Command, tmp_path: Path) -> Non
     id = command.submitted(path, *(f"--set={name}={value}" for name, value in ENDLESS.items()))
     assert command("cancel", id)[0] == 0
     assert command("wait", id)[:2] == (1, "cancelled\n")
+    code, _, err = command("cancel", id)
+    assert code == 0 and "cancelled already" in err and command("show", id)[0] == 0  # it stays
+    assert command("delete", id)[0] == 0
+    code, _, err = command("show", id)
+    assert code == 2 and "Gone" in err
+    under_way = command.submitted(path, *(f"--set={name}={value}" for name, value in ENDLESS.items()))
+    assert command("delete", under_way)[0] == 0 and command("show", under_way)[0] == 2
 
 
 def test_the_same_name_is_the_same_render(command: Command, scene: Path) -> None:

@@ -9,6 +9,7 @@ ordered     what was asked for, what became of it, and what it needs to begin
 resident    what the renderer has of a render
 scene       its scene: as a document while it waits, packed when it begins
 memory      what a render takes in memory
+documents   what the documents of renders that wait take on the disk, by owner
 retention   which ended renders make room
 recorder    writes what becomes of a render to the store
 waiting     waits for events

@@ -244,6 +244,8 @@ class Job(Resident):
         """Raises what loading the scene raises, and Unavailable where nothing renders."""
         self._lost.clear()
         self._gave_way.clear()
+        if self.outcome.started_at is None and not self.finished.is_set():
+            self.outcome = replace(self.outcome, started_at=time.time())
         if self.recorder is not None and not self._started:
             starts = await self.recorder.start(self.outcome)
             self._started, self.outcome = True, replace(self.outcome, starts=starts)  # it may be cancelled by now

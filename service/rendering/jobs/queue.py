@@ -11,14 +11,17 @@ from collections import Counter, OrderedDict
 from collections.abc import Callable, Collection, Coroutine, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from functools import partial
 from itertools import islice
 from typing import Any
 
 from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.quota import QuotaUsedUp
+from service.rendering.jobs.documents import WaitingDocuments
 from service.rendering.jobs.followers import Follower, Followers
 from service.rendering.jobs.job import Job
 from service.rendering.jobs.recorder import Recorder
-from service.rendering.jobs.retention import Retention, superfluous
+from service.rendering.jobs.retention import KeptRenders, Retention
 from service.rendering.jobs.slots import Slots
 from service.rendering.jobs.store.record import ENDED, IdempotencyKey, State, StoredRender
 from service.rendering.jobs.store.rows import REMEMBERED
@@ -43,6 +46,7 @@ class QueueLimits:
     waiting: int = 256
     each: int = 64  # running and waiting, of one owner
     retention: Retention = field(default_factory=Retention)
+    disk_bytes: int | None = None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
 
 
 @dataclass(frozen=True)
@@ -72,6 +76,8 @@ class RenderQueue:
         self._slots = Slots(self._limits.running, self._ran, clock)
         self._waiting = self._slots.waiting
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
+        self._documents = WaitingDocuments(self._limits.disk_bytes)
+        self._kept: KeptRenders[Job] = KeptRenders(self._limits.retention)
         self._resting: OrderedDict[str, Job] = OrderedDict()  # ended ones, the last one looked at last
         self._chores: set[asyncio.Task[None]] = set()
         self._timer: asyncio.TimerHandle | None = None
@@ -94,6 +100,10 @@ class RenderQueue:
             self._jobs[job.id] = job
             if not job.finished.is_set():
                 self._slots.add(job)
+                self._documents.count(job, job.order.bytes)
+        for job in sorted(self._jobs.values(), key=lambda job: job.ended_at):
+            if job.finished.is_set():
+                self._kept.add(job)
         if self._jobs:
             log.info("took up stored renders waiting=%d ended=%d", len(self._waiting), self.kept)
         self._evict()
@@ -139,7 +149,7 @@ class RenderQueue:
 
     def get(self, id: str, owner: str = "") -> Job:
         if id in self._gone and self._gone[id][0] == owner:
-            raise Gone("This render ended long ago, and made room for newer ones.")
+            raise Gone("This render was deleted, or it ended long ago and made room for newer ones.")
         job = self._jobs.get(id)
         if job is None or job.owner != owner:
             raise NotFound("There is no render of this id.")
@@ -198,7 +208,7 @@ class RenderQueue:
 
     @property
     def kept(self) -> int:
-        return sum(job.finished.is_set() for job in self._jobs.values())
+        return len(self._kept)
 
     @contextmanager
     def looking(self, job: Job) -> Iterator[None]:
@@ -228,23 +238,67 @@ class RenderQueue:
 
     async def _stored(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
         """The number that the store gave to the job."""
-        assert self.store is not None
+        self._documents.take(job, job.order.bytes)
         self._storing[job.owner] += 1
         try:
-            return await self.store.insert(job.order, job.outcome, await job.document(), uses, key)
+            return await self._insert(job, uses, key)
+        except BaseException:
+            self._documents.release(job)
+            raise
         finally:
             self._storing[job.owner] -= 1
+
+    async def _insert(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
+        """Where there is no room, ended renders make some, and at last there is a reserve for owners of few bytes."""
+        assert self.store is not None
+        insert = partial(self.store.insert, job.order, job.outcome, await job.document(), uses, key)
+        missing = job.order.bytes
+        while True:
+            try:
+                return await insert()
+            except QuotaUsedUp:
+                goes, missing = self._kept.take_for(missing), 2 * missing
+                if not goes:
+                    if self._documents.take_reserve(job, job.order.bytes):
+                        return await insert(reserved=True)
+                    raise
+                await self._forget(self._drop(goes))
 
     def _ran(self, job: Job) -> None:
         if job.finished.is_set() and job.id in self._jobs:
             self._rest(job)
+        self._ended(job)
+
+    def _ended(self, job: Job) -> None:
+        self._documents.release(job)
+        if job.finished.is_set() and job.id in self._jobs:
+            self._kept.add(job)
         self._evict()
 
     def cancel(self, job: Job) -> None:
-        """Cancel a job; one that waits leaves the queue."""
+        """Cancel a job that waits or runs; the image so far stays."""
         self._slots.remove(job)
         job.cancel()
-        self._evict()
+        self._ended(job)
+        if job.recorder is not None:
+            self._do(self._weigh(job))
+
+    async def _weigh(self, job: Job) -> None:
+        """Count what is stored of a cancelled render, once it is."""
+        await job.recorded()
+        if job.id in self._jobs:
+            self._kept.add(job)
+
+    async def delete(self, job: Job) -> None:
+        """Forget an ended render, its document and its picture. Raises Unavailable where the disk fails."""
+        await job.recorded()
+        if job.recorder is not None and self.store is not None:
+            job.release()
+            await job.recorder.close()
+            await self.store.forget([(job.recorder.number, job.id)])
+        if job.id in self._jobs:
+            self._kept.remove(job)
+            self._drop([job])
 
     def shrink(self, size: int) -> None:
         """Have ended renders leave the renderer until they have freed that many bytes. For any thread."""
@@ -289,25 +343,24 @@ class RenderQueue:
     def _evict(self) -> None:
         if self.closing:
             return
-        now, retention = time.monotonic(), self._limits.retention
-        ended = [job for job in self._jobs.values() if job.finished.is_set()]
-        goes = superfluous(ended, retention, now)
-        for job in goes:
-            job.release()
-            del self._jobs[job.id]
-            self._resting.pop(job.id, None)
-            self._remember(job.id, job.owner, job.number)
-        stored = [job.recorder for job in goes if job.recorder is not None]
-        if stored:
+        now = time.monotonic()
+        if stored := self._drop(self._kept.take_superfluous(now)):
             self._do(self._forget(stored))
         # So that room is made also when no more requests come.
         if self._timer is not None:
             self._timer.cancel()
             self._timer = None
-        left = [job.ended_at + retention.kept_s - now for job in ended if job.id in self._jobs]
-        if left:
-            pause_s = min(EVICTION_S, max(0.0, min(left)) + 1.0)
-            self._timer = asyncio.get_running_loop().call_later(pause_s, self._evict)
+        if (left_s := self._kept.left_s(now)) is not None:
+            self._timer = asyncio.get_running_loop().call_later(min(EVICTION_S, left_s + 1.0), self._evict)
+
+    def _drop(self, jobs: Collection[Job]) -> list[Recorder]:
+        """Forget renders; their recorders, where they are stored."""
+        for job in jobs:
+            job.release()
+            del self._jobs[job.id]
+            self._resting.pop(job.id, None)
+            self._remember(job.id, job.owner, job.number)
+        return [job.recorder for job in jobs if job.recorder is not None]
 
     async def _forget(self, recorders: list[Recorder]) -> None:
         assert self.store is not None

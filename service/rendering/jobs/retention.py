@@ -3,9 +3,8 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable
 from dataclasses import dataclass
-from typing import Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 
 @dataclass(frozen=True)
@@ -32,25 +31,69 @@ class Ended(Protocol):
 T = TypeVar("T", bound=Ended)
 
 
-def superfluous(ended: Iterable[T], bounds: Retention, now: float) -> list[T]:
-    """Those to forget, by `now`. The newest one stays, however large it is, until it is old."""
-    goes, stays, left = list[T](), list[T](), list[T]()
-    for render in sorted(ended, key=lambda render: render.ended_at):
-        (goes if now - render.ended_at >= bounds.kept_s else stays).append(render)
-    counts = Counter(render.owner for render in stays)
-    for render in stays:
-        if counts[render.owner] > bounds.kept:
-            counts[render.owner] -= 1
-            goes.append(render)
-        else:
-            left.append(render)
-    sizes = Counter[str]()
-    for render in left:
-        sizes[render.owner] += render.size
-    while left[1:] and sizes.total() > bounds.kept_bytes:
-        most = sizes.most_common(1)[0][0]  # the owner of most bytes loses a render, and not another owner of few
-        first = next(render for render in left if render.owner == most)
-        left.remove(first)
-        sizes[most] -= first.size
-        goes.append(first)
-    return goes
+class KeptRenders(Generic[T]):
+    """The ended renders within their bounds. What happens at an end does not grow with their number."""
+
+    def __init__(self, bounds: Retention) -> None:
+        self._bounds = bounds
+        self._lines: dict[str, dict[T, int]] = {}  # sizes by owner, the oldest end first
+        self._bytes: Counter[str] = Counter()
+        self._count = 0
+        self._newest: T | None = None
+
+    def __len__(self) -> int:
+        return self._count
+
+    def add(self, render: T) -> None:
+        """Keep one that has ended now; or count it by the size that it has by now. At a start they come in the order
+        of their ends."""
+        line = self._lines.setdefault(render.owner, {})
+        if render not in line:
+            self._newest = render
+            self._count += 1
+        self._bytes[render.owner] += render.size - line.get(render, 0)
+        line[render] = render.size
+
+    def remove(self, render: T) -> None:
+        line = self._lines.get(render.owner, {})
+        if render in line:
+            self._count -= 1
+            self._newest = None if self._newest is render else self._newest
+            self._bytes[render.owner] -= line.pop(render)
+            if not line:
+                del self._lines[render.owner], self._bytes[render.owner]
+
+    def take_superfluous(self, now: float) -> list[T]:
+        """Remove those to forget, by `now`. The newest one stays, however large it is, until it is old."""
+        goes, bounds = list[T](), self._bounds
+        for line in list(self._lines.values()):
+            while line and now - (first := next(iter(line))).ended_at >= bounds.kept_s:
+                goes.append(self._take(first))
+            while len(line) > bounds.kept:
+                goes.append(self._take(next(iter(line))))
+        return goes + self._take_largest(self._bytes.total() - bounds.kept_bytes)
+
+    def take_for(self, size: int) -> list[T]:
+        """Remove as many as take so many bytes, but for the newest one."""
+        return self._take_largest(size)
+
+    def left_s(self, now: float) -> float | None:
+        """Seconds until the next one is old; None where there is none."""
+        ends = [next(iter(line)).ended_at for line in self._lines.values()]
+        return max(0.0, min(ends) + self._bounds.kept_s - now) if ends else None
+
+    def _take_largest(self, size: int) -> list[T]:
+        """Of the owner of most bytes the oldest, and not those of another owner of few, until `size` is reached."""
+        goes = list[T]()
+        while size > 0 and self._count > 1:
+            for owner, _ in self._bytes.most_common(2):
+                first = next(iter(self._lines[owner]))
+                if first is not self._newest:
+                    break
+            size -= self._lines[owner][first]
+            goes.append(self._take(first))
+        return goes
+
+    def _take(self, render: T) -> T:
+        self.remove(render)
+        return render

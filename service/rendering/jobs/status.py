@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from datetime import UTC, datetime
 from typing import Any
 
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError
@@ -50,6 +51,9 @@ def status(order: Order, outcome: Outcome, renderers: int, measured: KernelMeasu
         "state": outcome.state,
         "label": order.label,
         "priority": order.priority,
+        "created": _iso(order.created_at),
+        "started": _iso(outcome.started_at),
+        "ended": _iso(outcome.ended_at),
         "reason": outcome.reason,
         "samples": progress.samples,
         "noise": progress.noise,
@@ -65,6 +69,13 @@ def status(order: Order, outcome: Outcome, renderers: int, measured: KernelMeasu
     if measured is not None:
         known["kernel"] = None if outcome.kernel is None else outcome.kernel | measured.kernel
     return known if outcome.problem is None else known | {"problem": outcome.problem}
+
+
+def _iso(seconds: float | None) -> str | None:
+    """A time since 1970 in UTC, by RFC 3339; None where it is not known."""
+    if not seconds:
+        return None
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="milliseconds").replace("+00:00", "Z")
 
 
 def error_of(failed: Failed) -> ServiceError:

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from contextlib import closing, suppress
+from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -92,9 +93,13 @@ def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: b
     done = start(first, label="mine", priority=3)
     told = status(first, done, PATIENCE_S)
     assert told["state"] == "done" and (told["label"], told["priority"]) == ("mine", 3)
+    times = [datetime.fromisoformat(told[name]) for name in ("created", "started", "ended")]
+    assert times == sorted(times) and abs((times[2] - datetime.now(UTC)).total_seconds()) < 600
     seen = {aov: pixels(first, done, aov) for aov in ("color", "variance", "normal")}
     running = start(first, LONG)
     queued = [start(first, {**SMALL, "seed": seed}) for seed in range(3)]
+    waits = status(first, queued[0])
+    assert (waits["started"], waits["ended"]) == (None, None) and waits["created"] >= told["ended"]
     until_checkpoint(tmp_path, running)
     before = until_samples(first, running, 100)
     kill(first)
@@ -118,8 +123,11 @@ def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: b
             ends.append(status(third, running)["state"])
         assert ends == ["done"] * 3  # the one that was running went first, the others in their order
         assert pixels(third, running) == undisturbed
-        assert third.http.delete(f"/v1/renders/{running}").status_code == 204
-        assert not list((tmp_path / "data" / "renders").glob("*.checkpoint"))
+        assert third.http.delete(f"/v1/renders/{running}").status_code == 204  # of an ended one its picture goes
+        assert third.http.get(f"/v1/renders/{running}").status_code == 410
+        assert third.http.get(f"/v1/renders/{running}/image").status_code == 410
+        assert running not in [each["id"] for each in third.http.get("/v1/renders").json()]
+        assert not list((tmp_path / "data" / "renders").glob(f"{running}*"))
         cancelled = start(third, ENDLESS)
         until_checkpoint(tmp_path, cancelled)
         assert third.http.delete(f"/v1/renders/{cancelled}").status_code == 204
@@ -130,6 +138,10 @@ def test_killed_and_ended_servers_leave_their_renders_to_the_next(undisturbed: b
     try:
         assert status(fourth, cancelled)["state"] == "cancelled" and status(fourth, cancelled)["samples"] > 0
         assert pixels(fourth, cancelled)
+        assert fourth.http.get(f"/v1/renders/{running}").status_code == 410
+        assert fourth.http.delete(f"/v1/renders/{cancelled}").status_code == 204
+        assert fourth.http.get(f"/v1/renders/{cancelled}").status_code == 410
+        assert fourth.http.delete(f"/v1/renders/{cancelled}").status_code == 410
     finally:
         assert fourth.stop() == 0
 
@@ -223,6 +235,19 @@ def test_only_an_accepted_request_takes_a_key(keyed: AnyServer) -> None:
     for wrong in ("", "x" * 201):
         assert submit(keyed, wrong, body).status_code == 422
     assert submit(keyed, "x" * 200, body).status_code == 202
+
+
+def test_a_full_owner_is_refused_unread_but_for_a_repetition(tmp_path: Path) -> None:
+    server = Server(tmp_path, SUNBOX_MAX_JOBS="1")
+    try:
+        body = {"scene": SCENE, "settings": ENDLESS}
+        id = submit(server, "first", body, {}).json()["id"]
+        assert submit(server, "second", "no JSON", {}).status_code == 429
+        assert submit(server, None, "no JSON", {}).status_code == 429
+        assert submit(server, "first", "no JSON", {}).status_code == 400
+        assert submit(server, "first", body, {}).json()["id"] == id
+    finally:
+        kill(server)
 
 
 @pytest.mark.parametrize(

@@ -21,7 +21,8 @@ class Job:
 
     def __init__(self, id: str, owner: str = "", size: int = 1, priority: int = 0, label: str | None = None) -> None:
         self.id, self.owner, self.size, self.ended_at = id, owner, size, 0.0
-        self.order = SimpleNamespace(label=label)
+        self.order = SimpleNamespace(label=label, bytes=0)
+        self.client = owner or id
         self.priority, self.began, self.number, self.resident_bytes = priority, False, 0, 0
         self.state, self.recorder, self.lasting, self.shown = "queued", None, True, False
         self.place, self.memory_share, self.lacks, self.can_give_way = 0, 0.0, 0, False

@@ -49,6 +49,7 @@ class Outcome:
     warnings: list[str] = field(default_factory=list)
     kernel: dict[str, Any] | None = None
     problem: dict[str, Any] | None = None
+    started_at: float | None = None  # s since 1970, when it first left the line
     ended_at: float | None = None  # s since 1970
     starts: int = 0  # how many servers began to render it
 

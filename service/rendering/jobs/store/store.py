@@ -44,13 +44,16 @@ Room = Callable[[Usage], AbstractContextManager[None]]
 
 
 class RenderStore:
-    """`room` is entered with what is to be stored, and raises where there is no room for it."""
+    """`room` is entered with what is to be stored, and raises where there is no room for it; `reserved` likewise for
+    small orders, where there is room in what is reserved for them."""
 
-    def __init__(self, folder: Path, room: Room = lambda size: nullcontext()) -> None:
+    def __init__(
+        self, folder: Path, room: Room = lambda size: nullcontext(), reserved: Room = lambda size: nullcontext()
+    ) -> None:
         self._folder = folder
         self._rows = RenderRows(Database(folder))
         self._files = PictureFiles(folder / RENDERS, room)
-        self._room = room
+        self._room, self._reserved = room, reserved
         self.failures = 0  # of writes, which had to do without
 
     def usable(self) -> bool:
@@ -134,11 +137,12 @@ class RenderStore:
         document: bytes,
         uses: Collection[str],
         key: IdempotencyKey | None = None,
+        reserved: bool = False,
     ) -> int:
         """The number of a render that waits from now on, and is on the disk."""
 
         def insert() -> int:
-            with self._room(expected([len(document)])):
+            with (self._reserved if reserved else self._room)(expected([len(document)])):
                 return self._rows.insert(order, outcome, document, uses, key)
 
         return await recording(insert)
