@@ -126,7 +126,9 @@ class AssetStore:
         if info.kind == "image":
             raise NotFound(f"{id[:100]} is an image: only meshes and scene files can be shown as a scene")
         if info.kind == "mesh":
-            return Imported(plain_scene(id, self.mesh(id)), list(info.warnings or ()), lit=False)
+            document, told = plain_scene(id, self.mesh(id))
+            said = [] if told is None else [{"pointer": "", "detail": told}]
+            return Imported(document, [*said, *(info.warnings or ())], lit=False)
         imported = self._imported(id)
         if imported is None:  # the file itself still exists: import it again
             with self.opened(id) as source:

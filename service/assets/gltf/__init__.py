@@ -23,5 +23,4 @@ texture_bake          pixels of textures that are computed from others
 anisotropy_texture    KHR_materials_anisotropy's texture
 lights_and_camera     lights and cameras -> the document's
 metering              the exposure that suits a file
-rays                  rays against a file's triangles, for metering
 """

@@ -19,8 +19,10 @@ from service.assets.gltf.placements import Part, Placements
 from service.assets.gltf.primitives import Primitive, read_primitive
 from service.assets.gltf.textures import Textures
 from service.assets.readers.raw_mesh import MAX_COORDINATE
+from service.assets.scenes.framing import framed
 from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.ply_writer import ply
+from service.assets.scenes.room import stand_inside
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import AssetLimits, SceneFile
 
@@ -52,7 +54,9 @@ class _Importer:
         shapes = self.placements.shapes(self.notes)
         if not shapes:
             raise self.notes.nothing_left()
-        camera, aspect = lights_and_camera.camera(file, shown, self.placements.bounds, self.notes)
+        around = self.placements.bounds
+        own, aspect = lights_and_camera.camera(file, shown, around, self.notes)
+        camera = own or framed(around)
         document = {
             "version": 1,
             "camera": camera,
@@ -63,10 +67,13 @@ class _Importer:
         }
         used = {name: value for name, value in document.items() if value or name in ("materials", "shapes")}
         lighting = Warnings()
+        told = stand_inside(used, self.placements.placed(), around, has_camera=own is not None)
+        if told is not None:
+            lighting.add("", told)
         exposure = self._metered(used, aspect, lighting) if lights else None
         warnings = [*lighting.document(), *self.notes.document()]  # first what concerns the whole picture
         triangles = sum(part.triangles for part in self.placements.shown)
-        bounds = [corner.tolist() for corner in self.placements.bounds]
+        bounds = [corner.tolist() for corner in around]
         return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect, bounds)
 
     def _metered(self, document: dict[str, Any], aspect: float | None, notes: Warnings) -> float | None:

@@ -10,7 +10,7 @@ import numpy as np
 from service.assets.gltf.document import GltfDocument
 from service.assets.gltf.json_view import JsonView, shown
 from service.assets.gltf.nodes import Node
-from service.assets.scenes.framing import FRAMED_VFOV, Bounds, framed
+from service.assets.scenes.framing import FRAMED_VFOV, Bounds
 from service.assets.scenes.warnings import Warnings
 
 INSTEAD = "a perspective camera that shows the whole scene is used instead"
@@ -61,9 +61,9 @@ def _light(place: JsonView, node: Node, notes: Warnings) -> dict[str, Any]:
 
 def camera(
     file: GltfDocument, nodes: list[Node], bounds: Bounds, notes: Warnings
-) -> tuple[dict[str, Any], float | None]:
-    """The scene's first camera, or one that shows everything where none is a perspective camera; and the width of its
-    picture over the height, or None."""
+) -> tuple[dict[str, Any] | None, float | None]:
+    """The scene's first perspective camera, and the width of its picture over the height; None where there is
+    none."""
     chosen: dict[str, Any] | None = None
     aspect: float | None = None
     for node in nodes:
@@ -81,7 +81,7 @@ def camera(
             notes.add(place.pointer, f"orthographic cameras are not supported; {INSTEAD}")
         else:
             notes.add(place.at("type"), f"must be perspective or orthographic, not {shown(kind)}; {INSTEAD}")
-    return chosen or framed(bounds), aspect
+    return chosen, aspect
 
 
 def _perspective(place: JsonView, node: Node, bounds: Bounds) -> dict[str, Any]:

@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from service.assets.gltf.rays import Hit, Placed, Scene
+from service.assets.scenes.rays import Hit, Placed, Scene
 from service.assets.types import Doubles
 
 GRID = 12  # rays along each side of the picture

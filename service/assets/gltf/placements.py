@@ -12,9 +12,9 @@ import numpy.typing as npt
 from service.assets.errors import ParseError
 from service.assets.gltf.document import Array
 from service.assets.gltf.nodes import Node
-from service.assets.gltf.rays import Placed
 from service.assets.readers.raw_mesh import MAX_COORDINATE
 from service.assets.scenes.framing import Bounds
+from service.assets.scenes.rays import Placed
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import Doubles, Indices
 

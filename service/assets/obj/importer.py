@@ -28,6 +28,8 @@ from service.assets.readers.raw_mesh import RawMesh, check_raw_mesh
 from service.assets.scenes.framing import framed
 from service.assets.scenes.part_files import PartFiles
 from service.assets.scenes.ply_writer import ply
+from service.assets.scenes.rays import Placed
+from service.assets.scenes.room import stand_inside
 from service.assets.scenes.warnings import Warnings
 from service.assets.types import AssetLimits, SceneFile
 
@@ -61,6 +63,13 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     document = {"version": 1, "camera": framed(bounds), "materials": materials.documents, "shapes": shapes}
     if textures.documents:
         document["textures"] = textures.documents
+    whole = np.asarray(mesh.vertices, np.float64)
+    parts = [
+        Placed(whole, mesh.faces[which].astype(np.int32), np.eye(4), True, shape["material"])
+        for (_, which), shape in zip(_by_material(read), shapes, strict=True)
+    ]
+    if (told := stand_inside(document, parts, bounds)) is not None:
+        notes.add(name, told)
     corners = [corner.tolist() for corner in bounds]
     return SceneFile(document, files.kept, notes.document(), len(mesh.faces), False, bounds=corners)
 

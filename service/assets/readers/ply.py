@@ -140,7 +140,8 @@ def _strips(counts: Longs, values: Corners) -> Corners:
     # Strips turn round corners by repeating a vertex, which makes triangles without area.
     real = (a != RESTART) & (b != RESTART) & (c != RESTART) & (a != b) & (b != c) & (c != a)
     turned = (at - starts[at]) % 2 == 1
-    return np.stack([np.where(turned, b, a), np.where(turned, a, b), c], axis=1)[real].reshape(-1)
+    triangles: Corners = np.stack([np.where(turned, b, a), np.where(turned, a, b), c], axis=1)[real]
+    return triangles.reshape(-1)
 
 
 def _stack(columns: Columns, names: tuple[str, ...]) -> Doubles:

@@ -4,18 +4,24 @@ from __future__ import annotations
 
 from typing import Any
 
+import numpy as np
+
 from service.assets.scenes.framing import framed
+from service.assets.scenes.rays import Placed
+from service.assets.scenes.room import stand_inside
 from service.assets.types import MeshData
 
 GREY = {"type": "diffuse", "albedo": 0.8}  # the material of what has none
 NAME = "default"
 
 
-def plain_scene(asset: str, mesh: MeshData) -> dict[str, Any]:
-    """A document that shows the mesh whole, in grey or its own colours; it has no light."""
-    return {
+def plain_scene(asset: str, mesh: MeshData) -> tuple[dict[str, Any], str | None]:
+    """A document that shows the mesh whole, in grey or its own colours, and what is to be said of it. There is no
+    light but in a closed room."""
+    document = {
         "version": 1,
         "camera": framed(mesh.bounds),
         "materials": {NAME: dict(GREY)},
         "shapes": [{"type": "mesh", "asset": asset, "material": NAME}],
     }
+    return document, stand_inside(document, [Placed(mesh.vertices, mesh.faces, np.eye(4), True, NAME)], mesh.bounds)

@@ -63,7 +63,8 @@ def place(
     groups = smooth if isinstance(smooth, np.ndarray) and normals is None and np.any(smooth) else None
     if groups is not None:
         which, group, faces = split(faces, groups)
-        vertices, uvs, uvs_1, colors = (row if row is None else row[which] for row in (vertices, uvs, uvs_1, colors))
+        vertices = vertices[which]
+        uvs, uvs_1, colors = (None if rows is None else rows[which] for rows in (uvs, uvs_1, colors))
         chart = None if chart is None else chart.of(which)
         found, places = corner_normals(vertices, faces, group)
         normals = np.empty((len(vertices), 3))

@@ -1,4 +1,5 @@
-"""Rays against a file's triangles, for metering: a few hundred rays, so numpy does, and no tree is built.
+"""Rays against a file's triangles, for metering and to tell rooms from other models: a few hundred rays, so numpy
+does, and no tree is built.
 
 A ray tries the boxes of the parts first, then those of runs of triangles (files store neighbours together), then the
 triangles. Too many triangles are thinned out, and the rest is enlarged to the same area [Cook et al. 2007,
@@ -35,6 +36,7 @@ class Hit:
     distance: float  # along the ray, in lengths of its direction
     placed: Placed
     normal: Doubles  # (3,), of length one, towards the ray's origin
+    is_front: bool  # whether the ray met the outward side
 
 
 class Triangles:
@@ -101,7 +103,11 @@ class Scene:
             distance, row = self._of(placed).nearest(*local, least, most, side)
             if row >= 0:
                 most, found = distance, (placed, row, inverse)
-        return None if found is None else Hit(most, found[0], self._normal(*found, direction))
+        if found is None:
+            return None
+        outward = self._normal(*found)
+        is_front = bool(outward @ direction < 0)
+        return Hit(most, found[0], outward if is_front else -outward, is_front)
 
     def _of(self, placed: Placed) -> Triangles:
         key = id(placed.faces)
@@ -109,11 +115,10 @@ class Scene:
             self._triangles[key] = Triangles(placed.vertices, placed.faces, max(self._stride, 1))
         return self._triangles[key]
 
-    def _normal(self, placed: Placed, row: int, inverse: Doubles, direction: Doubles) -> Doubles:
+    def _normal(self, placed: Placed, row: int, inverse: Doubles) -> Doubles:
         first, second = self._of(placed).edges[row]
         normal = inverse[:3, :3].T @ np.cross(first, second)
-        normal *= -np.sign(normal @ direction) / (float(np.linalg.norm(normal)) or 1.0)
-        return np.asarray(normal)
+        return np.asarray(normal / (float(np.linalg.norm(normal)) or 1.0))
 
 
 def entry(low: Doubles, high: Doubles, origin: Doubles, direction: Doubles, most: float) -> Doubles:
