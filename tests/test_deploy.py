@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import os
 import re
+import subprocess
 from pathlib import Path
 from typing import Any
 
@@ -68,6 +70,29 @@ def test_a_profile_of_compose_is_a_cluster() -> None:
     for service in (head, worker):
         assert service["environment"]["RAY_AUTH_MODE"] == "token" and service["read_only"]
     assert "SUNBOX_API_KEY" not in worker["environment"]
+
+
+@pytest.mark.parametrize("file", ["compose.yaml", "docs/deploy/kuberay.yaml"])
+def test_the_server_has_the_key_and_ray_has_not(file: str, tmp_path: Path) -> None:
+    """What the head runs, with programs that say what their environment is."""
+    first = documents(ROOT / file)[0]
+    if file == "compose.yaml":
+        (command,) = first["services"]["head"]["command"]
+    else:
+        (command,) = first["spec"]["headGroupSpec"]["template"]["spec"]["containers"][0]["args"]
+    for name in ("ray", "sunbox"):
+        (tmp_path / name).write_text(f'#!/bin/sh\necho "{name} $1 key=$SUNBOX_API_KEY"\n')
+        (tmp_path / name).chmod(0o755)
+    own = {"PATH": f"{tmp_path}:{os.environ['PATH']}", "SUNBOX_API_KEY": "anna"}
+    own["KUBERAY_GEN_RAY_START_CMD"] = "ray start --head"
+    done = subprocess.run(["bash", "-c", command], env=own, capture_output=True, text=True)
+    said = set(done.stdout.splitlines()) - {"ray health-check key=anna"}
+    assert said == {"ray start key=", "sunbox serve key=anna"}, done
+
+
+def test_no_example_has_a_key_on_a_command_line() -> None:
+    texts = [*DEPLOY.glob("*.yaml"), ROOT / "docs" / "scaling.md"]
+    assert not [path.name for path in texts if re.search(r"SUNBOX_API_KEY=(?!\"\$)", path.read_text())]
 
 
 def test_the_proxy_of_compose_is_trusted() -> None:

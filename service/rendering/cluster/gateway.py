@@ -23,7 +23,7 @@ from service.rendering.cluster import control
 from service.rendering.cluster.actor import Renderer
 from service.rendering.cluster.carriage import Scenes
 from service.rendering.cluster.control import Alive, Join, Joined, Open, Refused, Release
-from service.rendering.cluster.joining import CannotJoin, join, survey
+from service.rendering.cluster.joining import CannotJoin, close_token_file, has_token, join, survey
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described
 from service.rendering.ipc import channel
@@ -31,6 +31,10 @@ from service.rendering.supervisor.process import Waiting
 
 DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
+WITHOUT_TOKEN = (
+    "the Ray cluster has no token: whoever reaches its ports can run programs on its nodes, and in this server; make "
+    "one with `ray get-auth-token --generate` and put it on all nodes (docs/scaling.md) address=%s"
+)
 ALIVE_S = 1.0  # between two signs of life
 FAREWELL_S = 5.0  # for renderers to end by themselves
 
@@ -151,6 +155,8 @@ def main() -> int:
     logs.configure(os.environ.get("SUNBOX_LOG_FORMAT", "console"), logging.getLevelName(arguments.log_level))
     sys.stderr = sys.__stderr__
     _keep_others_from_writing()
+    os.umask(0o077)  # what Ray writes, its token first of all, is this user's alone
+    close_token_file()
     end = socket.socket(fileno=arguments.descriptor)
     received = control.receive(end)
     if received is None:
@@ -170,6 +176,8 @@ def main() -> int:
         control.send(end, joined)
     _written.clear()
     log.info("joined address=%s renderers=%d", joined.address, joined.renderers)
+    if not has_token():
+        log.warning(WITHOUT_TOKEN, joined.address)
     end.setblocking(False)
     asyncio.run(Gateway(end, ask, joined).serve())
     _leave()

@@ -7,6 +7,7 @@ import os
 import socket
 import time
 from contextlib import suppress
+from pathlib import Path
 from typing import Any, cast
 
 from service.rendering.cluster.control import Join, Joined
@@ -42,6 +43,7 @@ def join(ask: Join) -> bool:
     quietly: dict[str, Any] = {"log_to_driver": False, "configure_logging": False}
     try:
         if local:
+            _stay_on_this_machine()
             ray.init(address="local", include_dashboard=False, **quietly)
         else:
             ray.init(address=named or "auto", **quietly)
@@ -50,6 +52,35 @@ def join(ask: Join) -> bool:
             f"{variable}: could not join the Ray cluster {named or 'of this machine'}: {error}"
         ) from None
     return local
+
+
+def has_token() -> bool:
+    """Whether this process shows a token to the cluster, and takes requests with that token alone."""
+    from ray._private.authentication.authentication_utils import is_token_auth_enabled
+
+    return bool(is_token_auth_enabled())
+
+
+def close_token_file() -> None:
+    """Leave the token in the home folder to its owner: Ray and `ray get-auth-token --generate` make it as the umask
+    says, so that all users could read it, and run programs as this one."""
+    path = Path.home() / ".ray" / "auth_token"
+    with suppress(OSError):  # there is none, or it is another user's
+        if path.stat().st_mode & 0o077:
+            path.chmod(0o600)
+            log.info("left the token of Ray to its owner path=%s", path)
+
+
+def _stay_on_this_machine() -> None:
+    """Have a cluster that is about to be started listen on the loopback address alone.
+
+    Ray has no public way: it replaces 127.0.0.1 by an address that others reach, unless clusters of several machines
+    are switched off. The variable for that is named after the systems where they are off by default.
+    """
+    from ray._private import ray_constants
+
+    os.environ[ray_constants.ENABLE_RAY_CLUSTERS_ENV_VAR] = "0"  # for Ray's processes
+    ray_constants.ENABLE_RAY_CLUSTER = False
 
 
 def survey(ask: Join, local: bool) -> Joined:

@@ -117,6 +117,33 @@ def test_callers_keys_stay_with_the_server(run: Run) -> None:
     run(test)
 
 
+def test_a_cluster_of_ones_own_is_closed_to_others(run: Run, cluster: Cluster) -> None:
+    """It listens on the loopback address alone, and its files are its user's."""
+
+    async def test(pool: Pool) -> None:
+        assert cluster.joined.address.startswith("127.0.0.1:") and pool.process_id is not None
+        found = {address for pid in descendants(pool.process_id, "") for address in listening(pid)}
+        assert found and all(address.endswith("0100007F") for address in found), found  # 127.0.0.1, also within IPv6
+        status = Path(f"/proc/{pool.process_id}/status").read_text()
+        assert "\nUmask:\t0077\n" in status
+
+    run(test)
+
+
+def listening(pid: int) -> Iterator[str]:
+    """The addresses at which a process takes TCP connections, in hexadecimal as the kernel writes them."""
+    sockets = set[str]()
+    with suppress(OSError):  # it has just ended, or is hidden, as renderers are
+        for descriptor in Path(f"/proc/{pid}/fd").iterdir():
+            with suppress(OSError):
+                sockets.add(os.readlink(descriptor))
+    for name in ("tcp", "tcp6"):
+        for line in Path(f"/proc/net/{name}").read_text().splitlines()[1:]:
+            fields = line.split()
+            if fields[3] == "0A" and f"socket:[{fields[9]}]" in sockets:
+                yield fields[1].partition(":")[0]
+
+
 def test_actors_divide_a_render(run: Run) -> None:
     async def test(pool: Pool) -> None:
         await until(lambda: all(member.state == "ready" for member in pool.members))

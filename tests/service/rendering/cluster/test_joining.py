@@ -20,7 +20,7 @@ from service.rendering.cluster import carriage, code, lane
 from service.rendering.cluster.carriage import Scenes, digest
 from service.rendering.cluster.cluster import Cluster
 from service.rendering.cluster.control import Ended
-from service.rendering.cluster.joining import CannotJoin
+from service.rendering.cluster.joining import CannotJoin, close_token_file
 from service.rendering.cluster.lane import Lane
 from service.rendering.cluster.renderers import described, plan
 from service.rendering.ipc import channel
@@ -74,7 +74,7 @@ def test_settings_that_make_no_sense(variables: dict[str, Any], said: str) -> No
 
 def test_ray_is_not_installed(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(importlib.util, "find_spec", lambda name: None)
-    with pytest.raises(CannotJoin, match=r"^SUNBOX_RAY .* pip install 'sunbox\[ray\]'"):
+    with pytest.raises(CannotJoin, match=r"^SUNBOX_RAY .* pip install 'ray>="):
         Cluster("auto", None, False, OPTIONS)
 
 
@@ -93,6 +93,29 @@ def test_a_server_does_not_start_without_its_cluster(tmp_path: Path, variable: s
     assert ended.returncode == 1 and ended.stdout == ""
     assert f"no Ray cluster answers at {address}" in ended.stderr and f"{variable}" in ended.stderr
     assert "Traceback" not in ended.stderr
+
+
+@pytest.mark.parametrize("mode", [0o644, 0o600])
+def test_a_token_in_the_home_folder_is_left_to_its_owner(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, mode: int
+) -> None:
+    monkeypatch.setenv("HOME", str(tmp_path))
+    close_token_file()  # there is none
+    path = tmp_path / ".ray" / "auth_token"
+    path.parent.mkdir()
+    path.write_text("token")
+    path.chmod(mode)
+    close_token_file()
+    assert path.stat().st_mode & 0o777 == 0o600 and path.read_text() == "token"
+
+
+@needs_ray
+@pytest.mark.parametrize(("mode", "expected"), [("token", "True"), ("disabled", "False")])
+def test_a_cluster_without_a_token_is_known(mode: str, expected: str) -> None:
+    program = "from service.rendering.cluster.joining import has_token; print(has_token())"
+    environment = os.environ | {"RAY_AUTH_MODE": mode}
+    told = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
+    assert told.stdout.strip() == expected, told.stderr
 
 
 @needs_ray
