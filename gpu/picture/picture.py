@@ -207,7 +207,7 @@ class Picture:
         return self._sharing is None or self._sharing.own_done
 
     def allocate_block(self) -> None:
-        """Take the memory of the block under way, unless it is there, so that `share` needs none. Raises OutOfMemory."""
+        """Take the memory of the block under way, unless it is there: `share` then needs none. Raises OutOfMemory."""
         contexts.use(self.context)
         self._sums.allocate_block()
 

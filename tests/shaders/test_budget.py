@@ -48,7 +48,7 @@ def _cut(warnings: list[str]) -> int:
 
 
 def test_a_path_among_many_shapes_ends_and_keeps_what_it_found(gpu: Renderer) -> None:
-    """In a mesh that reflects all light and glows with 1, a path's light is the number of surfaces that it has met."""
+    """In a mesh that reflects all light and glows with 1, a path's light is the number of surfaces that it met."""
     scene = document(
         [{**icosphere("m", 1), "smooth": False}], {"m": GLOW}, camera={**INSIDE, "position": [0, 0, 0.5]}
     )
@@ -64,8 +64,8 @@ def test_a_path_among_many_shapes_ends_and_keeps_what_it_found(gpu: Renderer) ->
 
 @pytest.mark.parametrize("shapes", [[_sheets(400)], _quads(24)], ids=["in the tree", "in loops"])
 def test_a_path_through_many_layers_ends_and_keeps_what_it_found(gpu: Renderer, shapes: list[dict[str, Any]]) -> None:
-    """It is that of a picture with some fewer bounces, to the bit: light through layers that it did not come to the end
-    of is left out."""
+    """It is that of a picture with some fewer bounces, to the bit: light through layers to whose end it did not come
+    is left out."""
     made = picture(gpu, _veiled(*shapes), 1, **DEEP)
     seen = made.read()[..., :3]
     assert _cut(made.warnings) == 64

@@ -16,8 +16,8 @@ FIRST_FRAME_LEAD_S = 0.5
 # that loads a kernel, takes as long as ten others, and 32 clients would take 32 times that to catch up in full.
 CATCH_UP_S = 0.5
 TURN_S = 0.03  # no lead: the length of an ordinary turn, a slice and the tile that is under way at its end
-# What a client had beyond that lead it owes, and pays back as a surcharge on its turns: this share of each. It owes no
-# more than so many seconds; for the rest of a longer turn it waits until each of the others has had as much.
+# What a client had beyond that lead it owes, and pays back as a surcharge on its turns: this share of each. It owes
+# no more than so many seconds; for the rest of a longer turn it waits until each of the others has had as much.
 SURCHARGE, MOST_OWED_S = 0.125, 1.0
 # Whoever has waited for a frame for longer than this (s) goes first, up to this share of the device. With equal time
 # alone the costliest scenes of a crowd wait twice as long as the mean one.
