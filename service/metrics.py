@@ -108,7 +108,7 @@ def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[
     recovery = {member.place.id: member.statistics.recovery_s for member in members}
     yield _histograms("recovery_seconds", "From a renderer's loss to the next one.", "renderer", recovery)
     leases = _each_of(members, lambda seen: seen.leases)
-    help = "Parts of divided pictures that a renderer was given by others, traced, or failed to trace."
+    help = "Parts of divided pictures that a renderer was given by others, traced, failed to trace, or traced wrong."
     yield _counters("leases", help, ("renderer", "outcome"), leases)
     errors = {(kind,): float(count) for kind, count in clients.errors.items()}
     yield _counters("errors", "Errors on streams and of failed renders, by problem.", ("type",), errors)

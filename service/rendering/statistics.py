@@ -55,7 +55,7 @@ class Statistics(ClientStatistics):
     restarts: Counter[str] = field(default_factory=Counter)  # of the renderer: by process.Cause
     recovery_s: Distribution = field(default_factory=Distribution)  # from a renderer's loss to the next one ready
     checkpoints: int = 0  # of renders, against such losses
-    leases: Counter[str] = field(default_factory=Counter)  # it traced for other renderers: given, done, failed
+    leases: Counter[str] = field(default_factory=Counter)  # it traced for other renderers: given, done, failed, wrong
     gpu_s: dict[Kind, float] = field(default_factory=lambda: defaultdict(float))
     gpu_s_of: dict[int, float] = field(default_factory=lambda: defaultdict(float))  # by task, while it is there
     samples: int = 0  # of pixels, traced

@@ -60,6 +60,15 @@ class LeaseFailed:
     detail: str
 
 
+@dataclass(frozen=True)
+class LeaseRefuted:
+    """From the home: it has traced a band of this assistant again, and got other bits."""
+
+    task: int
+    generation: int
+    assistant: int
+
+
 def undivided(adaptive: bool, time_limit: float | None) -> str | None:
     """Why a picture of such settings is traced by one renderer; None where it may be divided."""
     if adaptive:

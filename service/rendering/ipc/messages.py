@@ -9,7 +9,7 @@ from typing import Any, Literal, Protocol
 import numpy as np
 
 from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
-from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
+from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.rendering.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.views import DEFAULT_TONE_MAP, Encoding
 
@@ -370,5 +370,6 @@ Heard = (  # of a renderer that has started
     | Lease
     | LeaseDone
     | LeaseFailed
+    | LeaseRefuted
 )
 FromRenderer = Ready | Unable | Heard

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from service.rendering.ipc.channel import Encoded
-from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, undivided
+from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted, undivided
 from service.rendering.ipc.messages import Done, Failed, Heard, ToRenderer, Update
 from service.rendering.ipc.orders import Drop, Pause, Resume, Stop
 
@@ -25,7 +25,7 @@ class Peer(Protocol):
 
     @property
     def leases(self) -> Counter[str]:
-        """How many leases it was given, has done, and has failed to do."""
+        """How many leases it was given, has done, has failed to do, and has done wrong."""
 
     def relay(self, message: ToRenderer) -> None:
         """Send a message as it is, past the records of this renderer's own tasks."""
@@ -54,6 +54,7 @@ class Division:
     def __init__(self, peers: Sequence[Peer]) -> None:
         self._peers = peers
         self._tasks: dict[int, _Task] = {}
+        self._wrong: set[int] = set()  # renderers whose results were refuted: they assist nobody any more
 
     def opened(self, task: int, home: int, most: int | None) -> None:
         self._tasks[task] = _Task(most, home)
@@ -137,7 +138,7 @@ class Division:
         if held is not None and held.assistants:
             self._peers[held.home].relay(Assistants(task, held.assistants))
 
-    def handed(self, message: Lease | LeaseDone | LeaseFailed, sender: int) -> None:
+    def handed(self, message: Lease | LeaseDone | LeaseFailed | LeaseRefuted, sender: int) -> None:
         """Hand on what the home and its assistants say to each other."""
         held = self._tasks.get(message.task)
         if held is None:
@@ -146,6 +147,9 @@ class Division:
             if message.assistant in held.assistants:
                 self._peers[message.assistant].leases["given"] += 1
                 self._peers[message.assistant].relay(message)
+        elif isinstance(message, LeaseRefuted):
+            if sender == held.home:
+                self._refuted(message)
         elif sender not in held.assistants:
             return
         elif isinstance(message, LeaseDone):
@@ -157,13 +161,23 @@ class Division:
             held.unfit |= {sender}
             self.assign()
 
+    def _refuted(self, message: LeaseRefuted) -> None:
+        self._peers[message.assistant].leases["wrong"] += 1
+        log.error(
+            "two renderers got different bits for the same part of a picture: check their memory; the second one "
+            "assists in no other picture task=%d home=%d renderer=%d",
+            message.task, self._tasks[message.task].home, message.assistant,
+        )  # fmt: skip
+        self._wrong.add(message.assistant)
+        self.assign()
+
     def assign(self) -> None:
         """Choose anew who assists whom; to be called when a renderer has come, gone or changed."""
         tasks = [
             held for held in self._tasks.values() if held.active and undivided(held.adaptive, held.time_limit) is None
         ]
         busy = {held.home for held in self._tasks.values() if held.active}
-        free = [n for n, peer in enumerate(self._peers) if n not in busy and peer.driver is not None]
+        free = [n for n, peer in enumerate(self._peers) if n not in busy | self._wrong and peer.driver is not None]
         chosen: dict[int, list[int]] = {id(held): [] for held in tasks}
         share = -(-len(free) // max(1, len(tasks)))
         for held in tasks:  # who assists already goes on, as far as that is still wanted

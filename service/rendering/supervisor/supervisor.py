@@ -14,7 +14,7 @@ from service.problems import Unavailable
 from service.rendering.executors import sending, tending
 from service.rendering.ipc import channel
 from service.rendering.ipc.kernel_messages import MeasureKernel
-from service.rendering.ipc.leases import Lease, LeaseDone, LeaseFailed
+from service.rendering.ipc.leases import Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.rendering.ipc.messages import (
     Checkpoint,
     Discarded,
@@ -74,7 +74,7 @@ class Supervisor:
         self.lost: Callable[[], None] = lambda: None
         self.ended: Callable[[int], None] = lambda task: None
         self.stray: Callable[[Heard], None] = lambda message: None
-        self.handed: Callable[[Lease | LeaseDone | LeaseFailed], None] = lambda message: None
+        self.handed: Callable[[Lease | LeaseDone | LeaseFailed | LeaseRefuted], None] = lambda message: None
         self.noticed: Callable[[Heard], None] = lambda message: None
         self.told: Callable[[int], None] = lambda task: None
         self.kind_of: Callable[[int], Kind] = lambda task: "server"
@@ -304,7 +304,7 @@ class Supervisor:
     def _received(self, message: Heard) -> None:
         if isinstance(message, Usage):
             self._account(message)
-        elif isinstance(message, Lease | LeaseDone | LeaseFailed):
+        elif isinstance(message, Lease | LeaseDone | LeaseFailed | LeaseRefuted):
             self.handed(message)
         elif (held := self._tasks.get(message.task)) is not None:
             self._hear(message, held)

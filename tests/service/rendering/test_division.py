@@ -14,7 +14,7 @@ import pytest
 
 from gpu import Band, OutOfMemory, Renderer, RenderSettings, Saved, Steps, border_after
 from gpu.picture.accumulators import Accumulators
-from service.rendering.ipc.leases import Lease, LeaseDone
+from service.rendering.ipc.leases import Lease, LeaseDone, LeaseRefuted
 from service.rendering.ipc.messages import Failed, Progress, Restore, StopRule, Update, driver_of
 from service.rendering.jobs.store.pictures import PictureFiles
 from service.rendering.worker.context import WorkerContext
@@ -314,6 +314,28 @@ def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
     assert not any(isinstance(message, Failed) for message in sent)
     for each in (home, helper, idle, back):
         each.release()
+
+
+@pytest.mark.parametrize("wrong", [None, 1])
+def test_results_are_traced_again_and_compared(wrong: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
+    """The picture has the home's bits then; whoever sends others assists no more, and its results are dropped."""
+    monkeypatch.setattr("service.rendering.worker.division.home.CHECKED", 1.0)
+    monkeypatch.setattr(_Picture, "read_band", lambda self, band: np.full(3, band.top, np.float32))
+    picture = _Picture()
+    home, sent = _home(picture, (1, 2))
+    answered, refuted = 0, 0
+    for _ in range(4000):
+        _turn(home, picture, 200)
+        for message in list(sent[answered:]):
+            answered += 1
+            if isinstance(message, LeaseRefuted):
+                assert message == LeaseRefuted(1, 1, 1) and wrong
+                refuted = answered
+            else:
+                assert not refuted or message.assistant != wrong
+                values = np.full(3, message.top + (message.assistant == wrong), np.float32)
+                home.heard(LeaseDone(1, 1, message.number, values))
+    assert picture.samples == 200 and bool(refuted) == bool(wrong)
 
 
 def test_a_result_is_never_too_large() -> None:

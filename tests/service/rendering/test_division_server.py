@@ -7,9 +7,10 @@ from collections.abc import Iterable
 from typing import Any, cast
 
 import numpy as np
+import pytest
 
 from service.rendering.ipc.channel import Encoded
-from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
+from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.rendering.ipc.messages import Done, Failed, Progress, StopRule, ToRenderer, Update
 from service.rendering.ipc.orders import Drop, Pause, Resume
 from service.rendering.supervisor.division import Division
@@ -124,6 +125,19 @@ def test_who_cannot_load_the_scene_is_not_asked_again_before_there_is_another() 
     assert division.renderers(1) == 1
     division.scene_sent(_update(1))
     assert division.renderers(1) == 2
+
+
+def test_whose_results_are_wrong_assists_in_no_picture(caplog: pytest.LogCaptureFixture) -> None:
+    division, peers = _pool("a", "a", "a")
+    _begin(division, 1, 0)
+    division.handed(LeaseRefuted(1, 1, 2), 1)  # only a home can say so
+    assert division.renderers(1) == 3 and not peers[2].leases
+    division.handed(LeaseRefuted(1, 1, 1), 0)
+    assert division.renderers(1) == 2 and peers[0].told[-1] == Assistants(1, (2,)) and peers[1].told[-1] == Drop(1)
+    assert peers[1].leases["wrong"] == 1 and "task=1 home=0 renderer=1" in caplog.text
+    division.dropped(1)
+    _begin(division, 2, 2)
+    assert division.renderers(2) == 2 and peers[2].told[-1] == Assistants(2, (0,))
 
 
 def test_where_an_edit_fails_at_home_assistants_begin_again() -> None:
