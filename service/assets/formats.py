@@ -56,8 +56,8 @@ SUFFIXES = {name: name for name in KINDS} | {"jpg": "jpeg", "pic": "hdr", "rgbe"
 
 # OBJ has no magic number: it is recognised by its first statement, after blank lines and comments.
 # Possessive quantifiers: a file of blanks would otherwise take exponential time.
-OBJ_START = re.compile(rb"(?:\s++|#[^\n]*+\n)*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
-STL_TEXT = re.compile(rb"\s*+solid\b[^\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
+OBJ_START = re.compile(rb"(?:\s++|#[^\r\n]*+[\r\n])*+(?:v|vn|vt|f|o|g|s|usemtl|mtllib)[ \t]")
+STL_TEXT = re.compile(rb"\s*+solid\b[^\r\n]*+\s++(?:facet|endsolid)\b", re.IGNORECASE)
 GLTF_TEXT = re.compile(rb"\s*\{")
 
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip")
 WHOLE = ("glb", "zip", "ply", "stl")  # formats of which nothing lies in other files
-MTLLIB = re.compile(rb"(?m)^[ \t]*mtllib[ \t]+([^#\r\n]*)")
+MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
 
 
 def is_model(path: Path, data: bytes) -> bool:

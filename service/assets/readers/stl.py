@@ -19,7 +19,7 @@ def read_stl(view: memoryview, limits: AssetLimits) -> RawMesh:
     data = bytes(view)
     promised = int.from_bytes(data[80:84], "little")
     if len(data) < 84 or len(data) != 84 + 50 * promised:
-        data = text(data)
+        data = text(data).replace(b"\r\n", b"\n").replace(b"\r", b"\n")
         if not re.match(rb"\s*+solid\b", data, re.IGNORECASE):
             raise ParseError(
                 f"not an STL file: {len(data)} bytes; its header promises {84 + 50 * promised}, and it is no text"
@@ -36,6 +36,5 @@ def read_stl(view: memoryview, limits: AssetLimits) -> RawMesh:
     if len(vertices) != 3 * promised:
         raise ParseError(f"{promised} facets were begun, {len(vertices) / 3:g} triangles can be read")
     faces = np.arange(len(vertices)).reshape(-1, 3)
-    return RawMesh(
-        vertices, faces, groups=np.zeros(len(faces), np.int32)
-    )  # a normal for each facet, none for vertices
+    facets = np.zeros(len(faces), np.int32)  # the file has a normal for each facet, and none for vertices
+    return RawMesh(vertices, faces, groups=facets)

@@ -77,6 +77,12 @@ def test_import(gpu: Any, folder: Path, tmp_path: Path) -> None:
     assert is_green(picture)
 
 
+def test_the_line_ends_of_old(folder: Path, tmp_path: Path) -> None:
+    (folder / "m.obj").write_text(MODEL.replace("\n", "\r"), newline="")
+    assert main(["import", str(folder / "m.obj"), "-o", str(tmp_path / "s.json")]) == 0
+    assert len(json.loads((tmp_path / "s.json").read_text())["textures"]) == 1
+
+
 def test_a_zip_is_imported(folder: Path, tmp_path: Path) -> None:
     model = tmp_path / "m.zip"
     model.write_bytes(zipped({"m.obj": MODEL, "parts/m.mtl": GLOWING.format("g.png"), "parts/g.png": GREEN}))
