@@ -1,7 +1,7 @@
 """Wavefront OBJ -> triangles, strictly. Runs in the parsing child.
 
 This reader is our own. trimesh's silently drops faces and normals that it cannot read, accepts indices beyond the
-vertices, and reorders them.
+vertices, and reorders them. Here a face with an index that leads nowhere is left out, with a warning.
 """
 
 from __future__ import annotations
@@ -18,13 +18,14 @@ from service.assets.readers.raw_mesh import Numbers, RawMesh
 from service.assets.types import Doubles
 
 Ints = npt.NDArray[np.int32]
+Faults = list[tuple[int, str]]  # lines with an index that leads nowhere, and why
 WIDTHS = {"v": 3, "vt": 2, "vn": 3}
 NAMES = {
     "v": ("vertex", "vertices"),
     "vt": ("texture coordinate", "texture coordinates"),
     "vn": ("normal", "normals"),
 }
-MOST_ROWS = 2**31 - 1
+NOWHERE = 2**31 - 1  # an index that leads to no row, whatever the file wrote: none has so many
 SHARES = 8
 MOST_NAMED = 1 << 20
 
@@ -39,6 +40,8 @@ class Found:
     corners: dict[str, list[Ints]] = field(default_factory=lambda: {"v": [], "vt": [], "vn": []})
     lines: list[Ints] = field(default_factory=list)  # of the faces
     named: list[Named] = field(default_factory=list)  # `faces` are those of the whole file
+    faults: Faults = field(default_factory=list)
+    left_out: int = 0  # faces with an index that leads nowhere
 
     def rows(self, keyword: str) -> int:
         return sum(map(len, self.tables[keyword]))
@@ -106,26 +109,24 @@ def _found(data: bytes | memoryview) -> Found:
                 if keyword == "v":
                     found.colors.append(np.empty((0, 3)) if colors is None else colors)
         if block.rows["f"].text:
-            counts, *corners = _corners(block.rows["f"])
+            lines = block.rows["f"].lines
+            counts, *corners = _corners(block.rows["f"], found.faults)
             found.counts.append(counts.astype(np.int32))
-            found.lines.append(block.rows["f"].lines.astype(np.int32))
+            found.lines.append(lines.astype(np.int32))
             for k, (keyword, index) in enumerate(zip(WIDTHS, corners, strict=True)):
-                _count_back(index, counts, rows_before[k] + block.before[:, k], keyword, block.rows["f"])
-                if index.max() > MOST_ROWS:
-                    bad, (one, many) = int(index.argmax()), NAMES[keyword]
-                    row = int(np.repeat(np.arange(len(counts)), counts)[bad])
-                    have = found.rows(keyword)
-                    raise block.rows["f"].error(row, f"{one} {index[bad]} does not exist; there are {have} {many}")
+                _count_back(index, counts, rows_before[k] + block.before[:, k], keyword, lines, found.faults)
+                _check(index, NOWHERE, found.rows(keyword), keyword, counts, lines, found.faults)
                 found.corners[keyword].append(index.astype(np.int32))
         if len(found.named) > MOST_NAMED:
             raise ParseError(f"it has more than {MOST_NAMED} `usemtl`, `mtllib` and `s` statements")
     if not found.counts:
         raise ParseError("it has no faces")
+    _leave_out(found)
     return found
 
 
-def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces: Lines) -> None:
-    """The indices with negative ones resolved to indices from 1; `before` is the number of rows before each face."""
+def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, lines: Longs, faults: Faults) -> None:
+    """Resolve negative indices to indices from 1; `before` is the number of rows before each face."""
     back = np.flatnonzero(index < 0)
     if len(back):
         row = np.repeat(np.arange(len(counts)), counts)[back]
@@ -134,8 +135,49 @@ def _count_back(index: Longs, counts: Longs, before: Longs, keyword: str, faces:
         if len(bad):
             one, many = NAMES[keyword]
             named, have = index[back[bad[0]]], before[row[bad[0]]]
-            raise faces.error(int(row[bad[0]]), f"{one} {named} does not exist; there are {have} {many} before it")
+            faults.append(
+                (int(lines[row[bad[0]]]), f"{one} {named} does not exist; there are {have} {many} before it")
+            )
+            resolved[bad] = NOWHERE
         index[back] = resolved
+
+
+def _check(
+    index: Longs | Ints, most: int, have: int, keyword: str, counts: Longs | Ints, lines: Longs | Ints, faults: Faults
+) -> Longs:
+    """The places of indices beyond `most`, which lead nowhere from here on; `have` is the number of rows so far."""
+    beyond = np.flatnonzero(index > most)
+    told = beyond[index[beyond] != NOWHERE]
+    if len(told):
+        one, many = NAMES[keyword]
+        line = lines[np.searchsorted(np.cumsum(counts), told[0], "right")]
+        faults.append((int(line), f"{one} {index[told[0]]} does not exist; there are {have} {many}"))
+        index[told] = NOWHERE
+    return beyond
+
+
+def _leave_out(found: Found) -> None:
+    """Take out the faces with an index that leads nowhere. Raises ParseError where no face is left."""
+    rows = {keyword: found.rows(keyword) for keyword in WIDTHS}
+    broken = []
+    for k, (counts, lines) in enumerate(zip(found.counts, found.lines, strict=True)):
+        bad = np.zeros(len(counts), bool)
+        for keyword, have in rows.items():
+            beyond = _check(found.corners[keyword][k], have, have, keyword, counts, lines, found.faults)
+            bad[np.searchsorted(np.cumsum(counts), beyond, "right")] = True
+        if bad.any():
+            kept = np.repeat(~bad, counts)
+            found.counts[k] = counts[~bad]
+            for pieces in found.corners.values():
+                pieces[k] = pieces[k][kept]
+        broken.append(bad)
+    found.lines = []
+    before = np.concatenate([[0], *broken]).cumsum()
+    found.left_out = int(before[-1])
+    if found.left_out:
+        if not sum(map(len, found.counts)):
+            raise ParseError("line {}: {}".format(*min(found.faults)))
+        found.named = [replace(one, faces=one.faces - int(before[one.faces])) for one in found.named]
 
 
 def _joined(found: Found) -> RawMesh:
@@ -147,9 +189,11 @@ def _joined(found: Found) -> RawMesh:
     index = {}
     for keyword in WIDTHS:
         index[keyword] = np.concatenate(found.corners.pop(keyword))
-        _check(index[keyword], len(tables[keyword]), keyword, found, counts)
     vertices = tables["v"]
     warnings = []
+    if found.left_out:
+        which = "1 face is left out" if found.left_out == 1 else f"{found.left_out} faces are left out, the first"
+        warnings.append("{}: line {}: {}".format(which, *min(found.faults)))
     missing = {keyword: int(np.count_nonzero(place == 0)) for keyword, place in index.items()}
     for place in index.values():
         place -= 1  # -1: the row of zeros at the end; a normal is computed
@@ -200,15 +244,6 @@ def _distinct(corner: Ints, have: int, others: list[tuple[Ints, int]]) -> tuple[
     return np.concatenate(firsts), joined
 
 
-def _check(index: Ints, have: int, keyword: str, found: Found, counts: Longs) -> None:
-    if int(index.max(initial=0)) > have:
-        bad = int(np.flatnonzero(index > have)[0])
-        face = int(np.searchsorted(np.cumsum(counts), bad, "right"))
-        one, many = NAMES[keyword]
-        line = np.concatenate(found.lines)[face]
-        raise ParseError(f"line {line}: {one} {index[bad]} does not exist; there are {have} {many}")
-
-
 def _vectors(found: Lines, keyword: str, width: int) -> tuple[Doubles, Doubles | None]:
     """The first numbers of each row; and where every row has six, as some write colours, the last three."""
     counts = found.counts(starts_of_words(np.frombuffer(found.text, np.uint8)))
@@ -233,7 +268,7 @@ def _vectors(found: Lines, keyword: str, width: int) -> tuple[Doubles, Doubles |
     return vectors, colors
 
 
-def _corners(faces: Lines) -> tuple[Longs, Longs, Longs, Longs]:
+def _corners(faces: Lines, faults: Faults) -> tuple[Longs, Longs, Longs, Longs]:
     """The number of corners of each face, and each corner's v, vt and vn as written, 0 where absent.
 
     A corner is v, v/vt, v//vn or v/vt/vn: the slashes before a number in its corner say what it is.
@@ -251,9 +286,15 @@ def _corners(faces: Lines) -> tuple[Longs, Longs, Longs, Longs]:
     slashes = np.flatnonzero(letters == ord("/"))
     slot = np.searchsorted(slashes, numbers) - np.searchsorted(slashes, corners)[owner]
     row = np.repeat(np.arange(len(counts)), counts)
-    for bad in (np.flatnonzero(slot > 2), np.flatnonzero(values == 0)):
-        if len(bad):
-            raise faces.error(int(row[owner[bad[0]]]), "corners are v, v/vt, v//vn or v/vt/vn, counted from 1")
+    long = np.flatnonzero(slot > 2)
+    if len(long):
+        raise faces.error(int(row[owner[long[0]]]), "corners are v, v/vt, v//vn or v/vt/vn")
+    zero = np.flatnonzero(values == 0)
+    if len(zero):
+        faults.append(
+            (int(faces.lines[row[owner[zero[0]]]]), "an index of 0 does not exist; they are counted from 1")
+        )
+        values[zero] = NOWHERE
     v, vt, vn = (np.zeros(len(corners), np.int64) for _ in range(3))
     for k, index in enumerate((v, vt, vn)):
         index[owner[slot == k]] = values[slot == k]

@@ -11,6 +11,8 @@ import pytest
 
 from service.assets import AssetStore, MeshData
 from service.assets.formats import sniff
+from service.assets.readers import obj_lines
+from service.assets.readers.obj import read_obj_with_materials
 from tests import asset_files as make
 from tests.asset_files import OBJ, TRIANGLE
 
@@ -91,6 +93,41 @@ def test_obj_without_some_texture_coordinates_says_so(store: AssetStore) -> None
     assert read.warnings[0] == "3 corners have no texture coordinate; they take 0 0"
 
 
+@pytest.mark.parametrize(
+    ("face", "told"),
+    [
+        ("f 1 2 9", "vertex 9 does not exist; there are 5 vertices"),
+        ("f 1 2 3 4 99999999999", "vertex 99999999999 does not exist; there are 5 vertices"),
+        ("f 1 0 2", "an index of 0 does not exist; they are counted from 1"),
+        ("f -1 -2 -6", "vertex -6 does not exist; there are 4 vertices before it"),
+        ("f 1/1 2/2 3/1", "texture coordinate 2 does not exist; there are 1 texture coordinates"),
+        ("f 1//1 2//1 3//1", "normal 1 does not exist; there are 0 normals"),
+    ],
+)
+def test_obj_faces_with_an_index_that_leads_nowhere_are_left_out(store: AssetStore, face: str, told: str) -> None:
+    """The others are there, also one that names a vertex of a later line."""
+    text = f"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\nvt 0 0\nf 1 2 3\n{face}\nf 2 4 5\nv 2 0 0\n"
+    read = mesh(store, text.encode(), "m.obj")
+    assert read.faces.tolist() == [[0, 1, 2], [1, 3, 4]]
+    assert read.warnings[0] == f"1 face is left out: line 7: {told}"
+    read = mesh(store, (text + face + "\n").encode(), "m.obj")
+    assert len(read.faces) == 2 and read.warnings[0].startswith("2 faces are left out, the first: line 7: ")
+
+
+@pytest.mark.parametrize("block", [1, obj_lines.BLOCK])
+def test_what_follows_a_face_that_is_left_out(block: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Materials and smoothing groups stay with their own faces."""
+    monkeypatch.setattr(obj_lines, "BLOCK", block)
+    corners = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nv 1 1 0\n"
+    faces = b"usemtl a\ns 3\nf 1 2 9\nf 1 2 3 4\nf 9 8 7 6\nusemtl b\ns off\nf 1 2 3\nf 0 0 0\nusemtl a\nf 2 3 4\n"
+    read = read_obj_with_materials(corners + faces)
+    assert [read.materials[k] for k in read.of_triangle] == ["a", "a", "b", "a"]
+    assert read.mesh.groups is not None and (read.mesh.groups > 0).tolist() == [True, True, False, False]
+    assert read.mesh.warnings == [
+        "3 faces are left out, the first: line 7: vertex 9 does not exist; there are 4 vertices"
+    ]
+
+
 @pytest.mark.parametrize("order", ["<", ">", "a"])
 def test_ply_texture_coordinates_and_colours(store: AssetStore, order: str) -> None:
     """Colours of whole numbers are sRGB, those of floats linear."""
@@ -146,7 +183,9 @@ def test_ply_agrees_with_trimesh(store: AssetStore) -> None:
 def test_stl_binary_and_text(store: AssetStore) -> None:
     soup = RNG.random((5, 3, 3)).astype(np.float32)
     latin = make.stl_text(soup).replace(b"thing", "größe".encode("latin-1"))
-    for data in (make.stl(soup), make.stl_text(soup), make.stl_text(soup) + make.stl_text(soup[:0]), latin):
+    text = make.stl_text(soup)
+    ends = [text.replace(b"\n", end) for end in (b"\r\n", b"\r")]
+    for data in (make.stl(soup), text, text + make.stl_text(soup[:0]), latin, *ends):
         read = mesh(store, data, "m.stl")
         assert read.normals is None and np.allclose(triangles(read), soup, atol=1e-7)
 
