@@ -23,7 +23,6 @@ from pathlib import Path
 import uvicorn
 from fastapi import FastAPI
 from starlette.responses import FileResponse, Response
-from starlette.staticfiles import StaticFiles
 
 from service import presets
 from service.config import Config, cores, unknown_variables
@@ -49,7 +48,7 @@ from service.rendering.supervisor.pool import Pool
 from service.routes import assets, bsdf, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
-from service.routes.errors import respond, tell_errors
+from service.routes.errors import Files, respond, tell_errors
 from service.state import MESSAGE_BYTES, AppState
 from service.storage import storage
 
@@ -108,7 +107,7 @@ def create_app(config: Config) -> FastAPI:
     for router in (each.router for each in api):
         app.include_router(router)
     app.add_api_route("/docs", _docs, include_in_schema=False)
-    app.mount("/", StaticFiles(directory=WEB, html=True))
+    app.mount("/", Files(directory=WEB, html=True))
     tell_errors(app)
     describe(app, keyed=bool(config.api_key))
     app.add_middleware(Guard, config=config, refuse=respond)

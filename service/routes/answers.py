@@ -109,8 +109,8 @@ class Asset(BaseModel):
     vertices: int | None = Field(None, description="Of a mesh.")
     triangles: int | None = Field(None, description="Of a mesh or a scene.")
     bounds: list[list[float]] | None = Field(None, description="Of a mesh or a scene: least and greatest x, y, z, m.")
-    warnings: list[AssetWarning] | None = Field(
-        None, description="What is odd about the file, and what it asks for and does not get."
+    warnings: list[AssetWarning] = Field(
+        description="What is odd about the file, and what it asks for and does not get."
     )
     exposure: float | None = Field(
         None,

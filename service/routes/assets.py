@@ -18,6 +18,7 @@ from service.assets import AssetInfo
 from service.assets.scene_import import Imported
 from service.bodies import SMALL
 from service.downloads import FileAnswer
+from service.problems import UnsupportedMedia
 from service.rendering.executors import opening, storing, storing_small
 from service.routes import answers
 from service.scene.text import dump_json
@@ -40,7 +41,11 @@ HEADER_BYTES = 4096  # proxies refuse headers not much longer
     responses=answers.shaped(answers.Asset, "It is here.", 201) | answers.problems(413, 415, 422, 429, 503),
 )
 async def upload(request: Request, filename: Annotated[str | None, Query(max_length=255)] = None) -> dict[str, Any]:
-    kind = request.headers.get("content-type")
+    kind = request.headers.get("content-type", "")
+    if kind.lower().startswith("multipart/"):
+        async for _ in request.stream():  # to its end, so that its sender reads the answer
+            pass
+        raise UnsupportedMedia("Send the file's bytes as the body, not as a form: curl --data-binary @FILE, not -F")
     own, whose, client = app_state(request), owner(request), caller(request)
     file = await asyncio.to_thread(own.assets.incoming)
 
@@ -58,7 +63,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
                 have(received)
             await asyncio.to_thread(own.assets.receive, file, chunk)
         info = await (storing_small if received <= SMALL_ASSET else storing)(add, client)
-    return {name: value for name, value in asdict(info).items() if value is not None}
+    return {"warnings": []} | {name: value for name, value in asdict(info).items() if value is not None}
 
 
 @router.get(

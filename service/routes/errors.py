@@ -8,6 +8,8 @@ from starlette.exceptions import HTTPException
 from starlette.requests import ClientDisconnect
 from starlette.responses import JSONResponse, Response
 from starlette.routing import Match, Mount
+from starlette.staticfiles import StaticFiles
+from starlette.types import Scope
 
 from service.problems import FieldError, InvalidDocument, ServiceError, Unauthorized, answer, problem
 
@@ -50,24 +52,38 @@ async def _invalid(request: Request, error: Exception) -> Response:
 
 
 async def _unrouted(request: Request, error: Exception) -> Response:
+    """Answer a path that leads nowhere, by any method, and a method that a path does not take."""
     assert isinstance(error, HTTPException)
-    headers = {"allow": _allowed(request)} if error.status_code == 405 else error.headers
+    status, title, headers = error.status_code, error.detail, error.headers
+    if status in (404, 405) and (
+        allowed := _allowed(request)
+    ):  # files stand behind all routes, and know none of them
+        status, title, headers = 405, "Method Not Allowed", {"allow": ", ".join(allowed)}
     body = {
         "type": "about:blank",
-        "title": error.detail,
-        "status": error.status_code,
-        "detail": f"{request.method} {request.url.path}: {error.detail}",
+        "title": title,
+        "status": status,
+        "detail": f"{request.method} {request.url.path}: {title}",
     }
-    return JSONResponse(body, error.status_code, headers, MEDIA_TYPE)
+    return JSONResponse(body, status, headers, MEDIA_TYPE)
 
 
-def _allowed(request: Request) -> str:
-    """Every method that the address allows; the framework names those of one route."""
+def _allowed(request: Request) -> list[str]:
+    """Every method that the routes of the address allow; none where it has no route."""
 
     def fits(method: str) -> bool:
         asked = {**request.scope, "method": method}
         routes = (route for route in request.app.router.routes if not isinstance(route, Mount))
         return any(route.matches(asked)[0] is Match.FULL for route in routes)
 
-    methods = {method for method in ("DELETE", "GET", "POST", "PUT") if fits(method)} or {"GET"}
-    return ", ".join(sorted(methods | {"HEAD"} if "GET" in methods else methods))
+    methods = {method for method in ("DELETE", "GET", "POST", "PUT") if fits(method)}
+    return sorted(methods | {"HEAD"} if "GET" in methods else methods)
+
+
+class Files(StaticFiles):
+    """A folder's files. A path without a file is not found, by any method."""
+
+    async def get_response(self, path: str, scope: Scope) -> Response:
+        if scope["method"] not in ("GET", "HEAD"):
+            await super().get_response(path, {**scope, "method": "GET"})
+        return await super().get_response(path, scope)

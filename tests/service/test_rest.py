@@ -226,7 +226,17 @@ def test_what_is_not_there(http: httpx.Client) -> None:
         assert is_problem(http.get(f"/v1/{name}"), 404)
     assert is_problem(http.get("/nothing"), 404)
     assert is_problem(http.delete("/v1/renders/nobody"), 404)
-    assert is_problem(http.post("/v1/info"), 405)
+    for method in ("POST", "PUT", "DELETE", "PATCH", "OPTIONS"):
+        for path in ("/v1/nothing", "/v1/renders/nobody/nothing", "/nothing.js", "/%00", f"/{'n' * 300}"):
+            answer = http.request(method, path)
+            assert is_problem(answer, 404) and "allow" not in answer.headers, (method, path)
+    for path, allowed in {"/v1/info": "GET, HEAD", "/v1/renders": "GET, HEAD, POST", "/v1/render": "POST"}.items():
+        answer = http.request("PATCH", path)
+        assert is_problem(answer, 405) and answer.headers["allow"] == allowed
+    assert is_problem(http.get("/v1/render"), 405)
+    for path in ("/", "/main.js"):
+        answer = http.post(path)
+        assert is_problem(answer, 405) and answer.headers["allow"] == "GET, HEAD"
     assert is_problem(http.get("/v1/renders/nobody?wait=-1"), 422, "/wait")
 
 
@@ -243,6 +253,16 @@ def test_assets(http: httpx.Client) -> None:
     assert status(http, render["id"], PATIENCE_S)["state"] == "done"
     assert is_problem(http.post("/v1/assets", content=b"v 1 nan 0\nf 1 1 1\n", params={"filename": "a.obj"}), 422)
     assert is_problem(http.post("/v1/assets", content=b"hello"), 415)
+
+
+def test_a_form_with_a_file_is_refused_with_what_would_be_right(http: httpx.Client) -> None:
+    answer = http.post("/v1/assets", files={"file": ("triangle.obj", OBJ + b"#" * (1 << 20))})
+    assert is_problem(answer, 415) and "as the body" in answer.json()["detail"]
+
+
+def test_the_answer_to_an_upload_always_has_warnings(http: httpx.Client) -> None:
+    answer = http.post("/v1/assets", content=OBJ, params={"filename": "triangle.obj"})
+    assert answer.json()["warnings"] == []
 
 
 def test_every_preset_is_there(http: httpx.Client) -> None:
