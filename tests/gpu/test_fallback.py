@@ -9,7 +9,8 @@ import subprocess
 import sys
 import time
 from pathlib import Path
-from typing import Any
+from types import SimpleNamespace
+from typing import Any, cast
 
 import numpy as np
 import pytest
@@ -22,7 +23,9 @@ from service.pack import pack
 from service.rendering.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
 from service.rendering.ipc.orders import Pause
 from service.rendering.supervisor.supervisor import Supervisor
+from service.rendering.worker.device.loaded_scene import KernelRequest
 from service.rendering.worker.helpers.compile_client import records
+from service.rendering.worker.view.fallback_preview import FallbackPreview
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.gpu.test_flags import IMAGES, SCENES
@@ -159,6 +162,23 @@ def compiled_ahead(digest: str) -> Path:
     return folder
 
 
+def test_a_first_look_reports_its_noise(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
+    """From its second sample on, as every picture does; here by the scene's own kernel."""
+    sent: list[Any] = []
+    preview = FallbackPreview(1, sent.append, gpu, cast(Any, SimpleNamespace(met=lambda key: None)))
+    wanted = cast(KernelRequest, SimpleNamespace(arrays=arrays_of(SCENE), settings=RenderSettings(64, 64)))
+    monkeypatch.setattr(preview, "_compiled", lambda wanted: SimpleNamespace(key=None, raised=None))
+    monkeypatch.setattr(gpu, "load_fallback", lambda arrays, raised: gpu.load(arrays))
+    preview.begin(wanted, 1)
+    for _ in range(4):
+        preview.step()
+        preview.answer(Want(1, 1, View(), anyway=True))
+    preview.release()
+    reports = [frame.progress for frame in sent]
+    assert max(report.samples for report in reports) >= 2
+    assert all((report.noise is None) == (report.samples < 2) for report in reports)
+
+
 @pytest.mark.calm  # the kernel is asked for in time that nobody else wants
 def test_a_stream_sees_at_once_what_is_compiled_for(
     gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
@@ -191,6 +211,7 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         assert after and not any(frame.provisional for frame in after if isinstance(frame, Frame))
         order = [(frame.scale, frame.progress.samples) for frame in frames]
         assert order == sorted(order) and len(set(order)) == len(order)
+        assert all((frame.progress.noise is None) == (frame.progress.samples < 2) for frame in frames)
         first, last = frames[0].pixels, frames[-1].pixels
         assert first.mean((0, 1)) == pytest.approx(last.mean((0, 1)), rel=0.25)
 

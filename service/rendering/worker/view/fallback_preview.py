@@ -16,6 +16,7 @@ from service.rendering.ipc.messages import Frame, FromRenderer, Progress, Want
 from service.rendering.worker.device.loaded_scene import KernelRequest
 from service.rendering.worker.device.resolution_ladder import FIRST_S, SCALES, SMALLEST_SIDE, ResolutionLadder
 from service.rendering.worker.helpers.compile_client import CompileClient
+from service.rendering.worker.progress.noise import NoiseReading
 from service.rendering.worker.view.frames import SLICE_S, pixels_of
 
 if TYPE_CHECKING:
@@ -62,6 +63,7 @@ class FallbackPreview:
         self._next = 1.0  # the scale that is traced
         self._pixel_s = BEGIN_S
         self._spent_s = 0.0
+        self._meter = NoiseReading()  # of the picture that is shown
         self._served: _Content | None = None  # of the last frame that was sent
         self._shown = (0, 0.0)
         self._began = 0.0
@@ -105,6 +107,7 @@ class FallbackPreview:
         settings, kernel = fallback.settings_for(wanted.settings), self._compiled(wanted)
         assert settings is not None and kernel is not None and self._spare is not None
         self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
+        self._meter = NoiseReading()
         try:
             same = self._scene is not None and self._raised == kernel.raised
             edits = fallback.edits(self._scene.arrays, wanted.arrays) if self._scene is not None and same else None
@@ -139,6 +142,8 @@ class FallbackPreview:
         self._spent_s += picture.trace(SLICE_S, before + 1)
         self._pixel_s = picture.cost_s or self._pixel_s
         if picture.samples:
+            if self.scale != self._next:
+                self._meter = NoiseReading()
             self.scale = self._next
             if self._spent_s < ENOUGH_S:
                 self._next = max(self._next, self._fitting(ladder, ENOUGH_S - self._spent_s))
@@ -158,7 +163,7 @@ class FallbackPreview:
         if content == self._served and not want.anyway:
             return False
         self._served, self._shown = content, (self.generation, self.scale)
-        progress = Progress(picture.samples, None, time.monotonic() - self._began)
+        progress = Progress(picture.samples, self._meter.read(picture), time.monotonic() - self._began)
         what = want.serial, self.generation, pixels_of(picture, want.view, None), progress, self.scale
         self._send(Frame(self._number, *what, last=False, provisional=True))
         return True
