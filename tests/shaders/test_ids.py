@@ -62,6 +62,9 @@ def test_incidence_is_the_angle_between_view_and_normal(gpu: Renderer) -> None:
     camera = {"position": [0, 0, 1000], "target": [0, 0, 0], "vfov": 0.16}
     made = picture(gpu, document([ball], MATERIALS, camera=camera), 64, filter="box")
     angles, shown = made.read("incidence")[..., 0], made.display("incidence")
+    depth, first = made.read("depth")[..., 0], made.read("shape_id")[..., 0]
+    assert (angles[depth == 0] == 0).all(), "none of the samples hits anything"
+    assert (angles[(first == 0) & (depth > 0)] > 45).any(), "the first one misses the edge, and others hit it"
     made.release()
     made.scene.release()
     y, x = (np.mgrid[:32, :32] + 0.5 - 16) / 16 * 1000 * np.tan(np.radians(0.08))

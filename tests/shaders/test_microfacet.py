@@ -253,6 +253,35 @@ def test_samples_follow_their_pdf_and_carry_the_albedo(prober: Prober, row: str,
     grid.assert_samples_follow(on_grid, f, wi[:, :3], len(CASES))
 
 
+@pytest.mark.parametrize("angle", [5.0, 35.0])
+@pytest.mark.parametrize("diffuse", [0.0, 0.9])
+@pytest.mark.parametrize(
+    "shape", [("abc", 300.0, 1.5), ("sgd", 0.15, 0.6), ("gaussian", 0.3, 2.0)], ids=lambda s: s[0]
+)
+def test_a_density_lacks_what_is_sampled_below_the_horizon(
+    prober: Prober, shape: tuple[str, float, float], diffuse: float, angle: float
+) -> None:
+    """Its integral over all wi is the share of samples that leave the surface. Where D cos has no inverse another
+    density is sampled, of which more may fall below: by `abc` twice as much as by D cos here."""
+    m, wo = shaped(shape, diffuse=diffuse), at(angle)
+    edges = np.linspace(0, 1, 801) ** 2 * np.pi / 2  # of wm: wi is the mirrored wo, d wi = 4 (wo.wm) d wm
+    theta, phi = np.meshgrid((edges[1:] + edges[:-1]) / 2, (np.arange(240) + 0.5) * (2 * np.pi / 240), indexing="ij")
+    wm = np.stack([np.sin(theta) * np.cos(phi), np.sin(theta) * np.sin(phi), np.cos(theta)], axis=-1).reshape(-1, 3)
+    cos_d = wm @ wo
+    wi = 2 * cos_d[:, None] * wm - wo
+    up = (cos_d > 0) & (wi[:, 2] > 0)
+    size = 4 * cos_d * (np.sin(theta) * np.diff(edges)[:, None]).ravel() * (2 * np.pi / 240)
+    whole = float((ask(prober, m, wo, wi[up])[0][:, 3] * size[up]).sum())
+    n = 100_000
+    f, _ = ask(prober, m, wo, np.random.default_rng(5).random((n, 3)), sample=1)
+    alive = float((f[:, 3] > 0).mean())
+    assert whole == pytest.approx(alive, abs=4.5 * math.sqrt(alive * (1 - alive) / n) + 3e-4)
+    if shape[0] == "abc" and not diffuse:
+        d = (1 + 300 * (1 - np.cos(theta).ravel())) ** -1.5 * size / (4 * np.where(cos_d == 0, 1, cos_d))
+        lost = d[~up].sum() / d.sum(), (d * wm[:, 2])[~up].sum() / (d * wm[:, 2]).sum()
+        assert whole == pytest.approx(1 - lost[0], abs=1e-3) and lost[0] > 1.7 * lost[1]
+
+
 def test_a_wrong_pdf_is_seen(prober: Prober) -> None:
     """The chi-square test above fails when gamma is off by 0.1: samples of one shape, density of another."""
     wo, n = at(35), 60_000
