@@ -5,9 +5,10 @@
 #   docker run --rm --init -p 127.0.0.1:8000:8000 --read-only -v sunbox:/data --gpus all -e SUNBOX_REQUIRE_GPU=1 sunbox
 # With Ray, for the nodes of a cluster (docs/scaling.md):
 #   docker build --build-arg LOCK=ray -t sunbox-ray .
-# Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22.
+# Debian 13 and not 12: on a processor its Mesa 25 traces 1.4 times as fast as Mesa 22. By digest,
+# as a tag may become another image; Dependabot proposes the next one.
 
-FROM python:3.13-slim-trixie AS build
+FROM python:3.13-slim-trixie@sha256:ffb752e139c0a19692a43af8d8523b274222dd68eebad5d583b45c2201c6e30a AS build
 ENV PIP_DISABLE_PIP_VERSION_CHECK=1 PIP_NO_CACHE_DIR=1
 RUN python -m venv /opt/sunbox
 WORKDIR /source
@@ -26,7 +27,7 @@ RUN python -m venv /opt/build \
     && /opt/sunbox/bin/pip uninstall -y pip \
     && /opt/sunbox/bin/python -m compileall -q /opt/sunbox/lib
 
-FROM python:3.13-slim-trixie
+FROM python:3.13-slim-trixie@sha256:ffb752e139c0a19692a43af8d8523b274222dd68eebad5d583b45c2201c6e30a
 # Mesa's software renderer, and glvnd, which finds NVIDIA's driver when the container runtime brings one along.
 # hadolint ignore=DL3008
 RUN apt-get update \

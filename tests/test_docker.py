@@ -16,6 +16,7 @@ from tests.serving import Server
 
 ROOT = Path(__file__).parents[1]
 DOCKERFILE, COMPOSE = (ROOT / "Dockerfile").read_text(), (ROOT / "compose.yaml").read_text()
+WORKFLOW = (ROOT / ".github" / "workflows" / "check.yml").read_text()
 LOCKS = ("requirements.lock", "requirements.serve.lock", "requirements.build.lock")
 PIN = re.compile(r"^([a-z0-9_.-]+)==[^\\]+\\\n(?:    --hash=\S+(?: \\)?\n)+", re.MULTILINE | re.IGNORECASE)
 
@@ -35,6 +36,21 @@ def test_the_image_has_what_was_tested() -> None:
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
     wanted = {re.split(r"[<>=\[; ]", text)[0].lower() for text in project["dependencies"]}
     assert wanted <= serving.keys() and "pytest" not in serving
+
+
+def test_images_and_actions_are_pinned_by_their_content() -> None:
+    """A tag is whatever its owner makes it. What stands beside a pin says which version that is."""
+    images = re.findall(r"^FROM (\S+)", DOCKERFILE, re.MULTILINE) + re.findall(r"image: (\S+[:/]\S+)", COMPOSE)
+    assert len(images) == 3 and all(re.search(r":[^@]+@sha256:[0-9a-f]{64}$", image) for image in images), images
+    actions = re.findall(r"uses: (.*)", WORKFLOW)
+    assert actions and all(re.fullmatch(r"[\w/-]+@[0-9a-f]{40} # v[\d.]+", action) for action in actions), actions
+
+
+def test_changes_are_tested_built_and_audited() -> None:
+    for command in (".ci/run", "docker build -t sunbox .", "for lock in requirements*.lock", "pip-audit=="):
+        assert command in WORKFLOW
+    for ecosystem in ("pip", "docker", "docker-compose", "github-actions"):
+        assert f"package-ecosystem: {ecosystem}" in (ROOT / ".github" / "dependabot.yml").read_text()
 
 
 def test_the_image_has_the_packages_that_make_run_asks_for() -> None:
