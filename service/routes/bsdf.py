@@ -25,6 +25,7 @@ router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
 
 AT_ONCE = 1 << 12  # numbers that are written in a few milliseconds
 PIECE = 1 << 10  # numbers that are written without giving way to other requests
+LOBES_PIECE = PIECE // 16  # directions whose specular lobes are written so
 
 Arrays = dict[str, np.ndarray]
 
@@ -89,21 +90,26 @@ async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]
 
 
 def _values(arrays: Arrays) -> bytes:
-    deltas = zip(arrays["delta_wi"], arrays["delta_weight"], arrays["delta_probability"], strict=True)
-    delta = [
-        [
-            {"wi": _numbers(wi), "weight": _numbers(weight), "probability": float(probability)}
-            for wi, weight, probability in zip(*each, strict=True)
-            if probability > 0
-        ]
-        for each in deltas
-    ]
-    parts = {"f": _rows(arrays["f"]), "pdf": _rows(arrays["pdf"]), "delta": json.dumps(delta)}
+    parts = {"f": _rows(arrays["f"]), "pdf": _rows(arrays["pdf"]), "delta": _deltas(arrays)}
     if len(arrays["lobes"]):
         named = zip(arrays["lobe_names"].tolist(), arrays["lobes"], strict=True)
         each = (f'{{"name":{json.dumps(name)},"f":{_rows(f)}}}' for name, f in named)
         parts["lobes"] = "[" + ",".join(each) + "]"
     return _object(parts)
+
+
+def _deltas(arrays: Arrays) -> str:
+    """The specular lobes of each `wo`, written in pieces."""
+    names = ("delta_wi", "delta_weight", "delta_probability")
+    pieces = []
+    for at in range(0, len(arrays["delta_wi"]), LOBES_PIECE):
+        wi, weight, probability = (_numbers(arrays[name][at : at + LOBES_PIECE]) for name in names)
+        rows = [
+            [{"wi": wi, "weight": weight, "probability": p} for wi, weight, p in zip(*row, strict=True) if p > 0]
+            for row in zip(wi, weight, probability, strict=True)
+        ]
+        pieces.append(json.dumps(rows, allow_nan=False)[1:-1])
+    return "[" + ",".join(pieces) + "]"
 
 
 def _albedo(arrays: Arrays) -> bytes:

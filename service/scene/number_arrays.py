@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from itertools import chain
 from typing import Annotated, Any
 
@@ -18,29 +19,34 @@ LARGEST_INDEX = 2**31 - 1
 WORDS = {2: "two", 3: "three", 4: "four"}
 
 
-def _rows(value: Any, low: float, high: float, example: str, width: int = 3) -> np.ndarray:
-    """(n, width) float64, read-only. Refuses with the pointer of the first bad row."""
+def _rows(value: Any, low: float, high: float, example: str, width: int = 3, to_number: bool = False) -> np.ndarray:
+    """(n, width) float64, read-only. Refuses with the pointer of the first bad row; `to_number`: of the number in it
+    that is bad, where the rest of the row is right."""
     bounds = f"between {low:.10g} and {high:.10g}"
     if not isinstance(value, list | tuple | np.ndarray):
         raise refusal(f"must be an array of rows like {example}, not {described(value)}")
     if len(value) == 0:
         raise refusal(f"must not be empty: it holds rows like {example}")
     if not isinstance(value, np.ndarray):
-        _check_kinds(value, example, width)
+        _check_kinds(value, example, width, to_number)
     try:
         array = np.array(value, np.float64)
     except (OverflowError, ValueError):  # a whole number beyond float64
-        i = next(i for i, row in enumerate(value) if any(abs(x) > high for x in row))
-        raise refusal(f"must be {bounds}", at=f"/{i}") from None
+        i, j = next((i, j) for i, row in enumerate(value) for j, x in enumerate(row) if abs(x) > high)
+        raise refusal(f"must be {bounds}", at=_place(i, j, to_number)) from None
     good = (array >= low) & (array <= high)  # NaN is neither
     if not good.all():
         i, j = np.argwhere(~good)[0].tolist()
-        raise refusal(f"must be {bounds}, not {described(value[i][j])}", at=f"/{i}")
+        raise refusal(f"must be {bounds}, not {described(value[i][j])}", at=_place(i, j, to_number))
     array.flags.writeable = False
     return array
 
 
-def _check_kinds(rows: Any, example: str, width: int) -> None:
+def _place(i: int, j: int, to_number: bool) -> str:
+    return f"/{i}/{j}" if to_number else f"/{i}"
+
+
+def _check_kinds(rows: Any, example: str, width: int, to_number: bool) -> None:
     # Sets of types: one pass in C each, and a fault is searched for only where there is one.
     good = (
         set(map(type, rows)) <= {list, tuple}
@@ -49,6 +55,9 @@ def _check_kinds(rows: Any, example: str, width: int) -> None:
     )
     if not good:
         i, row = next((i, row) for i, row in enumerate(rows) if not _is_row(row, width))
+        if to_number and isinstance(row, list | tuple) and len(row) == width:
+            j, bad = next((j, x) for j, x in enumerate(row) if not is_number(x))
+            raise refusal(f"must be a number, not {described(bad)}", at=f"/{i}/{j}")
         raise refusal(f"must be {WORDS[width]} numbers like {example}, not {_row_described(row, width)}", at=f"/{i}")
 
 
@@ -68,8 +77,8 @@ def _points(value: Any) -> np.ndarray:
     return _rows(value, -LARGEST, LARGEST, "[0.5, 1, 0]")
 
 
-def _directions(value: Any) -> np.ndarray:
-    array = _rows(value, -LARGEST, LARGEST, "[0, 1, 0]")
+def _directions(value: Any, to_number: bool = False) -> np.ndarray:
+    array = _rows(value, -LARGEST, LARGEST, "[0, 1, 0]", to_number=to_number)
     lengths = np.abs(array).max(axis=1).astype(np.float32)
     if not lengths.all():
         raise refusal("must not be zero: a direction has a length", at=f"/{int(np.argmin(lengths))}")
@@ -121,6 +130,8 @@ _COLOR_ROW = {"type": "array", "items": {"type": "number", "minimum": 0, "maximu
 
 Points = _type(_points, vector_schema())
 Directions = _type(_directions, vector_schema())
+# Those of a question, in which somebody wrote each number: refused with the pointer of the number.
+QuestionDirections = _type(partial(_directions, to_number=True), vector_schema())
 Triangles = _type(_indices, _INDEX_ROW)
 Coordinates = _type(_coordinates, _UV_ROW)
 Colors = _type(_colors, _COLOR_ROW)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 import os
 import signal
@@ -14,6 +15,7 @@ import numpy as np
 import pytest
 
 from service.rendering.requests.bsdf_request import MOST_PAIRS, MOST_WORK, in_plane, normalized
+from service.routes.bsdf import _values
 from tests import baseline
 from tests.probing import materials
 from tests.serving import ENDLESS, Server, client
@@ -108,6 +110,10 @@ def test_terms(server: Server) -> None:
         ({"wo": [[0, 0, 1], [0, 0, 0]]}, ["/wo/1"]),
         ({"wi": [[0, 0, 1], [1e-50, 0, 0]]}, ["/wi/1"]),
         ({"wi": [[0, 0, 1], [1, 2]]}, ["/wi/1"]),
+        ({"wi": [[0, 0, "1"]]}, ["/wi/0/2"]),
+        ({"wo": [[0, 0, 1], [0, None, 1]]}, ["/wo/1/1"]),
+        ({"wi": [[0, 0, 1], [2e9, 0, 1]]}, ["/wi/1/0"]),
+        ({"wi": [[0, 0, 10**400]]}, ["/wi/0/2"]),
         ({"wo": []}, ["/wo"]),
         ({"wi": None}, ["/wi"]),
         ({"scene": {}}, ["/scene"]),
@@ -187,3 +193,29 @@ def test_directions_are_normalised() -> None:
     np.testing.assert_allclose(np.linalg.norm(normalized(given), axis=1), 1, rtol=1e-15)
     plane = in_plane([1.0, 1e-8, 0.6])
     np.testing.assert_allclose(plane, [[0, 0, 1], [1, 0, 1e-8], [0.8, 0, 0.6]], rtol=1e-15)
+
+
+def test_large_answers_are_written_in_pieces(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The encoder keeps all other threads waiting for as long as it writes one text."""
+    written = []
+    dumps = json.dumps
+
+    def counted(*args: Any, **options: Any) -> str:
+        written.append(len(text := dumps(*args, **options)))
+        return text
+
+    monkeypatch.setattr(json, "dumps", counted)
+    count, random = 3000, np.random.default_rng(1)
+    arrays = {
+        "f": random.random((count, 1, 3), np.float32),
+        "pdf": random.random((count, 1), np.float32),
+        "delta_wi": random.random((count, 2, 3), np.float32),
+        "delta_weight": random.random((count, 2, 3), np.float32),
+        "delta_probability": np.tile(np.array([0.25, 0], np.float32), (count, 1)),
+        "lobes": np.zeros((0, count, 1, 3), np.float32),
+    }
+    answer = json.loads(_values(arrays))
+    assert max(written) < 32 * 1024
+    assert [len(lobes) for lobes in answer["delta"]] == [1] * count
+    last = answer["delta"][-1][0]
+    assert np.float32(last["wi"]).tolist() == arrays["delta_wi"][-1, 0].tolist() and last["probability"] == 0.25

@@ -13,7 +13,7 @@ from service.problems import FieldError, InvalidDocument, TooLarge
 from service.rendering.ipc.messages import BsdfQuestion
 from service.scene import ColorTexture, Material, NormalTexture, ScalarTexture, load_json
 from service.scene.base import Model
-from service.scene.number_arrays import Directions
+from service.scene.number_arrays import QuestionDirections
 from service.scene.numbers import Cosine
 from service.scene.validation import validated
 
@@ -28,8 +28,8 @@ class BsdfBody(Model):
     """Directions are in the shading frame and are normalised: z is the normal, x the tangent; wo.z < 0 is inside."""
 
     material: Material
-    wo: Directions
-    wi: Directions
+    wo: QuestionDirections
+    wi: QuestionDirections
     lobes: bool = False
 
 
