@@ -5,16 +5,17 @@ from __future__ import annotations
 import socket
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import partial
 from importlib import metadata
 from typing import TYPE_CHECKING, Any
 
 from service.problems import Unavailable
+from service.rendering.executors import measuring
 from service.rendering.renderers import Member
 from service.rendering.statistics import ClientStatistics, Distribution, Statistics
 
 if TYPE_CHECKING:
     from prometheus_client.core import Metric
-    from prometheus_client.registry import Collector
 
     from service.state import AppState
 from service.traffic import Traffic
@@ -23,33 +24,46 @@ MIME = "text/plain; version=0.0.4; charset=utf-8"
 PAGE = 4096  # bytes, of /proc/PID/statm
 
 
-def text(state: AppState, traffic: Traffic) -> bytes:
-    """One scrape."""
+async def scrape(state: AppState, traffic: Traffic) -> bytes:
+    """One scrape. What changes on the event loop is read there, between two changes; a thread reads the disk and
+    writes the text."""
+    await measuring(_prepare)
+    found = _of_the_loop(state, traffic)
+    return await measuring(partial(_written, found, state))
+
+
+def _prepare() -> None:
+    """Import what writes metrics, which is not imported at the start."""
+    import prometheus_client.core  # noqa: F401
+
+
+def _of_the_loop(state: AppState, traffic: Traffic) -> list[Metric]:
+    members = state.renderers.members
+    return [
+        *_about(state.renderers.info or {}),
+        *_states(members),
+        *_requests(traffic),
+        *_work(state.renderers.statistics, members),
+        *_kernels(members),
+        *_failures(state.renderers.statistics, members),
+        *_clients(state),
+        *_memory(state, members),
+    ]
+
+
+def _written(found: list[Metric], state: AppState) -> bytes:
     from prometheus_client import CollectorRegistry, ProcessCollector, generate_latest
-
-    registry = CollectorRegistry(auto_describe=False)
-    ProcessCollector(registry=registry)
-    registry.register(_collector(state, traffic))
-    return generate_latest(registry)
-
-
-def _collector(state: AppState, traffic: Traffic) -> Collector:
     from prometheus_client.registry import Collector
 
     class Sunbox(Collector):
         def collect(self) -> Iterator[Metric]:
-            members = state.renderers.members
-            yield from _about(state.renderers.info or {})
-            yield from _states(members)
-            yield from _requests(traffic)
-            yield from _work(state.renderers.statistics, members)
-            yield from _kernels(members)
-            yield from _failures(state.renderers.statistics, members)
-            yield from _clients(state)
-            yield from _memory(state, members)
+            yield from found
             yield from _disk(state)
 
-    return Sunbox()
+    registry = CollectorRegistry(auto_describe=False)
+    ProcessCollector(registry=registry)
+    registry.register(Sunbox())
+    return generate_latest(registry)
 
 
 def _about(renderer: Mapping[str, Any]) -> Iterator[Metric]:

@@ -4,15 +4,14 @@ from __future__ import annotations
 
 import asyncio
 import json
-from functools import cache, partial
+from functools import cache
 from typing import Any
 
 from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
 
 from service import scene
-from service.metrics import MIME, text
-from service.rendering.executors import measuring
+from service.metrics import MIME, scrape
 from service.rendering.streams import protocol
 from service.routes import answers
 from service.state import app_state
@@ -44,7 +43,7 @@ async def readyz(request: Request) -> dict[str, str]:
 )
 async def metrics(request: Request) -> Response:
     own = app_state(request)
-    return Response(await measuring(partial(text, own, own.traffic)), media_type=MIME)
+    return Response(await scrape(own, own.traffic), media_type=MIME)
 
 
 @router.get("/v1/info", summary="Version, renderer, limits, quality presets")

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import asyncio
 import json
 import logging
 import os
 import re
 import subprocess
 import sys
+import threading
+from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +21,8 @@ import uvicorn
 from service import app, config, logs
 from service.config import Config
 from service.logs import _fields
+from service.metrics import scrape
+from service.state import AppState
 from tests.serving import ENDLESS, SCENE, SMALL, Server, client, wait_until
 
 ROOT = Path(__file__).parents[2]
@@ -167,3 +172,21 @@ def test_logging_is_set_up_once(capfd: pytest.CaptureFixture[str]) -> None:
         assert (told["event"], told["count"], told["logger"]) == ("what happened", 3, "a.b")
     finally:
         root.handlers[:], root.level = before, level
+
+
+def test_what_changes_on_the_event_loop_is_read_there(tmp_path: Path) -> None:
+    """A thread that reads it meets dictionaries that change their size meanwhile."""
+    readers = set[int]()
+
+    class Watched(Counter[tuple[str, str, str]]):
+        def items(self) -> Any:
+            readers.add(threading.get_ident())
+            return super().items()
+
+    async def scenario() -> bytes:
+        state: AppState = app.create_app(Config(data_dir=tmp_path)).state.sunbox
+        state.traffic.count = Watched({("GET", "/", "200"): 3})
+        return await scrape(state, state.traffic)
+
+    assert b'sunbox_requests_total{method="GET",route="/",status="200"} 3.0' in asyncio.run(scenario())
+    assert readers == {threading.get_ident()}
