@@ -51,6 +51,9 @@ class Source:
     pointer: str = ""  # to the scene, from the root of what was read
     store: AssetStore | None = None  # a model's, with what it was taken apart into
     aspect_ratio: float | None = None  # of the picture of a model's camera, width over height
+    warned: frozenset[str] = (
+        frozenset()
+    )  # what the warnings that were printed about a model say, without their places
 
 
 def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
@@ -94,7 +97,9 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
             document = model.scene(presets.default_environment())
             view = None if model.exposure is None else PictureView(exposure=model.exposure)
             aspect = model.aspect_ratio
-            return Source(path, document, parse_scene(document), view=view, store=store, aspect_ratio=aspect)
+            warned = frozenset(warning["detail"] for warning in model.warnings)
+            scene = parse_scene(document)
+            return Source(path, document, scene, view=view, store=store, aspect_ratio=aspect, warned=warned)
     except BaseException:
         store.close()
         raise

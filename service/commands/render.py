@@ -86,7 +86,8 @@ def run(arguments: argparse.Namespace) -> int:
         if stats:
             files.write(stats, (json.dumps(tracing.status(setup_s), indent=1) + "\n").encode())
         for warning in tracing.warnings:
-            print(f"warning: {warning}", file=sys.stderr)
+            if warning.partition(": ")[2] not in source.warned:
+                print(f"warning: {warning}", file=sys.stderr)
         if output.is_repeatable:
             assets.keep(source.document)
     return 128 + interrupt.signal if interrupt.signal is not None else 0

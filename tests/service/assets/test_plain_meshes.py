@@ -61,6 +61,14 @@ def test_render(gpu: Any, ending: str, tmp_path: Path) -> None:
     assert pixels.std() > 5
 
 
+def test_what_the_import_said_is_not_said_again(gpu: Any, tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    corners, faces = box()
+    model = tmp_path / "box.ply"
+    model.write_bytes(make.ply(corners.astype(np.float32), faces[:, ::-1].tolist()))
+    assert main(["render", str(model), "-o", str(tmp_path / "box.png"), *SMALL]) == 0
+    assert capsys.readouterr().err.count("faces inwards") == 1
+
+
 @pytest.mark.parametrize("ending", ["ply", "stl"])
 def test_a_broken_file_is_refused_by_its_format(
     ending: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
