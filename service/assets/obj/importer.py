@@ -48,7 +48,11 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     name = path.rpartition("/")[2]
     for warning in [
         *mesh.warnings,
-        *mesh_warnings(np.asarray(mesh.vertices, np.float64), mesh.faces.astype(np.int32)),
+        *mesh_warnings(
+            np.asarray(mesh.vertices, np.float64),
+            mesh.faces.astype(np.int32),
+            varied=mesh.uvs is not None or mesh.colors is not None,
+        ),
     ]:
         notes.add(name, warning)
     library = _library(path, read.libraries, archive, notes)

@@ -19,8 +19,6 @@ SCALARS = {"ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr", "aniso
 MAPS = {"map_kd", "map_ks", "map_ke", "map_d", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr", "norm", "map_bump"}
 ALIASES = {"bump": "map_bump", "map_norm": "norm", "map_kn": "norm", "map_opacity": "map_d"}
 IGNORED = {
-    "ka": "ambient light (Ka) is not used: light is traced",
-    "map_ka": "ambient light (map_Ka) is not used: light is traced",
     "map_ns": "exponents in a texture (map_Ns) are not supported; Ns is used alone",
     "map_tr": "map_Tr is not supported; map_d is",
     "map_tf": "map_Tf is not supported; Tf is used alone",
@@ -36,6 +34,8 @@ IGNORED = {
     "sharpness": "sharpness is not used: reflections are traced",
     "map_aat": "map_aat is not used: every edge is antialiased",
 }
+# Ambient light: nearly every library has it, and as light is traced it has no place in the picture.
+SILENT = {"ka", "map_ka"}
 # The number of words that follow an option of a map; `-o`, `-s` and `-t` are followed by one to three numbers.
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
            "-texres": 1, "-type": 1}  # fmt: skip
@@ -119,6 +119,8 @@ def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, 
             notes.add(place, f"{keyword} names no file and is ignored")
             return
         material.maps[keyword] = found
+    elif keyword in SILENT:
+        return
     else:
         notes.add(place, IGNORED.get(keyword, f"the statement {keyword[:40]!r} is not supported and is ignored"))
         return

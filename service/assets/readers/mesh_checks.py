@@ -12,23 +12,27 @@ CHUNK = 1 << 14  # triangles at once: float64 copies of a million take 0.25 GB
 SHARE = 1 << 20  # triangles whose edges are sorted together: those of a million take 0.1 GB
 
 
-def mesh_warnings(vertices: Doubles, faces: Indices) -> list[str]:
-    """Warnings about repeated triangles, triangles back to back or inside out, and edges of more than two
-    triangles."""
+def mesh_warnings(vertices: Doubles, faces: Indices, varied: bool = False) -> list[str]:
+    """Warnings about triangles back to back or inside out; and about repeated ones or edges of more than two
+    triangles where these may change the picture.
+
+    Of repeated triangles it does not matter which one a ray hits unless they are `varied`, by texture coordinates or
+    colours. What is inside matters for glass, and only a mesh without holes has an inside.
+    """
     found: list[str] = []
     flat = _flat(vertices, faces)
     if flat.any():  # packing warns about these
         faces = faces[~flat]
     welded = _places(vertices).take(faces)
     count = len(vertices)
-    twice = _repeated(welded, count)
+    twice = _repeated(welded, count) if varied else 0
     if twice:
         coincide = "1 triangle coincides" if twice == 1 else f"{twice} triangles coincide"
         found.append(f"{coincide} with another one: which of the two a ray hits is arbitrary")
     if not len(welded):
         return found
     boundary, crowded, turned = _edges(welded, count)
-    if crowded:
+    if crowded and not boundary and not twice:
         belong = "1 edge belongs" if crowded == 1 else f"{crowded} edges belong"
         found.append(f"{belong} to more than two triangles: what is inside and what is outside is ambiguous there")
     if turned:

@@ -25,7 +25,7 @@ def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
     tangents = _floats(parts.tangents)
     parts.uvs = parts.uvs_1 = parts.tangents = None
-    parts.warnings += mesh_warnings(vertices, faces)
+    parts.warnings += mesh_warnings(vertices, faces, varied=uvs is not None or parts.colors is not None)
     colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
     return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents, groups)
 

@@ -168,7 +168,8 @@ def _check_charts(number: int, shape: MeshShape, data: MeshData, sets: frozenset
 def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshData]) -> MeshData:
     if shape.asset is None:
         assert shape.vertices is not None and shape.faces is not None
-        odd = tuple(mesh_warnings(shape.vertices, shape.faces))
+        varied = shape.uvs is not None or shape.colors is not None
+        odd = tuple(mesh_warnings(shape.vertices, shape.faces, varied))
         return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors, odd)
     try:
         if shape.asset not in files:

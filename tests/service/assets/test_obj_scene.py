@@ -129,7 +129,6 @@ def test_statements_become_parameters(store: AssetStore, text: str, expected: di
 @pytest.mark.parametrize(
     ("text", "detail"),
     [
-        ("Ka 1 1 1", "ambient light (Ka) is not used"),
         ("bump grey.png", "heights (bump) are not supported"),
         ("map_Bump normals.png", "is used as a normal map"),
         ("disp grey.png", "displacement"),
@@ -158,6 +157,10 @@ def test_what_is_not_taken_is_said(store: AssetStore, text: str, detail: str) ->
     _, details = material(store, text)
     assert [said for said in details if detail in said], details
     assert len(details) == 1, details
+
+
+def test_ambient_light_is_no_matter_for_a_warning(store: AssetStore) -> None:
+    assert material(store, "Kd .5 .5 .5\nPr 1\nKa 1 1 1\nmap_Ka grey.png")[1] == []
 
 
 def test_a_texture_needs_coordinates(store: AssetStore) -> None:

@@ -111,12 +111,12 @@ def test_degenerate_triangles_are_skipped_and_counted():
 
 
 def test_equal_warnings_about_shapes_are_one_with_a_count():
-    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]]
-    fan, flat = [[0, 1, 2], [0, 1, 3], [0, 1, 4]], [0, 0, 1]
-    fans = [mesh(vertices=vertices, faces=[*fan, *[flat] * count]) for count in (2, 2, 3)]
-    crowded = "1 edge belongs to more than two triangles: what is inside and what is outside is ambiguous there"
+    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0]]
+    wings, flat = [[0, 1, 2], [0, 1, 3]], [0, 0, 1]
+    fans = [mesh(vertices=vertices, faces=[*wings, *[flat] * count]) for count in (2, 2, 3)]
+    turned = "1 edge joins triangles that face opposite ways"
     assert packed(sphere(), *fans).warnings == [
-        f"/shapes/1: {crowded} (here and in 2 more shapes)",
+        f"/shapes/1: {turned} (here and in 2 more shapes)",
         "/shapes/1: 2 degenerate triangles skipped (with other counts also in 2 more shapes)",
     ]
 
