@@ -9,31 +9,36 @@ from typing import Any
 import numpy as np
 
 from gpu import context as contexts
-from gpu.layout import WORK_GROUP
 from gpu.layout.bindings import Slot
 from gpu.picture.schedule import Tile
+from gpu.picture.tiles import SLICE_S, Tiles
 from gpu.settings import ID_AOVS
 
 SAMPLES = 256  # samples that they average at most
-_PIXELS = 1 << 16  # pixels of a dispatch, which takes 25 ms on llvmpipe in a large mesh
+_GUESS_S = SLICE_S / 1024  # seconds of a pixel's first hit in a picture that was restored and not traced since
 
 
 class FirstHit:
-    """Made for a picture of `size`; takes memory from the first `trace` on."""
+    """Made for a picture of `size`, of which no more than `most` pixels are bound at once. The first `trace` takes
+    its memory."""
 
-    def __init__(self, context: Any, size: tuple[int, int]) -> None:
-        self._context, self._size = context, size
+    def __init__(self, context: Any, size: tuple[int, int], most: int) -> None:
+        self._context, self._size, self._most = context, size, most
         self.buffers: dict[Slot, Any] = {}
-        self.samples, self._row = 0, 0
+        self._begin()
+
+    def _begin(self) -> None:
+        self.samples, self._row, self._column = 0, 0, 0
+        self._tiles = Tiles(*self._size, self._most)
 
     @property
     def begun(self) -> bool:
-        return (self.samples, self._row) > (0, 0)
+        return (self.samples, self._row, self._column) > (0, 0, 0)
 
     def clear(self) -> None:
         for buffer in self.buffers.values():
             buffer.clear()
-        self.samples, self._row = 0, 0
+        self._begin()
 
     def allocate(self) -> None:
         width, height = self._size
@@ -43,18 +48,23 @@ class FirstHit:
 
     def limit(self, samples: int) -> None:
         """Begin again if more samples than these were traced."""
-        if (self.samples, self._row) > (samples, 0):
+        if (self.samples, self._row, self._column) > (samples, 0, 0):
             self.clear()
 
-    def trace(self, dispatch: Callable[[Tile, int], None], want: int, until: float) -> None:
+    def trace(self, dispatch: Callable[[Tile, int], None], want: int, until: float, rates: np.ndarray) -> None:
         """Trace up to `want` samples while the clock (perf_counter) is before `until`; `dispatch` traces the n-th
-        sample of a tile."""
+        sample of a tile. `rates` are those of the picture's paths, whose first rays these are: the first tiles are
+        sized by them, as the camera may look through thousands of layers."""
         width, height = self._size
-        rows = max(1 if width > _PIXELS else WORK_GROUP, _PIXELS // width // WORK_GROUP * WORK_GROUP)
-        while self.samples < want and time.perf_counter() < until:
-            lines = min(rows, height - self._row)
-            dispatch((0, self._row, width, lines), self.samples)
-            self._row += lines
+        if not self.begun:
+            self._tiles.expect(rates if rates.any() else np.array([_GUESS_S]))
+        while self.samples < want and (began := time.perf_counter()) < until:
+            tile = self._tiles.tile(self._row, self._column, 1)
+            dispatch(tile, self.samples)
+            self._tiles.took(tile, 1, time.perf_counter() - began)
+            self._column = tile[0] + tile[2]
+            if self._column >= width:
+                self._row, self._column = self._row + tile[3], 0
             if self._row >= height:
                 self.samples, self._row = self.samples + 1, 0
 

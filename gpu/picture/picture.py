@@ -336,7 +336,7 @@ class Picture:
         want = min(self.samples, most or first_hit.SAMPLES)
         if most is not None:
             self._readout.first_hit.limit(want)
-        return self._readout.trace_first_hits(want, until)
+        return self._readout.trace_first_hits(want, until, self._passes.schedule.rates)
 
     def noise(self) -> float | None:
         """Estimated RMSE of the picture's luminance over its mean luminance; None before 2 samples, 0 if black."""

@@ -28,7 +28,7 @@ class Readout:
     def __init__(self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter) -> None:
         self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
         self._size = dispatcher.settings.width, dispatcher.settings.height
-        self.first_hit = FirstHit(dispatcher.context, self._size)
+        self.first_hit = FirstHit(dispatcher.context, self._size, dispatcher.most_pixels)
 
     def _pieces(self) -> Iterator[tuple[int, int]]:
         """The first pixel, and the number of pixels, of pieces that stay in a processor's cache."""
@@ -75,15 +75,16 @@ class Readout:
             buffer.release()
         return pixels.reshape(self._size[1], self._size[0], 4)
 
-    def trace_first_hits(self, want: int, until: float) -> bool:
-        """Trace them until there are `want` samples, or `until` (perf_counter); whether they are all there."""
+    def trace_first_hits(self, want: int, until: float, rates: np.ndarray) -> bool:
+        """Trace them until there are `want` samples, or `until` (perf_counter); whether they are all there. `rates`
+        are those of the picture's schedule."""
         d = self._dispatcher
         if not self.first_hit.buffers:
             self.first_hit.allocate()
         if self.first_hit.samples < want and time.perf_counter() < until:
             kernel = self._kernels.get("guides.comp", d.scene.defines(d.settings))
             d.bind()
-            self.first_hit.trace(lambda tile, sample: self._trace_first_hit(kernel, tile, sample), want, until)
+            self.first_hit.trace(lambda tile, sample: self._trace_first_hit(kernel, tile, sample), want, until, rates)
         return self.first_hit.samples >= want
 
     def _trace_first_hit(self, kernel: Any, tile: Tile, sample: int) -> None:

@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+import math
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from gpu import Renderer
 from gpu import context as contexts
-from gpu.picture.schedule import group_stride
+from gpu.picture.first_hit import FirstHit
+from gpu.picture.schedule import Tile, group_stride
 from gpu.picture.tiles import BAND, LEAST_A_PASS, ROUND_S, SLICE_S, Tiles
 from tests.extremes.scenes import everything
 from tests.rendering import picture
@@ -111,6 +115,31 @@ def test_passes_of_those_who_share_come_round_soon(size: int, sharers: int) -> N
 def test_paths_that_may_be_long_begin_with_small_tiles() -> None:
     assert np.prod(Tiles(512, 512, 1 << 30, 1024).tile(0, 0, 1)[2:]) <= 1024
     assert np.prod(Tiles(512, 512, 1 << 30, 8).tile(0, 0, 1)[2:]) > 16_000
+
+
+@pytest.mark.parametrize("known", [True, False])
+def test_first_hits_are_traced_in_slices_of_what_they_cost(
+    gpu: Renderer, monkeypatch: pytest.MonkeyPatch, known: bool
+) -> None:
+    """By a simulated clock: behind thousands of layers a camera ray takes as long as a whole path. Of a picture that
+    was restored nothing is known."""
+    now, tiles, pixel_s = [0.0], [], 5e-4
+    monkeypatch.setattr("gpu.picture.first_hit.time", SimpleNamespace(perf_counter=lambda: now[0]))
+    first = FirstHit(None, (512, 256), 1 << 30)
+
+    def dispatch(tile: Tile, sample: int) -> None:
+        tiles.append(tile)
+        now[0] += pixel_s * tile[2] * tile[3]
+
+    first.trace(dispatch, 1, math.inf, np.array([pixel_s if known else 0.0]))
+    sizes = [width * height for _, _, width, height in tiles]
+    assert sum(sizes) == 512 * 256 and first.samples == 1
+    assert max(sizes) <= (8 * BAND if known else 1024)
+    pixel_s = 1e-9
+    for _ in range(40):
+        tiles.clear()
+        first.trace(dispatch, first.samples + 1, math.inf, np.zeros(1))
+    assert len(tiles) < 8, "and large ones where it costs little"
 
 
 @pytest.mark.parametrize("limit", [32 << 10, 100_000])
