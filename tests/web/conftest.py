@@ -22,7 +22,7 @@ from tests.serving import Server
 
 # The headless shell is the same engine without the window around it, and opens a page at half the cost.
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium")
-PATIENCE_S = 60.0  # two cores that other tests may share
+PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
 
 @pytest.hookimpl(tryfirst=True)  # before markers choose
@@ -112,6 +112,7 @@ class Editor:
 
     def __init__(self, page: Page) -> None:
         self.page = page
+        page.set_default_timeout(PATIENCE_S * 1000)
         self.complaints: list[str] = []
         self.requests: list[str] = []
         page.on("console", lambda message: self._note(message.type, message.text))
@@ -135,6 +136,16 @@ class Editor:
             if time.monotonic() > deadline:
                 pytest.fail(f"waited in vain for {what}; page says: {self.complaints}, {self.text('#messages')!r}")
             self.page.wait_for_timeout(30)
+
+    def rest(self, what: str, reading: Callable[[], object]) -> None:
+        """Return when a reading has stayed the same for half a second: what was under way has come by then."""
+
+        def stays() -> bool:
+            before = reading()
+            self.page.wait_for_timeout(500)
+            return reading() == before
+
+        self.wait(what, stays)
 
     def click_until(self, what: str, reached: Callable[[], object]) -> None:
         """Clicks into the middle of the picture, again where it was not yet ready to tell what stands there."""

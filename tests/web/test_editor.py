@@ -167,11 +167,9 @@ def test_fingers_pinch_and_drag(browser: Browser, server: Server) -> None:
 def test_pause_stops_the_samples(editor: Editor) -> None:
     editor.settled()
     editor.page.keyboard.press("Space")
-    editor.page.wait_for_timeout(400)
+    editor.wait("a pause", lambda: editor.text("#state") == "Paused")
+    editor.rest("the last frame", editor.samples)
     before = editor.samples()
-    assert editor.text("#state") == "Paused"
-    editor.page.wait_for_timeout(600)
-    assert editor.samples() == before
     editor.page.click("#pause")
     editor.wait("more samples", lambda: editor.samples() > before)
 

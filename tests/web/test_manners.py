@@ -76,7 +76,7 @@ def test_every_frame_is_acknowledged(wire: tuple[Editor, Wire]) -> None:
     editor.page.keyboard.press("ArrowLeft")
     editor.page.keyboard.press("Space")
     editor.wait("quiet", lambda: editor.text("#state") == "Paused")
-    editor.page.wait_for_timeout(500)
+    editor.rest("the last acknowledgement", lambda: (len(heard.frames), len(heard.said)))
     acknowledged = [message["seq"] for message in heard.said if message["type"] == "ack"]
     assert sorted(acknowledged) == [frame["seq"] for frame in heard.frames]
 
@@ -86,10 +86,8 @@ def test_a_hidden_page_pauses(wire: tuple[Editor, Wire]) -> None:
     editor.settled()
     editor.page.evaluate(HIDE, True)
     editor.wait("a pause", lambda: "pause" in heard.kinds())
-    editor.page.wait_for_timeout(300)
+    editor.rest("the last frame", lambda: len(heard.frames))
     frames = len(heard.frames)
-    editor.page.wait_for_timeout(500)
-    assert len(heard.frames) == frames
     editor.page.evaluate(HIDE, False)
     editor.wait("more frames", lambda: len(heard.frames) > frames + 1)
     assert heard.kinds().count("resume") == 1

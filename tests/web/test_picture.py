@@ -78,7 +78,7 @@ def test_frame_focus_and_fly(editor: Editor) -> None:
     before = camera(editor)["position"]
     editor.page.evaluate("document.activeElement.blur()")
     editor.page.keyboard.down("w")
-    editor.page.wait_for_timeout(300)
+    editor.wait("a flight", lambda: camera(editor)["position"][2] < before[2] - 0.1)
     editor.page.keyboard.up("w")
     after = camera(editor)
     assert after["position"][2] < before[2] - 0.1 and after["target"][2] < -0.1, "eye and target went forward"

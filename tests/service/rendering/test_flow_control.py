@@ -151,4 +151,4 @@ async def test_an_update_waits_for_its_predecessors_frame(renderer: Renderer) ->
     renderer.flow.update(3, 0.0)
     began = loop.time()
     await renderer.flow.settled()
-    assert loop.time() - began < 0.05, "without a credit no frame can come"
+    assert loop.time() == began, "without a credit no frame can come"
