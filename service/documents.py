@@ -5,8 +5,9 @@ from __future__ import annotations
 import hashlib
 import logging
 import sqlite3
+import time
 from collections.abc import Iterator
-from contextlib import contextmanager, nullcontext
+from contextlib import contextmanager, nullcontext, suppress
 from dataclasses import dataclass
 from itertools import islice
 from pathlib import Path
@@ -18,7 +19,15 @@ from service import recipe
 from service.assets import AssetStore
 from service.database import Database
 from service.disk_usage import Usage, expected
-from service.problems import FieldError, Forbidden, InvalidDocument, NotFound, PreconditionFailed, TooLarge
+from service.problems import (
+    FieldError,
+    Forbidden,
+    InvalidDocument,
+    NotFound,
+    PreconditionFailed,
+    TooLarge,
+    Unavailable,
+)
 from service.quota import Quota
 from service.scene import Material, parse_scene
 from service.scene.base import MOST_MISTAKES
@@ -29,6 +38,10 @@ from service.scene.validation import escaped, validated
 log = logging.getLogger(__name__)
 
 Kind = Literal["scenes", "materials"]
+PRIVATE, SHARED, BY_LINK = range(3)  # whose a document is: its owner's, listed to all, or whose knows its name
+LINK_DAYS = 90  # after which a document that only a link leads to is deleted, if nobody has read it
+DAY_S = 86_400.0
+MOST_NAMES = 1000  # of one page
 KINDS: tuple[Kind, ...] = get_args(Kind)
 LONGEST_NAME = 100  # characters
 _MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
@@ -97,30 +110,42 @@ class Documents:
     def prepare(self) -> None:
         """To be called once, before the server starts. Raises DamagedFile."""
         self._database.prepare()
+        if self._database.exists():
+            with suppress(Unavailable), self._database.open() as database, database:
+                _expire(database)
 
-    def names(self, kind: str, owner: str = "") -> list[dict[str, str]]:
-        """`[{name, title}]` of what this owner may read, in the order of the titles. Raises NotFound for an unknown
-        kind."""
+    def names(
+        self, kind: str, owner: str = "", limit: int = MOST_NAMES, after: str | None = None
+    ) -> tuple[list[dict[str, str]], bool]:
+        """`[{name, title}]` of what this owner may read but for documents by link, in the order of the titles: of the
+        first `limit` names behind `after`; and whether there are more. Raises NotFound for an unknown kind."""
         check_kind(kind)
         with self._database.open() as database:
             rows = database.execute(
-                "SELECT name, title FROM documents WHERE kind = ? AND (owner = ? OR shared) ORDER BY owner = ?",
-                (kind, owner, owner),
+                "SELECT name, title FROM documents WHERE kind = ? AND shared <> ? AND (owner = ? OR shared) "
+                "AND name > ? ORDER BY name, owner = ?",
+                (kind, BY_LINK, owner, after or "", owner),
             )
-            titles = dict(rows.fetchall())  # the owner's own come last, and count
-        return [{"name": name, "title": title} for title, name in sorted((titles[name], name) for name in titles)]
+            titles = dict[str, str]()  # the owner's own come last, and count
+            for name, title in rows:
+                if name not in titles and len(titles) == limit:
+                    return _listed(titles), True
+                titles[name] = title
+        return _listed(titles), False
 
     def get(self, kind: str, name: str, owner: str = "") -> bytes:
         """The bare document, as JSON: the owner's own of that name, or else one that is shared. Raises NotFound."""
         check_kind(kind)
         with self._database.open() as database:
             row = database.execute(
-                "SELECT body FROM documents WHERE kind = ? AND name = ? AND (owner = ? OR shared) "
+                "SELECT body, shared, owner FROM documents WHERE kind = ? AND name = ? AND (owner = ? OR shared) "
                 "ORDER BY owner = ? DESC, rowid LIMIT 1",
                 (kind, name, owner, owner),
             ).fetchone()
-        if row is None:
-            raise _missing(kind, name)
+            if row is None:
+                raise _missing(kind, name)
+            if row[1] == BY_LINK:
+                _note_read(database, kind, name, row[2])
         text: str = row[0]
         return text.encode()
 
@@ -131,12 +156,12 @@ class Documents:
         document: CheckedDocument,
         title: str | None = None,
         owner: str = "",
-        shared: bool | None = None,
+        shared: int | None = None,
         condition: Condition = ALWAYS,
     ) -> tuple[str, bool]:
         """Save an owner's document under a name; its title, and whether the name is new.
 
-        `shared`: others may read it; None leaves that as it is, and a new one is its owner's alone. Raises
+        `shared`: PRIVATE, SHARED, or BY_LINK; None leaves that as it is, and a new one is its owner's alone. Raises
         InvalidDocument, with pointers from the document's root, where an asset is missing, TooLarge where it is too
         much for its owner, PreconditionFailed.
         """
@@ -155,11 +180,15 @@ class Documents:
                 self._check_share(database, owner, size - (old[2] if old else 0))
                 kept = title or (old[0] if old else name)
                 if shared is None:
-                    shared = bool(old[1]) if old else not owner
-                row = (*key, shared, kept, size, body)
+                    shared = old[1] if old else (PRIVATE if owner else SHARED)
+                row = (*key, int(shared), kept, size, body)
                 database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?, ?, ?, ?)", row)
                 database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
                 database.executemany("INSERT INTO uses VALUES (?, ?, ?, ?)", [(asset, *key) for asset in uses])
+                database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
+                if shared == BY_LINK:
+                    database.execute("INSERT INTO document_links VALUES (?, ?, ?, ?)", (*key, time.time()))
+                _expire(database)
         log.info("document saved kind=%s name=%s bytes=%d", kind, name, size)
         return kept, old is None
 
@@ -183,6 +212,7 @@ class Documents:
             condition.check(found[0].encode())
             database.execute("DELETE FROM documents WHERE kind = ? AND name = ? AND owner = ?", key)
             database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
+            database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
         log.info("document deleted kind=%s name=%s", kind, name)
 
     @contextmanager
@@ -219,6 +249,30 @@ class Documents:
         if first:
             told = (FieldError(pointer, first[ref]) for pointer, ref in document.uses if ref in first)
             raise InvalidDocument(islice(told, MOST_MISTAKES))
+
+
+def _listed(titles: dict[str, str]) -> list[dict[str, str]]:
+    return [{"name": name, "title": title} for title, name in sorted((titles[name], name) for name in titles)]
+
+
+def _note_read(database: sqlite3.Connection, kind: str, name: str, owner: str) -> None:
+    """Note that a document by link was read; once a day, and not where the disk takes nothing."""
+    now = time.time()
+    with suppress(sqlite3.OperationalError), database:
+        database.execute(
+            "UPDATE document_links SET read_at = ? WHERE kind = ? AND name = ? AND owner = ? AND read_at < ?",
+            (now, kind, name, owner, now - DAY_S),
+        )
+
+
+def _expire(database: sqlite3.Connection) -> None:
+    """Delete documents by link that nobody has read for long: their assets may make room from then on."""
+    last = time.time() - LINK_DAYS * DAY_S
+    old = database.execute("SELECT kind, name, owner FROM document_links WHERE read_at < ?", (last,)).fetchall()
+    for table in ("documents", "uses", "document_links"):
+        database.executemany(f"DELETE FROM {table} WHERE kind = ? AND name = ? AND owner = ?", old)
+    if old:
+        log.info("deleted documents that nobody had read by their links for %d days count=%d", LINK_DAYS, len(old))
 
 
 def check_kind(kind: str) -> Kind:

@@ -98,5 +98,19 @@ MIGRATIONS = (
             "CREATE INDEX asset_owners_by_asset ON asset_owners (asset)",
         ),
     ),
+    Migration(
+        "documents that only a link leads to",
+        (
+            # Beside the documents, so that a read does not write a whole row again.
+            """CREATE TABLE document_links (
+                kind TEXT NOT NULL, name TEXT NOT NULL, owner TEXT NOT NULL, read_at REAL NOT NULL,
+                PRIMARY KEY (kind, name, owner)
+            ) WITHOUT ROWID""",
+            # Until now the editor saved them as shared, under names that it drew.
+            f"UPDATE documents SET shared = 2 WHERE shared AND name GLOB 'shared-{'[0-9a-f]' * 16}'",
+            """INSERT INTO document_links
+                SELECT kind, name, owner, CAST(strftime('%s', 'now') AS REAL) FROM documents WHERE shared = 2""",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

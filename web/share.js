@@ -37,7 +37,7 @@ export async function linkTo(state) {
   url.hash = `v=${await pack({ scene, ...rest })}`;
   if (url.hash.length <= LONGEST) return url.href;
   const name = `shared-${[...crypto.getRandomValues(new Uint8Array(8))].map((x) => x.toString(16).padStart(2, "0")).join("")}`;
-  await save("scenes", name, scene, { shared: true });
+  await save("scenes", name, scene, { by_link: true });
   url.hash = `s=${name}&v=${await pack(rest)}`;
   return url.href;
 }

@@ -4,10 +4,20 @@ from __future__ import annotations
 
 from functools import partial
 from typing import Annotated
+from urllib.parse import urlencode
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 
-from service.documents import LONGEST_NAME, CheckedDocument, Condition, check_kind, etag
+from service.documents import (
+    BY_LINK,
+    LINK_DAYS,
+    LONGEST_NAME,
+    MOST_NAMES,
+    CheckedDocument,
+    Condition,
+    check_kind,
+    etag,
+)
 from service.rendering.executors import saving
 from service.routes import answers
 from service.state import app_state, caller, owner
@@ -37,14 +47,29 @@ Shared = Annotated[
     bool | None,
     Query(description="Others may read it, but not replace it. Left out: as before, and not shared where it is new."),
 ]
+ByLink = Annotated[
+    bool,
+    Query(
+        description="Whoever knows the name may read it, and it is listed to nobody. It is deleted when nobody has "
+        f"read it for {LINK_DAYS} days."
+    ),
+]
+Limit = Annotated[int, Query(ge=1, le=MOST_NAMES)]
+After = Annotated[str | None, Query(max_length=LONGEST_NAME, description="Names behind this one only.")]
 IfMatch = Annotated[str | None, Header(description="The `ETag` that the document must have, or `*`.")]
 IfNoneMatch = Annotated[str | None, Header(description="`*`: there must be no document of this name.")]
 
 
-@router.get("/{kind}", summary="Names and titles", responses=answers.problems(404))
-async def names(request: Request, kind: answers.DocumentKind) -> list[answers.Named]:
-    """Of one's own documents and of those that others share; without keys of all."""
-    found = await saving(partial(app_state(request).documents.names, kind, owner(request)))
+@router.get("/{kind}", summary="Names and titles", responses=answers.problems(404, 422))
+async def names(
+    request: Request, response: Response, kind: answers.DocumentKind, limit: Limit = MOST_NAMES, after: After = None
+) -> list[answers.Named]:
+    """Of one's own documents and of those that others share, in the order of the titles; without keys of all. Those
+    that were saved `by_link` are left out. `Link` with `rel=next` leads to the next page while there is one."""
+    found, more = await saving(partial(app_state(request).documents.names, kind, owner(request), limit, after))
+    if more:
+        following = urlencode({"limit": limit, "after": max(each["name"] for each in found)})
+        response.headers["link"] = f'<{kind}?{following}>; rel="next"'
     return [answers.Named(**entry) for entry in found]
 
 
@@ -81,6 +106,7 @@ async def put(
     name: Name,
     title: Title = None,
     shared: Shared = None,
+    by_link: ByLink = False,
     if_match: IfMatch = None,
     if_none_match: IfNoneMatch = None,
 ) -> answers.Named:
@@ -88,9 +114,10 @@ async def put(
     async with own.bodies.taken(request, caller(request)) as body:
         checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body, caller(request))
     condition = Condition(_tags(if_match), _tags(if_none_match))
+    wanted = BY_LINK if by_link else shared
 
     def save() -> tuple[str, bool, str]:
-        kept, new = own.documents.put(kind, name, checked, title, owner(request), shared, condition)
+        kept, new = own.documents.put(kind, name, checked, title, owner(request), wanted, condition)
         return kept, new, etag(checked.body.encode())
 
     kept, new, response.headers["etag"] = await saving(save, caller(request))

@@ -59,8 +59,8 @@ def test_a_folder_of_an_earlier_version_opens(opened: Storage, tmp_path: Path) -
     assert any("migrated" in note for note in check(tmp_path).notes) is (version(tmp_path) < VERSION)
     opened.documents.prepare()
     assert check(tmp_path) == Report(documents=2, assets=1)
-    assert opened.documents.names("scenes") == [{"name": "bunny", "title": "The bunny"}]
-    assert opened.documents.names("materials") == [{"name": "grey", "title": "grey"}]
+    assert opened.documents.names("scenes")[0] == [{"name": "bunny", "title": "The bunny"}]
+    assert opened.documents.names("materials")[0] == [{"name": "grey", "title": "grey"}]
     scene = json.loads(opened.documents.get("scenes", "bunny"))
     used = scene["shapes"][0]["asset"]
     with opened.documents.assets_in_use() as assets:

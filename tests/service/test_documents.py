@@ -20,7 +20,7 @@ import pytest
 import uvicorn
 from starlette.requests import Request
 
-from service import app, database, documents
+from service import app, database, documents, migrations
 from service.assets import AssetStore
 from service.config import Config
 from service.database import DamagedFile
@@ -111,7 +111,7 @@ for i in range(10 ** 6):
     os.kill(writer.pid, signal.SIGKILL)
     last = int((writer.stdout.read().split() or [line])[-1])
     writer.wait()
-    names = [entry["name"] for entry in saved.names("materials")]
+    names = [entry["name"] for entry in saved.names("materials")[0]]
     found = {name: json.loads(saved.get("materials", name))["albedo"] for name in names}
     assert len(found) == 50
     for i in range(last - 48, last + 1):
@@ -172,7 +172,7 @@ def test_documents_of_an_earlier_version_are_converted(saved: Documents, tmp_pat
     assert file.stat().st_size > 4_000_000
     saved.prepare()
     assert file.stat().st_size < 100_000
-    assert saved.names("scenes") == [{"name": "a", "title": "A"}] and saved.get("scenes", "a") == body.encode()
+    assert saved.names("scenes")[0] == [{"name": "a", "title": "A"}] and saved.get("scenes", "a") == body.encode()
     with saved.assets_in_use() as used:
         assert used == {"sha256:1"}
     before = file.stat().st_mtime_ns
@@ -206,7 +206,7 @@ def test_looking_for_a_document_reads_no_other(saved: Documents) -> None:
 
     before = bytes_read()
     saved.get("scenes", "a")
-    saved.names("scenes")
+    saved.names("scenes")[0]
     assert bytes_read() - before < 500_000
 
 
@@ -229,7 +229,7 @@ def test_a_damaged_file_is_told_of(
     file, nonsense = tmp_path / "documents.sqlite3", b"no database at all" * 100
     file.write_bytes(nonsense)
     with pytest.raises(Unavailable, match="disk"):
-        saved.names("scenes")
+        saved.names("scenes")[0]
     monkeypatch.setattr(uvicorn.Server, "run", lambda self, sockets: pytest.fail("it was started"))
     assert app.run(Config(port=0, data_dir=tmp_path)) == 1
     assert str(file) in caplog.text and "backup" in caplog.text and "Traceback" not in caplog.text
@@ -252,7 +252,7 @@ def test_documents_belong_to_who_saved_them(saved: Documents, store: AssetStore)
     saved.put("materials", "old", dim(0.1))  # before there were keys
     for owner, albedo in (("anna", 0.2), ("bert", 0.3)):
         saved.put("materials", "mine", dim(albedo), owner.title(), owner)
-    assert saved.names("materials", "anna") == [{"name": "mine", "title": "Anna"}, {"name": "old", "title": "old"}]
+    assert saved.names("materials", "anna")[0] == [{"name": "mine", "title": "Anna"}, {"name": "old", "title": "old"}]
     assert json.loads(saved.get("materials", "mine", "bert"))["albedo"] == 0.3
     with pytest.raises(NotFound):
         saved.get("materials", "mine", "carl")
@@ -262,7 +262,7 @@ def test_documents_belong_to_who_saved_them(saved: Documents, store: AssetStore)
     with pytest.raises(Forbidden):
         saved.delete("materials", "gift", "bert")
     saved.put("materials", "gift", dim(0.6), "Bert's", "bert")  # one of his own, which he sees in its place
-    assert {"name": "gift", "title": "Bert's"} in saved.names("materials", "bert")
+    assert {"name": "gift", "title": "Bert's"} in saved.names("materials", "bert")[0]
     assert json.loads(saved.get("materials", "gift", "anna"))["albedo"] == 0.5
     saved.put("materials", "gift", dim(0.5), None, "anna", shared=False)
     with pytest.raises(NotFound):
@@ -271,7 +271,7 @@ def test_documents_belong_to_who_saved_them(saved: Documents, store: AssetStore)
         saved.delete("materials", "mine", "carl")
     saved.delete("materials", "old", "carl")
     saved.delete("materials", "mine", "anna")
-    assert [entry["name"] for entry in saved.names("materials", "anna")] == ["gift"]
+    assert [entry["name"] for entry in saved.names("materials", "anna")[0]] == ["gift"]
     mesh = store.add(OBJ).id
     saved.put("scenes", "a", checked("scenes", mesh_scene(mesh)), None, "anna")
     saved.put("scenes", "a", checked("scenes", mesh_scene(mesh)), None, "bert")
@@ -318,3 +318,77 @@ def test_a_document_is_replaced_only_if_it_is_the_expected_one(server: Server) -
     third = http.get(address).headers["etag"]
     assert http.delete(address, headers={"if-match": third}).status_code == 204
     assert is_problem(http.put(address, json=MATERIAL, headers={"if-match": third}), 412)
+
+
+def test_what_is_saved_by_link_is_listed_to_nobody_and_read_by_all(saved: Documents) -> None:
+    saved.put("materials", "secret", dim(0.2), None, "anna", shared=documents.BY_LINK)
+    saved.put("materials", "secret", dim(0.3), None, "anna")  # as it was
+    assert saved.names("materials", "anna")[0] == saved.names("materials", "bert")[0] == []
+    assert json.loads(saved.get("materials", "secret", "bert"))["albedo"] == 0.3
+    saved.put("materials", "secret", dim(0.3), None, "anna", shared=documents.SHARED)
+    assert len(saved.names("materials", "bert")[0]) == 1
+
+
+def test_what_is_saved_by_link_goes_when_nobody_reads_it(
+    saved: Documents, store: AssetStore, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    asset, day = store.add(OBJ).id, [0.0]
+    monkeypatch.setattr(documents, "time", SimpleNamespace(time=lambda: day[0] * documents.DAY_S))
+    for name in ("read", "forgotten"):
+        saved.put("scenes", name, checked("scenes", mesh_scene(asset)), None, "anna", shared=documents.BY_LINK)
+    day[0] = 60
+    saved.get("scenes", "read", "bert")
+    day[0] = 100
+    saved.prepare()
+    saved.get("scenes", "read", "carl")
+    with pytest.raises(NotFound):
+        saved.get("scenes", "forgotten", "anna")
+    day[0] = 300
+    saved.put("materials", "other", dim(0.2))
+    with saved.assets_in_use() as used:
+        assert not used, "assets of links that are gone may make room"
+
+
+def test_names_come_in_pages(saved: Documents) -> None:
+    for i in range(5):
+        saved.put("materials", f"m{i}", dim(0.1), f"title {9 - i}", "anna")
+    page, more = saved.names("materials", "anna", 3)
+    assert [each["name"] for each in page] == ["m2", "m1", "m0"] and more
+    page, more = saved.names("materials", "anna", 3, "m2")
+    assert [each["name"] for each in page] == ["m4", "m3"] and not more
+
+
+def test_links_of_before_are_listed_no_more(tmp_path: Path, store: AssetStore) -> None:
+    before = next(i for i, each in enumerate(migrations.MIGRATIONS) if "only a link" in each.about)
+    name = "shared-0123456789abcdef"
+    with sqlite3.connect(tmp_path / "documents.sqlite3") as old:
+        for each in migrations.MIGRATIONS[:before]:
+            for statement in each.statements:
+                old.execute(statement)
+        old.execute(f"PRAGMA user_version = {before}")
+        for each, shared in ((name, 1), ("shared-lamp", 1), ("shared-fedcba9876543210", 0)):
+            row = ("materials", each, "anna", shared, each, 2, json.dumps(MATERIAL))
+            old.execute("INSERT INTO documents VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+    saved = Documents(tmp_path, store)
+    saved.prepare()
+    assert [each["name"] for each in saved.names("materials", "bert")[0]] == ["shared-lamp"]
+    assert [each["name"] for each in saved.names("materials", "anna")[0]] == [
+        "shared-fedcba9876543210",
+        "shared-lamp",
+    ]
+    assert json.loads(saved.get("materials", name, "bert")) == MATERIAL
+
+
+def test_pages_and_links_over_http(server: Server) -> None:
+    for name in ("page-a", "page-b"):
+        assert server.http.put(f"/v1/documents/materials/{name}", json=MATERIAL).status_code == 201
+    link = server.http.put("/v1/documents/materials/by-link", params={"by_link": "true"}, json=MATERIAL)
+    assert link.status_code == 201 and server.http.get("/v1/documents/materials/by-link").json() == MATERIAL
+    names, address = [], "/v1/documents/materials?limit=1"
+    while address:
+        answer = server.http.get(address)
+        names += [each["name"] for each in answer.json()]
+        address = answer.links.get("next", {}).get("url", "") and f"/v1/documents/{answer.links['next']['url']}"
+    assert names == sorted(set(names)) and {"page-a", "page-b"} <= set(names) and "by-link" not in names
+    for name in ("page-a", "page-b", "by-link"):
+        server.http.delete(f"/v1/documents/materials/{name}")
