@@ -20,6 +20,7 @@ TESTS = Path(__file__).parent
 LONG_FILES = (
     "web/test_editor.py", "web/test_saving.py", "web/test_everyone.py", "web/test_lobe.py", "web/test_picture.py",
     "web/test_variants.py", "service/bench/test_bench.py", "shaders/test_furnace.py",
+    "gpu/test_fallback.py", "service/test_one_client.py",
     "service/rendering/test_durable.py", "service/bench/test_scale.py", "service/test_hostile.py",
     "service/rendering/cluster/test_cluster.py", "service/rendering/test_survival.py", "shaders/test_light.py",
     "service/rendering/cluster/test_nodes.py", "gpu/test_precompile.py", "service/rendering/test_divided.py",
