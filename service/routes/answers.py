@@ -46,6 +46,37 @@ class Named(BaseModel):
     title: str
 
 
+class RendererPlace(BaseModel):
+    id: str
+    driver: str | None = Field(description="Null until it has started.")
+    device: str
+    host: str
+    state: str
+
+
+class Memory(BaseModel):
+    limit: int = Field(description="Bytes (SUNBOX_MEMORY).")
+    used: dict[str, int] = Field(description="Bytes, by what is in it.")
+
+
+class Info(BaseModel):
+    version: str
+    renderer: dict[str, Any] | None = Field(
+        description="What the first renderer's driver says; null: nothing renders."
+    )
+    renderers: list[RendererPlace]
+    sandbox: dict[str, Any] = Field(description="What the processes that read uploads have given up.")
+    memory: Memory
+    limits: dict[str, Any] = Field(description="What may be sent, by the names of the settings.")
+    quality: dict[str, Any] = Field(description="The quality presets, with what they cost.")
+
+
+class Schemas(BaseModel):
+    scene: dict[str, Any] = Field(description="JSON Schema.")
+    settings: dict[str, Any] = Field(description="JSON Schema.")
+    view: dict[str, Any] = Field(description="JSON Schema of the stream's message.")
+
+
 class Kernel(BaseModel):
     raised: list[str] = Field(description="Features of the scene that the kernel was compiled with.")
     not_raised: list[str] = Field(description="Features that it was spared.")
@@ -278,8 +309,10 @@ ASSET_BODY = {
     "requestBody": {
         "required": True,
         "content": {
-            "application/octet-stream": {"schema": {"type": "string", "format": "binary"}},
-            "model/obj": {"schema": {"type": "string"}, "examples": {"triangle": {"value": ASSET}}},
+            "application/octet-stream": {
+                "schema": {"type": "string", "format": "binary"},
+                "examples": {"triangle": {"value": ASSET}},
+            },
         },
     }
 }

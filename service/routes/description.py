@@ -14,6 +14,37 @@ from service.routes.answers import PROBLEM, Problem
 
 HERE, THERE = "#/$defs/", "#/components/schemas/"
 
+# What programs that are generated from the description call the calls.
+NAMES = {
+    "GET /healthz": "isAlive",
+    "GET /readyz": "isReady",
+    "GET /metrics": "getMetrics",
+    "GET /v1/info": "getInfo",
+    "GET /v1/schema": "getSchema",
+    "GET /v1/presets/{kind}": "listPresets",
+    "GET /v1/presets/{kind}/{name}": "getPreset",
+    "POST /v1/assets": "uploadAsset",
+    "GET /v1/assets/{id}": "downloadAsset",
+    "GET /v1/assets/{id}/scene": "getAssetScene",
+    "GET /v1/documents/{kind}": "listDocuments",
+    "GET /v1/documents/{kind}/{name}": "getDocument",
+    "PUT /v1/documents/{kind}/{name}": "saveDocument",
+    "DELETE /v1/documents/{kind}/{name}": "deleteDocument",
+    "POST /v1/render": "render",
+    "POST /v1/renders": "startRender",
+    "GET /v1/renders": "listRenders",
+    "GET /v1/renders/events": "followRenders",
+    "GET /v1/renders/{id}": "getRender",
+    "DELETE /v1/renders/{id}": "deleteRender",
+    "GET /v1/renders/{id}/events": "followRender",
+    "GET /v1/renders/{id}/scene": "getRenderScene",
+    "GET /v1/renders/{id}/image": "getRenderImage",
+    "POST /v1/bsdf": "evaluateBsdf",
+    "POST /v1/bsdf/albedo": "getBsdfAlbedo",
+    "POST /v1/bsdf/terms": "getBsdfTerms",
+}
+OF_FILE, WRITTEN_OUT = ("asset",), ("vertices", "faces", "normals", "uvs", "colors")  # what a mesh has, either or
+
 
 def describe(app: FastAPI, keyed: bool) -> None:
     """Make `app` describe itself; `keyed`: calls need a key."""
@@ -30,7 +61,8 @@ def _described(app: FastAPI, keyed: bool) -> dict[str, Any]:
     _, defined = models_json_schema([(Problem, "serialization")], ref_template=THERE + "{model}")
     schemas |= defined["$defs"] | _documents()
     for path, calls in found["paths"].items():
-        for call in calls.values():
+        for method, call in calls.items():
+            call["operationId"] = NAMES.get(f"{method.upper()} {path}", call["operationId"])
             answers = call["responses"]
             if "HTTPValidationError" in str(answers.get("422")):
                 answers["422"] = {"description": "A parameter is not valid", **_problem()}
@@ -56,8 +88,25 @@ def _documents() -> dict[str, Any]:
         out |= schema.get("$defs", {}) | {name.capitalize(): bare}
     kinds = [name for name in out if name.endswith("Material")]
     out["Material"] = {"oneOf": [{"$ref": HERE + name} for name in sorted(kinds)]}
+    out |= _meshes(out["MeshShape"])
     moved: dict[str, Any] = _moved(out)
     return moved
+
+
+def _meshes(schema: dict[str, Any]) -> dict[str, Any]:
+    """A mesh as two models: of alternatives that only say what is required, generators make no model."""
+    common = {
+        name: value for name, value in schema.items() if name not in ("oneOf", "properties", "required", "title")
+    }
+    models = {}
+    for title, required, left_out in (
+        ("FileMeshShape", ["asset"], WRITTEN_OUT),
+        ("WrittenMeshShape", ["vertices", "faces"], OF_FILE),
+    ):
+        properties = {name: value for name, value in schema["properties"].items() if name not in left_out}
+        required = [*schema["required"], *required]
+        models[title] = {**common, "title": title, "properties": properties, "required": required}
+    return models | {"MeshShape": {"oneOf": [{"$ref": HERE + title} for title in models]}}
 
 
 def _moved(value: Any) -> Any:

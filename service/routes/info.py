@@ -46,7 +46,12 @@ async def metrics(request: Request) -> Response:
     return Response(await scrape(own, own.traffic), media_type=MIME)
 
 
-@router.get("/v1/info", summary="Version, renderer, limits, quality presets")
+@router.get(
+    "/v1/info",
+    summary="Version, renderer, limits, quality presets",
+    response_model=None,
+    responses=answers.shaped(answers.Info),
+)
 async def info(request: Request) -> dict[str, Any]:
     return await app_state(request).info()
 
@@ -55,7 +60,7 @@ async def info(request: Request) -> dict[str, Any]:
     "/v1/schema",
     summary="JSON Schema of Scene, Settings and the stream's View",
     response_class=JSONResponse,
-    responses=answers.DOCUMENT,
+    responses=answers.shaped(answers.Schemas),
 )
 async def schema() -> Response:
     return Response(await asyncio.to_thread(_schema), media_type="application/json")

@@ -7,6 +7,9 @@ from typing import Any
 import httpx
 import pytest
 
+from service.routes.answers import Info, Schemas
+from service.routes.description import NAMES
+from service.scene import MeshShape
 from tests.serving import Server
 
 
@@ -94,3 +97,38 @@ def test_answers_have_the_described_shape(server: Server, description: Any) -> N
     whole = server.http.get(f"/v1/renders/{status['id']}", params={"kernel": "true"}).json()
     assert whole.keys() == described["properties"].keys()
     server.http.delete(f"/v1/renders/{status['id']}")
+
+
+def test_every_call_has_a_name_for_programs(description: Any) -> None:
+    ids = {
+        f"{method.upper()} {path}": call["operationId"]
+        for path, methods in description["paths"].items()
+        for method, call in methods.items()
+    }
+    assert ids == NAMES and len(set(ids.values())) == len(ids)
+
+
+def test_a_mesh_is_two_models(description: Any) -> None:
+    """And between them they describe all that one may have."""
+    schemas = description["components"]["schemas"]
+    models = [schemas[each["$ref"].rpartition("/")[2]] for each in schemas["MeshShape"]["oneOf"]]
+    assert not any("oneOf" in model for model in models)
+    both = [set(model["properties"]) for model in models]
+    assert both[0] | both[1] == set(MeshShape.model_fields)
+    assert both[0] - both[1] == {"asset"} and {"vertices", "faces"} <= both[1] - both[0]
+    for model in models:
+        assert set(model["required"]) <= set(model["properties"]) and model["additionalProperties"] is False
+
+
+def test_information_has_the_described_shape(server: Server, description: Any) -> None:
+    for path, model in (("/v1/info", Info), ("/v1/schema", Schemas)):
+        answer = description["paths"][path]["get"]["responses"]["200"]["content"]["application/json"]
+        assert answer["schema"]["$ref"].endswith(f"/{model.__name__}")
+        body = server.http.get(path).json()
+        model.model_validate(body)
+        assert body.keys() == model.model_fields.keys()
+
+
+def test_an_upload_has_one_type_of_content(description: Any) -> None:
+    content = description["paths"]["/v1/assets"]["post"]["requestBody"]["content"]
+    assert list(content) == ["application/octet-stream"]
