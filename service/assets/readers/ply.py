@@ -5,6 +5,7 @@ promises its memory before looking at the file.
 """
 
 import warnings
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from struct import Struct
 from typing import Any
@@ -83,21 +84,19 @@ def read_ply(data: memoryview) -> RawMesh:
     groups: Corners | None = None
     for element in elements:
         if element.name in ("face", STRIPS) and element.lists():
-            more, indices, beside = body.lists(element, _indices(element), GROUP)
+            more, values, beside = body.lists(element, _indices(element), (GROUP,))
+            indices = _whole(values)
             if element.name == STRIPS:
-                indices, beside = _strips(more, indices), None
+                indices = _strips(more, indices)
                 more = np.full(len(indices) // 3, 3)
-            elif beside is not None:
-                groups = np.repeat(beside, np.maximum(more - 2, 0))
+            elif GROUP in beside:
+                groups = np.repeat(_whole(beside[GROUP]), np.maximum(more - 2, 0))
             counts = np.concatenate([counts, more]) if len(counts) else more
             corners = np.concatenate([corners, indices]) if len(corners) else indices
-        elif element.lists():
-            body.lists(element, element.lists()[0])
         else:
-            rows = body.rows(element)
+            columns = body.columns(element)
             if element.name == "vertex":
-                vertex = {p.name: rows[p.name] for p in element.properties}
-                declared = {p.name: p.declared for p in element.properties}
+                vertex, declared = columns, {p.name: p.declared for p in element.properties}
     if not {"x", "y", "z"} <= vertex.keys():
         raise ParseError("its header declares no vertices with x, y and z")
     vertices = _stack(vertex, ("x", "y", "z"))
@@ -213,41 +212,51 @@ class Body:
 
     def rows(self, element: Element, lengths: dict[str, int] | None = None) -> npt.NDArray[np.void]:
         dtype = element.row(lengths or {})
-        if not dtype.itemsize:
+        if element.length and not dtype.itemsize:
             raise ParseError(f"element {element.name} has no properties")
         self._need(element.length * dtype.itemsize, element)
+        if not element.length:
+            return np.empty(0, dtype)
         rows = np.frombuffer(self.data, dtype, element.length, self.at)
         self.at += rows.nbytes
         return rows
 
-    def lists(self, element: Element, wanted: Property, beside: str = "") -> tuple[Longs, Corners, Corners | None]:
-        """The lengths of the wanted list, all its values, one row after the other, and the whole number `beside` it
-        in each row, where there is one."""
+    def columns(self, element: Element) -> Columns:
+        """The numbers of each property that is no list."""
+        singles = [p.name for p in element.properties if p.count is None]
+        if element.lists():
+            return self.lists(element, element.lists()[0], singles)[2]
+        rows = self.rows(element)
+        return {name: rows[name] for name in singles}
+
+    def lists(
+        self, element: Element, wanted: Property, beside: Collection[str] = ()
+    ) -> tuple[Longs, npt.NDArray[Any], Columns]:
+        """The lengths of the wanted list, all its values, one row after the other, and the numbers of the properties
+        `beside` it, of those that the element has."""
+        others = [p for p in element.properties if p.name in beside and p.count is None]
         if not element.length:
-            return np.empty(0, np.int64), np.empty(0, np.int64), None
-        other = next((p for p in element.properties if p.name == beside and p.count is None), None)
+            return np.empty(0, np.int64), np.empty(0, np.int64), {p.name: np.empty(0, p.dtype) for p in others}
         start = self.at
-        lengths = self._walk(element, wanted, None, 1)[1]
+        lengths = self._walk(element, wanted, [], 1)[1]
         self.at = start
         if element.length * element.row(lengths).itemsize <= len(self.data) - start:
             rows = self.rows(element, lengths)
             if all((rows[_count_of(p)] == lengths[p.name]).all() for p in element.lists()):
                 values = rows[wanted.name]
-                return (
-                    np.full(len(rows), values.shape[1]),
-                    _whole(values).reshape(-1),
-                    None if other is None else _whole(rows[other.name]),
-                )
+                counts = np.full(len(rows), values.shape[1])
+                return counts, values.reshape(-1), {p.name: rows[p.name] for p in others}
             self.at = start
-        counts, lengths, values, numbers = self._walk(element, wanted, other, element.length)
-        return np.array(counts), values, numbers
+        walked, lengths, values, columns = self._walk(element, wanted, others, element.length)
+        return np.array(walked), values, columns
 
     def _walk(
-        self, element: Element, wanted: Property, other: Property | None, rows: int
-    ) -> tuple[list[int], dict[str, int], Corners, Corners | None]:
+        self, element: Element, wanted: Property, others: list[Property], rows: int
+    ) -> tuple[list[int], dict[str, int], npt.NDArray[Any], Columns]:
         """Row by row, for lists that differ: the wanted list's lengths, all lengths of the last row, the values, and
-        the numbers of the other property."""
-        counts, pieces, lengths, others = [], [], {}, []
+        the numbers of the other properties."""
+        counts, pieces, lengths = [], [], {}
+        beside: dict[str, list[Any]] = {p.name: [] for p in others}
         counters = [p.count and Struct(p.count[0] + CODES[p.count[1:]]) for p in element.properties]
         sizes = [int(p.dtype[-1]) for p in element.properties]
         for _ in range(rows):
@@ -262,11 +271,11 @@ class Body:
                 if p is wanted:
                     counts.append(n)
                     pieces.append(self.data[self.at : self.at + n * size])
-                elif p is other:
-                    others.append(self.data[self.at : self.at + size])
+                elif count is None and p.name in beside:
+                    beside[p.name].append(self.data[self.at : self.at + size])
                 self.at += n * size
-        numbers = None if other is None else _whole(np.frombuffer(b"".join(others), other.dtype))
-        return counts, lengths, _whole(np.frombuffer(b"".join(pieces), wanted.dtype)), numbers
+        columns = {p.name: np.frombuffer(b"".join(beside[p.name]), p.dtype) for p in others}
+        return counts, lengths, np.frombuffer(b"".join(pieces), wanted.dtype), columns
 
     def _length(self, written: float, element: Element) -> int:
         if not written >= 0 or written != written // 1:

@@ -78,3 +78,15 @@ def test_elements_that_nobody_knows_are_passed_over() -> None:
     lines += ("element face 1", "property list uchar int vertex_indices", "element edge 1", "property int vertex1")
     text = header(*lines) + BODY + "3 97 98 99 0.5\n3 0 1 2\n0\n"
     assert parsed(text.encode()).faces.tolist() == [[0, 1, 2]]
+
+
+@pytest.mark.parametrize("near", ["1 0.5", "2 0.5 9"])
+def test_lists_and_numbers_beside_what_is_known(near: str) -> None:
+    """Of vertices, whose lists may differ in length, and of elements without properties or rows."""
+    beside = ("property list uint8 float32 near", "property uint8 red", "property uint8 green", "property uint8 blue")
+    lines = (*beside, "element nothing 0", "element face 1", "property list uchar int vertex_indices")
+    first, *rest = BODY.splitlines()
+    body = "\n".join([f"{first} {near} 255 0 0", *(f"{row} 1 7 0 255 0" for row in rest), "3 0 1 2", ""])
+    mesh = parsed((header(*lines) + body).encode())
+    assert mesh.vertices.tolist() == VERTICES and mesh.faces.tolist() == [[0, 1, 2]]
+    assert mesh.colors is not None and mesh.colors[:2].tolist() == [[1, 0, 0], [0, 1, 0]]
