@@ -11,7 +11,7 @@ from typing import Any
 from service.assets.types import SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
 
-IMPORTER = 2  # counted up whenever a file is to be imported anew: its document or what is said of it has changed
+IMPORTER = 3  # counted up whenever a file is to be imported anew: its document or what is said of it has changed
 PART = re.compile(r"part:(\d+)")
 
 

@@ -13,6 +13,17 @@ Kind = Literal["mesh", "image", "scene"]
 
 
 @dataclass(frozen=True)
+class MeshOddities:
+    """What is unusual about a mesh. Whether the picture shows it depends on the material."""
+
+    coinciding: int = 0  # triangles with the corners of an earlier one, whichever way they face
+    differing: int = 0  # of these, those with other colours or texture coordinates
+    crowded: int = 0  # edges of more than two triangles
+    turned: int = 0  # edges whose two triangles face opposite ways
+    inwards: bool = False  # closed, and facing inwards
+
+
+@dataclass(frozen=True)
 class MeshData:
     """Triangles as in the file, neither merged nor reordered; polygons are triangulated. The arrays are read-only."""
 
@@ -27,6 +38,7 @@ class MeshData:
     # (m,) the smoothing group of each triangle: computed normals are shared within a group, and 0 has facets. None:
     # one group, or normals from the file.
     groups: Indices | None = None
+    oddities: MeshOddities = MeshOddities()
 
     @property
     def smoothing(self) -> Indices | bool:

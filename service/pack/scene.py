@@ -17,6 +17,7 @@ from service.pack.geometry.assemble import assemble
 from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.reuse import Earlier
 from service.pack.geometry.shared_meshes import shift
+from service.pack.geometry.warnings import odd_meshes
 from service.pack.geometry.world import ShapeMaterials, triangles
 from service.pack.lights import lights
 from service.pack.lights.environment import PackedEnvironment, check_images, environment_key, pack_environment
@@ -105,7 +106,8 @@ def pack(
         textures=textures,
         radiance_scale=lights.radiance_scale(max(sky.peak, brightest, picked.peak)),
     )
-    return Packed(_with_geometry(arrays, built), [*built.warnings, *texture_warnings, *sky.warnings])
+    odd = odd_meshes(built.meshes.odd, materials, emissive)
+    return Packed(_with_geometry(arrays, built), [*odd, *built.warnings, *texture_warnings, *sky.warnings])
 
 
 def _environment(

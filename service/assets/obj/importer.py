@@ -20,7 +20,6 @@ from service.assets.obj.materials import Materials
 from service.assets.obj.mtl import MtlMaterial, read_mtl
 from service.assets.obj.paths import library_names, located
 from service.assets.obj.textures import Textures
-from service.assets.readers.mesh_checks import mesh_warnings
 from service.assets.readers.obj import MaterialMesh, read_obj, read_obj_with_materials
 from service.assets.readers.obj_lines import Named
 from service.assets.readers.polygons import Longs
@@ -46,14 +45,7 @@ def read_obj_scene(data: bytes | memoryview, limits: AssetLimits) -> SceneFile:
     check_raw_mesh(mesh, limits.max_triangles)
     notes, files = Warnings(), PartFiles()
     name = path.rpartition("/")[2]
-    for warning in [
-        *mesh.warnings,
-        *mesh_warnings(
-            np.asarray(mesh.vertices, np.float64),
-            mesh.faces.astype(np.int32),
-            varied=mesh.uvs is not None or mesh.colors is not None,
-        ),
-    ]:
+    for warning in mesh.warnings:
         notes.add(name, warning)
     library = _library(path, read.libraries, archive, notes)
     textures = Textures(archive, files, notes, limits)

@@ -56,6 +56,7 @@ class _Converter:
         else:
             document |= {"base_color": self._base_color(is_glass), "metallic": metallic}
             document |= self._specular(is_glass)
+            self._miss_ambient(is_glass)
         document["roughness"] = self._roughness(is_sharp=is_glass or is_mirror)
         document |= self._layers()
         if is_glass:
@@ -84,6 +85,18 @@ class _Converter:
         if is_glass and max(self.material.color("tf", 0.0)) > 0:
             return _plain(self._fraction("tf", 0.0))
         return self._color("kd", "map_kd", 0.8)
+
+    def _miss_ambient(self, is_glass: bool) -> None:
+        """Warn where what the file shows stands under ambient light alone: most files repeat Kd there, or say 1."""
+        numbers, maps, places = self.material.numbers, self.material.maps, self.material.places
+        if "map_ka" in places and "map_kd" not in maps:
+            self.notes.add(places["map_ka"], "a texture of ambient light (map_Ka) is not used; map_Kd is")
+        elif "ka" in places and not (
+            is_glass
+            or any(any(numbers.get(keyword, ())) for keyword in ("kd", "ks", "ke"))
+            or any(keyword in maps for keyword in ("map_kd", "map_ks", "map_ke"))
+        ):
+            self.notes.add(places["ka"], "a colour of ambient light (Ka) is not used; Kd is")
 
     def _specular(self, is_glass: bool) -> dict[str, Any]:
         """Ks as Blender writes it: 0.5 is the reflectance of a dielectric of index Ni, F0 = 2 Ks F(Ni).

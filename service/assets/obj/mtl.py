@@ -14,10 +14,13 @@ from service.assets.errors import ParseError
 from service.assets.scenes.warnings import Warnings
 
 MAX_BYTES = 16 << 20  # bytes of a library; a thousand materials take 0.3 MiB
-COLORS = {"kd", "ks", "ke", "tf"}
+COLORS = {"ka", "kd", "ks", "ke", "tf"}
 SCALARS = {"ns", "ni", "d", "tr", "illum", "pr", "pm", "ps", "pc", "pcr", "aniso", "anisor"}
 MAPS = {"map_kd", "map_ks", "map_ke", "map_d", "map_pr", "map_pm", "map_ps", "map_pc", "map_pcr", "norm", "map_bump"}
 ALIASES = {"bump": "map_bump", "map_norm": "norm", "map_kn": "norm", "map_opacity": "map_d"}
+# Ambient light: nearly every library has it, and as light is traced it has no place in the picture. Their places are
+# recorded for materials that have nothing else.
+AMBIENT = {"ka", "map_ka"}
 IGNORED = {
     "map_ns": "exponents in a texture (map_Ns) are not supported; Ns is used alone",
     "map_tr": "map_Tr is not supported; map_d is",
@@ -34,8 +37,6 @@ IGNORED = {
     "sharpness": "sharpness is not used: reflections are traced",
     "map_aat": "map_aat is not used: every edge is antialiased",
 }
-# Ambient light: nearly every library has it, and as light is traced it has no place in the picture.
-SILENT = {"ka", "map_ka"}
 # The number of words that follow an option of a map; `-o`, `-s` and `-t` are followed by one to three numbers.
 OPTIONS = {"-blendu": 1, "-blendv": 1, "-bm": 1, "-boost": 1, "-cc": 1, "-clamp": 1, "-imfchan": 1, "-mm": 2,
            "-texres": 1, "-type": 1}  # fmt: skip
@@ -62,7 +63,7 @@ class MtlMaterial:
     place: str
     numbers: dict[str, tuple[float, ...]] = field(default_factory=dict)
     maps: dict[str, Map] = field(default_factory=dict)
-    places: dict[str, str] = field(default_factory=dict)  # FILE:LINE of each statement
+    places: dict[str, str] = field(default_factory=dict)  # FILE:LINE of each statement; of Ka where it is not black
 
     def number(self, keyword: str, default: float) -> float:
         return self.numbers.get(keyword, (default,))[0]
@@ -107,7 +108,10 @@ def _statement(line: str) -> tuple[str, str]:
 
 
 def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, notes: Warnings) -> None:
-    if keyword in COLORS or keyword in SCALARS:
+    if keyword in AMBIENT:
+        if keyword == "ka" and not any(_numbers(keyword, rest) or ()):
+            return
+    elif keyword in COLORS or keyword in SCALARS:
         values = _numbers(keyword, rest)
         if values is None:
             notes.add(place, f"{keyword} is not followed by the numbers that it needs and is ignored")
@@ -119,8 +123,6 @@ def _add(material: MtlMaterial, keyword: str, rest: str, place: str, path: str, 
             notes.add(place, f"{keyword} names no file and is ignored")
             return
         material.maps[keyword] = found
-    elif keyword in SILENT:
-        return
     else:
         notes.add(place, IGNORED.get(keyword, f"the statement {keyword[:40]!r} is not supported and is ignored"))
         return

@@ -6,6 +6,6 @@ ply          PLY, text and binary
 stl          STL, through trimesh
 polygons     polygons -> triangles
 raw_mesh     the result of a reader, and the checks that every mesh has to pass
-mesh_checks  warnings about a mesh: triangles without area, repeated ones, holes
+mesh_checks  oddities of a mesh: repeated triangles, edges of too many, inside out
 image        PNG, JPEG, WebP, OpenEXR and Radiance HDR
 """

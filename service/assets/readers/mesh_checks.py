@@ -1,46 +1,35 @@
-"""Warnings about oddities of a mesh that can be rendered all the same."""
+"""Oddities of a mesh that can be rendered all the same."""
 
 from __future__ import annotations
 
 import numpy as np
 import numpy.typing as npt
 
-from service.assets.types import Doubles, Indices
+from service.assets.types import Doubles, Floats, Indices, MeshOddities
 
 FLAT = 4 * float(np.finfo(np.float32).eps)
 CHUNK = 1 << 14  # triangles at once: float64 copies of a million take 0.25 GB
 SHARE = 1 << 20  # triangles whose edges are sorted together: those of a million take 0.1 GB
 
 
-def mesh_warnings(vertices: Doubles, faces: Indices, varied: bool = False) -> list[str]:
-    """Warnings about triangles back to back or inside out; and about repeated ones or edges of more than two
-    triangles where these may change the picture.
-
-    Of repeated triangles it does not matter which one a ray hits unless they are `varied`, by texture coordinates or
-    colours. What is inside matters for glass, and only a mesh without holes has an inside.
-    """
-    found: list[str] = []
+def mesh_oddities(
+    vertices: Doubles, faces: Indices, uvs: Floats | None = None, colors: Floats | None = None
+) -> MeshOddities:
+    """Repeated triangles, triangles back to back or inside out, and edges of more than two triangles."""
     flat = _flat(vertices, faces)
     if flat.any():  # packing warns about these
         faces = faces[~flat]
+    if not len(faces):
+        return MeshOddities()
     welded = _places(vertices).take(faces)
     count = len(vertices)
-    twice = _repeated(welded, count) if varied else 0
-    if twice:
-        coincide = "1 triangle coincides" if twice == 1 else f"{twice} triangles coincide"
-        found.append(f"{coincide} with another one: which of the two a ray hits is arbitrary")
-    if not len(welded):
-        return found
+    coinciding, differing = _repeated(welded, count), 0
+    looks = [rows for rows in (uvs, colors) if rows is not None]
+    if coinciding and looks:
+        differing = coinciding - _repeated(_places(np.column_stack([vertices, *looks])).take(faces), count)
     boundary, crowded, turned = _edges(welded, count)
-    if crowded and not boundary and not twice:
-        belong = "1 edge belongs" if crowded == 1 else f"{crowded} edges belong"
-        found.append(f"{belong} to more than two triangles: what is inside and what is outside is ambiguous there")
-    if turned:
-        join = "1 edge joins" if turned == 1 else f"{turned} edges join"
-        found.append(f"{join} triangles that face opposite ways")
-    if not boundary and not crowded and not turned and _volume(vertices, faces) < 0:
-        found.append("the mesh is closed and faces inwards: light and glass take its inside for its outside")
-    return found
+    inwards = not boundary and not crowded and not turned and _volume(vertices, faces) < 0
+    return MeshOddities(coinciding, differing, crowded, turned, inwards)
 
 
 def _flat(vertices: Doubles, faces: Indices) -> npt.NDArray[np.bool_]:
@@ -59,11 +48,11 @@ def _squares(rows: Doubles) -> Doubles:
     return squares
 
 
-def _places(vertices: Doubles) -> Indices:
-    """(n,) a number for each vertex, equal for equal positions, as files repeat vertices along their seams."""
-    bits = np.ascontiguousarray(vertices + 0.0).view(np.uint64)  # + 0.0: -0 becomes 0
+def _places(rows: Doubles) -> Indices:
+    """(n,) a number for each vertex, equal for equal rows, as files repeat vertices along their seams."""
+    bits = np.ascontiguousarray(rows + 0.0).view(np.uint64)  # + 0.0: -0 becomes 0
     mixed = np.zeros(len(bits), np.uint64)
-    for axis in range(3):  # two positions that mix to one number are as good as never: 1e-8 for a million
+    for axis in range(bits.shape[1]):  # two positions that mix to one number are as good as never: 1e-8 for a million
         mixed = (mixed ^ bits[:, axis]) * np.uint64(0x9E3779B97F4A7C15)
         mixed ^= mixed >> np.uint64(29)
     order = np.argsort(mixed)

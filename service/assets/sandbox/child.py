@@ -119,7 +119,7 @@ def _arrays(parsed: MeshData | ImageData | SceneFile) -> tuple[dict[str, Pieces]
     arrays: dict[str, Pieces] = {
         name: [array] for name, array in vars(parsed).items() if isinstance(array, np.ndarray)
     }
-    return arrays, {"warnings": list(parsed.warnings)}
+    return arrays, {"warnings": list(parsed.warnings), "oddities": vars(parsed.oddities)}
 
 
 if __name__ == "__main__":

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 
 from service.assets.formats import text
-from service.assets.readers.mesh_checks import mesh_warnings
+from service.assets.readers.mesh_checks import mesh_oddities
 from service.assets.readers.raw_mesh import Numbers, RawMesh, check_raw_mesh, unit_colors, unit_normals
 from service.assets.readers.stl import read_stl
 from service.assets.types import AssetLimits, Floats, Indices, MeshData
@@ -25,9 +25,9 @@ def parse_mesh(format: str, data: memoryview, limits: AssetLimits) -> MeshData:
     uvs, uvs_1 = _floats(parts.uvs), _floats(parts.uvs_1)
     tangents = _floats(parts.tangents)
     parts.uvs = parts.uvs_1 = parts.tangents = None
-    parts.warnings += mesh_warnings(vertices, faces, varied=uvs is not None or parts.colors is not None)
     colors = None if parts.colors is None else unit_colors(parts.colors, parts.warnings)
-    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents, groups)
+    odd = mesh_oddities(vertices, faces, uvs, colors)
+    return MeshData(vertices, faces, normals, uvs, uvs_1, colors, tuple(parts.warnings), tangents, groups, odd)
 
 
 def _floats(rows: Numbers | None) -> Floats | None:

@@ -12,7 +12,7 @@ from typing import Any
 from service.assets.errors import ParseError
 from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
-from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile, ScenePart
+from service.assets.types import AssetLimits, ImageData, MeshData, MeshOddities, SceneFile, ScenePart
 from service.child_processes import Child, Children, Closed, signal_name
 from service.confined import Rights
 from service.turns import Turns
@@ -186,6 +186,15 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
     return MeshData(
         arrays["vertices"], arrays["faces"], get("normals"), get("uvs"), get("uvs_1"), get("colors"),
         tuple(map(str, reply["warnings"])), get("tangents"), get("groups"),
+        _oddities(reply["oddities"]),
+    )  # fmt: skip
+
+
+def _oddities(found: dict[str, Any]) -> MeshOddities:
+    """The child is not trusted with types."""
+    return MeshOddities(
+        int(found["coinciding"]), int(found["differing"]), int(found["crowded"]), int(found["turned"]),
+        bool(found["inwards"]),
     )  # fmt: skip
 
 

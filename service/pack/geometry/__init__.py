@@ -16,5 +16,5 @@ triangle_buffers  the finished arrays of all triangles, in shared memory
 shape_records     members that the records of all kinds have in common: hidden shapes, lights
 rebase            the origin that float32 coordinates are relative to
 parallel          work over many rows, in threads
-warnings          equal warnings about many shapes as one with a count
+warnings          equal warnings about many shapes as one with a count; odd meshes whose materials show it
 """

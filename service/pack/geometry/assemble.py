@@ -143,5 +143,6 @@ def _mesh_extents(world: World, key: Hashable) -> MeshExtents:
     around = np.array(boxes).reshape(-1, 6)
     owners = [mesh.shape for mesh in some] + [each.used[1] for each in world.instances]
     return MeshExtents(
-        key, around[:, :3], around[:, 3:], np.array(owners, np.uint32), counted(world.mesh_warnings)
+        key, around[:, :3], around[:, 3:], np.array(owners, np.uint32), counted(world.mesh_warnings),
+        tuple(world.odd),
     )  # fmt: skip

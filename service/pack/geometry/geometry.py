@@ -10,6 +10,7 @@ import numpy as np
 from gpu.layout import ShapeKind
 from service.pack.geometry.shared_meshes import SharedMesh
 from service.pack.geometry.triangle_buffers import TriangleBuffers
+from service.pack.geometry.warnings import OddMesh
 from service.scene.numbers import Vec3
 
 
@@ -23,6 +24,7 @@ class MeshExtents:
     high: np.ndarray
     owners: np.ndarray
     warnings: tuple[str, ...]
+    odd: tuple[OddMesh, ...]
 
 
 @dataclass(frozen=True)

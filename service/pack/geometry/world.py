@@ -8,13 +8,14 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gpu import SceneTooLarge
-from service.assets import Assets, MeshData
-from service.assets.readers.mesh_checks import mesh_warnings
+from service.assets import Assets, MeshData, MeshOddities
+from service.assets.readers.mesh_checks import mesh_oddities
 from service.pack.geometry import instances, meshes
 from service.pack.geometry.analytic import AnalyticShapes, check_reach
 from service.pack.geometry.instances import Instance, MeshRequest
 from service.pack.geometry.meshes import Chart, PlacedMesh
 from service.pack.geometry.shared_meshes import SharedMesh, blank, shared_mesh
+from service.pack.geometry.warnings import OddMesh
 from service.pack.textures.uses import RequiredCharts
 from service.problems import AssetError, FieldError, InvalidDocument
 from service.scene.numbers import LARGEST
@@ -38,6 +39,7 @@ class World:
     meshes: list[PlacedMesh] = field(default_factory=list)
     instances: list[Instance] = field(default_factory=list)  # meshes that share their triangles
     mesh_warnings: list[tuple[int, str]] = field(default_factory=list)  # each with its shape's number
+    odd: list[OddMesh] = field(default_factory=list)
 
     @property
     def models(self) -> list[SharedMesh]:
@@ -63,6 +65,9 @@ def place(
             read = materials.charts.get(shape.material, RequiredCharts())
             _check_charts(i, shape, data, read.uv_sets)
             used, matrix = (numbers[shape.material], i), _matrix(shape)
+            if data.oddities != MeshOddities():
+                is_smoothed = data.normals is None and bool(np.any(_smooth(shape, data)))
+                out.odd.append(OddMesh(i, used[0], data.oddities, is_smoothed, shape.double_sided))
             wanted.append(MeshRequest(shape, data, matrix, used, read, shape.material in materials.emissive))
     shown, room = _instances(wanted, known or {}, apart, max_triangles)
     for each, instance in zip(wanted, shown, strict=True):
@@ -127,13 +132,17 @@ def _matrix(shape: Shape) -> np.ndarray | None:
 
 def _mesh(each: MeshRequest, matrix: np.ndarray | None) -> PlacedMesh:
     data, shape, read = each.data, each.shape, each.read
-    smooth = data.smoothing if shape.smooth is None else shape.smooth
     return meshes.place(
-        data.vertices, data.faces, data.normals, smooth, matrix, not shape.double_sided, each.used,
+        data.vertices, data.faces, data.normals, _smooth(shape, data), matrix, not shape.double_sided, each.used,
         data.uvs if read.uv_sets else None, data.uvs_1 if 1 in read.uv_sets else None,
         None if data.colors is None or (data.colors == 1).all() else data.colors,
         None if read.tangents is None else Chart(data.uvs_1 if read.tangents else data.uvs, data.tangents),
     )  # fmt: skip
+
+
+def _smooth(shape: MeshShape, data: MeshData) -> np.ndarray | bool:
+    """The document's word, or else the file's."""
+    return data.smoothing if shape.smooth is None else shape.smooth
 
 
 def _model(key: Hashable, each: MeshRequest) -> SharedMesh | None:
@@ -168,9 +177,8 @@ def _check_charts(number: int, shape: MeshShape, data: MeshData, sets: frozenset
 def _data(shape: MeshShape, number: int, assets: Assets, files: dict[str, MeshData]) -> MeshData:
     if shape.asset is None:
         assert shape.vertices is not None and shape.faces is not None
-        varied = shape.uvs is not None or shape.colors is not None
-        odd = tuple(mesh_warnings(shape.vertices, shape.faces, varied))
-        return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors, odd)
+        odd = mesh_oddities(shape.vertices, shape.faces, shape.uvs, shape.colors)
+        return MeshData(shape.vertices, shape.faces, shape.normals, shape.uvs, None, shape.colors, oddities=odd)
     try:
         if shape.asset not in files:
             files[shape.asset] = assets.mesh(shape.asset)

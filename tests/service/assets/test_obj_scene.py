@@ -72,6 +72,10 @@ SHINY = {"type": "principled", "base_color": 0.5, "metallic": 0.0, "specular": 0
         ("Kd 0.25 0.5 1  # blue", {"type": "diffuse", "albedo": [0.25, 0.5, 1.0]}),
         ("", {"type": "diffuse", "albedo": 0.8}),
         ("Kd .5 .5 .5\nKe 17 12 4", PLAIN | {"emission": [17.0, 12.0, 4.0]}),
+        ("Ka 1 1 1\nKd .5 .5 .5", PLAIN),
+        ("Ka 0 0 0\nKd 0 0 0", PLAIN | {"albedo": 0.0}),
+        ("Ka spectral a.rfl\nKd .5 .5 .5", PLAIN),
+        ("map_Ka grey.png\nKd 0 0 0\nmap_Kd grey.png", PLAIN | {"albedo": {"texture": "grey", "factor": 1.0}}),
         ("Kd .5 .5 .5\nd 0.25", PLAIN | {"alpha": 0.25}),
         ("Kd .5 .5 .5\nTr 0.25", PLAIN | {"alpha": 0.75}),
         ("Kd .5 .5 .5\nKs .5 .5 .5\nNs 0", SHINY),
@@ -129,6 +133,9 @@ def test_statements_become_parameters(store: AssetStore, text: str, expected: di
 @pytest.mark.parametrize(
     ("text", "detail"),
     [
+        ("Ka 1 1 1", "a colour of ambient light (Ka) is not used; Kd is"),
+        ("Ka 1 0 0\nKd 0 0 0", "a colour of ambient light (Ka) is not used; Kd is"),
+        ("Kd .5 .5 .5\nmap_Ka grey.png", "a texture of ambient light (map_Ka) is not used; map_Kd is"),
         ("bump grey.png", "heights (bump) are not supported"),
         ("map_Bump normals.png", "is used as a normal map"),
         ("disp grey.png", "displacement"),
@@ -157,10 +164,6 @@ def test_what_is_not_taken_is_said(store: AssetStore, text: str, detail: str) ->
     _, details = material(store, text)
     assert [said for said in details if detail in said], details
     assert len(details) == 1, details
-
-
-def test_ambient_light_is_no_matter_for_a_warning(store: AssetStore) -> None:
-    assert material(store, "Kd .5 .5 .5\nPr 1\nKa 1 1 1\nmap_Ka grey.png")[1] == []
 
 
 def test_a_texture_needs_coordinates(store: AssetStore) -> None:

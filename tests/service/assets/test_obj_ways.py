@@ -40,7 +40,7 @@ def is_green(picture: Path) -> bool:
 
 
 def test_over_rest(server: Server) -> None:
-    files = {"m.obj": MODEL, "parts/m.mtl": GLOWING.format("green.png") + "decal x.png\n", "parts/green.png": GREEN}
+    files = {"m.obj": MODEL, "parts/m.mtl": GLOWING.format("green.png") + "disp d.png\n", "parts/green.png": GREEN}
     answer = server.http.post("/v1/assets", content=zipped(files))
     assert answer.status_code == 201, answer.text
     info = answer.json()

@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from service.pack.edits.cache import PackCache
+from service.pack.geometry.geometry import Geometry
 from service.pack.geometry.parallel import CHUNK
 from service.pack.geometry.vertex_normals import corner_normals, encode
 from tests.documents import CUBE, GREY, MIRRORED, matrix_of, mesh, packed, sphere
@@ -111,14 +113,78 @@ def test_degenerate_triangles_are_skipped_and_counted():
 
 
 def test_equal_warnings_about_shapes_are_one_with_a_count():
-    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0]]
-    wings, flat = [[0, 1, 2], [0, 1, 3]], [0, 0, 1]
-    fans = [mesh(vertices=vertices, faces=[*wings, *[flat] * count]) for count in (2, 2, 3)]
-    turned = "1 edge joins triangles that face opposite ways"
-    assert packed(sphere(), *fans).warnings == [
-        f"/shapes/1: {turned} (here and in 2 more shapes)",
+    vertices = [[0, 0, 0], [0, 0, 1], [1, 0, 0], [0, 1, 0], [-1, 0, 0]]
+    fan, flat = [[0, 1, 2], [0, 1, 3], [0, 1, 4]], [0, 0, 1]
+    fans = [mesh(vertices=vertices, faces=[*fan, *[flat] * count], material="glass") for count in (2, 2, 3)]
+    crowded = "1 edge belongs to more than two triangles: light that passes through it may be wrong"
+    assert packed(sphere(), *fans, materials=MATERIALS).warnings == [
+        f"/shapes/1: {crowded} (here and in 2 more shapes)",
         "/shapes/1: 2 degenerate triangles skipped (with other counts also in 2 more shapes)",
     ]
+
+
+MATERIALS = {
+    "grey": GREY,
+    "glass": {"type": "principled", "transmission": 1},
+    "lamp": {**GREY, "emission": 1},
+    "both": {**GREY, "emission": 1, "emission_sides": "both"},
+    "veil": {**GREY, "alpha": 0.5},
+    "leaf": {**GREY, "alpha": 0.9, "alpha_cutoff": 0.5},
+}
+ODD = {
+    "coinciding": [*CUBE["faces"], CUBE["faces"][0]],
+    "crowded": [*CUBE["faces"], [0, 1, 4]],
+    "turned": [CUBE["faces"][0][::-1], *CUBE["faces"][1:]],
+    "inwards": [face[::-1] for face in CUBE["faces"]],
+}
+SEEN = {
+    ("coinciding", "glass"): "1 triangle coincides with another and 3 edges belong to more than two triangles: "
+    "light that passes through it may be wrong",
+    ("coinciding", "lamp"): "1 triangle coincides with another: light that it emits may be wrong",
+    ("coinciding", "both"): "1 triangle coincides with another: light that it emits may be wrong",
+    ("coinciding", "veil"): "1 triangle coincides with another: it is more opaque there",
+    ("crowded", "glass"): "2 edges belong to more than two triangles: light that passes through it may be wrong",
+    ("turned", "glass"): "3 edges join triangles that face opposite ways: light that passes through it may be wrong",
+    ("turned", "lamp"): "3 edges join triangles that face opposite ways: light that it emits may be wrong",
+    ("inwards", "glass"): "the mesh is closed and faces inwards: light that passes through it may be wrong",
+    ("inwards", "lamp"): "the mesh is closed and faces inwards: light that it emits may be wrong",
+}
+
+
+@pytest.mark.parametrize("material", MATERIALS)
+@pytest.mark.parametrize("oddity", ODD)
+def test_odd_meshes_are_warned_about_where_the_picture_shows_it(oddity, material):
+    shape = mesh(vertices=CUBE["vertices"], faces=ODD[oddity], material=material, smooth=False)
+    expected = SEEN.get((oddity, material))
+    assert packed(shape, materials=MATERIALS).warnings == ([f"/shapes/0: {expected}"] if expected else [])
+
+
+def test_smooth_shading_shows_triangles_that_face_opposite_ways():
+    """Their normals cancel, unless the file has its own."""
+    shape = {"vertices": CUBE["vertices"], "faces": ODD["turned"]}
+    told = "3 edges join triangles that face opposite ways: its smooth shading may be wrong there"
+    assert packed(mesh(**shape)).warnings == [f"/shapes/0: {told}"]
+    assert packed(mesh(**shape, normals=[[0, 0, 1]] * 8)).warnings == []
+
+
+def test_which_of_two_colours_is_seen_is_arbitrary():
+    """Of a leaf with a front and a back each side shows its own."""
+    leaf = {
+        "vertices": CUBE["vertices"][:3] * 2,
+        "faces": [[0, 1, 2], [5, 4, 3]],
+        "colors": [[1, 0, 0]] * 3 + [[0, 1, 0]] * 3,
+    }
+    told = "1 triangle coincides with one of other colours or texture coordinates: which of them is seen is arbitrary"
+    assert packed(mesh(**leaf)).warnings == [f"/shapes/0: {told}"]
+    assert packed(mesh(**leaf, double_sided=False)).warnings == []
+
+
+def test_a_warning_follows_the_material_and_not_the_mesh():
+    """The geometry is packed once."""
+    cache, shape = PackCache(), mesh(vertices=CUBE["vertices"], faces=ODD["crowded"])
+    for name, count in (("grey", 0), ("glass", 1)):
+        assert len(packed(shape, cache=cache, materials={"grey": MATERIALS[name]}).warnings) == count
+    assert len(cache.gather(Geometry)) == 1
 
 
 def grid(size):
