@@ -40,6 +40,18 @@ CRASHES = {
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
 }
 
+# The type of each array of a mesh, and what one row of it holds.
+MESH_ARRAYS: dict[str, tuple[str, tuple[tuple[int, ...], ...]]] = {
+    "vertices": ("<f8", ((3,),)),
+    "faces": ("<i4", ((3,),)),
+    "normals": ("<f4", ((3,),)),
+    "uvs": ("<f4", ((2,),)),
+    "uvs_1": ("<f4", ((2,),)),
+    "colors": ("<f4", ((3,), (4,))),
+    "tangents": ("<f4", ((4,),)),
+    "groups": ("<i4", ((),)),
+}
+
 
 class Sandbox:
     """`parse` from any thread; at most `limits.children` files at once, and one less of one caller; the others wait.
@@ -182,11 +194,24 @@ def _result(reply: dict[str, Any], fd: int) -> MeshData | ImageData | SceneFile:
         return ImageData(arrays["pixels"], tuple(map(str, reply["warnings"])))
     if "scene" in arrays:
         return _scene(arrays["scene"], arrays["files"])
+    return mesh_of(arrays, tuple(map(str, reply["warnings"])), _oddities(reply["oddities"]))
+
+
+def mesh_of(arrays: dict[str, Array], warnings: tuple[str, ...], oddities: MeshOddities) -> MeshData:
+    """The mesh of these arrays. Raises ValueError where one has not the form that compiled code relies on: the child
+    that made them read a stranger's file."""
+    vertices, faces = arrays["vertices"], arrays["faces"]
+    count = {"faces": len(faces), "groups": len(faces)}
+    for name, array in arrays.items():
+        dtype, widths = MESH_ARRAYS[name]
+        if array.dtype.str != dtype or array.shape[1:] not in widths or len(array) != count.get(name, len(vertices)):
+            raise ValueError(f"{name} of a mesh with shape {array.shape} and dtype {array.dtype}")
+    if faces.size and not 0 <= faces.min() <= faces.max() < len(vertices):
+        raise ValueError("a face names a vertex that is not there")
     get = arrays.get
     return MeshData(
-        arrays["vertices"], arrays["faces"], get("normals"), get("uvs"), get("uvs_1"), get("colors"),
-        tuple(map(str, reply["warnings"])), get("tangents"), get("groups"),
-        _oddities(reply["oddities"]),
+        vertices, faces, get("normals"), get("uvs"), get("uvs_1"), get("colors"), warnings, get("tangents"),
+        get("groups"), oddities,
     )  # fmt: skip
 
 

@@ -11,6 +11,7 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,7 +22,7 @@ from service.assets.errors import ParseError
 from service.assets.sandbox import sandbox
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.sandbox.wire import adopt, memory, publish
-from service.assets.types import AssetLimits
+from service.assets.types import AssetLimits, MeshOddities
 from service.child_processes import Children
 from tests.asset_files import OBJ, TRIANGLE, exr
 from tests.serving import wait_until
@@ -267,3 +268,25 @@ def test_unsealed_or_lying_memory_is_not_adopted() -> None:
     with pytest.raises(ValueError, match="sealed"):
         adopt(loose, table)
     os.close(loose)
+
+
+def test_a_mesh_that_lies_is_not_taken() -> None:
+    """Compiled code reads the vertices that its faces name, without a look at how many there are."""
+    good: dict[str, Any] = {
+        "vertices": np.zeros((3, 3)),
+        "faces": np.array([[0, 1, 2]], np.int32),
+        "normals": np.zeros((3, 3), np.float32),
+        "groups": np.zeros(1, np.int32),
+    }
+    assert sandbox.mesh_of(dict(good), ("odd",), MeshOddities()).warnings == ("odd",)
+    for name, lie in {
+        "faces": np.array([[0, 1, 3]], np.int32),
+        "vertices": np.zeros((3, 2)),
+        "normals": np.zeros((2, 3), np.float32),
+        "groups": np.zeros(2, np.int32),
+        "uvs": np.zeros((3, 2)),
+    }.items():
+        with pytest.raises(ValueError, match=r"mesh|vertex"):
+            sandbox.mesh_of({**good, name: lie}, (), MeshOddities())
+    with pytest.raises(ValueError, match="vertex"):
+        sandbox.mesh_of({**good, "faces": np.array([[0, 1, -1]], np.int32)}, (), MeshOddities())
