@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.assets import AssetStore, MeshData
+from service.assets import AssetStore, MeshData, MeshOddities
 from service.assets.formats import sniff
 from service.assets.readers import obj_lines
 from service.assets.readers.obj import read_obj_with_materials
@@ -178,6 +178,13 @@ def test_ply_agrees_with_trimesh(store: AssetStore) -> None:
         assert read.normals is not None and np.array_equal(read.faces, ball.faces)
         assert np.allclose(read.vertices, ball.vertices, atol=1e-6)
         assert np.allclose(read.normals, ball.vertex_normals, atol=1e-5)
+
+
+def test_oddities_come_along_and_are_no_warning(store: AssetStore) -> None:
+    """Whether they matter is for the material to say."""
+    info = store.add(OBJ + b"v 0 0 1\nf 2 3 1\nf 2 1 4\n", filename="m.obj")
+    assert info.warnings is None
+    assert store.mesh(info.id).oddities == MeshOddities(coinciding=1, crowded=1, turned=2)
 
 
 def test_stl_binary_and_text(store: AssetStore) -> None:
