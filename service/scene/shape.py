@@ -142,6 +142,14 @@ class MeshShape(_Placed):
                 raise refusal(f"has {len(rows)} rows for {count} vertices: must be one per vertex", at=f"/{name}")
         return self
 
+    def has_its_vertices(self) -> bool:
+        """Whether written faces name vertices that are there, in arrays of the right form."""
+        vertices, faces = self.vertices, self.faces
+        if vertices is None or faces is None or vertices.dtype != np.float64 or faces.dtype != np.int32:
+            return False
+        rows = vertices.shape[1:] == faces.shape[1:] == (3,)
+        return rows and (not faces.size or 0 <= faces.min() <= faces.max() < len(vertices))
+
     def __eq__(self, other: Any) -> bool:
         """Arrays by value: pydantic's own comparison has no answer for them."""
         if not isinstance(other, MeshShape):

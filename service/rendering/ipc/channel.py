@@ -9,6 +9,7 @@ arrays without a copy. (A memfd, and not /dev/shm: a container's holds 64 MB.)
 from __future__ import annotations
 
 import asyncio
+import io
 import mmap
 import os
 import pickle
@@ -28,6 +29,7 @@ MOST = 8  # descriptors that go with a datagram
 ROOM = socket.CMSG_SPACE(MOST * DESCRIPTOR.size)
 
 Encoded = tuple[bytes, tuple[int, ...]]  # a datagram, and the descriptors of the memory that goes with it
+FindClass = Callable[[str, str], Any]  # of a module and a name: the class; raises UnpicklingError
 Place = tuple[int, int, int]  # which descriptor, the first byte there, how many
 
 
@@ -59,9 +61,10 @@ def encode(message: object) -> Encoded:
     return datagram, tuple(held)
 
 
-def decode(datagram: bytes, descriptors: tuple[int, ...]) -> Any:
-    """The message; its arrays are read-only views of the mapped memory. Closes the descriptors."""
-    body, places = pickle.loads(datagram)
+def decode(datagram: bytes, descriptors: tuple[int, ...], find: FindClass | None = None) -> Any:
+    """The message; its arrays are read-only views of the mapped memory. Closes the descriptors. `find` gives what the
+    message may be made of, where its sender is not trusted."""
+    body, places = _loads(datagram, [], find and _nothing)
     try:
         maps = [memoryview(mmap.mmap(each, 0, prot=mmap.PROT_READ)) for each in descriptors]
     finally:
@@ -69,19 +72,41 @@ def decode(datagram: bytes, descriptors: tuple[int, ...]) -> Any:
     parts = [maps[which][at : at + size] if size else memoryview(b"") for which, at, size in places]
     if not body:
         body = parts.pop()
-    return pickle.loads(body, buffers=parts)
+    return _loads(body, parts, find)
 
 
-def receive(end: socket.socket, wait: bool = False) -> Any:
-    """The next message. Raises BlockingIOError where there is none and `wait` is False, Closed where there
-    will be none."""
+def _loads(body: bytes | memoryview, parts: list[memoryview], find: FindClass | None) -> Any:
+    if find is None:
+        return pickle.loads(body, buffers=parts)
+    unpickler = _Restricted(io.BytesIO(body), buffers=parts)
+    unpickler.find = find
+    return unpickler.load()
+
+
+def _nothing(module: str, name: str) -> Any:
+    raise pickle.UnpicklingError(f"{module}.{name} has no place here")
+
+
+class _Restricted(pickle.Unpickler):
+    """Makes only what `find` gives."""
+
+    find: FindClass
+
+    def find_class(self, module: str, name: str) -> Any:
+        return self.find(module, name)
+
+
+def receive(end: socket.socket, wait: bool = False, find: FindClass | None = None) -> Any:
+    """The next message; `find` as for `decode`. Raises BlockingIOError where there is none and `wait` is False, Closed
+    where there will be none."""
     try:  # not socket.recv_fds, which in Python 3.11 forgets its flags and waits
         datagram, passed, _, _ = end.recvmsg(RECEIVED, ROOM, 0 if wait else socket.MSG_DONTWAIT)
     except ConnectionError as error:
         raise Closed from error
     if not datagram:
         raise Closed
-    return decode(datagram, tuple(each for (each,) in DESCRIPTOR.iter_unpack(passed[0][2])) if passed else ())
+    descriptors = tuple(each for (each,) in DESCRIPTOR.iter_unpack(passed[0][2])) if passed else ()
+    return decode(datagram, descriptors, find)
 
 
 def send(end: socket.socket, message: object) -> None:

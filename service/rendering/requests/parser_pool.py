@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import importlib
 import logging
 import pickle
 import signal
@@ -18,11 +19,23 @@ from service.memory import MemoryBudget
 from service.problems import ServiceError, TooLarge, Unavailable
 from service.rendering.ipc import channel
 from service.rendering.requests.parser_child import Failed, Work
-from service.rendering.requests.request_parser import Kind
+from service.rendering.requests.request_parser import Kind, ParsedRequest
+from service.scene import MeshShape
 from service.scene.text import most_bytes
 
 BODIES = 1000  # for one child
 SECONDS_PER_BYTE = 0.25 / MIB  # twice what the slowest body there is was seen to take
+
+# What an answer is made of: the modules of its classes, and numpy's own functions for arrays.
+ANSWERS = {
+    "service.documents",
+    "service.problems",
+    "service.quality",
+    "service.rendering.requests.bsdf_request",
+    "service.rendering.requests.parser_child",
+    "service.rendering.requests.request_parser",
+}
+ARRAYS = {("numpy", "dtype"), ("numpy._core.numeric", "_frombuffer"), ("numpy.core.numeric", "_frombuffer")}
 
 log = logging.getLogger(__name__)
 
@@ -105,9 +118,31 @@ def _ask(child: Child, work: Work) -> Any:
         if not child.answers(work.seconds):
             raise TooLarge(f"Reading this body takes longer than the {work.seconds:.0f} s allowed.")
         with collector_paused():
-            return channel.receive(child.link, wait=True)
+            return _believed(channel.receive(child.link, wait=True, find=allowed))
     except channel.Closed:
         raise _death(child, work) from None
+    except (pickle.UnpicklingError, AttributeError, ImportError) as error:
+        raise ParserFailed(f"the parser's answer was refused: {error}") from None
+
+
+def allowed(module: str, name: str) -> Any:
+    """The class of that name, where an answer may have it: models of documents, errors, what PARSERS return, and
+    arrays of numbers. Whoever took over the parser cannot name a function. Raises UnpicklingError."""
+    if (module, name) in ARRAYS:
+        return getattr(importlib.import_module(module), name)
+    if module in ANSWERS or module.startswith("service.scene."):
+        found = getattr(importlib.import_module(module), name, None)
+        if isinstance(found, type) and found.__module__ == module:
+            return found
+    raise pickle.UnpicklingError(f"{module}.{name} is no part of an answer")
+
+
+def _believed(answer: Any) -> Any:
+    """The answer. Its meshes are looked at again: compiled code reads the vertices that faces name."""
+    for shape in answer.scene.shapes if isinstance(answer, ParsedRequest) else ():
+        if isinstance(shape, MeshShape) and shape.vertices is not None and not shape.has_its_vertices():
+            raise ParserFailed("the parser's answer has a mesh whose faces name vertices that are not there")
+    return answer
 
 
 def _death(child: Child, work: Work) -> Exception:

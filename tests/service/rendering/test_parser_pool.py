@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import importlib
 import json
 import os
+import pickle
 import signal
 import subprocess
 import threading
@@ -16,6 +18,7 @@ import pytest
 
 from service.config import MIB, Config
 from service.problems import InvalidDocument, MalformedJson, ServiceError, TooLarge
+from service.rendering.ipc import channel
 from service.rendering.requests import parser_pool
 from service.rendering.requests.parser_pool import ParserPool
 from service.rendering.requests.request_parser import RequestParser, unfolded
@@ -180,3 +183,35 @@ def test_nobody_overtakes_a_body_that_waits_for_memory() -> None:
     for thread in threads:
         thread.join(30)
     assert order == ["large", "small"]
+
+
+class Taken:
+    """What somebody sends who has taken over the parser: to be unpickled, it calls a function."""
+
+    def __reduce__(self) -> Any:
+        return os.mkdir, ("/tmp/never-made",)
+
+
+def test_an_answer_names_no_function() -> None:
+    ours, theirs = channel.pair()
+    with ours, theirs:
+        for answer in (Taken(), json.dumps, os.system, importlib.import_module, RequestParser.request):
+            channel.send(theirs, answer)
+            with pytest.raises(pickle.UnpicklingError):
+                channel.receive(ours, wait=True, find=parser_pool.allowed)
+        theirs.send(pickle.dumps(Taken()))  # in the place of the envelope
+        with pytest.raises(pickle.UnpicklingError):
+            channel.receive(ours, wait=True, find=parser_pool.allowed)
+        channel.send(theirs, RequestParser(config()).request(written(REQUEST)))
+        assert channel.receive(ours, wait=True, find=parser_pool.allowed).settings.width == SMALL["width"]
+    assert not Path("/tmp/never-made").exists()
+
+
+def test_a_mesh_of_an_answer_is_looked_at_again() -> None:
+    parsed = RequestParser(config()).request(written(REQUEST))
+    assert parser_pool._believed(parsed) is parsed
+    mesh = parsed.scene.shapes[-1]
+    assert isinstance(mesh, MeshShape)
+    object.__setattr__(mesh, "faces", np.array([[0, 1, len(ROWS)]], np.int32))
+    with pytest.raises(parser_pool.ParserFailed):
+        parser_pool._believed(parsed)
