@@ -97,8 +97,8 @@ class _Restricted(pickle.Unpickler):
 
 
 def receive(end: socket.socket, wait: bool = False, find: FindClass | None = None) -> Any:
-    """The next message; `find` as for `decode`. Raises BlockingIOError where there is none and `wait` is False, Closed
-    where there will be none."""
+    """The next message; `find` as for `decode`. Raises BlockingIOError where there is none and `wait` is False,
+    Closed where there will be none."""
     try:  # not socket.recv_fds, which in Python 3.11 forgets its flags and waits
         datagram, passed, _, _ = end.recvmsg(RECEIVED, ROOM, 0 if wait else socket.MSG_DONTWAIT)
     except ConnectionError as error:
