@@ -132,7 +132,7 @@ def test_what_is_refused_costs_nobody_anything(full: tuple[Storage, list[str]]) 
     with pytest.raises(UnsupportedMedia):
         kept.assets.add(b"hello" * 2000)
     with pytest.raises(AssetError):
-        kept.assets.add(OBJ + b"f 7 8 9\n" + b"#" * 9000)
+        kept.assets.add(b"v 0 0 0\nf 7 8 9\n" + b"#" * 9000)
     with pytest.raises(AssetError):
         kept.assets.add(glb(gltf(meshes=[]), bytes(9000)))
     assert all(here(kept, ids))
