@@ -81,6 +81,10 @@ SHARED_BY_PROCESSES = ("service.rendering.ipc", "service.rendering.priority")  #
 ERRORS = ("gpu.errors", "service.problems")
 WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic", "pydantic_settings"}
 
+# The rooms of the editor, from the bottom to the top; "" is web/ itself.
+WEB_LAYERS = [{"lib"}, {"server"}, {"document", "lobe"}, {"forms", "picture"}, {"panels"}, {""}]
+SPECIFIER = re.compile(r"""(?:\bfrom\s+|\bimport\s*\(\s*|\bimport\s+)["'](\.{1,2}/[^"']+)["']""")
+
 Graph = Mapping[str, Iterable[str]]
 
 
@@ -235,6 +239,21 @@ def test_folder_has_a_table_of_contents(folder: Path) -> None:
 
 def test_shaders_are_text() -> None:
     assert not list(ROOT.glob("shaders/**/*.py")) and not list(ROOT.glob("web/**/*.py"))
+
+
+def test_modules_of_the_editor_keep_to_their_rooms() -> None:
+    web = ROOT / "web"
+    arrows: dict[str, set[str]] = {}
+    for path in web.glob("**/*.js"):
+        found = ((path.parent / each).resolve() for each in SPECIFIER.findall(path.read_text()))
+        arrows[str(path.relative_to(web))] = {str(other.relative_to(web)) for other in found}
+    height = {room: i for i, rooms in enumerate(WEB_LAYERS) for room in rooms}
+    for module, imported in arrows.items():
+        for other in imported:
+            assert (web / other).is_file(), f"{module} imports {other}, which is not there"
+            mine, its = (each.rpartition("/")[0] for each in (module, other))
+            assert mine == its or height[its] < height[mine], f"{module} imports {other}: that arrow points up"
+    assert circles(arrows) == []
 
 
 @pytest.mark.parametrize("path", SHADERS, ids=lambda path: str(path.relative_to(ROOT)))

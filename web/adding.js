@@ -1,13 +1,13 @@
 // Things that come into the scene: made here, copied, or from files. They stand beside what is there, and in sight.
 
-import { box, remember, together } from "./bounds.js";
-import { axes, isInSight } from "./camera.js";
-import { PLAIN, fresh } from "./materials.js";
-import { adapted } from "./merging.js";
-import { at, pointer } from "./patch.js";
-import { ballOf, solids, union, wayOut } from "./placing.js";
-import { moved } from "./transforms.js";
-import { add, cross, length, normalize, scale, subtract, turn } from "./vector.js";
+import { box, remember, together } from "./document/bounds.js";
+import { axes, isInSight } from "./document/camera.js";
+import { PLAIN, fresh } from "./document/materials.js";
+import { adapted } from "./document/merging.js";
+import { at, pointer } from "./lib/patch.js";
+import { ballOf, solids, union, wayOut } from "./document/placing.js";
+import { moved } from "./document/transforms.js";
+import { add, cross, length, normalize, scale, subtract, turn } from "./lib/vector.js";
 
 const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
 const SUNS_APART = Math.PI / 6; // a copied sun shines from another side

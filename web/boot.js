@@ -1,10 +1,10 @@
 // What the page needs before it can begin: the schema, the library, and what to show first.
 
-import { Problem, fetchApi, fetchPreset, fetchSchema } from "./api.js";
-import { askForKey } from "./key.js";
-import { openLibrary } from "./library.js";
-import { readLink, revived } from "./share.js";
-import { lastWork } from "./work.js";
+import { Problem, fetchApi, fetchPreset, fetchSchema } from "./server/api.js";
+import { askForKey } from "./server/key.js";
+import { openLibrary } from "./forms/library.js";
+import { readLink, revived } from "./document/share.js";
+import { lastWork } from "./document/work.js";
 
 const FIRST_SCENE = "sphere-on-floor";
 const BOOT_RETRY_MS = 1500;

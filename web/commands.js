@@ -1,7 +1,7 @@
 // The commands of the buttons and the keys: what each one does, and which keys give it.
 
-import * as exporting from "./export.js";
-import { saveAs } from "./files.js";
+import * as exporting from "./picture/export.js";
+import { saveAs } from "./lib/files.js";
 
 // The copied material: the browser's clipboard where the page may read it, else one of the page's own.
 class Clipboard {

@@ -1,29 +1,25 @@
 // Files that come in: by drop, by the file picker. Meshes become shapes, HDR images the environment, other
 // images textures, glTF and zipped OBJ a scene, JSON what it says it is.
 
-import { fetchAssetScene, upload } from "./api.js";
-import { question } from "./ask.js";
-import { measure, remember } from "./bounds.js";
-import { browse } from "./files.js";
-import { isUnderNoSky, studio } from "./lighting.js";
-import { PLAIN } from "./materials.js";
-import { pointer } from "./patch.js";
-import { fileValueWords, problemText, warningText } from "./problem-text.js";
-import { readRecipe } from "./recipe.js";
-import { fields, materialModels } from "./schema.js";
-import { revived } from "./share.js";
-import { pictured } from "./textures.js";
-import { inWords } from "./format-text.js";
+import { fetchAssetScene, upload } from "./server/api.js";
+import { question } from "./lib/ask.js";
+import { measure, remember } from "./document/bounds.js";
+import { accepted, browse, kindOf } from "./lib/files.js";
+import { isUnderNoSky, studio } from "./document/lighting.js";
+import { PLAIN } from "./document/materials.js";
+import { pointer } from "./lib/patch.js";
+import { fileValueWords, problemText, warningText } from "./server/problem-text.js";
+import { readRecipe } from "./document/recipe.js";
+import { fields, materialModels } from "./server/schema.js";
+import { revived } from "./document/share.js";
+import { pictured } from "./document/textures.js";
+import { inWords } from "./lib/format-text.js";
 
-const ENDINGS = { gltf: "scene", glb: "scene", zip: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
 const STAYS = /^\/(cameras|extensions\/KHR_lights_punctual)(\/|$)|\/camera$/; // what adding leaves in its file
 const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes after the mesh that it is for
 
-const accepted = (kinds) => Object.keys(ENDINGS).filter((ending) => kinds.includes(ENDINGS[ending])).map((ending) => `.${ending}`).join(",");
 const ACCEPT = accepted(ORDER);
-export const ACCEPT_IMAGES = accepted(["image", "light"]);
 
-const sort = (file) => ENDINGS[file.name.split(".").at(-1).toLowerCase()];
 const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
 
 export class Importer {
@@ -40,9 +36,9 @@ export class Importer {
   // One after the other. `way` is "open", for models and scenes in place of this scene, or "add"; without one the
   // person is asked about whole scenes. `at` is where files were dropped.
   async take(files, { at = null, way = null } = {}) {
-    const known = [...files].sort((a, b) => ORDER.indexOf(sort(a)) - ORDER.indexOf(sort(b)));
+    const known = [...files].sort((a, b) => ORDER.indexOf(kindOf(a)) - ORDER.indexOf(kindOf(b)));
     // An image that comes with a mesh is for that, wherever they fell.
-    const place = known.some((file) => ["mesh", "scene"].includes(sort(file))) ? null : at;
+    const place = known.some((file) => ["mesh", "scene"].includes(kindOf(file))) ? null : at;
     let next = way;
     for (const file of known) {
       try {
@@ -56,7 +52,7 @@ export class Importer {
 
   // Whether a scene was opened.
   async #take(file, at, way) {
-    const kind = sort(file);
+    const kind = kindOf(file);
     if (!kind) throw new Error(`Sunbox reads ${[...new Set(Object.keys(ENDINGS))].join(", ")}.`);
     if (kind === "json") return this.#takeJson(JSON.parse(await file.text()), file, way);
     const recipe = way === "add" ? null : await readRecipe(file); // what is added is an image like any other

@@ -1,6 +1,6 @@
 // What the keys do, once: the table that obeys them is the sheet that explains them.
 
-import { element } from "./dom.js";
+import { element } from "./lib/dom.js";
 
 const KEY_ORBIT = Math.PI / 36;
 const KEY_PAN = 0.05; // of the picture's height

@@ -3,34 +3,34 @@
 import { Adder } from "./adding.js";
 import { boot } from "./boot.js";
 import { keyTable, makeCommands, watchButtons } from "./commands.js";
-import { Comparison } from "./compare.js";
-import { DisplayControls } from "./display-controls.js";
-import { Editor } from "./editor.js";
-import * as exporting from "./export.js";
-import { sentence } from "./format-text.js";
+import { Comparison } from "./picture/compare.js";
+import { DisplayControls } from "./panels/display-controls.js";
+import { Editor } from "./document/editor.js";
+import * as exporting from "./picture/export.js";
+import { sentence } from "./lib/format-text.js";
 import { Importer, watchDrops } from "./importer.js";
-import { askForKey } from "./key.js";
+import { askForKey } from "./server/key.js";
 import { fillSheet, watchKeys } from "./keys.js";
 import { LobePanel } from "./lobe/panel.js";
-import { Announcer, Messages } from "./messages.js";
-import { Output, forecastSize } from "./output.js";
-import { PageState, namesOf } from "./page-state.js";
-import { Panel } from "./panel.js";
-import { pictureRecipes } from "./picture-recipe.js";
-import { Preparing } from "./preparing.js";
-import { detailWords, fieldTitles, problemText } from "./problem-text.js";
-import { SavePage } from "./save-page.js";
-import { materialModels } from "./schema.js";
-import { essence, linkTo, revived } from "./share.js";
-import { Status } from "./status.js";
-import { Stream } from "./stream.js";
-import { textureActs } from "./texture-slot.js";
-import { TextureThumbnails } from "./texture-thumbnails.js";
-import { Thumbnails } from "./thumbnails.js";
-import { UiState } from "./ui-state.js";
-import { Viewport } from "./viewport.js";
-import { ViewportController } from "./viewport-controller.js";
-import { forgetWork, keepWork } from "./work.js";
+import { Announcer, Messages } from "./panels/messages.js";
+import { Output, forecastSize } from "./panels/output.js";
+import { PageState, namesOf } from "./document/page-state.js";
+import { Panel } from "./panels/panel.js";
+import { pictureRecipes } from "./picture/picture-recipe.js";
+import { Preparing } from "./panels/preparing.js";
+import { detailWords, fieldTitles, problemText } from "./server/problem-text.js";
+import { SavePage } from "./panels/save-page.js";
+import { materialModels } from "./server/schema.js";
+import { essence, linkTo, revived } from "./document/share.js";
+import { Status } from "./panels/status.js";
+import { Stream } from "./server/stream.js";
+import { textureActs } from "./forms/texture-slot.js";
+import { TextureThumbnails } from "./forms/texture-thumbnails.js";
+import { Thumbnails } from "./forms/thumbnails.js";
+import { UiState } from "./document/ui-state.js";
+import { Viewport } from "./picture/viewport.js";
+import { ViewportController } from "./picture/viewport-controller.js";
+import { forgetWork, keepWork } from "./document/work.js";
 
 const RESIZE_REST_MS = 120; // a window being dragged restarts nothing
 const SAVE_REST_MS = 600;
@@ -152,12 +152,11 @@ const thumbnails = new Thumbnails(() => page.isConnected && page.isDone && !page
 const textureThumbnails = new TextureThumbnails();
 const adder = new Adder({ acts: editor, controller });
 const importer = new Importer({ schema, acts: editor, adder, messages, controller, reopen: recipes.reopen, thumbnails: textureThumbnails });
-editor.takeTexture = (place, file) => importer.texture(place, file);
-editor.frame = (thing) => controller.frame(thing);
-editor.addThing = (offer) => adder.add(offer);
-editor.duplicate = (thing) => adder.duplicate(thing);
 const panel = new Panel(find("panel"), {
-  schema, library, acts: editor, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch), say,
+  schema, library, acts: editor, stage: {
+    frame: (thing) => controller.frame(thing), add: (offer) => adder.add(offer), duplicate: (thing) => adder.duplicate(thing),
+    takeTexture: (place, file) => importer.texture(place, file),
+  }, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch), say,
   textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
 });
 

@@ -19,7 +19,7 @@ from tests.web.test_modules import call
 CONVERT = """async ([old, type]) => {
     const schema = await (await fetch("/v1/schema")).json();
     const [{ converted }, { fields, materialModels }] = await Promise.all(
-        ["conversion.js", "schema.js"].map((name) => import(new URL(name, location))));
+        ["document/conversion.js", "server/schema.js"].map((name) => import(new URL(name, location))));
     const models = materialModels(schema.scene);
     const known = (name) => ({ type: name, fields: fields(schema.scene, models[name]) });
     return converted(old, known(old.type), known(type));
@@ -27,7 +27,7 @@ CONVERT = """async ([old, type]) => {
 REDISTRIBUTE = """async ([old, distribution]) => {
     const schema = await (await fetch("/v1/schema")).json();
     const [{ redistributed }, { fields, materialModels }] = await Promise.all(
-        ["distribution.js", "schema.js"].map((name) => import(new URL(name, location))));
+        ["document/distribution.js", "server/schema.js"].map((name) => import(new URL(name, location))));
     return redistributed(old, distribution, fields(schema.scene, materialModels(schema.scene).microfacet));
 }"""
 EVERY: list[dict[str, Any]] = [
@@ -113,7 +113,7 @@ def test_another_distribution_has_a_peak_as_wide(page: Page, distribution: str) 
 @pytest.mark.parametrize(("low", "high"), [(0, 1e6), (0.001, 10), (1e-3, 1e6), (0.01, 2), (0.1, 10), (0, 1000)])
 def test_far_ranges_are_slid_over_by_factors(page: Page, low: float, high: float) -> None:
     script = """async ([min, max]) => {
-        const { span } = await import(new URL("span.js", location));
+        const { span } = await import(new URL("lib/span.js", location));
         const scale = span({ min, max }, 0.01, true);
         const shares = Array.from({ length: 101 }, (_, i) => i / 100);
         const values = shares.map(scale.fromShare);
@@ -123,8 +123,8 @@ def test_far_ranges_are_slid_over_by_factors(page: Page, low: float, high: float
     assert is_log and values[0] == low and values[-1] == high
     assert all(a < b for a, b in pairwise(values))
     assert shares == pytest.approx([i / 100 for i in range(101)], abs=2e-3)
-    assert not call(page, "span.js", "span", {"min": 0, "max": 2}, 0.01, True)["isLog"]
-    assert not call(page, "span.js", "span", {"min": 0, "max": 1000}, 1, False)["isLog"], (
+    assert not call(page, "lib/span.js", "span", {"min": 0, "max": 2}, 0.01, True)["isLog"]
+    assert not call(page, "lib/span.js", "span", {"min": 0, "max": 1000}, 1, False)["isLog"], (
         "other sliders stay as they are"
     )
 

@@ -141,7 +141,7 @@ def test_a_message_does_not_hide_the_field_in_hand(at: Editor) -> None:
     page.evaluate("(place) => document.querySelector(place).scrollIntoView({ block: 'end' })", box)
     page.focus(box)
     page.evaluate("""async () => {
-        const { Messages } = await import(new URL("messages.js", location));
+        const { Messages } = await import(new URL("panels/messages.js", location));
         new Messages(document.getElementById("messages"), () => [])
             .show("import", { title: "duck.glb: not all of it was taken." });
     }""")

@@ -242,7 +242,7 @@ def test_images_are_replaced_and_that_is_said(lobe: Editor) -> None:
 def test_means_are_of_the_values_and_not_of_a_small_picture(lobe: Editor, server: Server, tmp_path: Path) -> None:
     """Of bright values, of alpha, and of a pattern that a small picture in sRGB would make too dark."""
     script = """async ([asset, reads]) => {
-        const { TextureThumbnails } = await import(new URL("texture-thumbnails.js", location));
+        const { TextureThumbnails } = await import(new URL("forms/texture-thumbnails.js", location));
         return new TextureThumbnails().mean({ asset }, reads);
     }"""
     pixels = np.random.default_rng(1).random((37, 53, 4)).astype(np.float32) * [40, 4, 0.4, 1]

@@ -58,7 +58,7 @@ def test_a_diff_leads_from_one_document_to_the_other(page: Page) -> None:
     assert len(pairs) > 100
     results = page.evaluate(
         """async (pairs) => {
-        const { merge, diff } = await import(new URL("patch.js", location));
+        const { merge, diff } = await import(new URL("lib/patch.js", location));
         return pairs.map(([from, to]) => {
             const patch = diff(from, to);
             return { merged: patch === undefined ? from : merge(from, patch), none: patch === undefined };
@@ -74,29 +74,30 @@ def test_a_diff_leads_from_one_document_to_the_other(page: Page) -> None:
 def test_a_diff_is_small(page: Page) -> None:
     before = {"materials": {"a": {"type": "disney", "roughness": 1, "metallic": 0}, "b": {"type": "diffuse"}}}
     after = {"materials": {"a": {"type": "disney", "roughness": 0.3}, "b": {"type": "diffuse"}}}
-    assert call(page, "patch.js", "diff", before, after) == {"materials": {"a": {"roughness": 0.3, "metallic": None}}}
+    changed = call(page, "lib/patch.js", "diff", before, after)
+    assert changed == {"materials": {"a": {"roughness": 0.3, "metallic": None}}}
     other = {"materials": {"a": {"type": "diffuse"}, "b": {"type": "diffuse"}}}
-    assert call(page, "patch.js", "diff", before, other) == {"materials": {"a": {"type": "diffuse"}}}
-    assert call(page, "patch.js", "diff", before, before) == "undefined"
+    assert call(page, "lib/patch.js", "diff", before, other) == {"materials": {"a": {"type": "diffuse"}}}
+    assert call(page, "lib/patch.js", "diff", before, before) == "undefined"
 
 
 def test_pointers(page: Page) -> None:
     name = "a/b~c"
-    place = call(page, "patch.js", "pointer", "materials", name, "albedo")
+    place = call(page, "lib/patch.js", "pointer", "materials", name, "albedo")
     assert place == "/materials/a~1b~0c/albedo"
-    assert call(page, "patch.js", "put", {"materials": {name: {}}}, place, 0.5) == {
+    assert call(page, "lib/patch.js", "put", {"materials": {name: {}}}, place, 0.5) == {
         "materials": {name: {"albedo": 0.5}}
     }
-    assert call(page, "patch.js", "at", {"materials": {name: {"albedo": 0.25}}}, place) == 0.25
+    assert call(page, "lib/patch.js", "at", {"materials": {name: {"albedo": 0.25}}}, place) == 0.25
 
 
 @pytest.mark.parametrize("byte", [0, 1, 10, 11, 128, 254, 255])
 def test_srgb_there_and_back(page: Page, byte: int) -> None:
     text = f"#{byte:02x}8001"
-    linear = call(page, "color.js", "linear", text)
+    linear = call(page, "lib/color.js", "linear", text)
     encoded = byte / 255
     assert math.isclose(linear[0], encoded / 12.92 if encoded <= 0.04045 else ((encoded + 0.055) / 1.055) ** 2.4)
-    assert call(page, "color.js", "hex", linear) == text
+    assert call(page, "lib/color.js", "hex", linear) == text
 
 
 CAMERA: dict[str, Any] = {"position": [1.0, 2.0, 5.0], "target": [0.0, 1.0, 0.0], "up": [0.0, 1.0, 0.0], "vfov": 40}
@@ -105,31 +106,31 @@ CAMERA: dict[str, Any] = {"position": [1.0, 2.0, 5.0], "target": [0.0, 1.0, 0.0]
 def test_orbiting_keeps_the_distance_and_the_poles(page: Page) -> None:
     distance = math.dist(CAMERA["position"], CAMERA["target"])
     for right, down in [(0.3, 0), (0, 0.2), (-2, 5), (1, -5)]:
-        moved = call(page, "camera.js", "orbit", CAMERA, right, down)
+        moved = call(page, "document/camera.js", "orbit", CAMERA, right, down)
         assert math.isclose(math.dist(moved["position"], CAMERA["target"]), distance, rel_tol=1e-5)
         height = (moved["position"][1] - 1) / distance
         assert abs(height) < math.cos(math.radians(1.9)), "the view must keep an up"
-    right = call(page, "camera.js", "orbit", CAMERA | {"position": [0, 1, 5]}, 0.1, 0)
+    right = call(page, "document/camera.js", "orbit", CAMERA | {"position": [0, 1, 5]}, 0.1, 0)
     assert right["position"][0] < 0, "the content follows the hand to the right"
 
 
 def test_panning_follows_the_hand(page: Page) -> None:
     camera = CAMERA | {"position": [0.0, 1.0, 5.0]}
-    moved = call(page, "camera.js", "pan", camera, 0.5, 0.25)
+    moved = call(page, "document/camera.js", "pan", camera, 0.5, 0.25)
     height = 2 * 5 * math.tan(math.radians(20))
     assert moved["target"] == pytest.approx([-0.5 * height, 1 + 0.25 * height, 0])
     assert moved["position"] == pytest.approx([-0.5 * height, 1 + 0.25 * height, 5])
 
 
 def test_the_picture_fills_its_box_within_an_area(page: Page) -> None:
-    size = call(page, "viewport.js", "pictureSize", {"width": 1200, "height": 800}, 2, 512 * 512)
+    size = call(page, "document/picture-view.js", "pictureSize", {"width": 1200, "height": 800}, 2, 512 * 512)
     assert size["width"] * size["height"] == pytest.approx(512 * 512, rel=0.01)
     assert size["width"] / size["height"] == pytest.approx(1.5, rel=0.01)
     box = {"width": 1091, "height": 825}
-    size = call(page, "viewport.js", "pictureSize", box, 1, 512 * 512)
+    size = call(page, "document/picture-view.js", "pictureSize", box, 1, 512 * 512)
     left_over = box["width"] - box["height"] * size["width"] / size["height"]
     assert abs(left_over) < 0.25, "no line of a pixel beside the picture"
-    assert call(page, "viewport.js", "pictureSize", {"width": 300, "height": 200}, 1, 512 * 512) == {
+    assert call(page, "document/picture-view.js", "pictureSize", {"width": 300, "height": 200}, 1, 512 * 512) == {
         "width": 300,
         "height": 200,
     }
@@ -143,7 +144,8 @@ def test_a_preset_says_what_it_costs_this_scene_and_before_that_the_list(page: P
     preset = {"max_samples": 256, "max_bounces": 8, "cost": cost}
 
     def said(live: Any) -> list[str]:
-        return [call(page, "quality.js", name, preset, live).replace("\u00a0", " ") for name in ("price", "taken")]
+        told = [call(page, "forms/quality.js", name, preset, live) for name in ("price", "taken")]
+        return [text.replace("\u00a0", " ") for text in told]
 
     assert said(None) == [
         "listed: 23 s to 3.9 % noise",
@@ -167,19 +169,19 @@ def test_a_matrix_is_told_as_move_turn_and_scale(page: Page) -> None:
         cases.append(Transform(translate=tuple(chance.uniform(-9, 9) for _ in range(3)), rotate=turn, scale=size))
     for case in cases:
         matrix = case.matrix4()
-        told = call(page, "transforms.js", "parts", matrix.astype(np.float32).reshape(-1).tolist())
+        told = call(page, "document/transforms.js", "parts", matrix.astype(np.float32).reshape(-1).tolist())
         again = Transform(**{name: tuple(values) for name, values in told.items()}).matrix4()
         assert np.abs(again - matrix).max() < 2e-6 * np.abs(matrix).max(), case
-    assert call(page, "transforms.js", "parts", cases[3].matrix4().reshape(-1).tolist()) == {
+    assert call(page, "document/transforms.js", "parts", cases[3].matrix4().reshape(-1).tolist()) == {
         "translate": [0, 0, 0], "rotate": [0, 0, 0], "scale": [1, 1, -2],
     }  # fmt: skip
 
 
 def test_a_skewing_matrix_can_only_be_moved(page: Page) -> None:
     skewed = [1, 0.5, 0, 3, 0, 1, 0, 4, 0, 0, 1, 5, 0, 0, 0, 1]
-    assert call(page, "transforms.js", "parts", skewed) is None
-    assert call(page, "transforms.js", "shown", {"matrix": skewed}) == {"translate": [3, 4, 5]}
-    moved = call(page, "transforms.js", "changed", {"matrix": skewed}, "translate", [7, 8, 9])["matrix"]
+    assert call(page, "document/transforms.js", "parts", skewed) is None
+    assert call(page, "document/transforms.js", "shown", {"matrix": skewed}) == {"translate": [3, 4, 5]}
+    moved = call(page, "document/transforms.js", "changed", {"matrix": skewed}, "translate", [7, 8, 9])["matrix"]
     assert moved == [1, 0.5, 0, 7, 0, 1, 0, 8, 0, 0, 1, 9, 0, 0, 0, 1]
 
 
@@ -197,7 +199,7 @@ def test_a_skewing_matrix_can_only_be_moved(page: Page) -> None:
     ],
 )
 def test_shapes_are_moved(page: Page, shape: dict[str, Any], expected: dict[str, Any]) -> None:
-    assert call(page, "transforms.js", "moved", shape, [1, 0, -2]) == shape | expected
+    assert call(page, "document/transforms.js", "moved", shape, [1, 0, -2]) == shape | expected
 
 
 NUMBERS = {
@@ -210,12 +212,12 @@ NUMBERS = {
 
 @pytest.mark.parametrize("text", NUMBERS)
 def test_numbers_are_read_as_people_write_them(page: Page, text: str) -> None:
-    assert call(page, "number.js", "parseNumber", text) == NUMBERS[text]
+    assert call(page, "lib/number.js", "parseNumber", text) == NUMBERS[text]
 
 
 def test_a_number_may_say_its_own_unit_and_no_share_of_it(page: Page) -> None:
-    assert call(page, "number.js", "parseNumber", "30\u00b0", "\u00b0") == 30
-    assert call(page, "number.js", "parseNumber", "50%", "\u00b0") is None
+    assert call(page, "lib/number.js", "parseNumber", "30\u00b0", "\u00b0") == 30
+    assert call(page, "lib/number.js", "parseNumber", "50%", "\u00b0") is None
 
 
 TRIPLES = ["0.2 0.4 0.6", "0,2 0,4 0,6", "0.2, 0.4, 0.6", "0.2,0.4,0.6", "0,2; 0,4; 0,6", "20% 2/5 .6"]
@@ -223,41 +225,42 @@ TRIPLES = ["0.2 0.4 0.6", "0,2 0,4 0,6", "0.2, 0.4, 0.6", "0.2,0.4,0.6", "0,2; 0
 
 @pytest.mark.parametrize("text", TRIPLES)
 def test_colours_are_three_numbers_however_parted(page: Page, text: str) -> None:
-    assert call(page, "number.js", "parseTriple", text) == [0.2, 0.4, 0.6]
+    assert call(page, "lib/number.js", "parseTriple", text) == [0.2, 0.4, 0.6]
 
 
 def test_a_new_thing_finds_a_place_beside_the_others(page: Page) -> None:
     ball, crate = {"low": [-1, 0, -1], "high": [1, 2, 1]}, {"low": [1.5, 0, -1], "high": [3.5, 2, 1]}
     new = {"low": [-0.4, 0.5, -0.4], "high": [0.4, 1.3, 0.4]}
-    assert call(page, "placing.js", "wayOut", new, [crate], [1, 0, 0]) is None, "it is in nobody's way"
+    assert call(page, "document/placing.js", "wayOut", new, [crate], [1, 0, 0]) is None, "it is in nobody's way"
     for right in ([1, 0, 0], [-1, 0, 0], [0.6, 0, 0.8], [0.6, 0.5, 0.6]):
-        found = call(page, "placing.js", "wayOut", new, [ball, crate], right, {"stands": True})
+        found = call(page, "document/placing.js", "wayOut", new, [ball, crate], right, {"stands": True})
         low, high = (np.add(new[end], found["offset"]) for end in ("low", "high"))
         assert low[1] == pytest.approx(0), "on the ground of the ball"
         for other in (ball, crate):
             assert not all(low[k] < other["high"][k] and other["low"][k] < high[k] for k in range(3)), right
     assert found["neighbour"] == ball
-    assert call(page, "placing.js", "wayOut", new, [ball], [1, 0, 0])["offset"] == [1.48, 0, 0]
+    assert call(page, "document/placing.js", "wayOut", new, [ball], [1, 0, 0])["offset"] == [1.48, 0, 0]
 
 
 def test_floors_and_rooms_are_in_nobodys_way(page: Page) -> None:
     room, floor = {"low": [-9, 0, -9], "high": [9, 5, 9]}, {"low": [-5, -0.1, -5], "high": [5, 0, 5]}
     crate = {"low": [1.5, 0, -1], "high": [3.5, 2, 1]}
-    assert call(page, "placing.js", "solids", [room, None, floor, crate], [0, 1, 8]) == [crate]
+    assert call(page, "document/placing.js", "solids", [room, None, floor, crate], [0, 1, 8]) == [crate]
 
 
 @pytest.mark.parametrize("position", [[0.0, 1.0, 5.0], [3.0, 4.0, -2.0]])
 def test_a_point_is_seen_where_its_ray_goes(page: Page, position: list[float]) -> None:
     camera = CAMERA | {"position": position}
     for x, y in [(0.5, 0.5), (0.1, 0.8), (0.9, 0.25)]:
-        direction = call(page, "camera.js", "ray", camera, x, y, 1.5)
-        seen = call(page, "camera.js", "project", camera, np.add(position, np.multiply(direction, 3)).tolist(), 1.5)
+        direction = call(page, "document/camera.js", "ray", camera, x, y, 1.5)
+        place = np.add(position, np.multiply(direction, 3)).tolist()
+        seen = call(page, "document/camera.js", "project", camera, place, 1.5)
         assert (seen["x"], seen["y"]) == pytest.approx((x, y))
         assert seen["z"] > 0
-        assert call(page, "markers.js", "spot", camera, np.add(position, direction).tolist(), 1.5)["isInside"]
+        assert call(page, "picture/markers.js", "spot", camera, np.add(position, direction).tolist(), 1.5)["isInside"]
     behind = np.add(position, np.subtract(position, camera["target"])).tolist()
     above = np.add(behind, [0, 0.5, 0]).tolist()
-    mark = call(page, "markers.js", "spot", camera, above, 1.5)
+    mark = call(page, "picture/markers.js", "spot", camera, above, 1.5)
     assert not mark["isInside"] and mark["y"] == pytest.approx(0.04), "at the upper edge"
 
 
@@ -272,7 +275,7 @@ def test_a_scene_is_added_under_free_names(page: Page) -> None:
             {"type": "mesh", "asset": "n", "material": "paint-2"},
         ],
     }
-    taken = call(page, "merging.js", "adapted", other, scene)
+    taken = call(page, "document/merging.js", "adapted", other, scene)
     assert taken["textures"] == {"wood-2": {"asset": "b"}, "bumps": {"asset": "c"}}
     assert taken["materials"] == {
         "paint-2": paint | {"albedo": {"texture": "wood-2", "factor": 0.5}},

@@ -1,8 +1,8 @@
 // The material whose lobe is drawn: the one in hand with numbers in the place of its textures, because a BSDF has no
 // surface on which an image could lie.
 
-import { linear } from "../color.js";
-import { isObject } from "../patch.js";
+import { linear } from "../lib/color.js";
+import { isObject } from "../lib/patch.js";
 
 const CHANNELS = { r: 0, g: 1, b: 2, a: 3 };
 

@@ -12,14 +12,14 @@ import { Table } from "./table.js";
 import { terms } from "./terms.js";
 import { channelClass, isGrey } from "./values.js";
 import { Warming } from "./warming.js";
-import { askBsdf } from "../api.js";
-import { element, freshId } from "../dom.js";
-import { saveAs } from "../files.js";
-import { inWords } from "../format-text.js";
-import { problemText } from "../problem-text.js";
-import { fields, materialModels } from "../schema.js";
-import { slideByTouch } from "../sliding.js";
-import { watchChoice } from "../tabs.js";
+import { askBsdf } from "../server/api.js";
+import { element, freshId } from "../lib/dom.js";
+import { saveAs } from "../lib/files.js";
+import { inWords } from "../lib/format-text.js";
+import { problemText } from "../server/problem-text.js";
+import { fields, materialModels } from "../server/schema.js";
+import { slideByTouch } from "../lib/sliding.js";
+import { watchChoice } from "../lib/tabs.js";
 
 const VIEWS = { polar, solid, terms, albedo, slice };
 const TURN = Math.PI / 200; // of the solid view, for a CSS pixel

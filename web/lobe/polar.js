@@ -3,7 +3,7 @@
 import { angleOf, inPlane, refined, sweep } from "./directions.js";
 import { decades, figure, line, path, svg, text, ticks, tickText } from "./plot.js";
 import { colorTable, column, curves, luminance, scaleOf, share } from "./values.js";
-import { percent } from "../format-text.js";
+import { percent } from "../lib/format-text.js";
 
 const JUMP = 0.02; // of the radius, between two neighbours of a curve
 const MOST_NEW = 60; // jumps that one refinement fills

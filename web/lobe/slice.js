@@ -4,7 +4,7 @@
 
 import { direction, ofHalf } from "./directions.js";
 import { figure, svg, text, tickText } from "./plot.js";
-import { toSrgb } from "../color.js";
+import { toSrgb } from "../lib/color.js";
 import { colorTable, luminance, scaleOf, share } from "./values.js";
 
 const ROWS = 36; // angles to the normal

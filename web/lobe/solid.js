@@ -3,9 +3,9 @@
 
 import { inPlane, direction, meshAngles } from "./directions.js";
 import { figure, path, svg, text, tickText } from "./plot.js";
-import { hex } from "../color.js";
+import { hex } from "../lib/color.js";
 import { luminance, scaleOf, share } from "./values.js";
-import { cross, dot, length, normalize, scale, subtract } from "../vector.js";
+import { cross, dot, length, normalize, scale, subtract } from "../lib/vector.js";
 
 const LIGHT = normalize([0.3, -0.5, 0.8]); // in the camera's space: right, up, towards
 const AMBIENT = 0.45;

@@ -1,6 +1,6 @@
 // The values of a plot as a table, for eyes that want numbers and for screen readers.
 
-import { element } from "../dom.js";
+import { element } from "../lib/dom.js";
 
 const DIGITS = 4;
 

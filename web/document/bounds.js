@@ -1,0 +1,85 @@
+// The ball around a shape, as far as its document or what was uploaded here tells; other files of triangles are
+// measured in the picture.
+
+import { add, length, mix, scale, subtract } from "../lib/vector.js";
+
+const radians = (degrees) => (degrees * Math.PI) / 180;
+
+// A place after the shape's transform: T Rz Ry Rx S, or a matrix by rows.
+export function place(point, transform) {
+  if (!transform) return point;
+  if (transform.matrix) {
+    const m = transform.matrix;
+    return [0, 4, 8].map((r) => m[r] * point[0] + m[r + 1] * point[1] + m[r + 2] * point[2] + m[r + 3]);
+  }
+  const { translate = [0, 0, 0], rotate = [0, 0, 0], scale: factor = 1 } = transform;
+  const factors = typeof factor === "number" ? [factor, factor, factor] : factor;
+  let [x, y, z] = point.map((value, i) => value * factors[i]);
+  const [a, b, c] = rotate.map(radians);
+  [y, z] = [y * Math.cos(a) - z * Math.sin(a), y * Math.sin(a) + z * Math.cos(a)];
+  [x, z] = [x * Math.cos(b) + z * Math.sin(b), z * Math.cos(b) - x * Math.sin(b)];
+  [x, y] = [x * Math.cos(c) - y * Math.sin(c), x * Math.sin(c) + y * Math.cos(c)];
+  return add([x, y, z], translate);
+}
+
+const corners = (low, high) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high : low)[k]));
+
+const measured = new Map(); // the corners of uploaded meshes, by asset
+
+// `bounds`: least and greatest coordinates, as the server answers an upload.
+export const measure = (asset, [low, high]) => measured.set(asset, corners(low, high));
+
+function points(shape) {
+  if (shape.type === "sphere") {
+    return [0, 1, 2].flatMap((k) => [-1, 1].map((side) => shape.center.map((x, i) => x + (i === k ? side * shape.radius : 0))));
+  }
+  if (shape.type === "box") return corners(shape.min, shape.max);
+  if (shape.type === "quad") {
+    const { origin, u, v } = shape;
+    return [origin, add(origin, u), add(origin, v), add(add(origin, u), v)];
+  }
+  return shape.vertices ?? measured.get(shape.asset) ?? null;
+}
+
+// {center, radius} of a cloud of points: around the middle of its box.
+export function around(cloud) {
+  const { low, high } = boxAround(cloud);
+  const center = mix(low, high, 0.5);
+  return { center, radius: cloud.reduce((most, p) => Math.max(most, length(subtract(p, center))), 0) };
+}
+
+function cloudOf(shape) {
+  const cloud = points(shape);
+  return cloud?.length ? cloud.map((point) => place(point, shape.transform)) : null;
+}
+
+// {center, radius}, or null where the document doesn't tell.
+export function ball(shape) {
+  const cloud = cloudOf(shape);
+  return cloud && around(cloud);
+}
+
+// {low, high} of points.
+export function boxAround(cloud) {
+  const [low, high] = [Math.min, Math.max].map((pick) => cloud.reduce((a, b) => a.map((x, i) => pick(x, b[i]))));
+  return { low, high };
+}
+
+const models = new WeakMap(); // the box around the whole model that a shape came with, while it stands as it came
+
+export const remember = (shapes, whole) => { for (const shape of shapes) models.set(shape, whole); };
+
+// {low, high}, or null where neither the document nor its file tells.
+export function box(shape) {
+  const cloud = cloudOf(shape);
+  return cloud ? boxAround(cloud) : models.get(shape) ?? null;
+}
+
+// Of several balls, the box around them.
+export function together(balls) {
+  if (!balls.length) return null;
+  const cloud = balls.flatMap(({ center, radius }) =>
+    corners(subtract(center, scale([1, 1, 1], radius)), add(center, scale([1, 1, 1], radius))));
+  const { center } = around(cloud);
+  return { center, radius: balls.reduce((most, each) => Math.max(most, length(subtract(each.center, center)) + each.radius), 0) };
+}

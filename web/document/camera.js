@@ -1,0 +1,91 @@
+// Camera moves: each takes a camera {position, target, up, vfov} and gives the members that change.
+
+import { add, cross, dot, length, normalize, scale, subtract, tidy, turn } from "../lib/vector.js";
+
+// At the poles the view would lose its up; two degrees keep it.
+const POLE = (2 * Math.PI) / 180;
+
+const radians = (degrees) => (degrees * Math.PI) / 180;
+
+// The arm turned to the right and down about `up`, short of the poles.
+function swing(arm, up, right, down) {
+  const pole = normalize(up);
+  const turned = turn(arm, pole, -right);
+  const side = normalize(cross(pole, turned));
+  const now = Math.acos(Math.min(Math.max(dot(pole, normalize(turned)), -1), 1));
+  const wanted = Math.min(Math.max(now - down, POLE), Math.PI - POLE);
+  return turn(turned, side, wanted - now);
+}
+
+// The eye circles the target; positive angles (radians) carry the picture's content right and down.
+export const orbit = ({ position, target, up }, right, down) => ({
+  position: tidy(add(target, swing(subtract(position, target), up, right, down))),
+});
+
+// The head turns: the target circles the eye, and the content moves with the hand.
+export const look = ({ position, target, up }, right, down) => ({
+  target: tidy(add(position, swing(subtract(target, position), up, -right, -down))),
+});
+
+// Unit vectors to the right, up and forward of the picture, and the distance to the target.
+export function axes({ position, target, up }) {
+  const view = subtract(target, position);
+  const forward = normalize(view);
+  const right = normalize(cross(forward, up));
+  return { right, up: cross(right, forward), forward, distance: length(view) };
+}
+
+// Eye and target slide; the plane through the target follows the hand. In heights of the picture.
+export function pan({ position, target, up, vfov }, right, down) {
+  const frame = axes({ position, target, up });
+  const height = 2 * frame.distance * Math.tan(radians(vfov) / 2);
+  const shift = add(scale(frame.right, -right * height), scale(frame.up, down * height));
+  return { position: tidy(add(position, shift)), target: tidy(add(target, shift)) };
+}
+
+// Eye and target move together, in distances to the target.
+export function fly({ position, target, up }, right, rise, forward) {
+  const frame = axes({ position, target, up });
+  const step = add(add(scale(frame.right, right), scale(normalize(up), rise)), scale(frame.forward, forward));
+  const shift = scale(step, frame.distance);
+  return { position: tidy(add(position, shift)), target: tidy(add(target, shift)) };
+}
+
+// The eye comes nearer to the target (factor below 1) or goes away.
+export const zoom = ({ position, target }, factor) => ({
+  position: tidy(add(target, scale(subtract(position, target), factor))),
+});
+
+// From the same side, so far that a ball fills `share` of the picture's shorter side.
+export function frame({ position, target, vfov }, { center, radius }, aspect, share = 0.8) {
+  const half = Math.atan(Math.tan(radians(vfov) / 2) * Math.min(1, aspect));
+  const distance = radius / Math.sin(Math.max(half * share, 1e-3));
+  const back = normalize(subtract(position, target));
+  return { position: tidy(add(center, scale(back, distance))), target: tidy(center) };
+}
+
+// Where a point is in the picture: x to the right and y down, both 0..1 within it, and z, its depth (behind the eye
+// below 0).
+export function project(camera, point, aspect) {
+  const { right, up, forward } = axes(camera);
+  const way = subtract(point, camera.position);
+  const z = dot(way, forward);
+  const tall = Math.tan(radians(camera.vfov) / 2) * z;
+  return { x: (dot(way, right) / (tall * aspect) + 1) / 2, y: (1 - dot(way, up) / tall) / 2, z };
+}
+
+// Whether a box is in the picture with all its corners.
+export function isInSight(camera, aspect, { low, high }) {
+  return Array.from({ length: 8 }, (_, i) => low.map((x, k) => ((i >> k) & 1 ? high[k] : x))).every((corner) => {
+    const { x, y, z } = project(camera, corner, aspect);
+    return z > 0 && x >= 0 && x <= 1 && y >= 0 && y <= 1;
+  });
+}
+
+// The unit direction of the ray through a place in the picture: x to the right and y down, both 0..1.
+export function ray(camera, x, y, aspect) {
+  const { right, up, forward } = axes(camera);
+  const tall = Math.tan(radians(camera.vfov) / 2);
+  const across = add(scale(right, (2 * x - 1) * tall * aspect), scale(up, (1 - 2 * y) * tall));
+  return normalize(add(forward, across));
+}

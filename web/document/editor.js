@@ -1,0 +1,239 @@
+// What the hand does, as changes of the state {scene, settings, view, chosen, home, compare}. `chosen` is what
+// the pickers show, `home` the scene as it was picked, `compare` a second variant of one material.
+
+import { fetchPreset } from "../server/api.js";
+import * as moving from "./camera.js";
+import { converted } from "./conversion.js";
+import { redistributed } from "./distribution.js";
+import { exposed } from "./lighting.js";
+import { at, pointer, put } from "../lib/patch.js";
+import { defaults, environmentModels, fields, materialModels, model } from "../server/schema.js";
+import { Store } from "./store.js";
+
+// The shape that the eye goes to: the first which is not flat.
+function subject({ shapes }) {
+  const index = shapes.findIndex(({ type }) => type !== "quad");
+  return Math.max(index, 0);
+}
+
+const picked = (name, scene, exposure) => ({
+  scene, home: scene, compare: null,
+  chosen: {
+    scene: name, environment: OWN, thing: pointer("shapes", subject(scene)),
+    material: scene.shapes[subject(scene)]?.material ?? Object.keys(scene.materials)[0],
+    ...(exposure === undefined ? {} : { exposure }),
+  },
+});
+
+// The choice of the environment that the scene came with.
+export const OWN = "";
+
+export class Editor extends Store {
+  #schema;
+  #cameraDefaults;
+  #picks = 0;
+
+  // `complain(problem)` shows what was refused, `forgive()` takes it away.
+  constructor({ schema, name, scene, complain, forgive }) {
+    super({ settings: {}, view: {}, ...picked(name, scene) });
+    this.#schema = schema.scene;
+    this.complain = complain;
+    this.forgive = forgive;
+    this.#cameraDefaults = defaults(schema.scene, model(schema.scene, schema.scene, "camera"));
+    const move = (how) => (...amounts) => this.#setCamera(how(this.camera, ...amounts), "camera");
+    this.moves = {
+      orbit: move(moving.orbit), look: move(moving.look), pan: move(moving.pan), zoom: move(moving.zoom),
+      fly: move(moving.fly), turn: (share) => this.#turn(share), rest: () => this.seal(),
+    };
+  }
+
+  // The camera with what its document leaves out.
+  get camera() { return this.cameraOf(this.state.scene); }
+
+  cameraOf({ camera }) { return { ...this.#cameraDefaults, ...camera }; }
+
+  setCamera(members) { this.#setCamera(members, null); }
+
+  #setCamera(members, gesture) {
+    this.change({ scene: { ...this.state.scene, camera: { ...this.state.scene.camera, ...members } } }, gesture);
+  }
+
+  // Turns the environment by shares of a whole turn.
+  #turn(share) {
+    const { environment } = this.state.scene;
+    if (!environment) return;
+    const { min, max } = fields(this.#schema, environmentModels(this.#schema)[environment.type])
+      .find(({ name }) => name === "rotation").soft;
+    const wound = (environment.rotation ?? 0) + share * 360;
+    const rotation = wound < min ? wound + 360 : wound > max ? wound - 360 : wound;
+    this.change(put(this.state, "/scene/environment/rotation", Number(rotation.toFixed(2))), "turn");
+  }
+
+  resetView() { this.change({ scene: { ...this.state.scene, camera: this.state.home.camera } }); }
+
+  // A value at a place such as /scene/camera/vfov; undefined gives it back to its default. Edits of one gesture are
+  // undone together.
+  edit(place, value, gesture = place) {
+    this.forgive();
+    this.change(put(this.state, place, value), gesture);
+  }
+
+  // A choice of the material at a place with what follows from it; `own` are the fields of its model.
+  choose(place, name, value, own) {
+    const material = at(this.state, place);
+    const isDistribution = own.some(({ ranges }) => ranges?.field === name);
+    const begun = own.filter(({ name: each, used, example }) => example && used?.field === name && used.values.includes(value) && material[each] === undefined)
+      .map(({ name: each, example }) => [each, example]);
+    this.edit(place, { ...(isDistribution ? redistributed(material, value, own) : { ...material, [name]: value }), ...Object.fromEntries(begun) });
+  }
+
+  rest() { this.seal(); }
+
+  async #fetch(kind, name, use) {
+    const turn = ++this.#picks;
+    try {
+      const document = await fetchPreset(kind, name);
+      if (turn === this.#picks) use(document); // else something else was picked meanwhile
+    } catch (problem) {
+      this.complain(problem);
+      this.amend({}); // the pickers go back to what there is
+    }
+  }
+
+  pickScene(name) { return this.#fetch("scenes", name, (scene) => this.openScene(scene, name)); }
+
+  // `exposure`: the view's that suits the scene's own lights; `members` of the state come with the scene.
+  openScene(scene, name, exposure, members = {}) {
+    this.change({ ...picked(name, scene, exposure), ...exposed(this.state, exposure), ...members });
+  }
+
+  pickEnvironment(name) {
+    if (name === null) this.putEnvironment(undefined, name);
+    else if (name === OWN) this.putEnvironment(this.state.home.environment, name);
+    else this.#fetch("environments", name, (environment) => this.putEnvironment(environment, name));
+  }
+
+  putEnvironment(environment, name = OWN) {
+    this.change({
+      ...put(this.state, "/scene/environment", environment),
+      chosen: { ...this.state.chosen, environment: name },
+    });
+  }
+
+  // --- materials ---
+
+  // Where the material in hand is: in the scene, or variant B.
+  get materialPlace() {
+    const { chosen, compare } = this.state;
+    const isB = compare?.side === "b" && compare.material === chosen.material;
+    return isB ? "/compare/document" : pointer("scene", "materials", chosen.material);
+  }
+
+  get material() { return at(this.state, this.materialPlace); }
+
+  pickMaterial(material) {
+    const shape = this.state.scene.shapes.findIndex((each) => each.material === material);
+    const thing = shape < 0 ? this.state.chosen.thing : pointer("shapes", shape);
+    this.amend({ chosen: { ...this.state.chosen, material, thing } });
+  }
+
+  putMaterial(material) { this.change(put(this.state, this.materialPlace, material)); }
+
+  converted(old, type) {
+    const models = materialModels(this.#schema);
+    return converted(old, ...[old.type, type].map((each) => ({ type: each, fields: fields(this.#schema, models[each]) })));
+  }
+
+  pickModel(type) { this.putMaterial(this.converted(this.material, type)); }
+
+  // --- two variants ---
+
+  // B begins as a copy of the material in hand, so that what changes from here on shows.
+  startComparing() {
+    const { chosen, scene } = this.state;
+    this.change({ compare: { material: chosen.material, document: scene.materials[chosen.material], side: "a" } });
+  }
+
+  stopComparing() { this.change({ compare: null }); }
+
+  editSide(side) {
+    const { compare, chosen } = this.state;
+    this.amend({ compare: { ...compare, side }, chosen: { ...chosen, material: compare.material } });
+  }
+
+  putVariant(document) { this.change({ compare: { ...this.state.compare, document } }); }
+
+  swapVariants() {
+    const { compare, scene } = this.state;
+    const a = scene.materials[compare.material];
+    this.change({
+      compare: { ...compare, document: a },
+      scene: { ...scene, materials: { ...scene.materials, [compare.material]: compare.document } },
+    });
+  }
+
+  // The scene with variant B in the place of A, or null.
+  get sceneB() {
+    const { scene, compare } = this.state;
+    if (!compare || !scene.materials[compare.material]) return null;
+    return { ...scene, materials: { ...scene.materials, [compare.material]: compare.document } };
+  }
+
+  // --- things of the scene ---
+
+  // `thing`: /camera, /environment, /lights/0, /shapes/0.
+  select(thing) {
+    const shape = thing.startsWith("/shapes/") ? at(this.state.scene, thing) : null;
+    const { chosen } = this.state;
+    this.amend({ chosen: { ...chosen, thing, material: shape?.material ?? chosen.material } });
+  }
+
+  // `members`: what else of the scene becomes another with it.
+  add(kind, document, members = {}) {
+    const { chosen } = this.state;
+    const scene = { ...this.state.scene, ...members };
+    const all = scene[kind] ?? [];
+    this.change({
+      scene: { ...scene, [kind]: [...all, document] },
+      chosen: { ...chosen, thing: pointer(kind, all.length), material: document.material ?? chosen.material },
+    });
+  }
+
+  // A scene keeps at least one shape.
+  removable(thing) {
+    return thing.startsWith("/lights/") || (thing.startsWith("/shapes/") && this.state.scene.shapes.length > 1);
+  }
+
+  remove(thing) {
+    const [, kind, index] = thing.split("/");
+    const { scene, chosen } = this.state;
+    const left = scene[kind].filter((_, i) => i !== Number(index));
+    const next = left.length ? pointer(kind, Math.min(Number(index), left.length - 1)) : "/camera";
+    this.change({ scene: { ...scene, [kind]: left }, chosen: { ...chosen, thing: next } });
+  }
+
+  // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and
+  // says which place the control is for (null: none has it). These places come back.
+  takeBack({ errors }, valid, mark) {
+    const places = errors
+      .filter(({ pointer: wrong }) => /^\/(scene|settings)(\/|$)/.test(wrong))
+      .map(({ pointer: wrong, detail }) => mark(wrong, detail));
+    if (!valid || !places.length) return places;
+    const { scene, settings } = valid;
+    if (places.includes(null)) this.amend({ scene, settings: this.#own(settings), chosen: this.#chosenIn(scene) });
+    else this.amend(places.reduce((state, place) => put(state, place, at(valid, place)), this.state));
+    return places;
+  }
+
+  // What is chosen, as far as the scene has it.
+  #chosenIn(scene) {
+    const { chosen } = this.state;
+    return chosen.material in scene.materials ? chosen : { ...picked(chosen.scene, scene).chosen };
+  }
+
+  // The streams are given sizes of their own, which are not those of the output.
+  #own({ width, height, ...settings }) {
+    const own = this.state.settings;
+    return own.width ? { ...settings, width: own.width, height: own.height } : settings;
+  }
+}

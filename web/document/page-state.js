@@ -1,0 +1,89 @@
+// What the page knows of its picture, and what follows from that: the renderer's greeting, the newest frame, whether
+// it is paused, connected, done; the size and the limit that hold for the next one.
+
+import { inWords } from "../lib/format-text.js";
+import { defaults } from "../server/schema.js";
+import { DISPLAY, contained, pictureSize, viewOf } from "./picture-view.js";
+
+// Pixels that a renderer traces fast enough to follow the hand.
+const AREA = { software: 512 * 512, hardware: 1920 * 1080 };
+
+// JPEG quality of a picture that somebody paused to look at; else the server chooses (null), by whether it still changes.
+const PAUSED_QUALITY = 90;
+
+export class PageState {
+  info = null; // the server's greeting
+  isPaused = false;
+  isConnected = false;
+  isWaiting = false; // an update is under way
+  ended = null; // the generation that is done
+  painted = 0; // the generation on the canvas
+  paintedHome = null; // the scene on the canvas, as it was picked
+  header = null; // of the frame on the canvas
+  knobs = {}; // what the chosen quality makes of the settings that are not given
+
+  // `root` is the element of the picture; `fit(box)` gives the part of a box that one of two variants has.
+  constructor({ schema, editor, ui, root, fit }) {
+    Object.assign(this, { schema, editor, ui, root, fit });
+    this.viewDefaults = defaults(schema.view, schema.view, DISPLAY);
+    this.layers = schema.view.properties.aov.enum;
+  }
+
+  // A frame stands on the canvas.
+  paint({ header }) {
+    this.header = header;
+    this.painted = header.generation;
+    if (!this.isWaiting) this.paintedHome = this.editor.state.home;
+  }
+
+  get isDone() { return this.ended === this.painted && !this.isWaiting; }
+
+  // The most samples that the picture gets, or null.
+  get limit() { return this.editor.state.settings.max_samples ?? this.knobs.max_samples ?? null; }
+
+  get view() { return { ...this.viewDefaults, ...this.editor.state.view }; }
+
+  // Transparency shows where the scene asks for it, or the person does.
+  get isCheckered() { return this.ui.state.checker ?? this.editor.state.scene.environment?.background === false; }
+
+  // The pixels of the picture on the page.
+  get size() {
+    const area = Math.min(this.info.renderer?.software === false ? AREA.hardware : AREA.software, this.info.limits.max_pixels);
+    const { width, height } = this.editor.state.settings;
+    const stageBox = this.root.getBoundingClientRect();
+    const box = width && height ? contained(stageBox, { width, height }) : stageBox;
+    if (!this.editor.sceneB) return pictureSize(box, window.devicePixelRatio, area);
+    return pictureSize(this.fit(box), window.devicePixelRatio, area / 2); // two variants share what one may cost
+  }
+
+  // The settings as the stream is given them.
+  get settings() { return { ...this.editor.state.settings, ...this.size }; }
+
+  // What the stream is asked for: {scene, settings, view}.
+  get wanted() {
+    const view = viewOf({ ...this.ui.state, checkered: this.isCheckered }, this.view, {
+      isPaused: this.isPaused, quality: PAUSED_QUALITY, isExact: this.editor.sceneB !== null,
+    });
+    return { scene: this.editor.state.scene, settings: this.settings, view };
+  }
+
+  // Looks up what the quality preset makes of the settings that are not given.
+  resolve() {
+    const { quality = this.schema.settings.properties.quality.default, time_limit, target_noise } = this.editor.state.settings;
+    const preset = this.info?.quality[quality] ?? {};
+    this.knobs = time_limit || target_noise ? { ...preset, max_samples: null } : preset;
+  }
+
+  // The one word for how things stand.
+  word(isPreparing) {
+    if (!this.isConnected) return "Offline";
+    if (this.isPaused) return "Paused";
+    if (this.isDone) return "Done";
+    return isPreparing || !this.header ? "Preparing" : "Rendering";
+  }
+}
+
+// The names behind the numbers of a layer that counts shapes or materials.
+export const namesOf = (layer, { shapes, materials }) => (layer === "shape_id"
+  ? shapes.map(({ type, material }, i) => `${i + 1} ${inWords(type)}, ${inWords(material)}`)
+  : Object.keys(materials).map(inWords));

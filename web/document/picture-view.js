@@ -1,0 +1,41 @@
+// What a picture on the page is to be: its size, its layer, and how its frames come.
+
+// What of a view is a matter of taste; the rest is how the stream carries it.
+export const DISPLAY = ["exposure", "tone_map"];
+
+// Colour as it is; albedo and normal as the server encodes them; the rest as numbers that are painted here.
+const PAINTED = ["depth", "variance", "shape_id", "material_id"];
+
+export const isPainted = (aov) => PAINTED.includes(aov);
+
+// Of the box, the largest part with these sides' proportions.
+export function contained(box, { width, height }) {
+  const zoom = Math.min(box.width / width, box.height / height);
+  return { width: width * zoom, height: height * zoom };
+}
+
+const NEARBY = 16; // pixels less across that a picture may have
+
+// Sides in pixels of a picture that fills the box at the device's ratio, within an area.
+export function pictureSize({ width, height }, ratio, area) {
+  const wanted = Math.max(1, width * ratio * height * ratio);
+  const shrink = ratio * Math.min(1, Math.sqrt(area / wanted));
+  const size = (across) => ({ width: Math.max(16, across), height: Math.max(16, Math.round((across * height) / width)) });
+  const across = Math.round(width * shrink);
+  if (shrink === ratio) return size(across);
+  // Of the sizes nearby the one whose sides are to each other as the box's: else a line of the stage shows beside it.
+  const gap = ({ width: w, height: h }) => Math.abs((w * height) / (h * width) - 1);
+  return Array.from({ length: NEARBY }, (_, i) => size(across - i)).reduce((best, each) => (gap(each) < gap(best) ? each : best));
+}
+
+// How frames are to come for a layer: numbers where the page paints them itself; without a loss where `isExact`, so
+// that what is measured between two pictures is not what JPEG did to them.
+export function viewOf(ui, view, { isPaused, quality, isExact }) {
+  const { layer } = ui;
+  const painted = isPainted(layer);
+  return {
+    ...view, aov: layer, bits: 8, quality: isPaused ? quality : null,
+    format: painted ? "rgba32f" : ui.checkered || isExact ? "png" : "jpeg",
+    max_fps: painted ? 4 : isExact ? 8 : null,
+  };
+}

@@ -1,0 +1,42 @@
+// The scene's textures as parameters of materials use them. A state of the editor goes in, another comes out.
+
+import { fresh } from "./materials.js";
+import { at, equal, isObject, put } from "../lib/patch.js";
+
+// The places of a checker's two values in a parameter's range: a contrast that shows, and no ends of a range.
+const LIGHT = 0.8;
+const DARK = 0.2;
+
+const reading = (state, place) => {
+  const now = at(state, place);
+  return isObject(now) ? now : {};
+};
+
+// With a texture of the scene at a parameter's place, read as the one before it was.
+export const used = (state, place, name) => put(state, place, { ...reading(state, place), texture: name });
+
+// With a texture that the scene may not have yet; `wanted` is the name that it gets, if that is free.
+export function given(state, place, texture, wanted) {
+  const textures = state.scene.textures ?? {};
+  const same = Object.keys(textures).find((name) => equal(textures[name], texture));
+  const name = same ?? fresh(wanted, textures);
+  return used({ ...state, scene: { ...state.scene, textures: { ...textures, [name]: texture } } }, place, name);
+}
+
+// With an uploaded image, that lies as the image lay whose place it takes.
+export function pictured(state, place, asset, wanted) {
+  const { type, ...lying } = state.scene.textures?.[reading(state, place).texture] ?? {};
+  return given(state, place, { ...(type ? {} : lying), asset }, wanted);
+}
+
+// With a checker of values that suit the parameter.
+export function checkered(state, place, { soft }) {
+  const low = Math.max(0, soft.min ?? 0);
+  const high = Math.max(low, soft.max ?? 1);
+  const [a, b] = [LIGHT, DARK].map((share) => Number((low + share * (high - low)).toPrecision(3)));
+  return given(state, place, { type: "checker", a, b }, "checker");
+}
+
+// How many parameters of the scene's materials show a texture.
+export const users = ({ materials }, name) =>
+  Object.values(materials).flatMap(Object.values).filter((value) => isObject(value) && value.texture === name).length;

@@ -1,0 +1,244 @@
+// The widgets of a form: each has an `element`, shows a value, and calls `input` with a new one while
+// the hand moves and `commit` when it comes to rest. `undefined` stands for "as the server likes". `refuse`
+// says what was wrong with something written, `restore` goes back to the value there was.
+
+import { HEX, hex, linear } from "../lib/color.js";
+import { element, isBeingEdited } from "../lib/dom.js";
+import { slideByTouch } from "../lib/sliding.js";
+import { neededIn, parseNumber, parseTriple } from "../lib/number.js";
+import { compact, inWords, unitText } from "../lib/format-text.js";
+import { span } from "../lib/span.js";
+
+const UNSET = "–"; // neither document nor schema has a value
+
+// A text field: one of type=number swallows what it does not understand, such as the comma of 0,35. Only where
+// a value is never negative may a phone show its keys for decimals: those have no minus.
+function numberEntry(field, id, { input, commit, refuse, restore }) {
+  const unit = unitText(field.unit);
+  let latest = null;
+  let scale = span(field.soft, field.step, Boolean(field.ranges));
+  const clean = () => { delete box.dataset.dirty; };
+  const take = () => {
+    clean();
+    if (box.value.trim() === "") {
+      if (field.required) return restore();
+      input(undefined);
+      return commit();
+    }
+    const value = parseNumber(box.value, unit);
+    if (value === null) return refuse(neededIn(unit));
+    input(value);
+    commit();
+  };
+  const step = (steps) => {
+    const from = parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
+    const to = Number((from + steps * scale.stepAt(from)).toPrecision(12));
+    const { min, max, open } = field;
+    if (to < min || to > max || to <= open.min || to >= open.max) return;
+    clean();
+    input(to);
+    box.value = compact(to);
+    box.select();
+  };
+  const box = element("input", {
+    type: "text", id, class: "entry number", autocomplete: "off", spellcheck: "false",
+    inputmode: field.min >= 0 ? "decimal" : undefined,
+    oninput: () => { box.dataset.dirty = "yes"; },
+    onblur: clean,
+    onkeydown: (event) => {
+      if (event.key === "Escape") {
+        clean();
+        restore();
+      }
+      const up = { ArrowUp: 1, ArrowDown: -1 }[event.key];
+      if (!up || event.altKey || event.ctrlKey || event.metaKey) return;
+      event.preventDefault();
+      step(up * (event.shiftKey ? 10 : 1));
+    },
+    onkeyup: ({ key }) => { if (key === "ArrowUp" || key === "ArrowDown") commit(); },
+    onchange: take,
+  });
+  const show = (value, effective, ends = field.soft) => {
+    latest = value ?? null;
+    scale = span(ends, field.step, Boolean(field.ranges));
+    box.placeholder = effective === undefined ? (field.absent ?? UNSET) : compact(effective);
+    if (isBeingEdited(box)) return;
+    box.value = latest === null ? "" : compact(latest);
+    box.title = latest === null || box.value === String(latest) ? "" : String(latest);
+  };
+  return { element: box, show };
+}
+
+function track(field, id, { input, commit }) {
+  let scale = null;
+  // A bound that does not belong to the range: the slider stops one step before it.
+  const inside = (at) => {
+    const value = scale.isLog ? scale.fromShare(at) : at;
+    if (value <= field.open.min) return field.open.min + field.step;
+    return value >= field.open.max ? field.open.max - field.step : value;
+  };
+  const range = element("input", { type: "range", id, oninput: () => input(inside(range.valueAsNumber)), onchange: commit });
+  const over = (ends) => {
+    if (scale && ends.min === scale.min && ends.max === scale.max) return;
+    scale = span(ends, field.step, Boolean(field.ranges));
+    const [min, max] = scale.isLog ? [0, 1] : [ends.min, ends.max];
+    Object.assign(range, { min: String(min), max: String(max), step: String(scale.step) });
+  };
+  over(field.soft);
+  slideByTouch(range, { input: (value) => input(inside(value)), commit });
+  // A slider without a value stands, as a ghost, where the one is that holds; without either it has no thumb.
+  const show = (value, effective, ends = field.soft) => {
+    over(ends);
+    const [min, max] = [Number(range.min), Number(range.max)];
+    const known = value ?? effective ?? null;
+    range.classList.toggle("ghost", (value ?? null) === null);
+    range.classList.toggle("unset", known === null);
+    range.value = String(known === null ? min : scale.isLog ? scale.toShare(known) : known);
+    range.style.setProperty("--fill", String((range.valueAsNumber - min) / (max - min)));
+    const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
+    const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
+    range.setAttribute("aria-valuetext", words);
+  };
+  return { element: range, show };
+}
+
+function slider(field, id, events) {
+  const range = track(field, id, events);
+  const entry = numberEntry(field, `${id}-entry`, events);
+  entry.element.setAttribute("aria-label", `${field.title}, number`);
+  return {
+    element: element("div", { class: "slider" }, range.element, entry.element),
+    show(value, effective, ends) {
+      range.show(value, effective, ends);
+      entry.show(value, effective, ends);
+    },
+  };
+}
+
+function choice(field, id, { input, commit }) {
+  const select = element("select", { id, onchange: () => { input(select.value || undefined); commit(); } });
+  if (field.initial === undefined && !field.required) select.append(element("option", { value: "" }, "Automatic"));
+  for (const name of field.choices.filter((option) => option !== null)) {
+    select.append(element("option", { value: name }, inWords(name)));
+  }
+  return { element: select, show: (value) => { select.value = value ?? ""; } };
+}
+
+function toggle(field, id, { input, commit }) {
+  const box = element("input", {
+    type: "checkbox", id, class: "toggle", onchange: () => { input(box.checked); commit(); },
+  });
+  // Neither on nor off where neither document nor schema says: the server decides.
+  const show = (value) => { Object.assign(box, { checked: Boolean(value), indeterminate: (value ?? null) === null }); };
+  return { element: box, show };
+}
+
+// Numbers in a row, three or as two for u and v; a single one stands for all, in the document and where none is set.
+function vector(field, id, { input, commit, refuse, restore }) {
+  const names = field.length === 2 ? ["U", "V"] : field.isPerChannel ? ["red", "green", "blue"] : ["X", "Y", "Z"];
+  let latest = null;
+  const entries = names.map((axis, i) => {
+    const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
+      input: (value) => input(latest ? latest.map((x, k) => (k === i ? value : x)) : names.map(() => value)), commit, refuse, restore,
+    });
+    entry.element.setAttribute("aria-label", `${field.title}, ${axis}`);
+    return entry;
+  });
+  return {
+    element: element("div", { class: "vector" }, ...entries.map((entry) => entry.element)),
+    show(value) {
+      const known = value ?? (field.isPerChannel ? null : 0);
+      latest = Array.isArray(known) || known === null ? known : names.map(() => known);
+      entries.forEach((entry, i) => entry.show(latest?.[i]));
+    },
+  };
+}
+
+// Swatch and text; a colour that may pass 1 is split into a tint and a strength.
+function color(field, id, { input, commit, refuse, restore }) {
+  const bright = !(field.max <= 1);
+  let strength = 1;
+  let tint = [1, 1, 1];
+  let isLinear = false; // what the text shows
+  const give = () => input(tint.map((x) => Number((x * strength).toPrecision(5))));
+
+  const swatch = element("input", {
+    type: "color", id, onchange: commit,
+    oninput: () => {
+      tint = linear(swatch.value);
+      if (bright && strength === 0) strength = 1;
+      give();
+    },
+  });
+  const text = element("input", {
+    type: "text", class: "entry", spellcheck: "false", autocomplete: "off",
+    "aria-label": `${field.title}, #rrggbb or three linear numbers`, placeholder: field.absent ?? UNSET,
+    oninput: () => { text.dataset.dirty = "yes"; },
+    onblur: () => { delete text.dataset.dirty; },
+    onkeydown: (event) => {
+      if (event.key !== "Escape") return;
+      delete text.dataset.dirty;
+      restore();
+    },
+    onchange: () => {
+      delete text.dataset.dirty;
+      if (text.value === "" && !isSet) return restore();
+      const match = HEX.exec(text.value.trim());
+      const triple = parseTriple(text.value);
+      if (match) input(linear(match[0]).map((x) => Number((x * (bright ? strength || 1 : 1)).toPrecision(5))));
+      else if (triple) input(triple);
+      else return refuse("Write #rrggbb, or three linear numbers such as 0.2 0.4 0.6.");
+      commit();
+    },
+  });
+  const mode = element("button", {
+    type: "button", class: "mode", "aria-label": `${field.title}: linear numbers`, "aria-pressed": "false",
+    onclick: () => {
+      isLinear = !isLinear;
+      mode.setAttribute("aria-pressed", String(isLinear));
+      write();
+    },
+  });
+  let isSet = true;
+  const write = () => {
+    const shown = !isSet ? "" : isLinear ? tint.map((x) => compact(x * strength)).join(" ") : hex(tint);
+    if (!isBeingEdited(text)) text.value = shown;
+    mode.textContent = isLinear ? "lin" : "hex";
+  };
+  const row = element("div", { class: "color" }, swatch, text, mode);
+  const power = bright && slider(
+    { ...field, title: `${field.title}, strength` },
+    `${id}-strength`,
+    { input: (value) => { strength = value ?? 0; give(); }, commit, refuse, restore },
+  );
+  if (power) power.element.querySelector("input").setAttribute("aria-label", `${field.title}, strength`);
+
+  return {
+    element: power ? element("div", {}, row, power.element) : row,
+    show(value) {
+      isSet = (value ?? null) !== null;
+      swatch.classList.toggle("unset", !isSet);
+      const now = linear(value ?? 0);
+      const most = Math.max(...now);
+      if (bright) {
+        strength = most;
+        if (most > 0) tint = now.map((x) => x / most);
+        power.show(strength);
+      } else tint = now;
+      swatch.value = hex(tint);
+      write();
+    },
+  };
+}
+
+const bounded = ({ soft }) => Number.isFinite(soft.max - soft.min);
+
+export function control(field, id, events) {
+  if (field.widget === "color") return color(field, id, events);
+  if (field.widget === "vector") return vector(field, id, events);
+  if (field.widget === "texture") return { element: element("span", { id }), show() {} }; // its slot is all there is
+  if (field.widget === "choice") return choice(field, id, events);
+  if (field.widget === "toggle") return toggle(field, id, events);
+  if (field.widget === "number" || !bounded(field)) return numberEntry(field, id, events);
+  return slider(field, id, events);
+}

@@ -1,0 +1,101 @@
+// Small pictures of textures: made by the browser from the image's bytes where it can read them, else (EXR, HDR) by
+// the service. One after the other, and each once. Their means are of the values that the renderer sees, however large.
+
+import { fetchAsset, renderPicture, renderValues } from "../server/api.js";
+import { hex, linear } from "../lib/color.js";
+
+const SIDE = 64;
+const SQUARES = 4; // of a checker, along each side
+const MEAN_SAMPLES = 16; // of a pixel, which spread evenly over it
+
+// A square that shines as the image tells, and fills the picture.
+const lit = (texture, looks = { emission: { texture: "image" } }) => ({
+  version: 1, camera: { position: [0, 0, 1], target: [0, 0, 0], vfov: 90 }, textures: { image: texture },
+  materials: { image: { type: "diffuse", albedo: 0, ...looks } },
+  shapes: [{ type: "quad", origin: [-1, -1, 0], u: [2, 0, 0], v: [0, 2, 0], material: "image" }],
+});
+// A square that shines where it is opaque.
+const OPACITY = { emission: 1, alpha: { texture: "image", channel: "a" } };
+const SETTINGS = { width: SIDE, height: SIDE, max_bounces: 0, filter: "box" };
+
+const rendered = async (asset) => createImageBitmap(await renderPicture(lit({ asset }), { ...SETTINGS, max_samples: 4 }));
+
+// The mean colour of a square's picture, whose pixels are single-precision numbers behind the header of a .npy file.
+async function meanOf(scene) {
+  const file = await renderValues(scene, { ...SETTINGS, max_samples: MEAN_SAMPLES });
+  const values = new Float32Array(file.slice(10 + new DataView(file).getUint16(8, true)));
+  const channels = values.length / (SIDE * SIDE);
+  return [0, 1, 2].map((k) => values.reduce((sum, x, i) => (i % channels === k ? sum + x : sum), 0) / (SIDE * SIDE));
+}
+
+function drawChecker(context, { a, b }) {
+  const side = SIDE / SQUARES;
+  for (let i = 0; i < SQUARES * SQUARES; i += 1) {
+    const [x, y] = [i % SQUARES, Math.floor(i / SQUARES)];
+    context.fillStyle = hex(linear((x + y) % 2 ? b : a));
+    context.fillRect(x * side, y * side, side, side);
+  }
+}
+
+// In the middle, and as large as it fits without a border.
+function drawImage(context, bitmap) {
+  const side = Math.min(bitmap.width, bitmap.height);
+  context.drawImage(bitmap, (bitmap.width - side) / 2, (bitmap.height - side) / 2, side, side, 0, 0, SIDE, SIDE);
+}
+
+const shrink = (blob) => createImageBitmap(blob, { resizeHeight: SIDE, resizeQuality: "medium" });
+
+export class TextureThumbnails {
+  #bitmaps = new Map(); // by asset: a promise of a bitmap, or of null
+  #means = new Map(); // by texture and what is read of it: a promise of [r, g, b, a]
+  #last = Promise.resolve();
+
+  // An image that is on its way to the server needs not come back from there.
+  keep(asset, file) { this.#bitmaps.set(asset, shrink(file).catch(() => rendered(asset)).catch(() => null)); }
+
+  #bitmap(asset) {
+    if (!this.#bitmaps.has(asset)) {
+      const made = this.#last.then(async () => {
+        try {
+          return await shrink(await fetchAsset(asset)).catch(() => rendered(asset));
+        } catch {
+          return null; // without a picture the name has to do
+        }
+      });
+      this.#last = made;
+      this.#bitmaps.set(asset, made);
+    }
+    return this.#bitmaps.get(asset);
+  }
+
+  // Resolves to the texture's mean, linear [r, g, b, a]; of an image that the service cannot read 1. `reads` is "color" or
+  // a channel: images of 8 bits are sRGB where a colour is read, unless they say otherwise. Only alpha has a mean where
+  // that is read, as an image without it cannot be asked for it.
+  async mean(texture, reads) {
+    if (texture.type === "checker") {
+      const [a, b] = [linear(texture.a), linear(texture.b)];
+      return [...a.map((x, i) => (x + b[i]) / 2), 1];
+    }
+    const { asset, color_space = reads === "color" ? undefined : "linear" } = texture;
+    const key = JSON.stringify([asset, color_space, reads === "a"]);
+    if (!this.#means.has(key)) {
+      const image = { asset, ...(color_space ? { color_space } : {}) };
+      const made = reads === "a" ? meanOf(lit(image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity]) : meanOf(lit(image)).then((color) => [...color, 1]);
+      this.#means.set(key, made.catch(() => [1, 1, 1, 1]));
+    }
+    return this.#means.get(key);
+  }
+
+  // A canvas that shows the texture, now or as soon as there is a picture of it.
+  paint(canvas, texture) {
+    const wanted = JSON.stringify([texture.asset, texture.a, texture.b]);
+    if (canvas.dataset.shown === wanted) return;
+    Object.assign(canvas, { width: SIDE, height: SIDE });
+    canvas.dataset.shown = wanted;
+    const context = canvas.getContext("2d");
+    if (texture.type === "checker") return drawChecker(context, texture);
+    this.#bitmap(texture.asset).then((bitmap) => {
+      if (bitmap && canvas.dataset.shown === wanted) drawImage(context, bitmap);
+    });
+  }
+}

@@ -1,0 +1,32 @@
+// The controls of the interface's state: tabs, the layer, the overlays of the picture.
+
+import { element } from "../lib/dom.js";
+import { inWords } from "../lib/format-text.js";
+import { watchTabs } from "../lib/tabs.js";
+
+const OVERLAYS = { histogram: "Histogram", clipping: "Clipped pixels", checker: "Checker behind alpha", guides: "Guides" };
+
+export class DisplayControls {
+  // `page` is the PageState, `does` the commands.
+  constructor({ find, page, ui, does }) {
+    Object.assign(this, { find, page, ui });
+    this.showTab = watchTabs(find("tabs"), ui.state.tab, (tab) => ui.set({ tab }));
+    this.layer = find("layer");
+    this.layer.append(...page.layers.map((each) => element("option", { value: each }, inWords(each))));
+    this.layer.addEventListener("change", () => ui.set({ layer: this.layer.value }));
+    find("overlays").append(...Object.entries(OVERLAYS).map(([member, title]) => element("label", {},
+      element("input", {
+        type: "checkbox", class: "toggle", id: `show-${member}`,
+        onchange: () => (member === "checker" ? does.toggleChecker() : does.toggle(member)),
+      }), title)));
+  }
+
+  show() {
+    const { tab, theme, layer, ...members } = this.ui.state;
+    this.showTab(tab);
+    this.layer.value = layer;
+    const isOn = { ...members, checker: this.page.isCheckered };
+    for (const member of Object.keys(OVERLAYS)) this.find(`show-${member}`).checked = isOn[member];
+    if (theme) document.documentElement.dataset.theme = theme;
+  }
+}
