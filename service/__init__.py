@@ -34,6 +34,7 @@ turns              whom the work at hand is for, and turns that go round these c
 quota              room on the disk
 lost_pictures      pictures of renders that the database does not know
 asset_shares       what the assets of one key take
+asset_access       which assets a key may use
 disk_usage         what files take on a disk: blocks and inodes
 garbage            the garbage collector, out of the way of large imports
 storage            what is kept in the data folder

@@ -87,11 +87,12 @@ def create_app(config: Config) -> FastAPI:
     own = AppState(
         config,
         kept.assets,
-        RequestReader(config, kept.assets, memory),
+        RequestReader(config, kept.assets, memory, kept.access),
         Pool(seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
         kept.documents,
         kept.quota,
         kept.shares,
+        kept.access,
         RenderQueue(_limits(config), store),
     )
     app = FastAPI(

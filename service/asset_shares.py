@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import threading
 from collections import Counter
@@ -56,6 +57,16 @@ class AssetShares:
         rows = [(owner, id, size) for id, size in self._quota.sizes(ids).items()]
         with self._database.open() as database, database:
             database.executemany("INSERT OR REPLACE INTO asset_owners VALUES (?, ?, ?)", rows)
+
+    def imported(self, owner: str, scene: str, parts: Collection[str]) -> None:
+        """Note the parts of an owner's scene, of which some may be here again after they made room."""
+        if not owner or not self._database.exists():
+            return
+        mine = "SELECT asset FROM asset_owners WHERE owner = ? AND asset IN (SELECT value FROM json_each(?))"
+        with self._database.open() as database:
+            known = {id for (id,) in database.execute(mine, (owner, json.dumps([scene, *parts])))}
+        if scene in known and not known.issuperset(parts):
+            self.uploaded(owner, parts)
 
     def owned(self) -> list[tuple[str, str, int]]:
         """Who uploaded what: owner, id and bytes. Raises Unavailable."""

@@ -16,7 +16,9 @@ from typing import Any, Literal, get_args
 from pydantic import TypeAdapter
 
 from service import recipe
+from service.asset_access import AssetAccess
 from service.assets import AssetStore
+from service.assets.store import unknown
 from service.database import Database
 from service.disk_usage import Usage, expected
 from service.problems import (
@@ -105,6 +107,7 @@ class Documents:
         self._each = each
         self._database = Database(folder)
         self._assets = assets
+        self._access = AssetAccess(folder, assets)
         self._quota = quota
 
     def prepare(self) -> None:
@@ -162,19 +165,20 @@ class Documents:
         """Save an owner's document under a name; its title, and whether the name is new.
 
         `shared`: PRIVATE, SHARED, or BY_LINK; None leaves that as it is, and a new one is its owner's alone. Raises
-        InvalidDocument, with pointers from the document's root, where an asset is missing, TooLarge where it is too
-        much for its owner, PreconditionFailed.
+        InvalidDocument, with pointers from the document's root, where there is no such asset for its owner, TooLarge
+        where it is too much for its owner, PreconditionFailed.
         """
         check_kind(kind)
         body, uses = document.body, list(dict.fromkeys(reference for _, reference in document.uses))
         key, size = (kind, name, owner), len(body.encode())
         # These assets stay while others make room, so that a refused document costs no asset.
         with self._quota.pinned(uses) if self._quota else nullcontext():
-            self._find_assets(document, uses)
+            foreign = self._access.foreign(owner, uses)
+            self._find_assets(document, uses, foreign)
             room = self._quota.room(expected([size])) if self._quota else nullcontext()
             with room, self._database.open() as database, database:
                 database.execute("BEGIN IMMEDIATE")
-                self._find_assets(document, uses)  # again: another process may have made room
+                self._find_assets(document, uses, foreign)  # again: another process may have made room
                 old = database.execute(f"SELECT title, shared, bytes, body {_OWN}", key).fetchone()
                 condition.check(None if old is None else old[3].encode())
                 self._check_share(database, owner, size - (old[2] if old else 0))
@@ -242,9 +246,13 @@ class Documents:
                 "(SUNBOX_MAX_KEY_DOCUMENTS). Delete some first."
             )
 
-    def _find_assets(self, document: CheckedDocument, uses: list[str]) -> None:
-        """Raises InvalidDocument where one of them is not here."""
-        missing = ((ref, why) for ref in uses if (why := self._assets.missing(ref)) is not None)
+    def _find_assets(self, document: CheckedDocument, uses: list[str], foreign: set[str]) -> None:
+        """Raises InvalidDocument where one of them is not here, or is foreign."""
+
+        def why_not(ref: str) -> str | None:
+            return unknown(ref).detail if ref in foreign else self._assets.missing(ref)
+
+        missing = ((ref, why) for ref in uses if (why := why_not(ref)) is not None)
         first = dict(islice(missing, MOST_MISTAKES))
         if first:
             told = (FieldError(pointer, first[ref]) for pointer, ref in document.uses if ref in first)

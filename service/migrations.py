@@ -112,5 +112,9 @@ MIGRATIONS = (
                 SELECT kind, name, owner, CAST(strftime('%s', 'now') AS REAL) FROM documents WHERE shared = 2""",
         ),
     ),
+    Migration(
+        "renders that use an asset are found at once",
+        ("CREATE INDEX render_uses_by_asset ON render_uses (asset)",),
+    ),
 )
 VERSION = len(MIGRATIONS)

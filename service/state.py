@@ -13,6 +13,7 @@ from typing import Any
 
 from starlette.requests import HTTPConnection
 
+from service.asset_access import AssetAccess
 from service.asset_shares import AssetShares
 from service.assets import AssetStore
 from service.bodies import Bodies
@@ -55,6 +56,7 @@ class AppState:
     documents: Documents
     quota: Quota
     shares: AssetShares
+    access: AssetAccess
     renders: RenderQueue = field(default_factory=RenderQueue)
     traffic: Traffic = field(default_factory=Traffic)
     address: str = ""  # of the server; "" where there is none, as under a test's client
@@ -118,7 +120,8 @@ class AppState:
         return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)
 
     async def _pack(self, document: bytes, count: Callable[[int], None]) -> Packed:
-        """The scene of a folded document, which was valid when it was stored. Raises what reading it raises.
+        """The scene of a folded document, which was valid when it was stored; that its owner may use its assets was
+        seen then, too. Raises what reading it raises.
 
         `count` is called with the bytes of memory that parsing takes, before that is done."""
         body = await packing(lambda: bytearray(f'{{"scene":{unfolded(document)}}}', "ascii"))

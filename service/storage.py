@@ -8,6 +8,7 @@ from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
+from service.asset_access import AssetAccess
 from service.asset_shares import AssetShares
 from service.assets import AssetStore
 from service.config import Config
@@ -23,6 +24,7 @@ class Storage:
     documents: Documents
     quota: Quota
     shares: AssetShares
+    access: AssetAccess
 
 
 RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
@@ -47,7 +49,7 @@ def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Stor
     assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
     documents = Documents(config.data_dir, assets, quota, config.max_key_documents)
     shares = AssetShares(config.data_dir, quota, config.max_key_assets)
-    return Storage(assets, documents, quota, shares)
+    return Storage(assets, documents, quota, shares, AssetAccess(config.data_dir, assets))
 
 
 def _pictures(folder: Path) -> Usage:

@@ -31,6 +31,7 @@ LAYERS = [
     {"service.recipe"},
     {"service.quota", "service.migrations"},
     {"service.database", "service.data_lock"},
+    {"service.asset_access"},
     {"service.documents", "service.asset_shares"},
     {"service.storage", "service.data_check"},
     {"service.pack"},

@@ -156,7 +156,10 @@ class AssetStore:
                 yield file
 
     def holds(self, id: str) -> bool:
-        return self._known(id) is not None or (self._builtin is not None and id in self._builtin())
+        return self._known(id) is not None or self.is_builtin(id)
+
+    def is_builtin(self, id: str) -> bool:
+        return self._builtin is not None and id in self._builtin()
 
     def missing(self, id: str) -> str | None:
         """Why there is no such asset here; None where there is one."""
@@ -332,8 +335,12 @@ class AssetStore:
         if found is None:
             if ID.fullmatch(id) and self._files.file(id, DAMAGED).exists():
                 raise damaged(id)
-            raise NotFound(f"there is no asset {id[:100]!r} here; upload it first")
+            raise unknown(id)
         return found
+
+
+def unknown(id: str) -> NotFound:
+    return NotFound(f"there is no asset {id[:100]!r} here; upload it first")
 
 
 def _limits(config: HasLimits | None) -> AssetLimits:

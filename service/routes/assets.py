@@ -8,7 +8,7 @@ import os
 from contextlib import ExitStack
 from dataclasses import asdict
 from functools import partial
-from typing import Annotated, Any
+from typing import Annotated, Any, BinaryIO
 
 from fastapi import APIRouter, Query, Request, Response
 from fastapi.responses import JSONResponse
@@ -26,7 +26,7 @@ from service.state import app_state, caller, owner
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
-FOREVER = "public, max-age=31536000, immutable"  # an id is the hash of what it names
+FOREVER = "{}, max-age=31536000, immutable"  # an id is the hash of what it names
 BYTES = "application/octet-stream"
 SMALL_ASSET = 1 << 20  # bytes of a file that seldom takes longer than its hash and its record
 HEADER_BYTES = 4096  # proxies refuse headers not much longer
@@ -77,8 +77,12 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
     here they are in headers: `Sunbox-Warnings` (as much of the list as has room, as JSON), `Sunbox-Exposure` and
     `Sunbox-Aspect-Ratio`, each only where there is something to say."""
 
+    own, whose = app_state(request), owner(request)
+
     def read() -> tuple[Imported, str]:
-        imported = app_state(request).assets.scene(id)
+        own.access.check(whose, id)
+        imported = own.assets.scene(id)
+        own.shares.imported(whose, id, imported.references())
         return imported, dump_json(imported.scene(presets.default_environment()))
 
     imported, text = await storing(read, caller(request))
@@ -102,9 +106,17 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     responses=answers.files("application/octet-stream") | answers.problems(404),
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
+    own, whose = app_state(request), owner(request)
+
+    def find(stack: ExitStack) -> bytes | BinaryIO:
+        own.access.check(whose, id)
+        return stack.enter_context(own.assets.opened(id))
+
     with ExitStack() as stack:
-        source = await opening(partial(stack.enter_context, app_state(request).assets.opened(id)), caller(request))
-        headers = {"content-disposition": "attachment", "cache-control": FOREVER}
+        source = await opening(partial(find, stack), caller(request))
+        # A cache that many share would answer other keys.
+        cached = FOREVER.format("private" if whose else "public")
+        headers = {"content-disposition": "attachment", "cache-control": cached}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)
         # A description of its own: the file stays open, whatever becomes of the asset meanwhile.

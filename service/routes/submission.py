@@ -82,7 +82,7 @@ async def _submitted(
 
 async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float) -> Job:
     """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
-    packed = await packing(partial(own.reader.pack, parsed.scene))
+    packed = await packing(partial(own.reader.pack, parsed.scene, owner=name))
     id, document = secrets.token_hex(ID_BYTES), parsed.document
     order = Order(id, name, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
     return own.job(order, document, packed, time.monotonic() - began)

@@ -30,7 +30,15 @@ from tests.service.rendering.test_durable import kill
 from tests.serving import SCENE, Server
 
 FOLDERS = Path(__file__).parent / "folders"
-MADE_BY = {"0": "0409cd4", "1": "ab88cfc", "2": "366adc8", "3": "19a5ccc", "4": "6643dc0", "5": "4213a40"}
+MADE_BY = {
+    "0": "0409cd4",
+    "1": "ab88cfc",
+    "2": "366adc8",
+    "3": "19a5ccc",
+    "4": "6643dc0",
+    "5": "4213a40",
+    "6": "5250b9c",
+}
 NAMES = sorted(MADE_BY)
 PARTS = ("assets", "renders")
 

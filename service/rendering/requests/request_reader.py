@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 
+from service.asset_access import AssetAccess
 from service.assets import Assets
 from service.config import Config
 from service.memory import MemoryBudget
@@ -22,18 +23,24 @@ ENVIRONMENTS = 4  # that renders share: the tables of a map of 512 x 256 texels 
 class RequestReader(RequestParser):
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
-    def __init__(self, config: Config, assets: Assets, budget: MemoryBudget | None = None) -> None:
+    def __init__(
+        self, config: Config, assets: Assets, budget: MemoryBudget | None = None, access: AssetAccess | None = None
+    ) -> None:
+        """`access` says which assets an owner may use; without it each may use all."""
         super().__init__(config)
         self.budget = budget or MemoryBudget(config.memory)
         self.memory = StreamMemory(config.max_stream_memory, self.budget)
         self.caches = CacheBudget(config.keep_packed)
         self.budget.cache("scenes", lambda: self.caches.bytes, self.caches.shrink)
         self._assets = assets
+        self._access = access
         self._environments = PackCache(ENVIRONMENTS, self.caches)
 
-    def pack(self, scene: Scene, cache: PackCache | None = None) -> Packed:
+    def pack(self, scene: Scene, cache: PackCache | None = None, owner: str = "") -> Packed:
+        """`owner`: whose assets the scene may use; "": all."""
+        assets = self._assets if self._access is None else self._access.view(owner, scene)
         with _under("/scene"):
-            return pack(scene, self._assets, cache, self._config, self._environments)
+            return pack(scene, assets, cache, self._config, self._environments)
 
 
 def stop_rule(settings: ResolvedSettings) -> StopRule:

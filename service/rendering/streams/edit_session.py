@@ -44,10 +44,11 @@ class Accepted:
 class EditSession:
     """The documents of one stream. Its methods parse and pack: not on the event loop, and one call at a time."""
 
-    def __init__(self, reader: RequestReader, task: int) -> None:
+    def __init__(self, reader: RequestReader, task: int, owner: str = "") -> None:
         self.version: Version | None = None  # the last valid one
         self._reader = reader
         self._task = task
+        self._owner = owner  # whose assets it may use
         self._cache = PackCache(budget=reader.caches)
         self._picture_bytes = 0
         self._bytes = 0  # that the scene's document takes at most
@@ -172,7 +173,7 @@ class EditSession:
             update = replace(update, denoise=new.settings.denoise)
         touched = scene_diff(old.scene, new.scene) if old is not None else None
         if touched is None or touched.whole:
-            packed = self._reader.pack(new.scene, self._cache)
+            packed = self._reader.pack(new.scene, self._cache, self._owner)
             arrays = packed.arrays
             self._reader.budget.hold("scenes", self, COPIES * weight(packed))
             delta = None if old is None else scene_delta(self._arrays, arrays)

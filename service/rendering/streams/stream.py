@@ -78,12 +78,13 @@ class Stream:
     """`hear` takes the client's messages, `attend` sends frames and answers; `run` works until it is cancelled."""
 
     def __init__(self, renderers: Renderers, reader: RequestReader, owner: str = "") -> None:
-        """`owner`: of the key; all that one owner renders shares one part of the GPU's time."""
+        """`owner`: of the key; all that one owner renders shares one part of the GPU's time,
+        and it uses no other owner's assets."""
         self.ended: Closing | None = None  # for good, and why
         self._renderers = renderers
         self._task = renderers.open(self, client=owner)
         self._flow = FlowControl(self._task, renderers.send)
-        self._live = EditSession(reader, self._task)
+        self._live = EditSession(reader, self._task, owner)
         self._executor = ClientExecutor("stream")  # parses and packs for this client alone
         self._paused = False  # by the client
         self._done: dict[str, Any] | None = None  # the last `done` of the present generation
