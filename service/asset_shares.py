@@ -51,22 +51,28 @@ class AssetShares:
                     self._promised[owner] -= size.bytes
 
     def uploaded(self, owner: str, ids: Collection[str]) -> None:
-        """Note that an owner uploaded these assets, or a scene with these parts. Raises Unavailable."""
+        """Note that an owner uploaded these assets, or a scene with these parts.
+
+        There must be room for those that others had uploaded before, too: else who has no room would learn of them.
+        Raises what `room` raises.
+        """
         if not owner:
             return
-        rows = [(owner, id, size) for id, size in self._quota.sizes(ids).items()]
-        with self._database.open() as database, database:
-            database.executemany("INSERT OR REPLACE INTO asset_owners VALUES (?, ?, ?)", rows)
+        with self._quota.pinned(ids), self._lock:
+            sizes = self._quota.sizes(ids)
+            if self._each is not None:
+                known = self._owned_of(owner, ids)
+                if more := sum(size for id, size in sizes.items() if id not in known):
+                    self._make_room(owner, more)
+            self._note(owner, sizes)
 
     def imported(self, owner: str, scene: str, parts: Collection[str]) -> None:
         """Note the parts of an owner's scene, of which some may be here again after they made room."""
         if not owner or not self._database.exists():
             return
-        mine = "SELECT asset FROM asset_owners WHERE owner = ? AND asset IN (SELECT value FROM json_each(?))"
-        with self._database.open() as database:
-            known = {id for (id,) in database.execute(mine, (owner, json.dumps([scene, *parts])))}
+        known = self._owned_of(owner, [scene, *parts])
         if scene in known and not known.issuperset(parts):
-            self.uploaded(owner, parts)
+            self._note(owner, self._quota.sizes(parts))
 
     def owned(self) -> list[tuple[str, str, int]]:
         """Who uploaded what: owner, id and bytes. Raises Unavailable."""
@@ -92,6 +98,17 @@ class AssetShares:
                 database.execute("BEGIN IMMEDIATE")  # who uploads one again notes that afterwards
                 gone = [(id,) for id in set(ids) - self._quota.sizes(ids).keys()]
                 database.executemany("DELETE FROM asset_owners WHERE asset = ?", gone)
+
+    def _note(self, owner: str, sizes: dict[str, int]) -> None:
+        rows = [(owner, id, size) for id, size in sizes.items()]
+        with self._database.open() as database, database:
+            database.executemany("INSERT OR REPLACE INTO asset_owners VALUES (?, ?, ?)", rows)
+
+    def _owned_of(self, owner: str, ids: Collection[str]) -> set[str]:
+        """Those of these assets that this owner is known to have uploaded."""
+        mine = "SELECT asset FROM asset_owners WHERE owner = ? AND asset IN (SELECT value FROM json_each(?))"
+        with self._database.open() as database:
+            return {id for (id,) in database.execute(mine, (owner, json.dumps(list(ids))))}
 
     def _make_room(self, owner: str, size: int) -> None:
         assert self._each is not None

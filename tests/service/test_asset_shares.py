@@ -54,6 +54,19 @@ def test_an_owner_s_own_assets_make_room(shared: Storage, tmp_path: Path) -> Non
     assert len({upload(shared, tmp_path, "", number) for number in range(10, 16)}) == 6  # without keys
 
 
+def test_what_others_uploaded_before_needs_room_as_well(shared: Storage, tmp_path: Path) -> None:
+    """Else whoever has none learns from the answer that it is here."""
+    others = [upload(shared, tmp_path, "bert", number) for number in (1, 2)]
+    mine = [upload(shared, tmp_path, "anna", number) for number in (3, 4, 5, 6)]
+    upload(shared, tmp_path, "anna", 1)
+    assert here(shared, mine) == [False, True, True, True] and all(here(shared, others))
+    shared.documents.put("scenes", "a", checked("scenes", mesh_scene(*mine[1:])), None, "anna")
+    shared.documents.put("scenes", "b", checked("scenes", mesh_scene(others[0])), None, "anna")
+    with pytest.raises(Unavailable, match="SUNBOX_MAX_KEY_ASSETS"):
+        upload(shared, tmp_path, "anna", 2)
+    assert ("anna", others[1]) not in noted(tmp_path)
+
+
 def test_what_made_room_for_others_counts_no_longer(shared: Storage, tmp_path: Path) -> None:
     mine = [upload(shared, tmp_path, "anna", number) for number in range(4)]
     with shared.quota._files.locked():
