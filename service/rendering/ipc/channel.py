@@ -9,6 +9,7 @@ arrays without a copy. (A memfd, and not /dev/shm: a container's holds 64 MB.)
 from __future__ import annotations
 
 import asyncio
+import fcntl
 import io
 import mmap
 import os
@@ -25,6 +26,8 @@ INLINE = 32 * 1024  # bytes of a pickle; a longer one goes to memory: a datagram
 ALIGNMENT = 64  # a cache line, and more than any dtype asks for
 RECEIVED = 2 * INLINE
 DESCRIPTOR = struct.Struct("i")
+# A sender that is not trusted must not change or shorten what was looked at: a file that shrinks kills who maps it.
+SEALS = fcntl.F_SEAL_SEAL | fcntl.F_SEAL_SHRINK | fcntl.F_SEAL_GROW | fcntl.F_SEAL_WRITE
 MOST = 8  # descriptors that go with a datagram
 ROOM = socket.CMSG_SPACE(MOST * DESCRIPTOR.size)
 
@@ -41,8 +44,8 @@ def pair() -> tuple[socket.socket, socket.socket]:
     return socket.socketpair(socket.AF_UNIX, socket.SOCK_SEQPACKET)
 
 
-def encode(message: object) -> Encoded:
-    """The message as a datagram and descriptors; the caller discards them."""
+def encode(message: object, sealed: bool = False) -> Encoded:
+    """The message as a datagram and descriptors; the caller discards them. `sealed`: as for `send`."""
     arrays: list[pickle.PickleBuffer] = []
     body = pickle.dumps(message, protocol=5, buffer_callback=arrays.append)
     parts = [array.raw() for array in arrays]
@@ -54,7 +57,7 @@ def encode(message: object) -> Encoded:
     held = [os.dup(block.descriptor) for block in blocks]
     if own:
         try:
-            held.append(_shared(own))
+            held.append(_shared(own, sealed))
         except BaseException:
             discard((datagram, tuple(held)))
             raise
@@ -62,17 +65,33 @@ def encode(message: object) -> Encoded:
 
 
 def decode(datagram: bytes, descriptors: tuple[int, ...], find: FindClass | None = None) -> Any:
-    """The message; its arrays are read-only views of the mapped memory. Closes the descriptors. `find` gives what the
-    message may be made of, where its sender is not trusted."""
-    body, places = _loads(datagram, [], find and _nothing)
+    """The message; its arrays are read-only views of the mapped memory. Closes the descriptors.
+
+    `find` gives what the message may be made of, where its sender is not trusted. Raises UnpicklingError for anything
+    else, and where its memory is not sealed.
+    """
     try:
-        maps = [memoryview(mmap.mmap(each, 0, prot=mmap.PROT_READ)) for each in descriptors]
+        body, places = _loads(datagram, [], find and _nothing)
+        maps = [memoryview(_mapped(each, find is None)) for each in descriptors]
     finally:
         discard((datagram, descriptors))
     parts = [maps[which][at : at + size] if size else memoryview(b"") for which, at, size in places]
     if not body:
         body = parts.pop()
     return _loads(body, parts, find)
+
+
+def _mapped(descriptor: int, trusted: bool) -> mmap.mmap:
+    if trusted:
+        return mmap.mmap(descriptor, 0, prot=mmap.PROT_READ)
+    try:
+        sealed = fcntl.fcntl(descriptor, fcntl.F_GET_SEALS) & SEALS == SEALS
+    except OSError:  # it is no file in memory
+        sealed = False
+    if not sealed:
+        raise pickle.UnpicklingError("the memory of a message could still change")
+    # Private, because until Linux 6.7 a sealed file cannot be mapped as shared; nothing is copied.
+    return mmap.mmap(descriptor, 0, flags=mmap.MAP_PRIVATE, prot=mmap.PROT_READ)
 
 
 def _loads(body: bytes | memoryview, parts: list[memoryview], find: FindClass | None) -> Any:
@@ -109,9 +128,12 @@ def receive(end: socket.socket, wait: bool = False, find: FindClass | None = Non
     return decode(datagram, descriptors, find)
 
 
-def send(end: socket.socket, message: object) -> None:
-    """Send, waiting for room. Raises Closed when nobody listens any more."""
-    encoded = encode(message)
+def send(end: socket.socket, message: object, sealed: bool = False) -> None:
+    """Send, waiting for room. Raises Closed when nobody listens any more.
+
+    `sealed`: for a receiver that does not trust this process. Arrays must not lie in blocks of shared memory then.
+    """
+    encoded = encode(message, sealed)
     try:
         _transmit(end, *encoded)
     except ConnectionError as error:
@@ -234,8 +256,8 @@ def _places(parts: list[memoryview]) -> tuple[list[Place], list[memoryview], lis
     return places, own, blocks
 
 
-def _shared(parts: list[memoryview]) -> int:
-    descriptor = os.memfd_create("sunbox", os.MFD_CLOEXEC)
+def _shared(parts: list[memoryview], sealed: bool) -> int:
+    descriptor = os.memfd_create("sunbox", os.MFD_CLOEXEC | (os.MFD_ALLOW_SEALING if sealed else 0))
     try:
         start = 0
         for part in parts:
@@ -243,6 +265,8 @@ def _shared(parts: list[memoryview]) -> int:
             while written < part.nbytes:  # a write stops at 2 GiB
                 written += os.pwrite(descriptor, part[written:], start + written)
             start += -(-part.nbytes // ALIGNMENT) * ALIGNMENT
+        if sealed:
+            fcntl.fcntl(descriptor, fcntl.F_ADD_SEALS, SEALS)
     except BaseException:
         os.close(descriptor)
         raise

@@ -52,7 +52,7 @@ def main() -> None:
     while True:
         try:
             answer = _answer(channel.receive(end, wait=True), end)
-            channel.send(end, answer)
+            channel.send(end, answer, sealed=True)
         except (channel.Closed, TimeoutError):
             return
         del answer

@@ -7,9 +7,11 @@ import json
 import os
 import pickle
 import signal
+import socket
 import subprocess
 import threading
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -202,9 +204,29 @@ def test_an_answer_names_no_function() -> None:
         theirs.send(pickle.dumps(Taken()))  # in the place of the envelope
         with pytest.raises(pickle.UnpicklingError):
             channel.receive(ours, wait=True, find=parser_pool.allowed)
-        channel.send(theirs, RequestParser(config()).request(written(REQUEST)))
+        channel.send(theirs, RequestParser(config()).request(written(REQUEST)), sealed=True)
         assert channel.receive(ours, wait=True, find=parser_pool.allowed).settings.width == SMALL["width"]
     assert not Path("/tmp/never-made").exists()
+
+
+def test_the_memory_of_an_answer_does_not_change_any_more() -> None:
+    """A sender that cut it off would end the server, and one that changed it would undo what was looked at."""
+    answer = RequestParser(config()).request(written(REQUEST))
+    ours, theirs = channel.pair()
+    with ours, theirs:
+        channel.send(theirs, answer)
+        with pytest.raises(pickle.UnpicklingError, match="could still change"):
+            channel.receive(ours, wait=True, find=parser_pool.allowed)
+        datagram, (memory,) = channel.encode(answer, sealed=True)
+        for change in (partial(os.ftruncate, memory, 0), partial(os.pwrite, memory, b"other", 0)):
+            with pytest.raises(PermissionError):
+                change()
+        found = channel.decode(datagram, (memory,), parser_pool.allowed)
+        assert np.array_equal(found.scene.shapes[-1].vertices, np.array(ROWS))
+        with Path("/dev/zero").open("rb") as other:
+            socket.send_fds(theirs, [datagram], [other.fileno()])
+            with pytest.raises(pickle.UnpicklingError, match="could still change"):
+                channel.receive(ours, wait=True, find=parser_pool.allowed)
 
 
 def test_a_mesh_of_an_answer_is_looked_at_again() -> None:
