@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from gpu import Renderer
+from gpu.analysis.unbounded import UnboundedRenderer
 from service.bench import machine
 from service.bench.seeds import blur, bounces, reflection, samples, spheres
 from service.bench.seeds.stage import Stage
@@ -19,13 +21,13 @@ def measure(quick: bool, told: Callable[[str], None]) -> tuple[dict[str, Any], d
 
     Raises GpuError.
     """
-    with Renderer() as renderer:
+    with Renderer() as renderer, UnboundedRenderer() as unbounded:
         stage = Stage(renderer, quick, told)
         began = stage.clock()
         document = {
             "machine": machine.describe(renderer.info),
             "quick": quick,
-            "spheres": spheres.measure(stage),
+            "spheres": spheres.measure(replace(stage, renderer=unbounded)),
             "rooms": bounces.rooms(stage),
             "model": bounces.model(stage),
             "samples": samples.measure(stage),

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from gpu.analysis.unbounded import UnboundedRenderer
 from service.bench.seeds import blur, bounces, reflection, report, run, samples, spheres
 from service.bench.seeds.stage import GAP, Stage, sheet, shown
 from service.cli import main
@@ -22,8 +23,13 @@ def stage(gpu: Renderer) -> Stage:
     return Stage(gpu, quick=True, told=lambda what: None)
 
 
-def test_every_tree_shows_the_same_spheres(stage: Stage) -> None:
+def test_every_tree_shows_the_same_spheres(gpu: Renderer) -> None:
     """With treelets, too: of 5 000 boxes not all fit into the top."""
+    with UnboundedRenderer() as renderer:
+        every_tree_shows_the_same_spheres(Stage(renderer, quick=True, told=lambda what: None))
+
+
+def every_tree_shows_the_same_spheres(stage: Stage) -> None:
     packed = stage.packed(spheres.field(5000))
     ways = [spheres.without_tree(packed), packed]
     ways += [spheres.with_tree(packed, split)[0] for split in spheres.SPLITS.values()]
