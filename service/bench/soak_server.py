@@ -18,6 +18,7 @@ from typing import Any
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 PATIENCE_S = 60.0
+WORKER = "service.rendering.worker"  # the module that a renderer runs
 
 
 class Server:
@@ -27,7 +28,7 @@ class Server:
         """`settings` are further variables of its environment."""
         environment = {name: value for name, value in os.environ.items() if not name.startswith("SUNBOX_")}
         environment |= {"SUNBOX_DATA_DIR": str(folder), "SUNBOX_LOG_LEVEL": "error", **(settings or {})}
-        self._mark = f"SUNBOX_DATA_DIR={folder}\0".encode()
+        self._is_in_cluster = "SUNBOX_RAY" in environment
         command = [sys.executable, "-m", "service.cli", "serve", "--port", "0"]
         with (folder / "server.log").open("wb") as log:
             self._process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, stderr=log, text=True)
@@ -63,16 +64,16 @@ class Server:
         return [int(pid) for pid in found.stdout.split()]
 
     def renderers(self) -> list[int]:
-        """The processes that render for this server: its children, or in a cluster on this machine those of Ray's
-        actors, and these. They are known by the data folder in their environment."""
-        found = []
+        """The processes that render for this server: its children, or in a cluster on this machine Ray's actors and
+        theirs."""
+        commands = dict[int, list[str]]()
         for process in Path("/proc").glob("[0-9]*"):
             with suppress(OSError):
-                command = (process / "cmdline").read_bytes()
-                renders = b"service.rendering.worker\0" in command or command.startswith(b"ray::Renderer")
-                if renders and self._mark in (process / "environ").read_bytes():
-                    found.append(int(process.name))
-        return found
+                commands[int(process.name)] = (process / "cmdline").read_text(errors="replace").split("\0")
+        actors = {pid for pid, (program, *_) in commands.items() if program.startswith("ray::Renderer")}
+        parents = {self.pid, *(actors if self._is_in_cluster else ())}
+        workers = {pid for pid, command in commands.items() if WORKER in command and _parent(command) in parents}
+        return [*(parents - {self.pid}), *workers]
 
     def family(self) -> list[int]:
         """The server's process and all processes below it."""
@@ -97,6 +98,12 @@ class Server:
             self._process.kill()
             code = -9
         return code, still_there(children, 1.0)
+
+
+def _parent(command: list[str]) -> int | None:
+    """The process that a renderer says it belongs to."""
+    _, _, parent = "\0".join(command).partition("--server\0")
+    return int(parent.partition("\0")[0]) if parent else None
 
 
 def add_renderers(parser: argparse.ArgumentParser) -> None:
