@@ -77,7 +77,9 @@ def adopt(fd: int, table: list[dict[str, Any]]) -> dict[str, Array]:
         raise ValueError("the memory is not sealed")
     size = os.fstat(fd).st_size
     large = size > COPIED
-    mapped: mmap.mmap | bytes = mmap.mmap(fd, size, access=mmap.ACCESS_READ) if large else os.pread(fd, size, 0)
+    # Private: before Linux 6.7 memory that is sealed against writing cannot be mapped as shared, not even to be read.
+    mapped: mmap.mmap | bytes
+    mapped = mmap.mmap(fd, size, mmap.MAP_PRIVATE, mmap.PROT_READ) if large else os.pread(fd, size, 0)
     arrays = {}
     for row in table:
         if row["dtype"] not in DTYPES:
