@@ -251,9 +251,8 @@ async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own.assets.warm()
     asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
     await own.resume_renders()
-    warming = asyncio.create_task(_warm(app))
+    own.warming = asyncio.create_task(_warm(app))
     yield
-    warming.cancel()
     asking.cancel()
     await own.farewell()
     await own.renderers.close()

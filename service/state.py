@@ -59,6 +59,7 @@ class AppState:
     access: AssetAccess
     renders: RenderQueue = field(default_factory=RenderQueue)
     traffic: Traffic = field(default_factory=Traffic)
+    warming: asyncio.Task[None] | None = None  # renders a first frame, and prepares for changes of scene
     address: str = ""  # of the server; "" where there is none, as under a test's client
     sessions: Sessions = field(init=False)
     downloads: Downloads = field(init=False)
@@ -142,6 +143,8 @@ class AppState:
 
     async def farewell(self) -> None:
         """Tell all clients that the server ends, so that requests are answered; renders go on at the next start."""
+        if self.warming is not None:
+            self.warming.cancel()
         self.renderers.drain()
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S
