@@ -193,7 +193,7 @@ def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, a
             supervisor.send(Read(busy, len(seen), LINEAR))
             seen.append((await other.next(busy, Image)).progress.samples)
             await asyncio.sleep(0)
-        assert len(set(seen)) >= 5 and len(before) <= len(helpers(supervisor.process_id)) == 1
+        assert seen[-1] > seen[0] and len(before) <= len(helpers(supervisor.process_id)) == 1
         pixels = (await normal).pixels
         scene = gpu.load(arrays)
         picture = gpu.picture(scene, RenderSettings(**SIZE))

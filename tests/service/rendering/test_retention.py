@@ -149,6 +149,7 @@ def test_ended_renders_make_room_for_new_ones(tmp_path: Path) -> None:
         disk = Disk(tmp_path)
         noise = np.frombuffer(np.random.default_rng(0).bytes(3 * MIB), np.uint8)
         saved = SavedPicture(8, (0, 0, 0), [noise])
+        await disk.submit("d", 10)  # has the only place, so that the others wait and have their pictures on the disk
         old = []
         for owner in "aab":
             job = await disk.submit(owner, 10)
