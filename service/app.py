@@ -26,31 +26,31 @@ from starlette.responses import FileResponse, Response
 
 from service import presets
 from service.config import Config, cores, unknown_variables
-from service.confined import hide
-from service.connection_limits import Watch
-from service.connections import connection_class, listen
-from service.data_lock import FolderInUse, locked
-from service.database import DamagedFile
-from service.downloads import Pieces
-from service.guard import Guard, open_for_health, turning_away
-from service.logs import Requests
-from service.memory import MemoryBudget
+from service.http.connection_limits import Watch
+from service.http.connections import connection_class, listen
+from service.http.downloads import Pieces
+from service.http.guard import Guard, open_for_health, turning_away
+from service.http.request_log import Requests
 from service.problems import Unavailable
-from service.rendering.cluster.joining import CannotJoin
-from service.rendering.cluster.pool import cluster_pool
-from service.rendering.first_frame import foresee, warm_up
-from service.rendering.jobs.queue import QueueLimits, RenderQueue
-from service.rendering.jobs.retention import Retention
-from service.rendering.jobs.store.store import RenderStore
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.supervisor.devices import missing_device, seats
-from service.rendering.supervisor.pool import Pool
+from service.renderers.first_frame import foresee, warm_up
+from service.renderers.pool.devices import missing_device, seats
+from service.renderers.pool.pool import Pool
+from service.renderers.ray.joining import CannotJoin
+from service.renderers.ray.pool import cluster_pool
+from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.retention import Retention
+from service.renders.store.store import RenderStore
+from service.requests.request_reader import RequestReader
 from service.routes import assets, bsdf, documents, info, renders, stream
 from service.routes import presets as preset_routes
 from service.routes.description import describe
 from service.routes.errors import Files, respond, tell_errors
 from service.state import MESSAGE_BYTES, AppState
-from service.storage import storage
+from service.storage.data_lock import FolderInUse, locked
+from service.storage.database import DamagedFile
+from service.storage.stores import storage
+from service.system.confined import hide
+from service.system.memory import MemoryBudget
 
 WEB = Path(__file__).parents[1] / "web"
 PING_S = 15.0  # proxies cut connections that are idle for a minute

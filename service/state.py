@@ -13,30 +13,30 @@ from typing import Any
 
 from starlette.requests import HTTPConnection
 
-from service.asset_access import AssetAccess
-from service.asset_shares import AssetShares
 from service.assets import AssetStore
-from service.bodies import Bodies
 from service.config import Config
-from service.documents import Documents
-from service.downloads import Downloads
-from service.memory import MemoryBudget
+from service.http.downloads import Downloads
+from service.operation.readiness import SOFTWARE, Readiness
+from service.operation.traffic import Traffic
 from service.pack import Packed
 from service.problems import Unavailable
 from service.quality import priced
-from service.quota import Quota
-from service.readiness import SOFTWARE, Readiness
-from service.rendering.bsdf import BsdfQuestions
-from service.rendering.executors import packing
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.queue import RenderQueue
-from service.rendering.jobs.store.record import Order, Outcome, StoredRender
-from service.rendering.renderers import Member, Renderers
-from service.rendering.requests.request_parser import ParsedRequest, unfolded
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.streams.sessions import Sessions
-from service.shares import Shares
-from service.traffic import Traffic
+from service.renderers.bsdf_questions import BsdfQuestions
+from service.renderers.protocol import Member, Renderers
+from service.renders.job import Job
+from service.renders.queue import RenderQueue
+from service.renders.store.record import Order, Outcome, StoredRender
+from service.requests.bodies import Bodies
+from service.requests.request_parser import ParsedRequest, unfolded
+from service.requests.request_reader import RequestReader
+from service.storage.asset_access import AssetAccess
+from service.storage.asset_shares import AssetShares
+from service.storage.documents import Documents
+from service.storage.quota import Quota
+from service.streams.sessions import Sessions
+from service.system.executors import packing
+from service.system.memory import MemoryBudget
+from service.system.shares import Shares
 
 MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
 MOST_WAITS = 64  # long-polls and event streams of one caller: each takes some 40 KB, and all wake at a render's end

@@ -8,7 +8,7 @@ from contextlib import contextmanager
 import pytest
 
 from service.assets.sandbox import sandbox
-from service.child_processes import Child
+from service.system.child_processes import Child
 
 
 @contextmanager

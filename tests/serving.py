@@ -82,7 +82,7 @@ class Server:
         while True:
             for pid in self.children():
                 with suppress(OSError):  # it may be gone by now
-                    if b"rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
+                    if b"service.worker" in Path(f"/proc/{pid}/cmdline").read_bytes():
                         return pid
             assert time.monotonic() < until, self.log.read_text()
             time.sleep(0.02)

@@ -6,8 +6,8 @@ import asyncio
 from collections.abc import Awaitable, Callable
 from typing import Any
 
-from service.rendering.supervisor.process import Options
-from service.rendering.supervisor.supervisor import Supervisor
+from service.renderers.local.process import Options
+from service.renderers.local.supervisor import Supervisor
 from tests.serving import PATIENCE_S
 
 

@@ -21,28 +21,26 @@ MOST_LINES = 400
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
-    {"service.problems", "service.shared_memory", "service.cpu_time", "service.confined", "service.garbage"},
-    {"service.child_processes", "service.disk_usage", "service.memory", "service.shares", "service.turns"},
-    {"service.lost_pictures"},
+    {"service.problems"},
     {"service.config"},
     {"service.views"},
-    {"service.scene", "service.images"},
-    {"service.quality", "service.presets", "service.assets"},
-    {"service.recipe"},
-    {"service.quota", "service.migrations"},
-    {"service.database", "service.data_lock"},
-    {"service.asset_access"},
-    {"service.documents", "service.asset_shares"},
-    {"service.storage", "service.data_check"},
+    {"service.system"},
+    {"service.logs", "service.ipc"},
+    {"service.scene"},
+    {"service.quality", "service.presets"},
+    {"service.images"},
+    {"service.assets"},
+    {"service.storage"},
     {"service.pack"},
-    {"service.logs", "service.log_output"},
-    {"service.downloads"},
-    {"service.rendering"},
-    {"service.readiness"},
-    {"service.traffic", "service.bodies"},
+    {"service.requests"},
+    {"service.renderers"},
+    {"service.renders"},
+    {"service.streams"},
+    {"service.worker"},
+    {"service.http"},
+    {"service.operation"},
     {"service.state"},
-    {"service.keys"},
-    {"service.connection_limits", "service.connections", "service.guard", "service.metrics", "service.routes"},
+    {"service.routes"},
     {"service.app"},
     {"service.bench"},
     {"service.commands"},
@@ -63,7 +61,7 @@ GPU_LAYERS = [
 RUNS_KERNELS = ("gpu", "gpu.errors", "gpu.denoise", "gpu.precompile", "gpu.analysis")
 LOOKS_INTO_GPU = {
     "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables"),
-    "service.rendering.worker": RUNS_KERNELS,
+    "service.worker": RUNS_KERNELS,
     "service.commands": RUNS_KERNELS,
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
 }
@@ -78,7 +76,7 @@ WITHOUT_GL = (
     "gpu.denoise",
 )
 OFFLINE = "gpu.tables.build"
-SHARED_BY_PROCESSES = ("service.rendering.ipc", "service.rendering.priority")  # by the server's and the renderer's
+SHARED_BY_PROCESSES = ("service.ipc", "service.system", "service.logs", "service.quality", "service.views")
 ERRORS = ("gpu.errors", "service.problems")
 WEB_FRAMEWORK = {"fastapi", "starlette", "uvicorn", "websockets", "pydantic", "pydantic_settings"}
 
@@ -195,13 +193,14 @@ def test_only_public_rooms_of_gpu_are_looked_into() -> None:
 
 
 def test_the_renderers_process_shares_only_its_channel() -> None:
-    worker = "service.rendering.worker"
+    """The server imports nothing of the renderer's process, and that process nothing of the server but SHARED."""
+    worker, server = "service.worker", ("service.requests", "service.renders", "service.renderers", "service.streams")
     for module, imported in graph().items():
         for other in imported:
             said = f"{module} imports {other}"
-            if within(module, "service.rendering") and not within(module, worker):
+            if within(module, *server, "service.routes", "service.state", "service.app", "service.storage"):
                 assert not within(other, worker, "gpu"), said
-            if within(module, worker) and within(other, "service.rendering"):
+            if within(module, worker) and within(other, "service"):
                 assert within(other, worker, *SHARED_BY_PROCESSES), said
 
 

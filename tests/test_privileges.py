@@ -113,7 +113,7 @@ def test_a_data_folder_that_may_not_be_looked_into(gpu: Renderer, tmp_path: Path
 def test_who_may_not_use_the_gpu_is_told(tmp_path: Path) -> None:
     for name, mode in (("renderD128", 0), ("renderD129", 0o600), ("card0", 0)):
         (tmp_path / name).touch(mode)
-    program = "import sys, pathlib; from service.rendering.worker.__main__ import closed_gpus; "
+    program = "import sys, pathlib; from service.worker.__main__ import closed_gpus; "
     program += "print(*closed_gpus(pathlib.Path(sys.argv[1])))"
     told = subprocess.run([sys.executable, "-c", program, tmp_path], capture_output=True, text=True, check=True)
     assert told.stdout.split() == [f"{tmp_path}/renderD128"]

@@ -9,7 +9,7 @@ from gpu import RenderSettings, footprint
 from gpu.layout import ShapeKind
 from service.assets.gltf import json_view
 from service.pack.lights import light_bounds
-from service.rendering.jobs import memory
+from service.renders import memory
 from service.scene import numbers
 from tests.documents import packed
 

@@ -24,7 +24,7 @@ from typing import BinaryIO
 
 from service.assets.folder_totals import FolderTotals
 from service.assets.source import Source, write
-from service.disk_usage import Usage, usage
+from service.system.disk_usage import Usage, usage
 
 log = logging.getLogger(__name__)
 

@@ -12,7 +12,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from service.disk_usage import Usage, usage
+from service.system.disk_usage import Usage, usage
 
 TOTALS = struct.Struct("<4sIqq")  # MAGIC, whether a change is under way, bytes, files
 MAGIC = b"SBX1"

@@ -21,10 +21,10 @@ from service.assets.scene_import import Imported, take_apart
 from service.assets.scenes.plain_mesh import plain_scene
 from service.assets.source import Source, digest, format_of, handed, length
 from service.assets.types import AssetInfo, AssetLimits, ImageData, MeshData, ScenePart
-from service.confined import Rights
-from service.disk_usage import Usage, expected
-from service.garbage import collector_paused
 from service.problems import AssetError, NotFound, Unavailable, UnsupportedMedia
+from service.system.confined import Rights
+from service.system.disk_usage import Usage, expected
+from service.system.garbage import collector_paused
 
 log = logging.getLogger(__name__)
 

@@ -22,7 +22,7 @@ from gpu import Renderer
 from service import presets
 from service.bench import machine, scale_costs, scale_model
 from service.bench.soak_server import Server
-from service.rendering.worker.division.ledger import MOST_BYTES
+from service.worker.division.ledger import MOST_BYTES
 
 PLACES = (  # what runs, renderers, cores
     ("1 renderer of 1 core", 1, 1),

@@ -18,8 +18,8 @@ from service import presets
 from service.bench.scale_model import Costs
 from service.bench.scenes import BenchAssets
 from service.pack import pack
-from service.rendering.worker.division.ledger import MOST_BYTES
 from service.scene import parse_scene
+from service.worker.division.ledger import MOST_BYTES
 
 if TYPE_CHECKING:
     from gpu import Picture

@@ -16,9 +16,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from gpu import Band, border_after
-from service.rendering.worker.division.home import EACH
-from service.rendering.worker.division.ledger import AHEAD_BYTES, LEASE_S, MOST_BYTES, PIXEL_BYTES, Ledger
-from service.rendering.worker.view.frames import SLICE_S
+from service.worker.division.home import EACH
+from service.worker.division.ledger import AHEAD_BYTES, LEASE_S, MOST_BYTES, PIXEL_BYTES, Ledger
+from service.worker.view.frames import SLICE_S
 
 BLOCK = 64  # samples of all blocks but the first two
 _NOTHING = np.zeros(0, np.float32)

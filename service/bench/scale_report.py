@@ -7,8 +7,8 @@ from pathlib import Path
 from typing import Any
 
 from service.bench.scale_model import BLOCK
-from service.rendering.worker.division.home import EACH
-from service.rendering.worker.division.ledger import AHEAD_BYTES, LEASE_S, MOST_BYTES, PIXEL_BYTES
+from service.worker.division.home import EACH
+from service.worker.division.ledger import AHEAD_BYTES, LEASE_S, MOST_BYTES, PIXEL_BYTES
 
 DOCS = Path(__file__).parents[2] / "docs"
 BEGIN, END = "<!-- scale: written by `sunbox bench scale --publish` -->", "<!-- scale end -->"

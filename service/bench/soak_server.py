@@ -18,7 +18,7 @@ from typing import Any
 
 PAGE = os.sysconf("SC_PAGE_SIZE")
 PATIENCE_S = 60.0
-WORKER = "service.rendering.worker"  # the module that a renderer runs
+WORKER = "service.worker"  # the module that a renderer runs
 
 
 class Server:

@@ -6,9 +6,9 @@ import hashlib
 import logging
 from typing import Any
 
-from service import recipe
 from service.assets import AssetStore, FileAssets, ImageData, MeshData
 from service.problems import AssetError, NotFound, ServiceError
+from service.scene import references
 
 log = logging.getLogger(__name__)
 
@@ -34,7 +34,7 @@ class SourceAssets:
 
         Without room there the picture can be made again only beside these files.
         """
-        for ref in recipe.references(scene):
+        for ref in references.references(scene):
             if not ref.startswith("sha256:"):
                 try:
                     self._found.keep(ref)
@@ -52,7 +52,7 @@ class SourceAssets:
             names[id] = ref
             return id
 
-        return recipe.renamed(scene, identified), names
+        return references.renamed(scene, identified), names
 
     def _where(self, ref: str) -> str:
         """The reference itself, or the path of the very file that it names where the data folder has it no more."""

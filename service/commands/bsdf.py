@@ -84,7 +84,7 @@ def _angle(value: str | float) -> float:
 def _material(path: Path, kind: str) -> Material:
     data = files.read(path)
     from service.problems import FieldError, InvalidDocument
-    from service.rendering.requests.bsdf_request import parse_material, without_terms
+    from service.requests.bsdf_request import parse_material, without_terms
     from service.scene import load_json
 
     with refusals(f"{path}: "):

@@ -8,8 +8,8 @@ from pathlib import Path
 
 from service.commands import BadInput
 from service.commands.configuration import configuration
-from service.data_check import check
-from service.rendering.jobs.store.check import check_renders
+from service.renders.store.check import check_renders
+from service.storage.data_check import check
 
 
 def run(arguments: argparse.Namespace) -> int:

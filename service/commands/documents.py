@@ -17,8 +17,8 @@ if TYPE_CHECKING:
     from service.assets import AssetStore
     from service.commands.assets import SourceAssets
     from service.config import Config
+    from service.images.recipe import PictureView
     from service.pack import Packed
-    from service.recipe import PictureView
     from service.scene import Scene, Settings
 
 WIDEST = 16.0  # width over height, at most, of a picture whose size a model's file decides
@@ -67,7 +67,7 @@ def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
     from service.scene import load_json, parse_scene
 
     if data.startswith((PNG_MAGIC, EXR_MAGIC)):
-        from service import recipe
+        from service.images import recipe
 
         metadata = read_metadata(data)
         if metadata is None:
@@ -86,9 +86,9 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
     from service import presets
     from service.assets import FileAssets
     from service.commands.models import import_model
-    from service.recipe import PictureView
+    from service.images.recipe import PictureView
     from service.scene import parse_scene
-    from service.storage import storage
+    from service.storage.stores import storage
 
     store = storage(config).assets
     try:
@@ -145,13 +145,13 @@ def picture_size(settings: Settings, aspect: float | None) -> dict[str, int]:
 @contextmanager
 def source_assets(source: Source, roots: Sequence[str], config: Config) -> Iterator[SourceAssets]:
     """Where the scene's assets are: beside its file, in `roots`, and by sha256 in the data folder."""
-    from service import recipe
     from service.assets import FileAssets
     from service.commands.assets import SourceAssets
-    from service.storage import storage
+    from service.scene import references
+    from service.storage.stores import storage
 
     uploaded = source.store or storage(config).assets
-    if recipe.references(source.document):
+    if references.references(source.document):
         uploaded.loader.sandbox.start()
     with closing(uploaded), FileAssets(source.path.parent, asset_folders(roots), uploaded) as assets:
         yield SourceAssets(assets, uploaded, source.assets)

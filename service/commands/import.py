@@ -19,9 +19,10 @@ def run(arguments: argparse.Namespace) -> int:
     target = files.writable(Path(arguments.output))
     config = configuration()
     data = files.read(source)
-    from service import presets, recipe
+    from service import presets
     from service.assets import AssetStore, FileAssets
     from service.commands.models import import_model, is_model
+    from service.scene import references
 
     if not is_model(source, data) and not data.lstrip(b"\xef\xbb\xbf \t\r\n").startswith(b"{"):
         raise BadInput(f"{str(source)!r}: is no model: neither glTF, nor OBJ, PLY, STL, nor a zip")
@@ -52,7 +53,7 @@ def run(arguments: argparse.Namespace) -> int:
             files.write(folder / name, store.read(id), lasting=False)  # thousands, and the model is still there
             return f"{folder.name}/{name}"
 
-        named = {ref: written(ref) for ref in recipe.references(document)}
-        document = recipe.renamed(document, named.__getitem__)
+        named = {ref: written(ref) for ref in references.references(document)}
+        document = references.renamed(document, named.__getitem__)
     files.write(target, (json.dumps(document, indent=1) + "\n").encode())
     return 0

@@ -78,7 +78,7 @@ def measured(renderer: Renderer, packed: Packed, device: int | None) -> list[tup
     """What the scene's kernel saves beside one with every feature; both are compiled, and measured here and now."""
     from gpu import RenderSettings
     from gpu.analysis.kernel_cost import SIZE, full_kernel, kernel_cost
-    from service.rendering.worker.helpers.compile_client import CompileClient
+    from service.worker.helpers.compile_client import CompileClient
 
     settings = RenderSettings(SIZE, SIZE)
     print("compiling and measuring; the kernel with every feature may take minutes", file=sys.stderr)

@@ -7,7 +7,7 @@ import sys
 import time
 from typing import TextIO
 
-from service.rendering.ipc.messages import Progress
+from service.ipc.messages import Progress
 
 BAR_WIDTH = 24
 REDRAW_S = 0.2

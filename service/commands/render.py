@@ -29,7 +29,7 @@ from service.views import AOVS, LEAST_EXPOSURE, LOSSLESS_FORMATS, MOST_EXPOSURE,
 
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
-    from service.recipe import PictureView
+    from service.images.recipe import PictureView
 
 
 @dataclass(frozen=True)
@@ -54,7 +54,7 @@ def run(arguments: argparse.Namespace) -> int:
     stats = files.writable(Path(arguments.stats)) if arguments.stats else None
     config = configuration()
     given = read_settings(arguments.set or [], config)
-    from service.shared_memory import reuse_freed  # here, as it loads numpy
+    from service.system.shared_memory import reuse_freed  # here, as it loads numpy
 
     reuse_freed()
     source = read_source(Path(arguments.input), arguments.asset_root, config)
@@ -121,7 +121,7 @@ def _view(
     arguments: argparse.Namespace, format: str, exposure: float | None, before: PictureView | None
 ) -> PictureView:
     """The view as given; the rest comes from the picture that is made again, if it is one."""
-    from service.recipe import PictureView
+    from service.images.recipe import PictureView
 
     options = {"aov": arguments.aov, "exposure": exposure, "tone_map": arguments.tone_map}
     given = {name: value for name, value in options.items() if value is not None}
@@ -145,8 +145,9 @@ def _choose(option: str, value: str, known: tuple[str, ...]) -> None:
 
 
 def _encode(tracing: Tracing, output: Output, document: Any, names: dict[str, str]) -> bytes:
-    from service import images, recipe
-    from service.rendering.ipc.messages import View
+    from service import images
+    from service.images import recipe
+    from service.ipc.messages import View
 
     view, made_from = output.view, None
     if output.is_repeatable:

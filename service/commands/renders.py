@@ -39,11 +39,11 @@ def run(arguments: argparse.Namespace) -> int:
 
 def _submit(api: Api, arguments: argparse.Namespace) -> int:
     """The id goes to stdout."""
-    from service import recipe
     from service.assets import FileAssets
     from service.commands.configuration import configuration
     from service.commands.documents import asset_folders, read_settings, read_source, refusals
     from service.commands.models import is_model
+    from service.scene import references
 
     path, config = Path(arguments.input), configuration()
     if is_model(path, files.read(path)):
@@ -53,10 +53,10 @@ def _submit(api: Api, arguments: argparse.Namespace) -> int:
     settings = chosen.model_dump(mode="json", exclude_unset=True)
     with refusals(), FileAssets(path.parent, asset_folders(arguments.asset_root)) as found:
         uploaded: dict[str, str] = {}
-        for ref in recipe.references(source.document):
+        for ref in references.references(source.document):
             if not ref.startswith("sha256:"):
                 uploaded[ref] = api.upload(found.read(ref), Path(ref).name)
-    scene = recipe.renamed(source.document, lambda ref: uploaded.get(ref, ref))
+    scene = references.renamed(source.document, lambda ref: uploaded.get(ref, ref))
     asked = {"scene": scene, "settings": settings, "label": arguments.label, "priority": arguments.priority}
     body = {name: value for name, value in asked.items() if value is not None}
     key = {} if arguments.idempotency_key is None else {"idempotency-key": arguments.idempotency_key}
@@ -99,7 +99,7 @@ def _wait(api: Api, arguments: argparse.Namespace) -> int:
 def _watched(api: Api, id: str) -> dict[str, Any]:
     """The status at the render's end. A server that is restarted meanwhile is asked again."""
     from service.commands.progress import ProgressLine
-    from service.rendering.ipc.messages import Progress
+    from service.ipc.messages import Progress
 
     line, heard_at = ProgressLine(), time.monotonic()
     try:

@@ -19,9 +19,10 @@ log = logging.getLogger(__name__)
 
 def run(arguments: argparse.Namespace) -> int:
     config = configuration(host=arguments.host, port=arguments.port)
-    from service import app, logs
+    from service import app
+    from service.logs import setup
 
-    logs.configure(config.log_format, config.log_level, queued=True, secrets=config.api_key)
+    setup.configure(config.log_format, config.log_level, queued=True, secrets=config.api_key)
     if (closed := _closed(config.data_dir)) is not None:
         log.warning(CLOSED, os.geteuid(), closed.stat().st_uid, closed)
 

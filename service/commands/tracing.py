@@ -13,10 +13,9 @@ import numpy as np
 from gpu import GpuError
 from service.commands import Failed
 from service.commands.progress import ProgressLine
-from service.quality import forecast
-from service.rendering.ipc import messages
-from service.rendering.ipc.kernel_messages import KernelMeasured
-from service.rendering.ipc.messages import (
+from service.ipc import messages
+from service.ipc.kernel_messages import KernelMeasured
+from service.ipc.messages import (
     Done,
     FromRenderer,
     Image,
@@ -28,10 +27,11 @@ from service.rendering.ipc.messages import (
     Update,
     View,
 )
-from service.rendering.worker.context import WorkerContext
-from service.rendering.worker.helpers.compile_client import CompileClient
-from service.rendering.worker.helpers.denoise_client import DenoiseClient
-from service.rendering.worker.task import Task
+from service.quality import forecast
+from service.worker.context import WorkerContext
+from service.worker.helpers.compile_client import CompileClient
+from service.worker.helpers.denoise_client import DenoiseClient
+from service.worker.task import Task
 
 if TYPE_CHECKING:
     from gpu import Renderer

@@ -2,6 +2,7 @@
 
 encoders  how each format is written
 metadata  what PNG and EXR files carry beside their pixels
+recipe    what a picture was made from, in that metadata
 """
 
 from __future__ import annotations

@@ -9,6 +9,7 @@ bsdf         a material's BSDF as numbers
 assets       uploads
 documents    saved scenes and materials
 presets      built-in documents
+metrics      /metrics, in Prometheus' format
 info         what the service is, whether it lives, what its documents look like
 answers      what answers look like, for the API's description
 errors       errors as problem+json

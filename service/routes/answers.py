@@ -9,11 +9,12 @@ from typing import Annotated, Any, Literal
 from fastapi import Path
 from pydantic import BaseModel, Field
 
-from service import documents, presets
+from service import presets
 from service.problems import ANSWERS
-from service.rendering.requests.bsdf_request import MOST_SAMPLES
-from service.rendering.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
+from service.requests.bsdf_request import MOST_SAMPLES
+from service.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
 from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE, TERMS
+from service.storage import documents
 
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
 TITLES = {row.status: row.title for row in ANSWERS.values()}

@@ -16,13 +16,13 @@ from fastapi.responses import JSONResponse
 from service import presets
 from service.assets import AssetInfo
 from service.assets.scene_import import Imported
-from service.bodies import SMALL
-from service.downloads import FileAnswer
+from service.http.downloads import FileAnswer
 from service.problems import UnsupportedMedia
-from service.rendering.executors import opening, storing, storing_small
+from service.requests.bodies import SMALL
 from service.routes import answers
 from service.scene.text import dump_json
 from service.state import app_state, caller, owner
+from service.system.executors import opening, storing, storing_small
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 

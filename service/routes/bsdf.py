@@ -11,15 +11,15 @@ from typing import Any
 import numpy as np
 from fastapi import APIRouter, Request, Response
 
+from service.ipc.messages import EvaluateBsdf
 from service.pack import pack_material
-from service.rendering.executors import packing
-from service.rendering.ipc.messages import EvaluateBsdf
-from service.rendering.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfRequest
-from service.rendering.requests.request_parser import Kind
+from service.requests.bsdf_request import MOST_PAIRS, MOST_WORK, BsdfRequest
+from service.requests.request_parser import Kind
 from service.routes import answers
 from service.routes.errors import GONE
 from service.routes.waiting import until
 from service.state import STARTING_S, app_state, caller, owner
+from service.system.executors import packing
 
 router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
 

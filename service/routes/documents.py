@@ -8,7 +8,9 @@ from urllib.parse import urlencode
 
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 
-from service.documents import (
+from service.routes import answers
+from service.state import app_state, caller, owner
+from service.storage.documents import (
     BY_LINK,
     LINK_DAYS,
     LONGEST_NAME,
@@ -18,9 +20,7 @@ from service.documents import (
     check_kind,
     etag,
 )
-from service.rendering.executors import saving
-from service.routes import answers
-from service.state import app_state, caller, owner
+from service.system.executors import saving
 
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
 

@@ -15,8 +15,8 @@ from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 from starlette.types import Receive, Scope, Send
 
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.queue import RenderQueue
+from service.renders.job import Job
+from service.renders.queue import RenderQueue
 from service.routes.waiting import place
 from service.state import app_state, bodiless, caller
 

@@ -11,10 +11,10 @@ from fastapi import APIRouter, Request, Response
 from fastapi.responses import JSONResponse, PlainTextResponse
 
 from service import scene
-from service.metrics import MIME, scrape
-from service.rendering.streams import protocol
 from service.routes import answers
+from service.routes.metrics import MIME, scrape
 from service.state import app_state
+from service.streams import protocol
 
 router = APIRouter(tags=["service"])
 

@@ -15,17 +15,18 @@ from fastapi import APIRouter, Header, Query, Request, Response
 from fastapi.responses import JSONResponse
 from pydantic import BaseModel, ConfigDict, Field
 
-from service import images, recipe, views
-from service.downloads import Downloads, FileAnswer, Written, present
+from service import images, views
+from service.http.downloads import Downloads, FileAnswer, Written, present
+from service.images import recipe
+from service.ipc.messages import View
 from service.problems import Conflict, FieldError, InvalidDocument, Unavailable
-from service.rendering.executors import writing
-from service.rendering.ipc.messages import View
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.store.record import State
-from service.rendering.requests.request_parser import LONGEST_LABEL, unfolded
+from service.renders.job import Job
+from service.renders.store.record import State
+from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
 from service.state import MOST_WAITS, app_state, caller, owner
+from service.system.executors import writing
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
 
 router = APIRouter(prefix="/v1", tags=["renders"])

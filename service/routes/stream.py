@@ -9,8 +9,8 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from starlette.websockets import WebSocketState
 
 from service.problems import NotFound, ServiceError, TooManyRequests
-from service.rendering.streams.stream import LOST, Attendance, Stream
 from service.state import app_state, owner
+from service.streams.stream import LOST, Attendance, Stream
 
 router = APIRouter()
 

@@ -15,13 +15,13 @@ from typing import Any
 from starlette.requests import Request
 
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, Unavailable
-from service.quota import Quota
-from service.rendering.executors import opening, packing
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.status import status
-from service.rendering.jobs.store.record import IdempotencyKey, Order, StoredRender
-from service.rendering.requests.request_parser import ParsedRequest
+from service.renders.job import Job
+from service.renders.status import status
+from service.renders.store.record import IdempotencyKey, Order, StoredRender
+from service.requests.request_parser import ParsedRequest
 from service.state import STARTING_S, AppState, app_state, caller, owner
+from service.storage.quota import Quota
+from service.system.executors import opening, packing
 
 ID_BYTES = 16  # 128 bits: an id cannot be guessed; as hex digits: none of them reads as an option in a shell
 LONGEST_KEY = 200  # characters

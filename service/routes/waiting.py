@@ -9,7 +9,7 @@ from typing import Any
 
 from starlette.requests import Request
 
-from service.downloads import disconnected
+from service.http.downloads import disconnected
 from service.state import app_state, caller
 
 

@@ -11,6 +11,7 @@ validation      what pydantic says, as errors with pointers
 error_location  a pointer into the document, from pydantic's
 text            JSON texts: parsed, weighed and bounded
 patch           JSON merge patches
+references      the assets that a document refers to
 schema          the schema that editors are made from
 """
 

@@ -18,14 +18,14 @@ from gpu import Renderer, RenderSettings, Scene
 from gpu.analysis.kernel_cost import full_kernel
 from gpu.kernels import features
 from gpu.precompile import fallback
+from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
+from service.ipc.orders import Pause
 from service.pack import pack
-from service.rendering.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
-from service.rendering.ipc.orders import Pause
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.device.loaded_scene import KernelRequest
-from service.rendering.worker.helpers.compile_client import records
-from service.rendering.worker.view.fallback_preview import FallbackPreview
+from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
+from service.worker.device.loaded_scene import KernelRequest
+from service.worker.helpers.compile_client import records
+from service.worker.view.fallback_preview import FallbackPreview
 from tests.documents import Shelf
 from tests.gpu.test_flags import IMAGES, SCENES
 from tests.gpu.test_precompile import Ears

@@ -9,12 +9,12 @@ from typing import Any
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.precompile import fallback
 from gpu.precompile.kernel_keys import keys_after_edit
+from service.ipc.messages import Foresee, Frame, Loaded, StopRule, Update, View, Want, driver_of
 from service.pack import pack
-from service.rendering.ipc.messages import Foresee, Frame, Loaded, StopRule, Update, View, Want, driver_of
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.device.loaded_scene import begin_key, slider_keys
-from service.rendering.worker.helpers.compile_client import records
+from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
+from service.worker.device.loaded_scene import begin_key, slider_keys
+from service.worker.helpers.compile_client import records
 from tests.documents import Shelf
 from tests.gpu.test_precompile import SIZE, Ears, arrays, arrays_of, cold
 from tests.serving import PATIENCE_S, SCENE

@@ -11,7 +11,7 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.kernels import cache
 from gpu.kernels.cache import KernelCache
-from service.rendering.worker.helpers import compile_client
+from service.worker.helpers import compile_client
 from tests.gpu.test_precompile import arrays_of
 
 TEXT = """

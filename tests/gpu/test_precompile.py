@@ -16,13 +16,13 @@ import pytest
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import common_keys, kernel_key
+from service.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.pack import pack
-from service.rendering.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.device.loaded_scene import LoadedScene, kernel_request
-from service.rendering.worker.helpers.compile_client import CompileClient, Compiled, records
-from service.rendering.worker.helpers.compile_main import LOCKS
+from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
+from service.worker.device.loaded_scene import LoadedScene, kernel_request
+from service.worker.helpers.compile_client import CompileClient, Compiled, records
+from service.worker.helpers.compile_main import LOCKS
 from tests.documents import Shelf
 from tests.serving import PATIENCE_S, SCENE, wait_until
 from tests.supervisors import with_supervisor
@@ -379,7 +379,7 @@ def is_there(pid: int) -> bool:
 def test_the_other_end_of_a_pipe_is_a_lifeline() -> None:
     """Of two that share it, in the middle of a loop that never looks."""
     read, write = os.pipe()
-    program = "import sys\nfrom service.rendering.worker.helpers.lifeline import end_with_pipe\n"
+    program = "import sys\nfrom service.worker.helpers.lifeline import end_with_pipe\n"
     program += "print(end_with_pipe(int(sys.argv[1])), flush=True)\nwhile True: pass"
     command = [sys.executable, "-c", program, str(read)]
     both = [subprocess.Popen(command, pass_fds=[read], stdout=subprocess.PIPE, text=True) for _ in range(2)]

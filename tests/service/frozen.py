@@ -25,7 +25,7 @@ from contextlib import closing
 from pathlib import Path
 from typing import Any
 
-from service.database import FILE
+from service.storage.database import FILE
 from tests.service.rendering.test_durable import kill
 from tests.serving import SCENE, Server
 

@@ -13,10 +13,10 @@ import pytest
 
 from service import presets
 from service.config import Config
-from service.database import Database
-from service.documents import BY_LINK, PRIVATE, SHARED, checked
 from service.problems import InvalidDocument, NotFound
-from service.storage import Storage, storage
+from service.storage.database import Database
+from service.storage.documents import BY_LINK, PRIVATE, SHARED, checked
+from service.storage.stores import Storage, storage
 from tests.asset_files import OBJ, glb, gltf, png
 from tests.service.test_quota import mesh_scene
 from tests.service.test_rest import is_problem

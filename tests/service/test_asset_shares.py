@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from service.config import Config
-from service.database import Database
-from service.disk_usage import Usage
-from service.documents import checked
 from service.problems import TooLarge, Unavailable
-from service.storage import Storage, storage
+from service.storage.database import Database
+from service.storage.documents import checked
+from service.storage.stores import Storage, storage
+from service.system.disk_usage import Usage
 from tests.asset_files import OBJ, glb, gltf
 from tests.service.test_quota import ASSET, file, here, mesh_scene
 

@@ -12,11 +12,11 @@ from typing import Any
 import pytest
 
 from service.app import create_app
-from service.bodies import SMALL
 from service.config import Config
-from service.rendering.executors import storing
+from service.requests.bodies import SMALL
 from service.routes.submission import _pinned
 from service.state import AppState
+from service.system.executors import storing
 
 MIB = 1 << 20
 GREY = b'{"type": "diffuse", "albedo": 0.5}'

@@ -14,7 +14,7 @@ import httpx
 import numpy as np
 import pytest
 
-from service.rendering.requests.bsdf_request import MOST_PAIRS, MOST_WORK, in_plane, normalized
+from service.requests.bsdf_request import MOST_PAIRS, MOST_WORK, in_plane, normalized
 from service.routes.bsdf import _values
 from tests import baseline
 from tests.probing import materials

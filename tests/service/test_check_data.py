@@ -13,11 +13,11 @@ import pytest
 
 from service import cli
 from service.config import Config
-from service.data_check import Report, check
-from service.data_lock import locked
-from service.database import FILE
-from service.documents import checked
-from service.storage import Storage, storage
+from service.storage.data_check import Report, check
+from service.storage.data_lock import locked
+from service.storage.database import FILE
+from service.storage.documents import checked
+from service.storage.stores import Storage, storage
 from tests.asset_files import OBJ
 from tests.serving import SCENE
 

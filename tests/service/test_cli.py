@@ -24,8 +24,8 @@ from service.cli import main
 from service.commands.progress import ProgressLine, describe
 from service.config import load_config
 from service.images import read_metadata
-from service.rendering.ipc.messages import Progress
-from service.rendering.worker.progress import stop_rules, truncated_light
+from service.ipc.messages import Progress
+from service.worker.progress import stop_rules, truncated_light
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -251,9 +251,9 @@ def test_target_noise_ends_a_render_at_the_same_samples_however_fast_it_is(
     """In turns of a slice and of many passes, and however rarely the noise is read in between."""
     found = []
     for turn_s, slice_s, pause in ((0.0, 1e-5, 0), (1.0, 0.1, 1000)):
-        monkeypatch.setattr("service.rendering.worker.task.SLICE_S", turn_s)
+        monkeypatch.setattr("service.worker.task.SLICE_S", turn_s)
         monkeypatch.setattr("gpu.picture.tiles.SLICE_S", slice_s)
-        monkeypatch.setattr("service.rendering.worker.progress.noise.PAUSE", pause)
+        monkeypatch.setattr("service.worker.progress.noise.PAUSE", pause)
         out, stats = tmp_path / f"{pause}.npy", tmp_path / f"{pause}.json"
         more = {"width": 64, "height": 64, "target_noise": 0.012, "sampler": "independent"}
         size = [part for name, value in more.items() for part in ("--set", f"{name}={value}")]

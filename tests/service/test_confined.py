@@ -19,10 +19,10 @@ import pytest
 
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.types import AssetLimits
-from service.child_processes import ROOT, Children, inherited_environment
-from service.confined import Rights, seccomp
-from service.confined.landlock import RIGHTS
-from service.confined.system_calls import AUDIT_ARCH, READING, system_calls
+from service.system.child_processes import ROOT, Children, inherited_environment
+from service.system.confined import Rights, seccomp
+from service.system.confined.landlock import RIGHTS
+from service.system.confined.system_calls import AUDIT_ARCH, READING, system_calls
 from tests import privileges
 from tests.serving import SCENE, SMALL, Server, families
 
@@ -31,7 +31,7 @@ PYTHONS = {"as the tests": privileges._own, "without capabilities": None}
 TRIES = """
 import ctypes, fcntl, json, os, resource, signal, socket, struct, subprocess, sys
 from dataclasses import asdict
-from service.confined import confine, landlock, renounce, seccomp
+from service.system.confined import confine, landlock, renounce, seccomp
 folder, victim, layer = sys.argv[1], int(sys.argv[2]), sys.argv[3]
 if layer == "landlock":
     seccomp.restrict = lambda calls: False
@@ -145,7 +145,7 @@ BY_ANYTHING = {"read the server's memory", "write the server's memory", "read th
 @pytest.fixture
 def victim() -> Iterator[int]:
     """A process as the server is one: of the same user, with secrets in its memory and environment."""
-    program = "from service.confined import hide; assert hide(); print(flush=True); input()"
+    program = "from service.system.confined import hide; assert hide(); print(flush=True); input()"
     process = subprocess.Popen(
         [sys.executable, "-c", program],
         cwd=ROOT,
@@ -212,7 +212,7 @@ def test_seccomp_alone(tmp_path: Path, victim: int, python: str) -> None:
 
 def test_the_children_that_parse_have_given_up_their_rights(caplog: pytest.LogCaptureFixture) -> None:
     caplog.set_level("INFO")
-    bodies = Children("service.rendering.requests.parser_child", 1)
+    bodies = Children("service.requests.parser_child", 1)
     with Sandbox(AssetLimits()) as box:
         rights = box.rights()
         assert rights == box.rights() == bodies.rights()

@@ -16,11 +16,11 @@ import pytest
 import uvicorn
 from starlette.types import Message, Receive, Scope, Send
 
-from service import connection_limits, guard
 from service.config import Config
-from service.connection_limits import Room, Watch
-from service.connections import connection_class, listen
-from service.guard import Guard, open_for_health, turning_away
+from service.http import connection_limits, guard
+from service.http.connection_limits import Room, Watch
+from service.http.connections import connection_class, listen
+from service.http.guard import Guard, open_for_health, turning_away
 from service.problems import Unavailable
 from service.routes.errors import respond
 

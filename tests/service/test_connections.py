@@ -13,7 +13,7 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service.connections import JOINED, MOST_BESIDE, JoinedWrites
+from service.http.connections import JOINED, MOST_BESIDE, JoinedWrites
 from tests.serving import Server
 
 
@@ -150,7 +150,7 @@ def test_a_vanished_peer_is_noticed(server: Server) -> None:
 
 @pytest.mark.parametrize("host", ["127.0.0.1", "::1"])
 def test_a_listener_hands_its_options_on(host: str) -> None:
-    from service.connections import listen
+    from service.http.connections import listen
 
     try:
         listener = listen(host, 0)

@@ -13,9 +13,9 @@ from types import SimpleNamespace
 
 import pytest
 
-from service import cpu_time
-from service.cpu_time import LEAST, RunnableTime, elapsed_s, ran
-from service.rendering.supervisor.process import Options, Process
+from service.renderers.local.process import Options, Process
+from service.system import cpu_time
+from service.system.cpu_time import LEAST, RunnableTime, elapsed_s, ran
 
 SECOND = 10**9
 

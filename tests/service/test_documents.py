@@ -20,14 +20,15 @@ import pytest
 import uvicorn
 from starlette.requests import Request
 
-from service import app, database, documents, migrations
+from service import app
 from service.assets import AssetStore
 from service.config import Config
-from service.database import DamagedFile
-from service.documents import Documents, checked
-from service.downloads import Downloads, FileAnswer
+from service.http.downloads import Downloads, FileAnswer
 from service.problems import Forbidden, NotFound, TooLarge, Unavailable
 from service.routes.documents import document
+from service.storage import database, documents, migrations
+from service.storage.database import DamagedFile
+from service.storage.documents import Documents, checked
 from tests.asset_files import OBJ
 from tests.service.test_rest import is_problem
 from tests.serving import SCENE, Server
@@ -95,7 +96,7 @@ def test_documents_survive_a_kill(saved: Documents, store: AssetStore, tmp_path:
 import sys
 from pathlib import Path
 from service.assets import AssetStore
-from service.documents import Documents, checked
+from service.storage.documents import Documents, checked
 folder = Path({str(tmp_path)!r})
 documents = Documents(folder, AssetStore(folder))
 for i in range(10 ** 6):

@@ -15,8 +15,8 @@ import numpy as np
 import pytest
 from starlette.types import Message, Receive, Scope, Send
 
-from service import downloads
-from service.downloads import PIECE, Downloads, FileAnswer, Pieces
+from service.http import downloads
+from service.http.downloads import PIECE, Downloads, FileAnswer, Pieces
 from service.problems import TooManyRequests, Unavailable
 from tests.service.test_operation import metrics
 from tests.serving import PATIENCE_S, SCENE, Server, wait_until

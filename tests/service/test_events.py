@@ -6,7 +6,7 @@ import asyncio
 from contextlib import suppress
 from typing import Any, cast
 
-from service.rendering.jobs.job import Job
+from service.renders.job import Job
 from service.routes import events
 from tests.counting import in_simulated_time
 

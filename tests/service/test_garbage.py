@@ -6,7 +6,7 @@ import gc
 
 import pytest
 
-from service.garbage import collector_paused
+from service.system.garbage import collector_paused
 
 
 def test_it_rests_until_the_last_pause_ends() -> None:

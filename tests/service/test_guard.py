@@ -19,9 +19,9 @@ from websockets.sync.client import connect
 from websockets.typing import Subprotocol
 
 from service.config import Config, ConfigError, load_config
-from service.downloads import disconnected
-from service.guard import Guard, _Body
-from service.keys import Keys
+from service.http.downloads import disconnected
+from service.http.guard import Guard, _Body
+from service.http.keys import Keys
 from service.problems import Unauthorized
 from service.routes.errors import respond
 from tests.service.test_rest import OBJ, is_problem

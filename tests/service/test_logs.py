@@ -15,7 +15,8 @@ from urllib.parse import urlsplit
 
 import pytest
 
-from service import log_output, logs
+from service.logs import output as log_output
+from service.logs import setup
 from tests.service.test_operation import metrics
 from tests.serving import PATIENCE_S, Client, Server, wait_until
 
@@ -27,7 +28,7 @@ log = logging.getLogger("service.test")
 @pytest.fixture
 def untouched() -> Iterator[None]:
     """Logging as it was before the test."""
-    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in logs.ROOMS]
+    root, rooms = logging.getLogger(), [logging.getLogger(room) for room in setup.ROOMS]
     before, levels, hooks = (
         root.handlers[:],
         [each.level for each in (root, *rooms)],
@@ -54,7 +55,7 @@ def failing(secret: str = "a-local-secret") -> None:
 
 @pytest.mark.parametrize("form", ["console", "json"])
 def test_tracebacks_are_plain_and_rare(form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
-    logs.configure(form, "info")
+    setup.configure(form, "info")
     for _ in range(5):
         failing()
     (output,) = logging.getLogger().handlers
@@ -80,8 +81,8 @@ def test_who_logs_does_not_wait(untouched: None, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr(logging.StreamHandler, "emit", write)
     monkeypatch.setattr(log_output.atexit, "register", lambda stop: None)
-    logs.configure("json", "info", queued=True)
-    with logs.structlog.contextvars.bound_contextvars(request="mine"):
+    setup.configure("json", "info", queued=True)
+    with setup.structlog.contextvars.bound_contextvars(request="mine"):
         log.info("first count=%d", 1)
         failing()
     (queued,) = logging.getLogger().handlers
@@ -118,7 +119,7 @@ def test_nobody_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
 )
 @pytest.mark.parametrize("form", ["console", "json"])
 def test_no_secret_is_logged(text: str, form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
-    logs.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
+    setup.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
     log.info("heard text=%s", text)
     log.info(text)
     told = capfd.readouterr().err
@@ -127,7 +128,7 @@ def test_no_secret_is_logged(text: str, form: str, untouched: None, capfd: pytes
 
 def test_libraries_speak_of_what_matters(untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
     """uvicorn tells each WebSocket's address at INFO, query included; numba's DEBUG is thousands of lines."""
-    logs.configure("json", "debug")
+    setup.configure("json", "debug")
     for name in ("uvicorn.error", "numba.core.ssa", "PIL.PngImagePlugin", "asyncio", "websockets"):
         logging.getLogger(name).info("something happened")
     assert not capfd.readouterr().err
@@ -175,7 +176,7 @@ def test_every_message_has_its_fields_last() -> None:
             if not (isinstance(call, ast.Call) and ast.unparse(call.func).startswith("log.")):
                 continue
             for message in (each.value for each in call.args if isinstance(each, ast.Constant)):
-                fields = [bool(match["field"]) for match in logs.CONVERSION.finditer(str(message))]
+                fields = [bool(match["field"]) for match in setup.CONVERSION.finditer(str(message))]
                 where = f"{path}:{call.lineno}: {message}"
                 assert fields == sorted(fields) and fields.count(False) <= 1, where
                 assert not str(message).endswith(": %s"), where

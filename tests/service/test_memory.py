@@ -15,20 +15,20 @@ import pytest
 from starlette.requests import Request
 
 from gpu import context
-from service import memory
 from service.assets import AssetStore, ImageData
 from service.assets.cache import ParsedCache
 from service.assets.types import AssetLimits
-from service.bodies import Bodies
 from service.config import MIB, Config
-from service.memory import MemoryBudget, machine_memory
 from service.pack import CacheBudget, PackCache
 from service.problems import TooLarge, Unavailable
-from service.rendering.jobs.memory import PICTURE_BYTES, SAVED_BYTES
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.streams import protocol
-from service.rendering.streams.edit_session import EditSession
-from service.rendering.worker.device.memory import UNLIMITED, default_limit
+from service.renders.memory import PICTURE_BYTES, SAVED_BYTES
+from service.requests.bodies import Bodies
+from service.requests.request_reader import RequestReader
+from service.streams import protocol
+from service.streams.edit_session import EditSession
+from service.system import memory
+from service.system.memory import MemoryBudget, machine_memory
+from service.worker.device.memory import UNLIMITED, default_limit
 from tests.serving import PATIENCE_S, SCENE, Client, Server
 from tests.test_privileges import served
 

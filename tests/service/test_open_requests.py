@@ -15,7 +15,7 @@ import pytest
 
 from service.app import create_app, server_settings
 from service.config import Config, ConfigError, load_config
-from service.guard import OPEN_OF_A_KEY, Guard
+from service.http.guard import OPEN_OF_A_KEY, Guard
 from service.routes.errors import respond
 from tests.service.test_rest import is_problem
 from tests.serving import Server

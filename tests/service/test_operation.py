@@ -18,10 +18,11 @@ import httpx
 import pytest
 import uvicorn
 
-from service import app, config, logs
+from service import app, config
 from service.config import Config
-from service.logs import _fields
-from service.metrics import scrape
+from service.logs import setup
+from service.logs.setup import _fields
+from service.routes.metrics import scrape
 from service.state import AppState
 from tests.serving import ENDLESS, SCENE, SMALL, Server, client, wait_until
 
@@ -165,7 +166,7 @@ def test_logging_is_set_up_once(capfd: pytest.CaptureFixture[str]) -> None:
     root = logging.getLogger()
     before, level = root.handlers[:], root.level
     try:
-        logs.configure("json", "warning")
+        setup.configure("json", "warning")
         logging.getLogger("a.b").warning("what happened count=%d", 3)
         logging.getLogger("a.b").info("not told")
         told = json.loads(capfd.readouterr().err)

@@ -15,10 +15,10 @@ import pytest
 from service.assets import AssetStore
 from service.assets.folder_totals import TOTALS
 from service.config import Config
-from service.disk_usage import BLOCK, Usage
-from service.documents import checked
 from service.problems import AssetError, InvalidDocument, NotFound, TooLarge, Unavailable, UnsupportedMedia
-from service.storage import Storage, storage
+from service.storage.documents import checked
+from service.storage.stores import Storage, storage
+from service.system.disk_usage import BLOCK, Usage
 from tests.asset_files import OBJ, glb, gltf
 from tests.serving import SCENE
 

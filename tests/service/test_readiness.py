@@ -10,16 +10,16 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from service import readiness
 from service.assets import Assets
 from service.config import Config
+from service.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, Update, Want
+from service.operation import readiness
+from service.operation.readiness import Readiness
 from service.problems import Unavailable
-from service.readiness import Readiness
-from service.rendering.first_frame import foresee, warm_up
-from service.rendering.ipc.messages import Failed, Foresee, Frame, Progress, ToRenderer, Update, Want
-from service.rendering.renderers import Listener
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.statistics import Kind, Statistics
+from service.renderers.first_frame import foresee, warm_up
+from service.renderers.protocol import Listener
+from service.renderers.statistics import Kind, Statistics
+from service.requests.request_reader import RequestReader
 
 READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]
 

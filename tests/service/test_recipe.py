@@ -10,11 +10,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import recipe
 from service.cli import main
-from service.images import read_metadata
+from service.images import read_metadata, recipe
 from service.images.metadata import png_with_text
 from service.problems import InvalidDocument
+from service.scene import references
 from tests.serving import PATIENCE_S, SCENE, Server
 
 OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n"
@@ -146,10 +146,10 @@ def test_references_are_found_where_they_may_stand() -> None:
         "materials": {"assets": {"type": "a", "asset": "no"}},
         "shapes": [{"asset": "a"}, 3, {"asset": 4}],
     }
-    assert recipe.references(document) == ["a", "b", "c"]
-    renamed = recipe.renamed(document, str.upper)
+    assert references.references(document) == ["a", "b", "c"]
+    renamed = references.renamed(document, str.upper)
     assert renamed["materials"] == document["materials"] and renamed["shapes"] == [{"asset": "A"}, 3, {"asset": 4}]
-    assert recipe.references("nonsense") == []
+    assert references.references("nonsense") == []
 
 
 def test_recipe_is_validated() -> None:

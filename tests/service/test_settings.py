@@ -11,8 +11,8 @@ import pytest
 from service.config import ConfigError, load_config, unknown_variables
 from service.problems import InvalidDocument
 from service.quality import PRESETS, ResolvedSettings, resolve
-from service.rendering.worker.progress import truncated_light
 from service.scene import Settings, parse_settings
+from service.worker.progress import truncated_light
 
 NAN, INF = float("nan"), float("inf")
 

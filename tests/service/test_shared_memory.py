@@ -7,9 +7,9 @@ import os
 
 import numpy as np
 
-from service import shared_memory
-from service.rendering.ipc import channel
-from service.shared_memory import LEAST, SharedArena, locate
+from service.ipc import channel
+from service.system import shared_memory
+from service.system.shared_memory import LEAST, SharedArena, locate
 
 
 def descriptors() -> int:

@@ -7,7 +7,7 @@ import random
 import pytest
 
 from service.problems import TooLarge, TooManyRequests, Unavailable
-from service.shares import Shares
+from service.system.shares import Shares
 
 
 def test_one_caller_leaves_a_quarter_to_each_other() -> None:

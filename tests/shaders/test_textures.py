@@ -17,8 +17,8 @@ from gpu.layout import texture_records
 from gpu.layout.bindings import Slot
 from service.pack import pack, pack_materials, repacked
 from service.problems import InvalidDocument
-from service.rendering.streams.scene_diff import SceneDiff, scene_diff
 from service.scene import parse_scene
+from service.streams.scene_diff import SceneDiff, scene_diff
 from tests.documents import Few
 from tests.probing import PROBES
 from tests.rendering import Images, document, render

@@ -21,9 +21,9 @@ import numpy as np
 from service.assets.errors import ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile
-from service.confined import bound, cap, confine, renounce, unbind
-from service.garbage import collector_paused
-from service.shared_memory import trim
+from service.system.confined import bound, cap, confine, renounce, unbind
+from service.system.garbage import collector_paused
+from service.system.shared_memory import trim
 
 NICENESS = 5
 LARGE = 1 << 20  # bytes of a file after which memory is given back to the system

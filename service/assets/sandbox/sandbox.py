@@ -13,9 +13,9 @@ from service.assets.errors import ParseError
 from service.assets.formats import KINDS
 from service.assets.sandbox.wire import Array, adopt, memory, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, MeshOddities, SceneFile, ScenePart
-from service.child_processes import Child, Children, Closed, signal_name
-from service.confined import Rights
-from service.turns import Turns
+from service.system.child_processes import Child, Children, Closed, signal_name
+from service.system.confined import Rights
+from service.system.turns import Turns
 
 log = logging.getLogger(__name__)
 

@@ -23,7 +23,7 @@ from service.pack.geometry.warnings import counted
 from service.pack.geometry.world import ShapeMaterials, World, place
 from service.pack.parameters import vec3
 from service.scene.shape import Shape
-from service.shared_memory import LEAST, SharedArena, trim
+from service.system.shared_memory import LEAST, SharedArena, trim
 
 MANY = 100_000  # triangles from which on the memory that packing needed is given back to the system
 

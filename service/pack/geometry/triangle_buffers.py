@@ -12,7 +12,7 @@ import numpy as np
 from gpu.layout import Node, Triangle, TriangleNormals
 from service.pack.geometry.meshes import Triangles
 from service.pack.geometry.shared_meshes import SharedMesh
-from service.shared_memory import SharedArena
+from service.system.shared_memory import SharedArena
 
 
 @dataclass(frozen=True)

@@ -16,14 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service import child_processes, cpu_time
 from service.assets import ImageData, MeshData
 from service.assets.errors import ParseError
 from service.assets.sandbox import sandbox
 from service.assets.sandbox.sandbox import Sandbox
 from service.assets.sandbox.wire import adopt, memory, publish
 from service.assets.types import AssetLimits, MeshOddities
-from service.child_processes import Children
+from service.system import child_processes, cpu_time
+from service.system.child_processes import Children
 from tests.asset_files import OBJ, TRIANGLE, exr
 from tests.serving import wait_until
 

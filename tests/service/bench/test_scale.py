@@ -13,7 +13,7 @@ import pytest
 from service.bench import scale, scale_report
 from service.bench.scale_model import BLOCK, Costs, Network, Work, limits, simulate, speedup, steady_speedup
 from service.cli import main
-from service.rendering.worker.division.home import EACH
+from service.worker.division.home import EACH
 
 FREE = Network(1e15)
 COSTS = Costs(sample_s=4e-7, write_s=0.0, merge_s=0.0, meter_pixels=0)

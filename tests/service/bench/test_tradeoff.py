@@ -14,8 +14,8 @@ from service.bench import pareto, tradeoff, tradeoff_report
 from service.bench.tradeoff_scenes import TradeoffAssets, bumps, cases, planks
 from service.cli import main
 from service.pack import pack
-from service.rendering.worker.progress.truncated_light import LIMITS
 from service.scene import parse_scene
+from service.worker.progress.truncated_light import LIMITS
 from tests.serving import PATIENCE_S, SCENE, Server
 
 

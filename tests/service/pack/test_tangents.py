@@ -15,8 +15,8 @@ from service.assets import AssetStore, MeshData
 from service.pack import pack
 from service.pack.geometry.tangents import codes
 from service.pack.geometry.vertex_normals import decode
-from service.rendering.streams.scene_diff import scene_diff
 from service.scene import parse_scene
+from service.streams.scene_diff import scene_diff
 from tests.documents import Shelf, matrix_of
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
 from tests.probing import prober_of

@@ -14,11 +14,11 @@ import pytest
 
 from gpu import Renderer
 from gpu.precompile import kernel_keys
+from service.ipc.messages import EvaluateBsdf, Image, Loaded, Read, StopRule, Update
 from service.pack import pack, pack_material
 from service.problems import TooManyRequests
-from service.rendering.bsdf import LONG_AT_ONCE, MOST, BsdfQuestions
-from service.rendering.ipc.messages import EvaluateBsdf, Image, Loaded, Read, StopRule, Update
-from service.rendering.supervisor.supervisor import Supervisor
+from service.renderers.bsdf_questions import LONG_AT_ONCE, MOST, BsdfQuestions
+from service.renderers.local.supervisor import Supervisor
 from service.scene import PrincipledMaterial, parse_scene
 from tests.documents import Shelf
 from tests.gpu.test_precompile import LINEAR, SIZE, Ears, helpers

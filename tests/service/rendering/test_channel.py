@@ -11,8 +11,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.rendering.ipc import channel
-from service.rendering.ipc.messages import Frame, Progress, StopRule, Update, View, Want
+from service.ipc import channel
+from service.ipc.messages import Frame, Progress, StopRule, Update, View, Want
 
 
 @pytest.fixture

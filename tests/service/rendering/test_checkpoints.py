@@ -17,8 +17,8 @@ import pytest
 
 from gpu import Renderer, RenderSettings
 from gpu.picture.blocks import FIRST
-from service.rendering.ipc import channel
-from service.rendering.ipc.messages import (
+from service.ipc import channel
+from service.ipc.messages import (
     Checkpoint,
     Done,
     Image,
@@ -29,11 +29,11 @@ from service.rendering.ipc.messages import (
     StopRule,
     Update,
 )
-from service.rendering.ipc.orders import CheckpointStored, Stop
-from service.rendering.jobs.recorder import Recorder
-from service.rendering.jobs.store.store import RenderStore
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.device import checkpoints
+from service.ipc.orders import CheckpointStored, Stop
+from service.renderers.local.supervisor import Supervisor
+from service.renders.recorder import Recorder
+from service.renders.store.store import RenderStore
+from service.worker.device import checkpoints
 from tests.gpu.test_precompile import LINEAR, arrays_of
 from tests.service.rendering.test_worker import Ears, settings
 from tests.supervisors import with_supervisor

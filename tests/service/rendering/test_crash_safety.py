@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from service.rendering.ipc.messages import Checkpoint, Done, Progress
-from service.rendering.jobs.recorder import Recorder
-from service.rendering.jobs.store.pictures import PictureFiles
-from service.rendering.jobs.store.record import Outcome, StoredRender
-from service.rendering.jobs.store.rows import RenderRows
-from service.rendering.jobs.store.store import RenderStore
+from service.ipc.messages import Checkpoint, Done, Progress
+from service.renders.recorder import Recorder
+from service.renders.store.pictures import PictureFiles
+from service.renders.store.record import Outcome, StoredRender
+from service.renders.store.rows import RenderRows
+from service.renders.store.store import RenderStore
 from tests.service.rendering.test_render_store import DOCUMENT, order, picture
 
 HALF, WHOLE = Progress(8, 0.2, 1.0), Progress(64, 0.1, 4.0)

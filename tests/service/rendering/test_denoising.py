@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from service.cli import main
-from service.rendering.worker.helpers.denoise_client import DIED, DenoiseClient, DenoiseResult, denoise_request
+from service.worker.helpers.denoise_client import DIED, DenoiseClient, DenoiseResult, denoise_request
 from tests.serving import PATIENCE_S, SCENE, Client, Server
 from tests.serving import client as opened
 
@@ -211,7 +211,7 @@ def test_a_denoiser_that_dies_is_replaced_and_then_given_up() -> None:
 def test_the_helper_ends_with_its_parent() -> None:
     program = (
         "import sys, numpy as np\n"
-        "from service.rendering.worker.helpers.denoise_client import DenoiseClient, denoise_request\n"
+        "from service.worker.helpers.denoise_client import DenoiseClient, denoise_request\n"
         "d = DenoiseClient(); a = np.ones((64, 64, 4), np.float32)\n"
         "d.ask(denoise_request(a, (a[..., :3], a[..., :3]), True), print)\n"
         "sys.stdout.write(str(d.process_id)); sys.stdout.flush()\n"

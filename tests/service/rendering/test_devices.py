@@ -15,14 +15,14 @@ import pytest
 from gpu import Renderer, devices, software_device
 from service import app
 from service import config as configs
-from service.child_processes import inherited_environment
 from service.config import Config, ConfigError, load_config
-from service.rendering.ipc import channel
-from service.rendering.supervisor import devices as seating
-from service.rendering.supervisor import process
-from service.rendering.supervisor.devices import missing_device, seats
-from service.rendering.supervisor.process import THREADS, Options
-from service.rendering.worker.helpers import compile_main
+from service.ipc import channel
+from service.renderers.local import process
+from service.renderers.local.process import THREADS, Options
+from service.renderers.pool import devices as seating
+from service.renderers.pool.devices import missing_device, seats
+from service.system.child_processes import inherited_environment
+from service.worker.helpers import compile_main
 from tests.serving import SCENE, Server
 
 GPU, PROCESSOR = {"name": "/dev/dri/card0", "software": False}, {"name": "software", "software": True}
@@ -146,7 +146,7 @@ def test_a_server_with_two(gpu: Renderer, tmp_path: Path) -> None:
         pytest.skip("there is one core")
     server = Server(tmp_path, SUNBOX_DEVICES="llvmpipe:2")
     server.wait()
-    workers = [pid for pid in server.children() if b"rendering.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
+    workers = [pid for pid in server.children() if b"service.worker" in Path(f"/proc/{pid}/cmdline").read_bytes()]
     share = configs.cores() // 2
     for worker in workers:
         threads = [(path / "comm").read_text() for path in Path(f"/proc/{worker}/task").iterdir()]

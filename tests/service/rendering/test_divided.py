@@ -13,10 +13,10 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
-from service.rendering.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule, Update, View, Want
-from service.rendering.renderers import Place
-from service.rendering.supervisor.pool import Pool, Seat
-from service.rendering.supervisor.process import Options, Process
+from service.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule, Update, View, Want
+from service.renderers.local.process import Options, Process
+from service.renderers.pool.pool import Pool, Seat
+from service.renderers.protocol import Place
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.test_pool import impatient
 from tests.service.rendering.test_worker import LINEAR, Ears, settings

@@ -14,16 +14,16 @@ import pytest
 
 from gpu import Band, OutOfMemory, Renderer, RenderSettings, Saved, Steps, border_after
 from gpu.picture.accumulators import Accumulators
-from service.rendering.ipc.leases import Lease, LeaseDone, LeaseRefuted
-from service.rendering.ipc.messages import Failed, Progress, Restore, StopRule, Update, driver_of
-from service.rendering.jobs.store.pictures import PictureFiles
-from service.rendering.worker.context import WorkerContext
-from service.rendering.worker.division.assistant import Assistant
-from service.rendering.worker.division.home import Home
-from service.rendering.worker.division.ledger import MOST_BYTES, PIXEL_BYTES, Ledger
-from service.rendering.worker.helpers.denoise_client import DenoiseClient
-from service.rendering.worker.payloads import saved_bands, saved_picture, sent_picture
-from service.rendering.worker.task import Task
+from service.ipc.leases import Lease, LeaseDone, LeaseRefuted
+from service.ipc.messages import Failed, Progress, Restore, StopRule, Update, driver_of
+from service.renders.store.pictures import PictureFiles
+from service.worker.context import WorkerContext
+from service.worker.division.assistant import Assistant
+from service.worker.division.home import Home
+from service.worker.division.ledger import MOST_BYTES, PIXEL_BYTES, Ledger
+from service.worker.helpers.denoise_client import DenoiseClient
+from service.worker.payloads import saved_bands, saved_picture, sent_picture
+from service.worker.task import Task
 from tests.gpu.test_precompile import arrays_of
 
 FIRST, SIZE = 8, 64  # samples: the first border, and the distance of the others
@@ -151,7 +151,7 @@ def test_assistants_do_most_of_it_where_they_answer_at_once() -> None:
 
 def test_a_lease_that_never_comes_back_is_traced_at_home(monkeypatch: pytest.MonkeyPatch) -> None:
     now = [0.0]
-    monkeypatch.setattr("service.rendering.worker.division.home.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("service.worker.division.home.time.monotonic", lambda: now[0])
     picture = _Picture()
     home, leases = _home(picture, (1,))
     for _ in range(1000):
@@ -211,7 +211,7 @@ def test_what_was_done_of_a_long_block_is_saved_and_not_traced_again(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     now = [0.0]
-    monkeypatch.setattr("service.rendering.worker.division.home.time.monotonic", lambda: now[0])
+    monkeypatch.setattr("service.worker.division.home.time.monotonic", lambda: now[0])
     picture = _Picture(samples=SIZE)
     home, leases = _home(picture, (1,))
     for _ in range(20):
@@ -319,7 +319,7 @@ def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
 @pytest.mark.parametrize("wrong", [None, 1])
 def test_results_are_traced_again_and_compared(wrong: int | None, monkeypatch: pytest.MonkeyPatch) -> None:
     """The picture has the home's bits then; whoever sends others assists no more, and its results are dropped."""
-    monkeypatch.setattr("service.rendering.worker.division.home.CHECKED", 1.0)
+    monkeypatch.setattr("service.worker.division.home.CHECKED", 1.0)
     monkeypatch.setattr(_Picture, "read_band", lambda self, band: np.full(3, band.top, np.float32))
     picture = _Picture()
     home, sent = _home(picture, (1, 2))

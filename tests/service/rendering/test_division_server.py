@@ -9,11 +9,11 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from service.rendering.ipc.channel import Encoded
-from service.rendering.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
-from service.rendering.ipc.messages import Done, Failed, Progress, StopRule, ToRenderer, Update
-from service.rendering.ipc.orders import Drop, Pause, Resume
-from service.rendering.supervisor.division import Division
+from service.ipc.channel import Encoded
+from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
+from service.ipc.messages import Done, Failed, Progress, StopRule, ToRenderer, Update
+from service.ipc.orders import Drop, Pause, Resume
+from service.renderers.pool.division import Division
 
 SCENE = cast(Any, "a scene")
 

@@ -22,12 +22,12 @@ import pytest
 
 from gpu import Renderer
 from service.config import MIB, Config
-from service.database import FILE
 from service.quality import resolve
-from service.rendering.jobs.store.record import Order, Outcome
-from service.rendering.jobs.store.store import RenderStore
-from service.rendering.requests.request_parser import folded
+from service.renders.store.record import Order, Outcome
+from service.renders.store.store import RenderStore
+from service.requests.request_parser import folded
 from service.scene import parse_settings
+from service.storage.database import FILE
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, wait_until
 from tests.serving import Server as AnyServer
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import pytest
 
-from service.rendering.ipc.messages import StopRule
-from service.rendering.worker.progress.eta import EtaEstimate
+from service.ipc.messages import StopRule
+from service.worker.progress.eta import EtaEstimate
 
 
 def gone(

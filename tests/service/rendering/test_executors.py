@@ -7,8 +7,8 @@ import threading
 
 import pytest
 
-from service.rendering.executors import ClientExecutor, Pool
-from service.turns import CALLER
+from service.system.executors import ClientExecutor, Pool
+from service.system.turns import CALLER
 
 
 def test_a_flood_delays_its_sender_alone() -> None:

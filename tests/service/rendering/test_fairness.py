@@ -9,11 +9,11 @@ from typing import Any
 import pytest
 
 from gpu import Renderer
+from service.ipc.messages import FromRenderer, StopRule, Update
+from service.ipc.orders import Pause
 from service.pack import pack
-from service.rendering.ipc.messages import FromRenderer, StopRule, Update
-from service.rendering.ipc.orders import Pause
-from service.rendering.statistics import Kind
-from service.rendering.supervisor.supervisor import Supervisor
+from service.renderers.local.supervisor import Supervisor
+from service.renderers.statistics import Kind
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.serving import SCENE

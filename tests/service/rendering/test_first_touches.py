@@ -14,12 +14,12 @@ from service import presets
 from service.bench.scenes import BenchAssets
 from service.bench.sliders import Slider, sliders
 from service.config import Config
-from service.rendering.ipc.messages import Update
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.streams import protocol
-from service.rendering.streams.edit_session import EditSession
-from service.rendering.worker.device.loaded_scene import KernelRequest, LoadedScene, kernel_request
-from service.rendering.worker.payloads import updated_scene
+from service.ipc.messages import Update
+from service.requests.request_reader import RequestReader
+from service.streams import protocol
+from service.streams.edit_session import EditSession
+from service.worker.device.loaded_scene import KernelRequest, LoadedScene, kernel_request
+from service.worker.payloads import updated_scene
 
 SETTINGS = {"width": 256, "height": 256}
 SHARES = (0.0, 0.618, 1.0)  # of a slider's range: it is dragged to its ends, too

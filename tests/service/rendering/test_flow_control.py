@@ -8,10 +8,10 @@ from collections.abc import Awaitable, Callable
 import numpy as np
 import pytest
 
+from service.ipc.messages import Frame, Progress, Want
 from service.problems import InvalidDocument
-from service.rendering.ipc.messages import Frame, Progress, Want
-from service.rendering.streams.flow_control import PATIENCE_S, FlowControl
-from service.rendering.streams.protocol import View
+from service.streams.flow_control import PATIENCE_S, FlowControl
+from service.streams.protocol import View
 from tests.counting import in_simulated_time
 
 PIXELS = np.zeros((1, 1, 4), np.uint8)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import asyncio
 from dataclasses import dataclass, field
 
-from service.rendering.jobs.followers import Changes, Followers
+from service.renders.followers import Changes, Followers
 
 
 @dataclass

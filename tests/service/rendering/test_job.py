@@ -12,10 +12,7 @@ import numpy as np
 import pytest
 
 from service.config import Config
-from service.pack import Packed, pack
-from service.problems import Conflict, Internal, Unavailable
-from service.quality import resolve
-from service.rendering.ipc.messages import (
+from service.ipc.messages import (
     Checkpoint,
     Done,
     Image,
@@ -27,12 +24,15 @@ from service.rendering.ipc.messages import (
     Update,
     View,
 )
-from service.rendering.ipc.orders import Stop, TakeCheckpoint
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.recorder import MOST_STARTS, Recorder
-from service.rendering.jobs.store.record import Order, Outcome
-from service.rendering.jobs.store.store import RenderStore
-from service.rendering.statistics import Statistics
+from service.ipc.orders import Stop, TakeCheckpoint
+from service.pack import Packed, pack
+from service.problems import Conflict, Internal, Unavailable
+from service.quality import resolve
+from service.renderers.statistics import Statistics
+from service.renders.job import Job
+from service.renders.recorder import MOST_STARTS, Recorder
+from service.renders.store.record import Order, Outcome
+from service.renders.store.store import RenderStore
 from service.scene import parse_scene, parse_settings
 from tests.documents import Shelf
 from tests.serving import SCENE

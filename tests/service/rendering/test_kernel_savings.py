@@ -16,11 +16,11 @@ import pytest
 from gpu import KernelKey, Renderer, RenderSettings
 from gpu.kernels import features
 from service.cli import main
-from service.rendering.ipc.kernel_messages import KernelMeasured, MeasureKernel
-from service.rendering.ipc.messages import Done, StopRule, Update
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.context import WorkerContext
-from service.rendering.worker.kernel_savings import NO_KERNEL, NO_PICTURE, KernelSavings
+from service.ipc.kernel_messages import KernelMeasured, MeasureKernel
+from service.ipc.messages import Done, StopRule, Update
+from service.renderers.local.supervisor import Supervisor
+from service.worker.context import WorkerContext
+from service.worker.kernel_savings import NO_KERNEL, NO_PICTURE, KernelSavings
 from tests.extremes.scenes import LONG
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.test_worker import Ears, settings

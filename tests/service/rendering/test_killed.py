@@ -10,11 +10,11 @@ from pathlib import Path
 import pytest
 
 from gpu import Renderer
+from service.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.problems import Unavailable
-from service.rendering.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
-from service.rendering.supervisor import restarts
-from service.rendering.supervisor.process import Options
-from service.rendering.supervisor.supervisor import Supervisor
+from service.renderers.local import restarts
+from service.renderers.local.process import Options
+from service.renderers.local.supervisor import Supervisor
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.test_worker import LINEAR, Ears, settings
 from tests.supervisors import with_supervisor

@@ -11,15 +11,15 @@ import pytest
 
 from service import cli
 from service.config import Config
-from service.database import FILE
-from service.disk_usage import Usage
-from service.lost_pictures import KEEP
+from service.ipc.messages import Progress
 from service.problems import Unavailable
-from service.rendering.ipc.messages import Progress
-from service.rendering.jobs.store.pictures import PictureFiles
-from service.rendering.jobs.store.record import Outcome
-from service.rendering.jobs.store.store import RenderStore
-from service.storage import storage
+from service.renders.store.pictures import PictureFiles
+from service.renders.store.record import Outcome
+from service.renders.store.store import RenderStore
+from service.storage.database import FILE
+from service.storage.lost_pictures import KEEP
+from service.storage.stores import storage
+from service.system.disk_usage import Usage
 from tests.service.rendering.test_render_store import DOCUMENT, PROGRESS, order, picture
 
 DATABASE = [FILE, f"{FILE}-wal", f"{FILE}-shm"]

@@ -12,13 +12,13 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
+from service.ipc import messages
+from service.ipc.messages import Done, Frame, Image, Loaded, Read, StopRule, Update, View, Want
+from service.ipc.orders import Hold
 from service.pack import pack
-from service.rendering.ipc import messages
-from service.rendering.ipc.messages import Done, Frame, Image, Loaded, Read, StopRule, Update, View, Want
-from service.rendering.ipc.orders import Hold
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.task import HOLD_S
+from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
+from service.worker.task import HOLD_S
 from tests.documents import Shelf
 from tests.service.rendering.test_worker import ENDLESS, LINEAR, Ears, settings
 from tests.serving import SCENE

@@ -19,11 +19,11 @@ import numpy as np
 import pytest
 
 from service.config import MIB, Config
+from service.ipc import channel
 from service.problems import InvalidDocument, MalformedJson, ServiceError, TooLarge
-from service.rendering.ipc import channel
-from service.rendering.requests import parser_pool
-from service.rendering.requests.parser_pool import ParserPool
-from service.rendering.requests.request_parser import RequestParser, unfolded
+from service.requests import parser_pool
+from service.requests.parser_pool import ParserPool
+from service.requests.request_parser import RequestParser, unfolded
 from service.scene import MeshShape, load_json
 from service.scene.text import most_bytes, weigh
 from tests.serving import SCENE, SMALL

@@ -10,9 +10,8 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.problems import Unavailable
-from service.rendering.ipc import channel
-from service.rendering.ipc.messages import (
+from service.ipc import channel
+from service.ipc.messages import (
     Checkpoint,
     Done,
     Failed,
@@ -27,11 +26,12 @@ from service.rendering.ipc.messages import (
     View,
     Want,
 )
-from service.rendering.ipc.orders import Pause, Resume, Settle
-from service.rendering.renderers import Place
-from service.rendering.supervisor import restarts
-from service.rendering.supervisor.pool import Pool, Seat
-from service.rendering.supervisor.process import Waiting
+from service.ipc.orders import Pause, Resume, Settle
+from service.problems import Unavailable
+from service.renderers.local import restarts
+from service.renderers.local.process import Waiting
+from service.renderers.pool.pool import Pool, Seat
+from service.renderers.protocol import Place
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.test_worker import LINEAR, Ears, settings
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from gpu import Renderer
-from service.rendering.ipc.messages import (
+from service.ipc.messages import (
     Checkpoint,
     Done,
     Frame,
@@ -25,9 +25,9 @@ from service.rendering.ipc.messages import (
     View,
     Want,
 )
-from service.rendering.renderers import Place
-from service.rendering.supervisor.pool import Pool, Seat
-from service.rendering.supervisor.process import Options, Process
+from service.renderers.local.process import Options, Process
+from service.renderers.pool.pool import Pool, Seat
+from service.renderers.protocol import Place
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.test_pool import impatient
 from tests.service.rendering.test_worker import LINEAR, Ears, settings

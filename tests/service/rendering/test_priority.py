@@ -10,12 +10,12 @@ import threading
 
 import pytest
 
-from service.rendering import priority
-from service.rendering.priority import raise_thread_niceness
+from service.system import priority
+from service.system.priority import raise_thread_niceness
 
 GIVES_WAY = """
 import os, threading
-from service.rendering.priority import raise_process_niceness
+from service.system.priority import raise_process_niceness
 
 def give_way():
     os.setpriority(os.PRIO_PROCESS, 0, 19)
@@ -34,7 +34,7 @@ print(*found, os.getpriority(os.PRIO_PROCESS, 0))
 """
 PACKS = """
 import asyncio, os
-from service.rendering.executors import packing
+from service.system.executors import packing
 
 os.nice(10)
 print(asyncio.run(packing(lambda: os.getpriority(os.PRIO_PROCESS, 0))))

@@ -17,17 +17,17 @@ import pytest
 
 from service import cli
 from service.config import Config
-from service.database import Database
+from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import FieldError, Internal, InvalidDocument, Unavailable
 from service.quality import resolve
-from service.rendering.ipc.messages import Progress, Restore, SavedPicture
-from service.rendering.jobs.store import rows
-from service.rendering.jobs.store import store as store_module
-from service.rendering.jobs.store.pictures import DamagedPicture, PictureFiles
-from service.rendering.jobs.store.record import IdempotencyKey, Order, Outcome
-from service.rendering.jobs.store.store import RenderStore
+from service.renders.store import rows
+from service.renders.store import store as store_module
+from service.renders.store.pictures import DamagedPicture, PictureFiles
+from service.renders.store.record import IdempotencyKey, Order, Outcome
+from service.renders.store.store import RenderStore
 from service.scene import parse_settings
-from service.storage import storage
+from service.storage.database import Database
+from service.storage.stores import storage
 
 SETTINGS = resolve(parse_settings({"width": 4, "height": 4}, "", None))
 PROGRESS = Progress(8, 0.25, 1.5, None, {4: 0.125})

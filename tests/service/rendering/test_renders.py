@@ -11,9 +11,9 @@ from typing import Any
 import pytest
 
 from service.problems import Gone, InvalidDocument, NotFound, TooManyRequests, Unavailable
-from service.rendering.jobs.followers import Changes
-from service.rendering.jobs.queue import QueueLimits, RenderQueue
-from service.rendering.jobs.retention import Retention
+from service.renders.followers import Changes
+from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.retention import Retention
 
 
 class Job:

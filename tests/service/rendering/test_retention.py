@@ -11,18 +11,18 @@ import numpy as np
 import pytest
 
 from service.config import MIB, Config
-from service.disk_usage import Usage
+from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import Gone, TooManyRequests, Unavailable
-from service.quota import QuotaUsedUp, reserve_bytes
-from service.rendering.ipc.messages import Progress, Restore, SavedPicture
-from service.rendering.jobs.documents import WaitingDocuments
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.queue import QueueLimits, RenderQueue
-from service.rendering.jobs.retention import KeptRenders, Retention
-from service.rendering.jobs.status import status
-from service.rendering.jobs.store.record import Order, Outcome
-from service.rendering.jobs.store.store import RenderStore
-from service.storage import Storage, storage
+from service.renders.documents import WaitingDocuments
+from service.renders.job import Job
+from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.retention import KeptRenders, Retention
+from service.renders.status import status
+from service.renders.store.record import Order, Outcome
+from service.renders.store.store import RenderStore
+from service.storage.quota import QuotaUsedUp, reserve_bytes
+from service.storage.stores import Storage, storage
+from service.system.disk_usage import Usage
 from tests.asset_files import OBJ
 from tests.service.rendering.test_job import SETTINGS, Renderers, load
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import pytest
 
-from service.rendering.streams.scene_diff import SceneDiff, may_be_refused, scene_diff
 from service.scene import Scene, merge_patch, parse_scene
+from service.streams.scene_diff import SceneDiff, may_be_refused, scene_diff
 from tests.serving import SCENE
 
 IMAGE = {"type": "image", "asset": "sha256:" + "1" * 64}

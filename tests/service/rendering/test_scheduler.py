@@ -8,11 +8,12 @@ import pytest
 
 from gpu import Renderer
 from gpu.picture.tiles import LEAST_A_PASS
+from service.ipc.messages import StopRule, Update
 from service.pack import pack
-from service.rendering.ipc.messages import StopRule, Update
-from service.rendering.worker.context import WorkerContext
-from service.rendering.worker.helpers.denoise_client import DenoiseClient
-from service.rendering.worker.scheduler import (
+from service.scene import parse_scene
+from service.worker.context import WorkerContext
+from service.worker.helpers.denoise_client import DenoiseClient
+from service.worker.scheduler import (
     CATCH_UP_S,
     FIRST_FRAME_LEAD_S,
     LATE_S,
@@ -20,8 +21,7 @@ from service.rendering.worker.scheduler import (
     Account,
     Scheduler,
 )
-from service.rendering.worker.task import HOLD_S, Task
-from service.scene import parse_scene
+from service.worker.task import HOLD_S, Task
 from tests.documents import Shelf
 from tests.serving import SCENE
 
@@ -68,7 +68,7 @@ def test_sharers_are_those_who_are_ready() -> None:
 
 def test_a_stream_among_many_takes_passes_of_one_sample(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that the next picture of each comes soon; nobody waits for the next pass of a render."""
-    monkeypatch.setattr("service.rendering.worker.task.SLICE_S", 0.0)  # a tile a turn
+    monkeypatch.setattr("service.worker.task.SLICE_S", 0.0)  # a tile a turn
     context = WorkerContext(gpu, lambda _: None, DenoiseClient(), sharers=lambda client: 10**6)
     arrays = pack(parse_scene(SCENE), Shelf()).arrays
     passes = {}

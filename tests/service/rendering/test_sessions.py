@@ -12,10 +12,10 @@ from websockets.exceptions import ConnectionClosed
 from service.assets import Assets
 from service.config import Config
 from service.problems import NotFound, TooManyRequests
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.streams import sessions
-from service.rendering.streams.sessions import Sessions
-from service.rendering.supervisor.supervisor import Supervisor
+from service.renderers.local.supervisor import Supervisor
+from service.requests.request_reader import RequestReader
+from service.streams import sessions
+from service.streams.sessions import Sessions
 from tests.service.test_operation import metrics
 from tests.serving import ENDLESS, PATIENCE_S, SMALL, Client, Picture, Server, wait_until
 

@@ -12,20 +12,20 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.memory import MemoryBudget
+from service.ipc.messages import Done, Progress, Restore, SavedPicture, Update, View
 from service.pack import Packed
 from service.quality import ResolvedSettings
-from service.rendering.ipc.messages import Done, Progress, Restore, SavedPicture, Update, View
-from service.rendering.jobs import preemption, slots
-from service.rendering.jobs.job import Job
-from service.rendering.jobs.memory import PICTURE_BYTES, SAVED_BYTES
-from service.rendering.jobs.preemption import giving_way
-from service.rendering.jobs.queue import QueueLimits, RenderQueue
-from service.rendering.jobs.slots import Slots
-from service.rendering.jobs.store.record import Order, Outcome
-from service.rendering.jobs.store.store import RenderStore
-from service.rendering.requests.request_reader import weight
-from service.rendering.supervisor.supervisor import Supervisor
+from service.renderers.local.supervisor import Supervisor
+from service.renders import preemption, slots
+from service.renders.job import Job
+from service.renders.memory import PICTURE_BYTES, SAVED_BYTES
+from service.renders.preemption import giving_way
+from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.slots import Slots
+from service.renders.store.record import Order, Outcome
+from service.renders.store.store import RenderStore
+from service.requests.request_reader import weight
+from service.system.memory import MemoryBudget
 from tests.service.rendering.test_job import PACKED, SETTINGS, Renderers, until
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from service.rendering.statistics import Distribution
+from service.renderers.statistics import Distribution
 
 
 def test_distribution() -> None:

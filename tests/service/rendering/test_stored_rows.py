@@ -15,13 +15,13 @@ import pytest
 from gpu import Renderer
 from service.commands.check_data import check_renders
 from service.config import Config
-from service.data_check import Report
-from service.database import FILE
-from service.documents import Documents
-from service.rendering.ipc.messages import Progress
-from service.rendering.jobs.store.rows import stored_renders
-from service.rendering.jobs.store.store import RenderStore
-from service.storage import storage
+from service.ipc.messages import Progress
+from service.renders.store.rows import stored_renders
+from service.renders.store.store import RenderStore
+from service.storage.data_check import Report
+from service.storage.database import FILE
+from service.storage.documents import Documents
+from service.storage.stores import storage
 from tests.service import frozen
 from tests.serving import Server
 

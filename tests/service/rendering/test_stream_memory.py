@@ -14,12 +14,12 @@ from service.assets import Assets
 from service.config import Config
 from service.pack import CacheBudget, PackCache
 from service.problems import InvalidDocument, TooLarge, TooManyRequests
-from service.rendering.requests.request_reader import RequestReader
-from service.rendering.streams import edit_session, protocol
-from service.rendering.streams.edit_session import EditSession
-from service.rendering.streams.stream import WAITING_CHARACTERS, Stream
-from service.rendering.supervisor.supervisor import Supervisor
-from service.turns import CALLER
+from service.renderers.local.supervisor import Supervisor
+from service.requests.request_reader import RequestReader
+from service.streams import edit_session, protocol
+from service.streams.edit_session import EditSession
+from service.streams.stream import WAITING_CHARACTERS, Stream
+from service.system.turns import CALLER
 from tests.serving import SCENE, SMALL
 
 KIB = 1 << 10

@@ -13,9 +13,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings
-from service.pack import pack
-from service.problems import Unavailable
-from service.rendering.ipc.messages import (
+from service.ipc.messages import (
     Done,
     Failed,
     Frame,
@@ -29,14 +27,16 @@ from service.rendering.ipc.messages import (
     View,
     Want,
 )
-from service.rendering.ipc.orders import Pause, Resume, Stop
-from service.rendering.supervisor.process import Options
-from service.rendering.supervisor.supervisor import Supervisor
-from service.rendering.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
-from service.rendering.worker.loop import coalesced
-from service.rendering.worker.progress.noise import NoiseReading
-from service.rendering.worker.progress.stop_rules import judged_after, judged_from, late, reached
+from service.ipc.orders import Pause, Resume, Stop
+from service.pack import pack
+from service.problems import Unavailable
+from service.renderers.local.process import Options
+from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
+from service.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
+from service.worker.loop import coalesced
+from service.worker.progress.noise import NoiseReading
+from service.worker.progress.stop_rules import judged_after, judged_from, late, reached
 from tests.documents import Shelf
 from tests.serving import PATIENCE_S, SCENE
 

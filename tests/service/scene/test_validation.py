@@ -10,12 +10,12 @@ import pytest
 
 from service.config import Config
 from service.problems import InvalidDocument
-from service.rendering.streams import protocol
 from service.scene import merge_patch, parse_scene
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Parsed
 from service.scene.shape import SphereShape
 from service.scene.validation import LONGEST_STEP
+from service.streams import protocol
 
 MANY = 100_000
 BALL = {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "grey"}

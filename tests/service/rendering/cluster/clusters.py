@@ -12,10 +12,10 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
-from service.rendering.cluster.cluster import Cluster
-from service.rendering.renderers import Place
-from service.rendering.supervisor.pool import Pool, Seat
-from service.rendering.supervisor.process import Options
+from service.renderers.local.process import Options
+from service.renderers.pool.pool import Pool, Seat
+from service.renderers.protocol import Place
+from service.renderers.ray.cluster import Cluster
 
 LIST_NODES = """
 import sys, ray

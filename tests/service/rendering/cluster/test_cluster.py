@@ -13,11 +13,11 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.rendering.cluster import cluster as clusters
-from service.rendering.cluster.cluster import RESTS, Cluster
-from service.rendering.ipc.messages import Checkpoint, Done, Image, Read, StopRule, Update
-from service.rendering.supervisor.pool import Pool
-from service.rendering.supervisor.supervisor import Supervisor
+from service.ipc.messages import Checkpoint, Done, Image, Read, StopRule, Update
+from service.renderers.local.supervisor import Supervisor
+from service.renderers.pool.pool import Pool
+from service.renderers.ray import cluster as clusters
+from service.renderers.ray.cluster import RESTS, Cluster
 from tests.gpu.test_precompile import LINEAR, arrays_of
 from tests.service.rendering.cluster.clusters import OPTIONS, descendants, kill, until, with_pool
 from tests.service.rendering.test_worker import Ears, settings
@@ -166,7 +166,7 @@ def test_actors_divide_a_render(run: Run) -> None:
     assert np.array_equal(*pictures)
 
 
-@pytest.mark.parametrize(("word", "cause"), [("rendering.worker", "killed"), ("ray::Renderer", "node lost")])
+@pytest.mark.parametrize(("word", "cause"), [("service.worker", "killed"), ("ray::Renderer", "node lost")])
 def test_a_render_goes_on_where_its_renderer_is_killed(run: Run, expected: np.ndarray, word: str, cause: str) -> None:
     async def test(pool: Pool) -> None:
         assert pool.process_id is not None

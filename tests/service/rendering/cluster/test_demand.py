@@ -8,10 +8,10 @@ from typing import Any
 
 import pytest
 
-from service.rendering.cluster.control import Joined
-from service.rendering.cluster.pool import IDLE_S, LONG_S, ClusterPool
-from service.rendering.cluster.renderers import room
-from service.rendering.supervisor.process import Start
+from service.renderers.local.process import Start
+from service.renderers.ray.control import Joined
+from service.renderers.ray.pool import IDLE_S, LONG_S, ClusterPool
+from service.renderers.ray.renderers import room
 from tests.service.rendering.test_pool import Fake
 from tests.service.rendering.test_worker import Ears
 

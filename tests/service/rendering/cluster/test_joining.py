@@ -16,16 +16,16 @@ import numpy as np
 import pytest
 
 from service.config import ConfigError, load_config
-from service.rendering.cluster import carriage, code, lane
-from service.rendering.cluster.carriage import Scenes, digest
-from service.rendering.cluster.cluster import Cluster
-from service.rendering.cluster.control import Ended
-from service.rendering.cluster.joining import CannotJoin, close_token_file
-from service.rendering.cluster.lane import Lane
-from service.rendering.cluster.renderers import described, plan
-from service.rendering.ipc import channel
-from service.rendering.ipc.messages import Unable, Update
-from service.rendering.supervisor.process import Waiting
+from service.ipc import channel
+from service.ipc.messages import Unable, Update
+from service.renderers.local.process import Waiting
+from service.renderers.ray import carriage, code, lane
+from service.renderers.ray.carriage import Scenes, digest
+from service.renderers.ray.cluster import Cluster
+from service.renderers.ray.control import Ended
+from service.renderers.ray.joining import CannotJoin, close_token_file
+from service.renderers.ray.lane import Lane
+from service.renderers.ray.renderers import described, plan
 from service.state import AppState
 from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.cluster.clusters import OPTIONS, until
@@ -112,7 +112,7 @@ def test_a_token_in_the_home_folder_is_left_to_its_owner(
 @needs_ray
 @pytest.mark.parametrize(("mode", "expected"), [("token", "True"), ("disabled", "False")])
 def test_a_cluster_without_a_token_is_known(mode: str, expected: str) -> None:
-    program = "from service.rendering.cluster.joining import has_token; print(has_token())"
+    program = "from service.renderers.ray.joining import has_token; print(has_token())"
     environment = os.environ | {"RAY_AUTH_MODE": mode}
     told = subprocess.run([sys.executable, "-c", program], env=environment, capture_output=True, text=True)
     assert told.stdout.strip() == expected, told.stderr

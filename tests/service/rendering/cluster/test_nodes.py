@@ -8,10 +8,10 @@ from collections.abc import Iterator
 import pytest
 
 from gpu import Renderer
+from service.ipc.messages import Checkpoint, Progressed
 from service.problems import Unavailable
-from service.rendering.cluster.cluster import Cluster
-from service.rendering.ipc.messages import Checkpoint, Progressed
-from service.rendering.supervisor.pool import Pool
+from service.renderers.pool.pool import Pool
+from service.renderers.ray.cluster import Cluster
 from tests.service.rendering.cluster.clusters import OPTIONS, Nodes, seats, until
 from tests.service.rendering.cluster.test_cluster import ENDLESS, begun
 

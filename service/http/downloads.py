@@ -1,0 +1,172 @@
+"""Large answers: sent in pieces, as the client takes them, from files that hold no memory.
+
+Pictures are written one at a time for each client, so that a client that asks for many delays itself alone, and what
+one client does not fetch leaves room for others.
+"""
+
+from __future__ import annotations
+
+import asyncio
+import errno
+import logging
+import os
+import tempfile
+import weakref
+from collections.abc import AsyncIterator, Callable, Hashable, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import BinaryIO
+
+from starlette.responses import Response
+from starlette.types import ASGIApp, Message, Receive, Scope, Send
+
+from service.problems import Unavailable
+from service.system.shares import Shares
+
+PIECE = 1 << 18  # bytes that are read and sent at a time
+AT_ONCE = 2  # pictures that are fetched from the renderer and written
+ROOM = 4 << 30  # bytes on the disk of pictures that are being sent, of all clients
+RETRY_S = 10
+READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
+
+log = logging.getLogger(__name__)
+
+
+class Pieces:
+    """ASGI middleware that sends bodies from memory in pieces: nothing is copied whole into the connection."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app = app
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        async def sending(message: Message) -> None:
+            body = message.get("body", b"")
+            if message["type"] != "http.response.body" or len(body) <= PIECE:
+                return await send(message)
+            view, more = memoryview(body), message.get("more_body", False)
+            for start in range(0, len(body), PIECE):
+                end = start + PIECE
+                await send({**message, "body": view[start:end], "more_body": more or end < len(body)})
+
+        await self._app(scope, receive, sending if scope["type"] == "http" else send)
+
+
+class FileAnswer(Response):
+    """The bytes of an open file, which need not have a name. `held` is kept until the answer's end."""
+
+    def __init__(self, file: BinaryIO, media_type: str, headers: Mapping[str, str], held: object = None) -> None:
+        self._file = file
+        self._held = held
+        self._size = os.fstat(file.fileno()).st_size
+        super().__init__(None, media_type=media_type, headers={**headers, "content-length": str(self._size)})
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        sent = 0
+        async with present(receive) as gone:
+            await send({"type": "http.response.start", "status": self.status_code, "headers": self.raw_headers})
+            while not gone():
+                data = await asyncio.to_thread(os.pread, self._file.fileno(), PIECE, sent)
+                sent += len(data)
+                if not data and sent < self._size:
+                    raise OSError(f"a file became shorter while it was sent: {sent} of {self._size} bytes")
+                await send({"type": "http.response.body", "body": data, "more_body": sent < self._size})
+                if sent >= self._size:
+                    break
+        self._held = None
+
+
+@asynccontextmanager
+async def present(receive: Receive) -> AsyncIterator[Callable[[], bool]]:
+    """Tells whether the client has gone away meanwhile; what it still sends is thrown away."""
+    listening = asyncio.ensure_future(disconnected(receive))
+    try:
+        yield lambda: listening.done() and listening.exception() is None
+    finally:
+        listening.cancel()
+        await asyncio.gather(listening, return_exceptions=True)
+
+
+async def disconnected(receive: Receive) -> None:
+    """Return once the client has gone away."""
+    while (await receive())["type"] != "http.disconnect":
+        pass
+
+
+class Written:
+    """A picture's file. It has no name, and is deleted with the last reference to this object."""
+
+    def __init__(self, file: BinaryIO) -> None:
+        self.file = file
+        self.bytes = os.fstat(file.fileno()).st_size
+
+
+class Downloads:
+    """Pictures that are written and sent, for the event loop."""
+
+    def __init__(self, folder: Path) -> None:
+        self._folder = folder
+        self._room = asyncio.Semaphore(AT_ONCE)
+        self._turns: weakref.WeakValueDictionary[str, asyncio.Lock] = weakref.WeakValueDictionary()
+        self._written: weakref.WeakValueDictionary[Hashable, Written] = weakref.WeakValueDictionary()
+        self._shares = Shares(ROOM, "pictures that are being sent", retry_s=RETRY_S)  # bytes on the disk
+
+    @asynccontextmanager
+    async def turn(self, client: str) -> AsyncIterator[None]:
+        """Wait for the client's turn to have a picture written: each client has one at a time."""
+        mine = self._turns.setdefault(client, asyncio.Lock())
+        async with mine, self._room:
+            yield
+
+    async def answer(
+        self, client: str, data: bytes, media_type: str, headers: Mapping[str, str] | None = None
+    ) -> Response:
+        """An answer that holds little memory: large ones come from a file. Raises Unavailable."""
+        if len(data) <= PIECE:
+            return Response(data, media_type=media_type, headers=headers)
+
+        def fill(file: BinaryIO) -> None:
+            file.write(data)
+
+        self.admit(client, len(data))
+        written = await asyncio.to_thread(self.write, fill)
+        self.keep(client, None, written)
+        return FileAnswer(written.file, media_type, headers or {}, written)
+
+    def find(self, key: Hashable) -> Written | None:
+        """A picture that is still being sent to somebody."""
+        return self._written.get(key)
+
+    def admit(self, client: str, most_bytes: int) -> None:
+        """Raise TooManyRequests or Unavailable where that many more bytes are too much, for the client or for all.
+
+        What is more than a quarter of the room is admitted like a quarter, so that a picture of any size can be sent.
+        """
+        self._shares.check(client, min(most_bytes, ROOM // 4))
+
+    def write(self, fill: Callable[[BinaryIO], None]) -> Written:
+        """A file that `fill` has written. For any thread. Raises Unavailable where the disk takes no more."""
+        try:
+            file = self._new_file()
+            fill(file)
+            file.flush()
+        except OSError as error:
+            log.error("could not write an answer error=%s", error)
+            raise Unavailable("The answer could not be written to the disk.", RETRY_S) from None
+        return Written(file)
+
+    def _new_file(self) -> BinaryIO:
+        """A file without a name beside the data, or a temporary one where the data is read-only."""
+        try:
+            self._folder.mkdir(parents=True, exist_ok=True)
+            return tempfile.TemporaryFile(dir=self._folder)
+        except OSError as error:
+            if error.errno not in READ_ONLY:
+                raise
+            return tempfile.TemporaryFile()
+
+    def keep(self, client: str, key: Hashable | None, written: Written) -> None:
+        """Count a picture while it is being sent; with `key`, `find` leads other requests to it."""
+        if key is not None:
+            self._written[key] = written
+        self._shares.count(client, written.bytes)
+        weakref.finalize(written, self._shares.release, client, written.bytes)

@@ -1,0 +1,375 @@
+"""What the server and the renderer's process say to each other. Immutable; arrays inside travel as shared memory."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any, Literal, Protocol
+
+import numpy as np
+
+from service.ipc.kernel_messages import KernelMeasured, MeasureKernel
+from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
+from service.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.views import DEFAULT_TONE_MAP, Encoding
+
+BsdfQuestion = Literal["values", "albedo", "terms"]
+Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
+
+EDITS = (  # what `Scene.edit` takes
+    "camera", "materials", "texture_words", "microfacets", "environment", "environment_map", "moved"
+)  # fmt: skip
+
+
+LARGE = 4 << 20  # bytes, which are copied in about a millisecond
+
+
+class SceneData(Protocol):
+    """A gpu.SceneArrays, of which the server reads nothing: it may not import gpu."""
+
+    @property
+    def materials(self) -> np.ndarray: ...
+
+
+@dataclass(frozen=True)
+class StopRule:
+    """Rendering ends at the first of these; None: no such limit."""
+
+    max_samples: int | None = None
+    time_limit: float | None = None  # s
+    target_noise: float | None = None
+
+
+@dataclass(frozen=True)
+class View:
+    """How a picture is to be shown; changing it costs no samples."""
+
+    aov: str = "color"
+    exposure: float = 0.0
+    tone_map: str = DEFAULT_TONE_MAP
+    encoding: Encoding = "u1"
+
+
+@dataclass(frozen=True)
+class Progress:
+    samples: int = 0
+    noise: float | None = None
+    elapsed_s: float = 0.0
+    eta_s: float | None = None
+    missing: dict[int, float] | None = None  # by bounces, the share of the scene's light that comes later
+
+
+@dataclass(frozen=True)
+class SavedPicture:
+    """The accumulated samples of a picture: with the same scene and settings it goes on to the same bits.
+
+    The server knows nothing of what is in `buffers`, which are arrays of bytes.
+    """
+
+    samples: int
+    under_way: tuple[int, int, int]  # samples of the pass, row and column of its next tile
+    buffers: list[np.ndarray]
+    driver: str = ""  # whose bits these are: only with an equal one they are gone on with; "": nobody knows
+    # Bands that were done of blocks that were not merged yet: first sample, number of samples, first row, number of
+    # rows. Their values are the last ones of `buffers`.
+    bands: tuple[tuple[int, int, int, int], ...] = ()
+
+    @property
+    def nbytes(self) -> int:
+        return sum(buffer.nbytes for buffer in self.buffers)
+
+
+def driver_of(info: Mapping[str, Any]) -> str:
+    """The driver and its version by what `gpu.Renderer.info` says: with equal ones a picture has equal bits."""
+    return f"{info.get('renderer', '')} {info.get('version', '')}".strip()
+
+
+# --- to the renderer ---
+
+
+@dataclass(frozen=True)
+class Update:
+    """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
+
+    `settings` are the arguments of gpu.RenderSettings. Any of these, or of EDITS, starts accumulation again; `stop`
+    and `denoise` do not.
+    """
+
+    task: int
+    generation: int
+    scene: SceneData | None = None
+    settings: dict[str, Any] | None = None
+    stop: StopRule | None = None
+    camera: np.void | None = None  # gpu.layout.Camera
+    materials: np.ndarray | None = None
+    texture_words: np.ndarray | None = None
+    microfacets: np.ndarray | None = None
+    environment: tuple[float, float] | None = None
+    environment_map: object = None  # a gpu.EnvironmentArrays; `environment` comes with it
+    moved: Mapping[str, object] | None = None  # a gpu.MovedArrays
+    denoise: bool | None = None
+    base: int | None = None  # the generation that it changes; without one it is whole
+    client: str = ""  # tasks of one client share its part of the GPU's time
+    interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
+
+    @property
+    def edits(self) -> dict[str, Any]:
+        return {name: getattr(self, name) for name in EDITS if getattr(self, name) is not None}
+
+    @property
+    def is_large(self) -> bool:
+        """Whether copying it to shared memory is too much for the event loop."""
+        if self.scene is not None:
+            return True
+        members = {**(self.moved or {}), **(vars(self.environment_map) if self.environment_map is not None else {})}
+        return sum(part.nbytes for part in members.values() if isinstance(part, np.ndarray)) > LARGE
+
+    @property
+    def restarts(self) -> bool:
+        return self.scene is not None or self.settings is not None or bool(self.edits)
+
+    def then(self, later: Update) -> Update:
+        """This update and a later one of the same task as one."""
+        if later.scene is not None:  # a whole scene: the edits before it are in it
+            denoise = self.denoise if later.denoise is None else later.denoise
+            settings, stop = later.settings or self.settings, later.stop or self.stop
+            return replace(later, settings=settings, stop=stop, denoise=denoise)
+        names = ("settings", "stop", "denoise", *EDITS)
+        values = {name: getattr(later, name) for name in names if getattr(later, name) is not None}
+        if self.moved is not None and later.moved is not None:
+            values["moved"] = {**self.moved, **later.moved}
+        return replace(self, generation=later.generation, **values)
+
+
+@dataclass(frozen=True)
+class Foresee:
+    """Asks for the kernels to be compiled with which a stream would begin this scene and touch its sliders. The task
+    has no other use."""
+
+    task: int
+    scene: SceneData
+    settings: dict[str, Any]  # the arguments of gpu.RenderSettings
+
+
+@dataclass(frozen=True)
+class Want:
+    """Asks for one Frame, as soon as there is newer content than the last one showed; with `anyway` at once."""
+
+    task: int
+    serial: int
+    view: View
+    anyway: bool = False
+
+
+@dataclass(frozen=True)
+class Read:
+    """Asks for one Image of the picture so far."""
+
+    task: int
+    serial: int
+    view: View
+
+
+@dataclass(frozen=True)
+class Restore:
+    """The picture of a task whose scene was just sent again, as it was when Done or Checkpoint brought it."""
+
+    task: int
+    generation: int
+    saved: SavedPicture
+    reason: Reason | None  # why it had ended; None: it goes on
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class EvaluateBsdf:
+    """Asks for one Evaluated: the result of the method `question` of gpu.BsdfEvaluator. The task has no other use."""
+
+    task: int
+    question: BsdfQuestion
+    material: SceneData  # of one material
+    wo: np.ndarray  # (n, 3), unit length
+    wi: np.ndarray  # (m, 3), unit length; for "albedo" none
+    samples: int = 0  # for "albedo"
+    lobes: bool = False  # for "values": each lobe alone, too
+    client: str = ""
+
+
+# --- from the renderer ---
+
+
+@dataclass(frozen=True)
+class Ready:
+    info: dict[str, Any]  # of the GL implementation
+
+    @property
+    def driver(self) -> str:
+        return driver_of(self.info)
+
+
+@dataclass(frozen=True)
+class Unable:
+    """Says why there is no renderer on this machine."""
+
+    detail: str
+
+
+@dataclass(frozen=True)
+class Loaded:
+    task: int
+    generation: int
+    setup_s: float
+    compile_ms: float
+    raised: tuple[str, ...]  # features that the kernel was compiled with, and those that were left out
+    spared: tuple[str, ...]
+    warnings: list[str]
+
+    @property
+    def kernel(self) -> dict[str, Any]:
+        """What a render's status says of its kernel."""
+        return {"raised": list(self.raised), "not_raised": list(self.spared), "compile_ms": self.compile_ms}
+
+
+@dataclass(frozen=True)
+class Frame:
+    """Pixels (height, width, 4) for a Want; `last`: nothing better will follow."""
+
+    task: int
+    serial: int
+    generation: int
+    pixels: np.ndarray
+    progress: Progress
+    scale: float
+    last: bool
+    denoised: bool = False
+    provisional: bool = False  # the generation may still fail
+
+
+@dataclass(frozen=True)
+class Image:
+    """Pixels (height, width, channels) for a Read; None before the first sample."""
+
+    task: int
+    serial: int
+    pixels: np.ndarray | None
+    progress: Progress
+    denoised: bool = False
+
+
+@dataclass(frozen=True)
+class Progressed:
+    task: int
+    generation: int
+    progress: Progress
+
+
+@dataclass(frozen=True)
+class Done:
+    task: int
+    generation: int
+    reason: Reason
+    progress: Progress
+    warnings: list[str]
+    saved: SavedPicture | None = None  # of a render that no stream edits; None: no samples
+
+
+@dataclass(frozen=True)
+class Checkpoint:
+    """The picture of a render under way, to go on from should this renderer be lost."""
+
+    task: int
+    generation: int
+    progress: Progress
+    saved: SavedPicture
+
+
+@dataclass(frozen=True)
+class Evaluated:
+    """The members of a gpu.BsdfValues, BsdfAlbedo or BsdfTerms, by name."""
+
+    task: int
+    arrays: dict[str, np.ndarray]
+
+
+@dataclass(frozen=True)
+class Evicted:
+    """The renderer no longer has this finished task; Restore brings it back."""
+
+    task: int
+
+
+@dataclass(frozen=True)
+class Discarded:
+    """A Restore of a picture under way did not fit, as another driver or version had saved it: it begins again."""
+
+    task: int
+
+
+@dataclass(frozen=True)
+class Usage:
+    """GPU seconds by task and samples of pixels since the last Usage, and what the device stores now."""
+
+    gpu_s: dict[int, float]
+    samples: int
+    tasks: int
+    bytes: int  # on the device
+    kernels: int
+    evicted: int  # kernels, since the last one
+    task: int = 0  # of nobody in particular
+
+
+@dataclass(frozen=True)
+class Failed:
+    """An update failed: the task goes on with generation `fallback`; None: not before there is a whole scene.
+
+    `refused`: the scene asks for too much.
+    """
+
+    task: int
+    generation: int
+    detail: str
+    refused: bool = False
+    serial: int | None = None  # of the Read that failed, when only that did
+    fallback: int | None = None
+
+
+ToRenderer = (
+    Update
+    | Foresee
+    | Want
+    | Read
+    | Pause
+    | Resume
+    | Hold
+    | Stop
+    | Drop
+    | Settle
+    | TakeCheckpoint
+    | CheckpointStored
+    | Restore
+    | MeasureKernel
+    | EvaluateBsdf
+    | Assist
+    | Assistants
+    | Lease
+    | LeaseDone
+)
+Heard = (  # of a renderer that has started
+    Usage
+    | Loaded
+    | Frame
+    | Image
+    | Progressed
+    | Checkpoint
+    | Done
+    | KernelMeasured
+    | Evaluated
+    | Evicted
+    | Discarded
+    | Failed
+    | Lease
+    | LeaseDone
+    | LeaseFailed
+    | LeaseRefuted
+)
+FromRenderer = Ready | Unable | Heard

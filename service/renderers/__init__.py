@@ -1,0 +1,12 @@
+"""The renderers as the server sees them: processes of this machine, or of a cluster, behind one protocol.
+
+protocol        what the server asks of its renderers
+local           one process: started, watched, replaced, and its tasks replayed when it is lost
+pool            several renderers behind one door; a picture divided among them
+ray             renderers on the hosts of a Ray cluster, behind the same supervisor
+task            one task as the server has it
+replay_log      the messages of one task, so that another renderer can go on with it
+statistics      counters and distributions, for /metrics
+first_frame     the first frame of a scene that no client asked for: for readiness, and to warm up
+bsdf_questions  questions about the BSDF of one material
+"""

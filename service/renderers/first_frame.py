@@ -1,0 +1,109 @@
+"""The first frame of a scene that no client asked for: readiness looks at it, and a start is warmed up by it."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import time
+from collections.abc import Iterable
+from functools import partial
+from typing import Any
+
+from service.ipc.messages import Failed, Foresee, Frame, FromRenderer, StopRule, Update, View, Want
+from service.pack import Packed, warm_builder, warm_light_tree
+from service.problems import ServiceError, Unavailable
+from service.renderers.protocol import Renderers
+from service.requests.request_reader import RequestReader
+from service.system.executors import packing
+
+WARM_UP_SETTINGS = {"width": 64, "height": 64}  # a stream's kernel does not depend on its size
+
+log = logging.getLogger(__name__)
+
+
+async def first_frame(
+    renderers: Renderers, packed: Packed, settings: dict[str, Any], patience_s: float | None = None
+) -> Frame:
+    """The frame of the first sample, rendered as a stream's; nothing stays behind in the renderer.
+
+    `settings` are the arguments of gpu.RenderSettings. Raises Unavailable where there is no renderer, where it fails,
+    and where it gives no frame within `patience_s`.
+    """
+    listener = _Listener()
+    task = renderers.open(listener, "server")
+    try:
+        stop = StopRule(max_samples=1)
+        await renderers.send_scene(Update(task, 1, packed.arrays, settings, stop, interactive=True))
+        renderers.send(Want(task, 1, View()))
+        return await asyncio.wait_for(listener.frame, patience_s)
+    except TimeoutError:
+        raise Unavailable(f"The renderer has not rendered anything for {patience_s:g} s.") from None
+    finally:
+        renderers.drop(task)
+        listener.frame.cancel()
+
+
+async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) -> bool:
+    """Do what the first client would have to wait for: import modules, compile kernels; whether that succeeded.
+
+    `document` is the scene that a client is likely to begin with. An error is logged and not raised: a client that
+    comes later meets it as well.
+    """
+    began = time.monotonic()
+    try:
+        packed = await packing(partial(_packed, reader, document))
+        settings = await packing(partial(reader.settings, WARM_UP_SETTINGS))
+        # As many at a time as there are renderers: each gets one, as each one makes it busier than the others.
+        frames = [first_frame(renderers, packed, settings.for_gpu()) for _ in renderers.members]
+        for error in await asyncio.gather(*frames, return_exceptions=True):
+            if isinstance(error, BaseException):
+                raise error
+    except ServiceError as error:
+        log.warning("did not warm up error=%s", error)
+        return False
+    log.info("warmed up seconds=%.2f", time.monotonic() - began)
+    return True
+
+
+async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterable[Any]) -> None:
+    """Compile the builders' code, and without hurry the kernels of scenes to which a client may change.
+
+    An error is logged and not raised.
+    """
+    await packing(warm_builder)
+    await packing(warm_light_tree)
+    log.debug("loaded the builders")
+    task = renderers.open(_Listener(), "server")
+    try:
+        settings = (await packing(partial(reader.settings, WARM_UP_SETTINGS))).for_gpu()
+        for document in documents:
+            packed = await packing(partial(_packed, reader, document))
+            renderers.send(Foresee(task, packed.arrays, settings))
+    except ServiceError as error:
+        log.warning("did not foresee scenes error=%s", error)
+    finally:
+        renderers.drop(task)
+
+
+def _packed(reader: RequestReader, document: Any) -> Packed:
+    return reader.pack(reader.scene(document))
+
+
+class _Listener:
+    """`frame` is the task's first frame, or Unavailable."""
+
+    def __init__(self) -> None:
+        self.frame: asyncio.Future[Frame] = asyncio.get_running_loop().create_future()
+
+    def heard(self, message: FromRenderer) -> None:
+        if isinstance(message, Failed):
+            self.lost(f"The renderer failed: {message.detail}")
+        elif isinstance(message, Frame) and not self.frame.done():
+            self.frame.set_result(message)
+
+    def again(self) -> None:
+        """Another renderer begins the task again: the frame comes from that one."""
+
+    def lost(self, detail: str) -> None:
+        if not self.frame.done():
+            self.frame.set_exception(Unavailable(detail))

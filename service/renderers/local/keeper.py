@@ -1,0 +1,203 @@
+"""Keeps one renderer's process alive: starts it, watches it, replaces it when it is lost, and says how it stands."""
+
+from __future__ import annotations
+
+import asyncio
+import logging
+import os
+import time
+from collections.abc import Callable
+from typing import Any
+
+from service.ipc import channel
+from service.ipc.messages import FromRenderer, Heard, Ready, ToRenderer, Unable
+from service.problems import Unavailable
+from service.renderers.local.process import Cause, RendererProcess, Start, Waiting
+from service.renderers.local.restarts import Restarts
+from service.renderers.protocol import State
+from service.renderers.statistics import Statistics
+
+LAST_WORDS_S = 5.0  # for a renderer that closed its end of the channel to exit, so that its exit code says why
+WATCH_S = 0.5
+FAREWELL_S = 3.0  # for the renderer to end by itself; one slice on a slow machine, or a compilation
+STARTING = "The renderer is starting."
+CLOSING = "The server is shutting down."
+
+log = logging.getLogger(__name__)
+
+
+class Keeper:
+    """For the event loop. `heard` is called with the process's messages; `began` when another process has been begun;
+    `lost` with one that was lost, and why; `hopeless` after that, when the next attempt is some time away; `changed`
+    whenever the process is ready or lost, or has to wait, or there is no hope for it.
+    """
+
+    def __init__(self, id: str, start: Start, patience_s: float, statistics: Statistics) -> None:
+        """`id` names the renderer in the log; `patience_s` is how long it may be without progress."""
+        self.heard: Callable[[Heard], None] = lambda message: None
+        self.began: Callable[[], None] = lambda: None
+        self.lost: Callable[[RendererProcess, Cause], None] = lambda process, cause: None
+        self.hopeless: Callable[[], None] = lambda: None
+        self.changed: Callable[[], None] = lambda: None
+        self.detail = "The renderer has not been started."  # why there is none, where there is none
+        self.waiting = ""  # what it waits for, where there is no place for the process
+        self.driver: str | None = None  # of the process that was ready last; None: there was none
+        self.process: RendererProcess | None = None
+        self.restarts = Restarts()
+        self._id, self._begin_process, self._patience_s, self._statistics = id, start, patience_s, statistics
+        self._ready: asyncio.Future[dict[str, Any]] | None = None
+        self._lost_at: float | None = None
+        self._chores: set[asyncio.Task[None]] = set()
+        self._draining = self._closed = False
+        self._lifeline: tuple[int, int] | None = None  # a pipe: what outlives a renderer ends with its other end
+
+    def start(self) -> None:
+        if self._ready is None:
+            self._ready = asyncio.get_running_loop().create_future()
+            self._lifeline = os.pipe()
+            self._begin()
+            self.do(self._watch())
+
+    def drain(self) -> None:
+        self._draining, self.detail = True, CLOSING
+
+    async def stop(self) -> None:
+        """End all chores; what is lost from now on is not replaced."""
+        self.drain()
+        self._closed = True
+        for chore in self._chores:
+            chore.cancel()
+        await asyncio.gather(*self._chores, return_exceptions=True)
+
+    async def end(self) -> None:
+        """End the process, after `stop`."""
+        process, self.process = self.process, None
+        if process is not None:
+            await process.end(FAREWELL_S)
+        for end in self._lifeline or ():
+            os.close(end)
+        self._lifeline = None
+
+    @property
+    def state(self) -> State:
+        if self._draining:
+            return "draining"
+        if self.process is not None and self.process.ready:
+            return "ready"
+        return "starting" if self._lost_at is None else "lost"
+
+    @property
+    def takes_tasks(self) -> bool:
+        """Whether it takes tasks; they wait while the process starts or is replaced."""
+        return self._ready is not None and not self._draining and not self.restarts.hopeless
+
+    @property
+    def info(self) -> dict[str, Any] | None:
+        ready = self._ready
+        known = ready is not None and ready.done() and not self.restarts.hopeless
+        return ready.result() if ready is not None and known else None
+
+    async def ready(self, timeout_s: float) -> dict[str, Any]:
+        if self._ready is None or not self.takes_tasks:
+            raise Unavailable(self.detail)
+        try:
+            return await asyncio.wait_for(asyncio.shield(self._ready), timeout_s)
+        except TimeoutError:
+            raise Unavailable(self.waiting or STARTING) from None
+
+    def send(self, message: ToRenderer) -> None:
+        """Nothing happens where there is no process; it is told later what it needs."""
+        if self.process is not None:
+            self.process.link.send(message)
+
+    def send_encoded(self, encoded: channel.Encoded) -> None:
+        if self.process is not None:
+            self.process.link.send_encoded(encoded)
+        else:
+            channel.discard(encoded)
+
+    def do(self, work: Any) -> None:
+        """Run a coroutine, which `stop` cancels."""
+        chore = asyncio.get_running_loop().create_task(work)
+        self._chores.add(chore)
+        chore.add_done_callback(self._chores.discard)
+
+    def _begin(self) -> None:
+        lifeline = None if self._lifeline is None else self._lifeline[0]
+        process: RendererProcess = self._begin_process(self._received, lambda: self._lose(process), lifeline)
+        self.process = process
+        self.began()
+
+    def _received(self, message: FromRenderer | Waiting) -> None:
+        if isinstance(message, Ready):
+            self._is_ready(message)
+        elif isinstance(message, Waiting):
+            self._waits(message)
+        elif isinstance(message, Unable):
+            self.detail = message.detail
+            if self.process is not None:
+                self.process.unable = True
+            log.error("could not start a renderer renderer=%s error=%s", self._id, message.detail)
+        else:
+            self.heard(message)
+
+    def _waits(self, message: Waiting) -> None:
+        if message.detail != self.waiting:
+            level = logging.WARNING if message.needed else logging.INFO
+            log.log(level, "a renderer waits renderer=%s reason=%s", self._id, message.detail)
+        self.waiting = message.detail
+        self.changed()
+
+    def _is_ready(self, message: Ready) -> None:
+        assert self.process is not None
+        self.process.ready, self.driver, self.waiting = True, message.driver, ""
+        self.restarts.succeeded()
+        seconds = time.monotonic() - self.process.began
+        log.info("renderer ready renderer=%s driver=%s seconds=%.2f", self._id, self.driver, seconds)
+        if self._ready is not None and not self._ready.done():
+            self._ready.set_result(message.info)
+        if self._lost_at is not None:
+            self._statistics.recovery_s.add(time.monotonic() - self._lost_at)
+            self._lost_at = None
+        self.changed()
+
+    async def _watch(self) -> None:
+        loop, pause_s = asyncio.get_running_loop(), min(WATCH_S, self._patience_s / 4)
+        while True:
+            began = loop.time()
+            await asyncio.sleep(pause_s)
+            late = loop.time() - began > 2 * pause_s  # then it is the server that was slow, and has not listened
+            if self.process is not None:
+                self.process.watch(excused=late)
+
+    def _lose(self, process: RendererProcess) -> None:
+        """Replace a renderer whose end of the channel is closed."""
+        if self._closed or process is not self.process:
+            return
+        self.process = None
+        self._lost_at = self._lost_at or time.monotonic()
+        if process.ready:
+            if not self._draining:
+                self.detail = "The renderer was lost."
+            self._ready = asyncio.get_running_loop().create_future()
+        self.changed()
+        self.do(self._replace(process))
+
+    async def _replace(self, process: RendererProcess) -> None:
+        cause = await process.end(LAST_WORDS_S)
+        self.restarts.lost(process, cause)
+        self._statistics.restarts[cause] += 1
+        line = "renderer lost renderer=%s cause=%s lived_s=%.1f failures=%d"
+        level = logging.INFO if cause == "released" else logging.ERROR
+        log.log(level, line, self._id, cause, process.lived_s, self.restarts.failures)
+        self.lost(process, cause)
+        if self.restarts.hopeless:
+            self.hopeless()
+            self.changed()
+            if self._ready is not None and not self._ready.done():
+                self._ready.set_exception(Unavailable(self.detail))
+                self._ready.exception()  # looked at: perhaps nobody waits, and asyncio would complain
+        await asyncio.sleep(self.restarts.pause_s(process.lived_s))
+        if self.restarts.hopeless:
+            self._ready = asyncio.get_running_loop().create_future()
+        self._begin()

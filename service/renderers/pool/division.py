@@ -1,0 +1,220 @@
+"""Which renderers assist which tasks; leases and their results are handed on between them."""
+
+from __future__ import annotations
+
+import logging
+from collections import Counter
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass
+from typing import Protocol
+
+from service.ipc.channel import Encoded
+from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted, undivided
+from service.ipc.messages import Done, Failed, Heard, ToRenderer, Update
+from service.ipc.orders import Drop, Pause, Resume, Stop
+
+log = logging.getLogger(__name__)
+
+
+class Peer(Protocol):
+    """One renderer of the pool."""
+
+    @property
+    def driver(self) -> str | None:
+        """What decides about equal bits; None while it cannot render."""
+
+    @property
+    def leases(self) -> Counter[str]:
+        """How many leases it was given, has done, has failed to do, and has done wrong."""
+
+    def relay(self, message: ToRenderer) -> None:
+        """Send a message as it is, past the records of this renderer's own tasks."""
+
+    def relay_encoded(self, encoded: Encoded) -> None: ...
+
+    def scene_of(self, task: int) -> Iterable[Encoded | ToRenderer]:
+        """What another renderer has to be told to have the scene and the settings of this one's task."""
+
+
+@dataclass
+class _Task:
+    most: int | None  # renderers that may trace it; None: all that are free
+    home: int
+    adaptive: bool = False
+    time_limit: float | None = None
+    active: bool = False  # there are samples to be traced
+    ended: bool = False
+    assistants: tuple[int, ...] = ()
+    unfit: frozenset[int] = frozenset()  # renderers that have failed with its scene
+
+
+class Division:
+    """For the event loop. Renderers are numbered by their place in `peers`."""
+
+    def __init__(self, peers: Sequence[Peer]) -> None:
+        self._peers = peers
+        self._tasks: dict[int, _Task] = {}
+        self._wrong: set[int] = set()  # renderers whose results were refuted: they assist nobody any more
+
+    def opened(self, task: int, home: int, most: int | None) -> None:
+        self._tasks[task] = _Task(most, home)
+
+    def leave(self, task: int) -> None:
+        """End all assistance for a task that is about to move: one of its assistants may be its next home."""
+        if (held := self._tasks.get(task)) is not None:
+            self._leave(task, held)
+
+    def moved(self, task: int, home: int) -> None:
+        """Another renderer goes on with this task, after `leave`."""
+        if (held := self._tasks.get(task)) is not None:
+            held.home = home
+            self.assign()
+
+    def dropped(self, task: int) -> None:
+        held = self._tasks.pop(task, None)
+        if held is not None:
+            for each in held.assistants:
+                self._peers[each].relay(Drop(task))
+            self.assign()
+
+    def divide(self, task: int, most: int | None) -> None:
+        """Let at most so many renderers trace the task; None: all that are free."""
+        if (held := self._tasks.get(task)) is not None and held.most != most:
+            held.most = most
+            self.assign()
+
+    def renderers(self, task: int) -> int:
+        """How many trace this task."""
+        held = self._tasks.get(task)
+        return 1 + len(held.assistants) if held is not None and held.active else 0
+
+    def sent(self, message: ToRenderer) -> None:
+        """Note what was sent to a task's home, and tell those that assist it."""
+        held = self._tasks.get(message.task)
+        if held is None:
+            return
+        if isinstance(message, Update):
+            self._updated(message, held)
+            for each in held.assistants:
+                self._peers[each].relay(message)
+            self.assign()
+        elif isinstance(message, Pause | Resume | Stop):
+            held.active = isinstance(message, Resume) and not held.ended
+            self.assign()
+
+    def scene_sent(self, update: Update, ended: bool = False) -> None:
+        """The home was sent a whole scene: so are the others. `ended`: with its finished picture."""
+        if (held := self._tasks.get(update.task)) is not None:
+            held.unfit = frozenset()
+            self._updated(update, held)
+            held.active, held.ended = not ended, ended
+            for each in held.assistants:
+                self._tell_scene(update.task, held, each)
+            self.assign()
+
+    def _updated(self, update: Update, held: _Task) -> None:
+        held.active, held.ended = True, False
+        if update.settings is not None:
+            held.adaptive = bool(update.settings.get("adaptive"))
+        if update.stop is not None:
+            held.time_limit = update.stop.time_limit
+
+    def heard(self, message: Heard) -> None:
+        """Note what a task's home has said."""
+        held = self._tasks.get(message.task)
+        if held is None:
+            return
+        if isinstance(message, Done):
+            held.active, held.ended = False, True
+            self.assign()
+        elif isinstance(message, Failed) and message.serial is None:
+            held.active = message.fallback is not None
+            self._leave(message.task, held)  # they may have what the home has not
+            self.assign()
+
+    def told(self, task: int) -> None:
+        """A new process of the home has been told of the task: what the old one leased is forgotten there."""
+        held = self._tasks.get(task)
+        if held is not None and held.assistants:
+            self._peers[held.home].relay(Assistants(task, held.assistants))
+
+    def handed(self, message: Lease | LeaseDone | LeaseFailed | LeaseRefuted, sender: int) -> None:
+        """Hand on what the home and its assistants say to each other."""
+        held = self._tasks.get(message.task)
+        if held is None:
+            return
+        if isinstance(message, Lease):
+            if message.assistant in held.assistants:
+                self._peers[message.assistant].leases["given"] += 1
+                self._peers[message.assistant].relay(message)
+        elif isinstance(message, LeaseRefuted):
+            if sender == held.home:
+                self._refuted(message)
+        elif sender not in held.assistants:
+            return
+        elif isinstance(message, LeaseDone):
+            self._peers[sender].leases["done"] += 1
+            self._peers[held.home].relay(message)
+        else:
+            self._peers[sender].leases["failed"] += 1
+            log.warning("a renderer cannot assist task=%d renderer=%d error=%s", message.task, sender, message.detail)
+            held.unfit |= {sender}
+            self.assign()
+
+    def _refuted(self, message: LeaseRefuted) -> None:
+        self._peers[message.assistant].leases["wrong"] += 1
+        log.error(
+            "two renderers got different bits for the same part of a picture: check their memory; the second one "
+            "assists in no other picture task=%d home=%d renderer=%d",
+            message.task, self._tasks[message.task].home, message.assistant,
+        )  # fmt: skip
+        self._wrong.add(message.assistant)
+        self.assign()
+
+    def assign(self) -> None:
+        """Choose anew who assists whom; to be called when a renderer has come, gone or changed."""
+        tasks = [
+            held for held in self._tasks.values() if held.active and undivided(held.adaptive, held.time_limit) is None
+        ]
+        busy = {held.home for held in self._tasks.values() if held.active}
+        free = [n for n, peer in enumerate(self._peers) if n not in busy | self._wrong and peer.driver is not None]
+        chosen: dict[int, list[int]] = {id(held): [] for held in tasks}
+        share = -(-len(free) // max(1, len(tasks)))
+        for held in tasks:  # who assists already goes on, as far as that is still wanted
+            for each in held.assistants[:share]:
+                if each in free and self._wants(held, each, chosen[id(held)]):
+                    chosen[id(held)].append(each)
+                    free.remove(each)
+        for each in free:
+            wanting = [held for held in tasks if self._wants(held, each, chosen[id(held)])]
+            if wanting:
+                chosen[id(min(wanting, key=lambda held: len(chosen[id(held)])))].append(each)
+        for task, held in self._tasks.items():
+            self._set(task, held, tuple(chosen.get(id(held), [])))
+
+    def _wants(self, held: _Task, renderer: int, others: Sequence[int]) -> bool:
+        same = self._peers[held.home].driver == self._peers[renderer].driver
+        return same and renderer not in held.unfit and (held.most is None or 1 + len(others) < held.most)
+
+    def _set(self, task: int, held: _Task, assistants: tuple[int, ...]) -> None:
+        if assistants == held.assistants:
+            return
+        before, held.assistants = held.assistants, assistants
+        for each in before:
+            if each not in assistants:
+                self._peers[each].relay(Drop(task))
+        for each in assistants:
+            if each not in before:
+                self._peers[each].relay(Assist(task))
+                self._tell_scene(task, held, each)
+        self._peers[held.home].relay(Assistants(task, assistants))
+
+    def _leave(self, task: int, held: _Task) -> None:
+        self._set(task, held, ())
+
+    def _tell_scene(self, task: int, held: _Task, assistant: int) -> None:
+        for message in self._peers[held.home].scene_of(task):
+            if isinstance(message, tuple):
+                self._peers[assistant].relay_encoded(message)
+            else:
+                self._peers[assistant].relay(message)

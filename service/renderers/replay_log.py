@@ -1,0 +1,217 @@
+"""The messages of a task that a new renderer needs in order to go on with it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+from service.ipc import channel
+from service.ipc.channel import Encoded
+from service.ipc.kernel_messages import KernelMeasured, MeasureKernel
+from service.ipc.messages import (
+    Checkpoint,
+    Done,
+    EvaluateBsdf,
+    Failed,
+    Frame,
+    Heard,
+    Image,
+    Loaded,
+    Progressed,
+    Read,
+    Restore,
+    SavedPicture,
+    StopRule,
+    ToRenderer,
+    Update,
+    Want,
+)
+from service.ipc.orders import Pause, Resume, Settle, Stop
+
+# A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
+Kept = Restore | Callable[[], Restore]
+
+STATES = 4  # that wait to be seen working; of more than these, the middle ones are passed over
+
+
+@dataclass
+class _State:
+    """A scene as it was sent, in the memory that the renderer maps too, and what was changed of it since."""
+
+    began: int  # the generation that may have been too much for the renderer
+    scene: Encoded
+    whole: bool  # the scene was that generation's, and not an earlier one's
+    since: Update | None = None
+
+
+class ReplayLog:
+    """One task's state as the renderer has it. `close` frees the memory of its scenes."""
+
+    def __init__(self, task: int) -> None:
+        self.reads: dict[int, Read] = {}  # not answered yet
+        self.measure_kernel: MeasureKernel | None = None  # not answered yet
+        self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
+        self.saved: Kept | None = None  # a finished picture
+        self._checkpoint: Kept | None = None  # one under way
+        self._driver = ""
+        self._task = task
+        self._states: list[_State] = []  # the last one that was seen to work, and those after it
+        self._want: Want | None = None
+        self._stopped = False
+        self._paused: Pause | Resume | None = None
+        self._stopped_at: Done | None = None
+
+    @property
+    def kept(self) -> Kept | None:
+        """The picture as the server keeps it, if it does."""
+        return self.saved or self._checkpoint
+
+    @property
+    def away(self) -> bool:
+        """Whether it is a stream's that nobody attends."""
+        return isinstance(self._paused, Pause) and self._paused.away
+
+    @property
+    def driver(self) -> str:
+        """The driver whose bits the kept picture under way has; "" where there is none, or nobody knows."""
+        return "" if self._checkpoint is None else self._driver
+
+    def stored(self, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        """A picture is on the disk, from where `read` gives it: it need not stay in memory."""
+        if isinstance(self.saved, Restore) and self.saved.saved is picture:
+            self.saved = read
+        elif isinstance(self._checkpoint, Restore) and self._checkpoint.saved is picture:
+            self._checkpoint = read
+
+    def forget(self) -> None:
+        """The picture under way that the server keeps can't be read: the render begins again."""
+        self._checkpoint = None
+
+    def scene_told(self, update: Update, encoded: Encoded) -> None:
+        self._push(_State(update.generation, channel.another(encoded), whole=True))
+
+    def restored(self, restore: Restore) -> None:
+        """The server had this picture already: the render goes on from it, or has ended with it."""
+        if restore.reason is None:
+            self._checkpoint, self._driver = restore, restore.saved.driver
+        else:
+            self.saved = restore
+
+    def told(self, message: ToRenderer) -> None:
+        if isinstance(message, Update):
+            self._edited(message)
+        elif isinstance(message, Want):
+            self._want = message
+        elif isinstance(message, Read):
+            self.reads[message.serial] = message
+        elif isinstance(message, MeasureKernel):
+            self.measure_kernel = message
+        elif isinstance(message, EvaluateBsdf):
+            self._question = message
+        elif isinstance(message, Pause | Resume):
+            self._paused = message
+        elif isinstance(message, Stop):
+            self._stopped = True
+
+    def heard(self, message: Heard) -> Heard:
+        """Note what a message changes; the message as the task's listener is to get it."""
+        if isinstance(message, Failed):
+            if message.serial is not None:
+                self.reads.pop(message.serial, None)
+            else:
+                self._fall_back(message)
+        elif isinstance(message, Image):
+            self.reads.pop(message.serial, None)
+        elif isinstance(message, KernelMeasured):
+            self.measure_kernel = None
+        elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
+            self._works(message.generation)
+        if isinstance(message, Checkpoint):
+            self._checkpoint = Restore(message.task, message.generation, message.saved, None, message.progress)
+            self._driver = message.saved.driver
+        if isinstance(message, Frame) and self._want is not None and self._want.serial == message.serial:
+            self._want = None
+        return self._done(message) if isinstance(message, Done) else message
+
+    def scenes(self) -> list[Encoded | ToRenderer]:
+        """What gives another renderer the same scenes, in order; the encoded ones are whoever's sends them."""
+        out: list[Encoded | ToRenderer] = []
+        for number, state in enumerate(self._states):
+            if number:  # joined with the one before, that would be lost with it
+                out.append(Settle(self._task))
+            out.append(channel.another(state.scene))
+            if state.since is not None:
+                out.append(state.since)
+        return out
+
+    def again(self, kept: Encoded | None = None) -> list[Encoded | ToRenderer]:
+        """What to tell a new renderer, in order; the encoded ones are whoever's sends them. `kept`: encoded."""
+        out = self.scenes()
+        if kept is not None:
+            out.append(kept)
+        asked: list[ToRenderer] = [*self.reads.values()]
+        if self.measure_kernel is not None:
+            asked.append(self.measure_kernel)
+        if self._question is not None:
+            asked.append(self._question)
+        if not out or self.saved is not None:
+            return [*out, *asked]
+        stopped = self._stopped_at
+        if stopped is not None and stopped.progress.samples:  # as far as it was seen, not further and not less
+            stop = StopRule(max_samples=stopped.progress.samples)
+            out.append(Update(self._task, stopped.generation, stop=stop, base=stopped.generation))
+        elif self._stopped:
+            out.append(Stop(self._task))
+        if self._paused is not None:
+            out.append(self._paused)
+        if self._want is not None:
+            out.append(self._want)
+        return [*out, *asked]
+
+    def close(self) -> None:
+        while self._states:
+            channel.discard(self._states.pop().scene)
+
+    def _push(self, state: _State) -> None:
+        self._states.append(state)
+        if len(self._states) > STATES:
+            channel.discard(self._states.pop(1).scene)
+        self._stopped, self._stopped_at, self._checkpoint = False, None, None
+
+    def _edited(self, update: Update) -> None:
+        if not self._states:
+            return
+        last = self._states[-1]
+        since = last.since.then(update) if last.since is not None else update
+        # It may be too large, and then the state before it is the one that counts.
+        if update.settings is not None or update.environment_map is not None:
+            self._push(_State(update.generation, channel.another(last.scene), whole=False, since=since))
+        else:
+            last.since = since
+            self._stopped, self._stopped_at, self._checkpoint = False, None, None
+
+    def _works(self, generation: int) -> None:
+        while len(self._states) > 1 and self._states[1].began <= generation:
+            channel.discard(self._states.pop(0).scene)
+
+    def _fall_back(self, failed: Failed) -> None:
+        """Forget the state that failed and the edits of it, but not a whole scene that was sent later."""
+        kept, later = [], False
+        for state in self._states:
+            later = later or (state.whole and state.began > failed.generation)
+            if later or (failed.fallback is not None and state.began <= failed.fallback):
+                kept.append(state)
+            else:
+                channel.discard(state.scene)
+        self._states = kept
+
+    def _done(self, done: Done) -> Done:
+        self._checkpoint = None
+        if self._stopped_at is not None and self._stopped_at.generation == done.generation:
+            done = replace(done, reason="stopped")
+        if done.reason == "stopped":
+            self._stopped_at = done
+        if done.saved is not None:
+            self.saved = Restore(done.task, done.generation, done.saved, done.reason, done.progress)
+            self._stopped_at = None
+        return done

@@ -1,9 +1,0 @@
-"""From what a caller wrote to what the renderer takes.
-
-request_reader  documents -> packed scenes, with the server's limits and assets
-request_parser  bodies -> scenes and settings, checked
-bsdf_request    bodies -> a material and directions, checked
-parser_pool     large bodies are parsed in processes of their own, within bounds of memory and time
-parser_child    such a process: `python -m service.rendering.requests.parser_child`
-stream_memory   the bytes that the documents of streams may take together
-"""

@@ -1,0 +1,382 @@
+"""All renders asked for over REST: some run, some wait, ended ones are kept for a while. Each has its owner."""
+
+from __future__ import annotations
+
+import asyncio
+import concurrent.futures
+import contextlib
+import logging
+import time
+from collections import Counter, OrderedDict
+from collections.abc import Callable, Collection, Coroutine, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from functools import partial
+from itertools import islice
+from typing import Any
+
+from service.problems import FieldError, Gone, InvalidDocument, NotFound, ServiceError, TooManyRequests, Unavailable
+from service.renders.documents import WaitingDocuments
+from service.renders.followers import Follower, Followers
+from service.renders.job import Job
+from service.renders.recorder import Recorder
+from service.renders.retention import KeptRenders, Retention
+from service.renders.slots import Slots
+from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
+from service.renders.store.rows import REMEMBERED
+from service.renders.store.store import RenderStore
+from service.storage.quota import QuotaUsedUp
+
+RETRY_S = 5  # when to ask again where there is no room
+# Bytes of scenes and pictures of ended renders that stay with the renderer, so that looking at them takes no time;
+# the last one stays however large it is. The others come back from the disk.
+RESTING_BYTES = 256 << 20
+SHRINK_S = 0.5  # how long a thread waits for the event loop to free memory
+CLOSING_S = 3.0  # for the last samples of running renders to reach the disk
+EVICTION_S = 60.0  # at most between two looks for renders that are too old
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class QueueLimits:
+    """How many renders run and wait at once, and which of the ended ones are kept."""
+
+    running: int = 8  # renders; the others wait, as each has its scene and its picture on the GPU
+    waiting: int = 256
+    each: int = 64  # running and waiting, of one owner
+    retention: Retention = field(default_factory=Retention)
+    disk_bytes: int | None = None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
+
+
+@dataclass(frozen=True)
+class Page:
+    """Renders, the newest first, and whether there are more."""
+
+    renders: list[Job]
+    more: bool
+
+
+class RenderQueue:
+    """The renders of all owners. An owner is a text that the caller chooses; nobody else learns of its renders."""
+
+    def __init__(
+        self,
+        limits: QueueLimits | None = None,
+        store: RenderStore | None = None,
+        clock: Callable[[], float] = time.monotonic,
+    ) -> None:
+        """With a `store` renders outlive the server."""
+        self._limits = limits or QueueLimits()
+        self.store = store
+        self._jobs: dict[str, Job] = {}  # in the order of arrival
+        self._followers = Followers[Job]()
+        self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
+        self._number = 0  # of the last one
+        self._slots = Slots(self._limits.running, self._ran, clock)
+        self._waiting = self._slots.waiting
+        self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
+        self._documents = WaitingDocuments(self._limits.disk_bytes)
+        self._kept: KeptRenders[Job] = KeptRenders(self._limits.retention)
+        self._resting: OrderedDict[str, Job] = OrderedDict()  # ended ones, the last one looked at last
+        self._chores: set[asyncio.Task[None]] = set()
+        self._timer: asyncio.TimerHandle | None = None
+        self._loop: asyncio.AbstractEventLoop | None = None
+        self.closing = False
+
+    def resume(self, stored: Collection[StoredRender], make: Callable[[StoredRender], Job]) -> None:
+        """Take up what the store has: ended ones are kept, the others go on or wait."""
+        assert self.store is not None
+        self._loop = asyncio.get_running_loop()
+        for each in stored:
+            if each.gone:
+                self._remember(each.order.id, each.order.owner, each.number)
+                continue
+            job = make(each)
+            job.number = self._number = each.number
+            whole = each.outcome.state in ENDED
+            job.recorder = Recorder(self.store, each.number, job.id, whole, job.renderers, job.owner)
+            job.changes.followers = self._followers
+            self._jobs[job.id] = job
+            if not job.finished.is_set():
+                self._slots.add(job)
+                self._documents.count(job, job.order.bytes)
+        for job in sorted(self._jobs.values(), key=lambda job: job.ended_at):
+            if job.finished.is_set():
+                self._kept.add(job)
+        if self._jobs:
+            log.info("took up stored renders waiting=%d ended=%d", len(self._waiting), self.kept)
+        self._evict()
+        self._slots.dispatch()
+
+    async def submit(
+        self, job: Job, uses: Collection[str] = (), key: IdempotencyKey | None = None, listed: bool = True
+    ) -> None:
+        """Queue a job, which runs when its turn comes; it is stored first where that is possible.
+
+        `uses`: the assets that it refers to. The caller releases one that is not `listed`. Raises TooManyRequests
+        where its owner has as many under way as one may have, Unavailable where the queue or the disk is full.
+        """
+        self._loop = asyncio.get_running_loop()
+        self.admit(job.owner)
+        if listed and self.store is not None:
+            job.number = await self._stored(job, uses, key)
+            job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
+            job.forget_document()
+        if listed:
+            self._number = job.number = max(job.number, self._number + 1)
+            self._jobs[job.id] = job
+            job.changes.followers = self._followers
+            job.changes.tell(job)
+        self._slots.add(job)
+        self._slots.dispatch()
+        if job in self._waiting:
+            job.set_aside()
+
+    def admit(self, owner: str) -> None:
+        """Raise what `submit` would raise, before a scene is read for nothing."""
+        if self.closing:
+            raise Unavailable("The server is shutting down.", RETRY_S)
+        own = self._waiting.count(owner) + self._storing[owner]
+        active = own + sum(job.owner == owner for job in self._slots.running)
+        if active >= self._limits.each:
+            detail = f"{active} renders of yours are under way: no more than {self._limits.each} (SUNBOX_MAX_JOBS)"
+            raise TooManyRequests(detail, RETRY_S)
+        # A queue that is full still takes renders of owners with less than their share of it.
+        share = self._limits.waiting // max(1, len(self._waiting.owners) + (own == 0))
+        if self.queued >= self._limits.waiting and own >= share:
+            raise Unavailable(f"{self.queued} renders are waiting; the queue is full (SUNBOX_MAX_QUEUE)", RETRY_S)
+
+    def get(self, id: str, owner: str = "") -> Job:
+        if id in self._gone and self._gone[id][0] == owner:
+            raise Gone("This render was deleted, or it ended long ago and made room for newer ones.")
+        job = self._jobs.get(id)
+        if job is None or job.owner != owner:
+            raise NotFound("There is no render of this id.")
+        return job
+
+    def page(
+        self,
+        owner: str = "",
+        label: str | None = None,
+        state: State | None = None,
+        limit: int = 200,
+        after: str | None = None,
+    ) -> Page:
+        """An owner's renders, the newest first, of that label and state; those that were asked for before `after`.
+
+        Raises InvalidDocument where there never was a render `after`.
+        """
+        last = None if after is None else self._place(after, owner)
+        fits = (
+            job
+            for job in reversed(self._jobs.values())
+            if job.owner == owner
+            and (last is None or job.number < last)
+            and label in (None, job.order.label)
+            and state in (None, job.state)
+        )
+        found = list(islice(fits, limit))
+        return Page(found, more=len(found) == limit and next(fits, None) is not None)
+
+    @contextmanager
+    def follower(self, owner: str) -> Iterator[Follower[Job]]:
+        """Learns of every change of an owner's renders; first of those that are under way."""
+        with self._followers.follower(owner) as follower:
+            for job in self._jobs.values():
+                if job.owner == owner and not job.finished.is_set():
+                    follower.add(job)
+            if self.closing:
+                follower.close()
+            yield follower
+
+    def _place(self, id: str, owner: str) -> int:
+        """The number of a render, which may be gone. Raises InvalidDocument."""
+        job = self._jobs.get(id)
+        known, number = self._gone.get(id, (None, 0)) if job is None else (job.owner, job.number)
+        if known != owner:
+            raise InvalidDocument([FieldError("/after", "is not the id of one of your renders")])
+        return number
+
+    @property
+    def queued(self) -> int:
+        return len(self._waiting) + self._storing.total()
+
+    @property
+    def running(self) -> int:
+        return len(self._slots.running)
+
+    @property
+    def kept(self) -> int:
+        return len(self._kept)
+
+    @contextmanager
+    def looking(self, job: Job) -> Iterator[None]:
+        """Somebody looks at a render's picture: it stays with the renderer for a while."""
+        try:
+            yield
+        finally:
+            if job.finished.is_set() or job.shown:
+                self._rest(job)
+
+    async def close(self) -> None:
+        """Have the last samples of what runs stored, for the next start; what is not stored is cancelled."""
+        if self.closing:
+            return
+        self.closing = True
+        self._followers.close()
+        self._slots.close()
+        if self._timer is not None:
+            self._timer.cancel()
+        for job in [*self._slots.running, *self._waiting]:
+            if job.recorder is None:
+                job.cancel()
+        with contextlib.suppress(TimeoutError):
+            async with asyncio.timeout(CLOSING_S):
+                await asyncio.gather(*(job.close() for job in self._jobs.values() if not job.finished.is_set()))
+                await asyncio.gather(*self._chores, return_exceptions=True)
+
+    async def _stored(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
+        """The number that the store gave to the job."""
+        self._documents.take(job, job.order.bytes)
+        self._storing[job.owner] += 1
+        try:
+            return await self._insert(job, uses, key)
+        except BaseException:
+            self._documents.release(job)
+            raise
+        finally:
+            self._storing[job.owner] -= 1
+
+    async def _insert(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
+        """Where there is no room, ended renders make some, and at last there is a reserve for owners of few bytes."""
+        assert self.store is not None
+        insert = partial(self.store.insert, job.order, job.outcome, await job.document(), uses, key)
+        missing = job.order.bytes
+        while True:
+            try:
+                return await insert()
+            except QuotaUsedUp:
+                goes, missing = self._kept.take_for(missing), 2 * missing
+                if not goes:
+                    if self._documents.take_reserve(job, job.order.bytes):
+                        return await insert(reserved=True)
+                    raise
+                await self._forget(self._drop(goes))
+
+    def _ran(self, job: Job) -> None:
+        if job.finished.is_set() and job.id in self._jobs:
+            self._rest(job)
+        self._ended(job)
+
+    def _ended(self, job: Job) -> None:
+        self._documents.release(job)
+        if job.finished.is_set() and job.id in self._jobs:
+            self._kept.add(job)
+        self._evict()
+
+    def cancel(self, job: Job) -> None:
+        """Cancel a job that waits or runs; the image so far stays."""
+        self._slots.remove(job)
+        job.cancel()
+        self._ended(job)
+        if job.recorder is not None:
+            self._do(self._weigh(job))
+
+    async def _weigh(self, job: Job) -> None:
+        """Count what is stored of a cancelled render, once it is."""
+        await job.recorded()
+        if job.id in self._jobs:
+            self._kept.add(job)
+
+    async def delete(self, job: Job) -> None:
+        """Forget an ended render, its document and its picture. Raises Unavailable where the disk fails."""
+        await job.recorded()
+        if job.recorder is not None and self.store is not None:
+            job.release()
+            await job.recorder.close()
+            await self.store.forget([(job.recorder.number, job.id)])
+        if job.id in self._jobs:
+            self._kept.remove(job)
+            self._drop([job])
+
+    def shrink(self, size: int) -> None:
+        """Have ended renders leave the renderer until they have freed that many bytes. For any thread."""
+        loop = self._loop
+        try:
+            elsewhere = loop is not asyncio.get_running_loop()
+        except RuntimeError:
+            elsewhere = True
+        if loop is None or not elsewhere:
+            self._shrink(size)
+            return
+        with contextlib.suppress(concurrent.futures.TimeoutError, RuntimeError):  # busy, or closed
+            asyncio.run_coroutine_threadsafe(self._shrunk(size), loop).result(SHRINK_S)
+
+    async def _shrunk(self, size: int) -> None:
+        self._shrink(size)
+
+    def _shrink(self, size: int) -> None:
+        for job in list(self._resting.values()):
+            if size <= 0:
+                break
+            freed = job.resident_bytes
+            if job.rest():
+                size -= freed
+                del self._resting[job.id]
+
+    def _rest(self, job: Job) -> None:
+        """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""
+        self._resting.pop(job.id, None)
+        self._resting[job.id] = job
+        for each in [each for each in self._resting.values() if not (each.finished.is_set() or each.shown)]:
+            del self._resting[each.id]  # it waited, and runs by now
+        total = sum(each.resident_bytes for each in self._resting.values())
+        for each in list(self._resting.values())[:-1]:
+            if total <= RESTING_BYTES:
+                break
+            size = each.resident_bytes
+            if each.rest():
+                total -= size
+                del self._resting[each.id]
+
+    def _evict(self) -> None:
+        if self.closing:
+            return
+        now = time.monotonic()
+        if stored := self._drop(self._kept.take_superfluous(now)):
+            self._do(self._forget(stored))
+        # So that room is made also when no more requests come.
+        if self._timer is not None:
+            self._timer.cancel()
+            self._timer = None
+        if (left_s := self._kept.left_s(now)) is not None:
+            self._timer = asyncio.get_running_loop().call_later(min(EVICTION_S, left_s + 1.0), self._evict)
+
+    def _drop(self, jobs: Collection[Job]) -> list[Recorder]:
+        """Forget renders; their recorders, where they are stored."""
+        for job in jobs:
+            job.release()
+            del self._jobs[job.id]
+            self._resting.pop(job.id, None)
+            self._remember(job.id, job.owner, job.number)
+        return [job.recorder for job in jobs if job.recorder is not None]
+
+    async def _forget(self, recorders: list[Recorder]) -> None:
+        assert self.store is not None
+        for recorder in recorders:
+            await recorder.close()
+        try:
+            await self.store.forget([(recorder.number, recorder.id) for recorder in recorders])
+        except ServiceError as error:
+            log.warning("could not delete renders from the disk error=%s", error)
+
+    def _remember(self, id: str, owner: str, number: int) -> None:
+        self._gone[id] = owner, number
+        while len(self._gone) > REMEMBERED:
+            self._gone.popitem(last=False)
+
+    def _do(self, work: Coroutine[Any, Any, None]) -> None:
+        chore = asyncio.get_running_loop().create_task(work)
+        self._chores.add(chore)
+        chore.add_done_callback(self._chores.discard)

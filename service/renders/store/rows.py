@@ -1,0 +1,133 @@
+"""Renders, their documents and idempotency keys in the data folder's database."""
+
+from __future__ import annotations
+
+import sqlite3
+import time
+from collections.abc import Collection
+from contextlib import ExitStack
+
+from service.problems import Internal
+from service.renders.store.record import (
+    IdempotencyKey,
+    Order,
+    Outcome,
+    StoredRender,
+    settings_json,
+    stored_render,
+)
+from service.storage.database import Database
+
+KEY_S = 24 * 3600.0  # of the contract: how long an idempotency key counts
+MOST_KEYS = 10_000  # of one owner; the oldest go first
+REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
+
+_COLUMNS = "number, id, owner, label, priority, created_at, settings, bytes, state, ended_at, outcome, gone"
+
+
+class RenderRows:
+    """For any number of threads; not for an event loop. Raises Unavailable where the disk fails."""
+
+    def __init__(self, database: Database) -> None:
+        self._database = database
+        self._held = ExitStack()
+
+    def hold(self) -> None:
+        """Keep a connection open, which `close` closes in the same thread.
+
+        Closing the last one writes the log into the file and deletes it, and syncs both: three times what a commit
+        takes.
+        """
+        connection = self._held.enter_context(self._database.open())
+        connection.execute("SELECT count(*) FROM sqlite_master").fetchone()
+
+    def close(self) -> None:
+        self._held.close()
+
+    def insert(
+        self, order: Order, outcome: Outcome, document: bytes, uses: Collection[str], key: IdempotencyKey | None
+    ) -> int:
+        """Store a render that waits; its number. `uses`: the ids of the assets that it refers to."""
+        settings = settings_json(order.settings)
+        with self._database.open() as database, database:
+            database.execute("BEGIN IMMEDIATE")
+            values = (order.id, order.owner, order.label, order.priority, order.created_at, settings, order.bytes)
+            number = database.execute(
+                "INSERT INTO renders (id, owner, label, priority, created_at, settings, bytes, state, outcome) "
+                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+                (*values, outcome.state, outcome.json()),
+            ).lastrowid
+            assert number is not None
+            database.execute("INSERT INTO render_documents VALUES (?, ?)", (number, document))
+            database.executemany(
+                "INSERT OR IGNORE INTO render_uses VALUES (?, ?)", [(asset, number) for asset in uses]
+            )
+            if key is not None:
+                taken = (order.owner, key.key, key.digest, number, time.time())
+                database.execute("INSERT OR REPLACE INTO render_keys VALUES (?, ?, ?, ?, ?)", taken)
+                database.execute(
+                    "DELETE FROM render_keys WHERE owner = ?1 AND taken_at <= (SELECT taken_at FROM render_keys "
+                    "WHERE owner = ?1 ORDER BY taken_at DESC LIMIT 1 OFFSET ?2)",
+                    (order.owner, MOST_KEYS),
+                )
+        return number
+
+    def update(self, number: int, outcome: Outcome) -> None:
+        values = (outcome.state, outcome.ended_at, outcome.json(), number)
+        with self._database.open() as database, database:
+            database.execute("UPDATE renders SET state = ?, ended_at = ?, outcome = ? WHERE number = ?", values)
+
+    def document(self, number: int) -> bytes:
+        """The folded document of a render. Raises Internal where there is none."""
+        with self._database.open() as database:
+            row = database.execute("SELECT body FROM render_documents WHERE number = ?", (number,)).fetchone()
+        if row is None:
+            raise Internal("The document of this render is not stored any more.")
+        return bytes(row[0])
+
+    def all(self) -> list[StoredRender]:
+        """Every render, in the order of arrival; those that are gone as far as their ids are remembered."""
+        if not self._database.exists():
+            return []
+        with self._database.open() as database:
+            return stored_renders(database)
+
+    def keyed(self, owner: str, key: str) -> tuple[str, StoredRender] | None:
+        """The digest and the render of a key that was taken within KEY_S, also where the render is gone."""
+        if not self._database.exists():
+            return None
+        with self._database.open() as database:
+            found = database.execute(
+                "SELECT digest, number FROM render_keys WHERE owner = ? AND key = ? AND taken_at > ?",
+                (owner, key, time.time() - KEY_S),
+            ).fetchone()
+            if found is None:
+                return None
+            digest, number = found
+            row = database.execute(f"SELECT {_COLUMNS} FROM renders WHERE number = ?", (number,)).fetchone()
+        return None if row is None else (digest, stored_render(*row))
+
+    def forget(self, numbers: Collection[int]) -> None:
+        """Delete renders but for their ids, and forget what is too old even for that."""
+        with self._database.open() as database, database:
+            database.execute("BEGIN IMMEDIATE")
+            ids = [(number,) for number in numbers]
+            database.executemany("UPDATE renders SET gone = 1, settings = '{}', outcome = '{}' WHERE number = ?", ids)
+            database.executemany("DELETE FROM render_documents WHERE number = ?", ids)
+            database.executemany("DELETE FROM render_uses WHERE number = ?", ids)
+            database.execute("DELETE FROM render_keys WHERE taken_at <= ?", (time.time() - KEY_S,))
+            database.execute(
+                "DELETE FROM renders WHERE gone AND number NOT IN (SELECT number FROM render_keys) AND number NOT IN "
+                "(SELECT number FROM renders WHERE gone ORDER BY number DESC LIMIT ?)",
+                (REMEMBERED,),
+            )
+
+
+def stored_renders(database: sqlite3.Connection) -> list[StoredRender]:
+    """As `RenderRows.all`. Raises sqlite3.Error."""
+    rows = database.execute(
+        f"SELECT {_COLUMNS} FROM renders WHERE NOT gone OR number IN "
+        "(SELECT number FROM renders WHERE gone ORDER BY number DESC LIMIT ?) ORDER BY number",
+        (REMEMBERED,),
+    )
+    return [stored_render(*row) for row in rows]

@@ -1,0 +1,80 @@
+"""JSON bodies: received, counted, and parsed where no other request waits for that."""
+
+from __future__ import annotations
+
+from collections.abc import AsyncIterator
+from contextlib import asynccontextmanager
+from functools import partial
+from typing import Any
+
+from starlette.requests import Request
+
+from service.config import Config
+from service.problems import TooLarge, UnsupportedMedia
+from service.requests.parser_pool import ParserPool
+from service.requests.request_parser import PARSERS, Kind
+from service.scene.text import most_bytes
+from service.system.executors import parsing, waiting_for_parsers
+from service.system.memory import MemoryBudget
+from service.system.shares import Shares
+
+# The last three are the defaults of programs that set no content type (curl, urllib, fetch).
+TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
+# Bytes that are parsed in some ms: handing them to another process would take as long. So few are not counted either:
+# as many as there may be connections take less than two of the largest bodies.
+SMALL = 64 * 1024
+AT_ONCE = 4  # as many of the largest bodies may wait, two of one caller
+
+
+class Bodies:
+    """The JSON bodies of all requests."""
+
+    def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
+        self._config = config
+        self._memory = memory or MemoryBudget(config.memory)
+        self._pool = ParserPool(config, self._memory)
+        self._shares = Shares(AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")  # bytes in memory
+
+    async def parsed(self, kind: Kind, body: bytearray, client: str = "", counted: bool = False) -> Any:
+        """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
+
+        Turns go round the clients. `counted`: the caller has counted what `memory_for` says.
+        """
+        if len(body) <= SMALL:
+            return await parsing(partial(PARSERS[kind], self._config, body), client)
+        return await waiting_for_parsers(partial(self._pool.parse, kind, body, counted), client)
+
+    @staticmethod
+    def memory_for(body: bytearray) -> int:
+        """The bytes of memory that parsing a body takes at most; 0 for small ones, which are not counted."""
+        return most_bytes(body) if len(body) > SMALL else 0
+
+    def close(self) -> None:
+        self._pool.close()
+
+    @asynccontextmanager
+    async def taken(self, request: Request, client: str) -> AsyncIterator[bytearray]:
+        """The body, whose bytes count as long as it is needed.
+
+        Raises UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.
+        """
+        told = request.headers.get("content-type", "").partition(";")[0].strip().lower()
+        if told not in TAKEN and not told.endswith("+json"):
+            raise UnsupportedMedia(f"{told[:100]!r} is not taken here: send application/json")
+        body, received = bytearray(), 0
+        try:
+            with self._shares.growing(client) as have:
+                async for chunk in request.stream():
+                    received += len(chunk)
+                    if received > self._config.max_json:  # received to its end, so that its sender reads the answer
+                        body = bytearray()
+                    else:
+                        body += chunk
+                    if received > SMALL:
+                        have(len(body))
+                        self._memory.hold("bodies", self, self._shares.total)
+                if received > self._config.max_json:
+                    raise TooLarge(f"A JSON body holds at most {self._config.max_json} bytes (SUNBOX_MAX_JSON)")
+                yield body
+        finally:
+            self._memory.hold("bodies", self, self._shares.total)

@@ -1,0 +1,82 @@
+"""The process that parses large JSON bodies: `python -m service.requests.parser_child FD`, FD being a link.
+
+The C scanner and pydantic keep all other threads of their process waiting, seconds for some bodies. Here nobody
+waits, and what takes too much memory or time is ended. It ends with its parent, and when nothing came for a while.
+"""
+
+from __future__ import annotations
+
+import fcntl
+import gc
+import json
+import os
+import socket
+import sys
+from dataclasses import asdict, dataclass
+from typing import Any
+
+from service.config import Config
+from service.ipc import channel
+from service.problems import ServiceError, TooLarge
+from service.requests.request_parser import PARSERS, Kind
+from service.system.confined import bound, confine, renounce, unbind
+from service.system.shared_memory import trim
+
+NICENESS = 10  # as the renderer has, whose share of the processors large bodies would take otherwise
+IDLE_S = 300.0
+BASE_BYTES, TIMES = 256 << 20, 3  # of address space: for what comes beside the values; models and arrays made of them
+
+
+@dataclass(frozen=True)
+class Work:
+    kind: Kind
+    body: Any  # a buffer, by protocol 5 of pickle
+    config: Config
+    memory: int  # bytes that the values may take
+    seconds: float
+
+
+@dataclass(frozen=True)
+class Failed:
+    """Parsing failed through no fault of the body; `detail` is for the log."""
+
+    detail: str
+
+
+def main() -> None:
+    end = socket.socket(fileno=int(sys.argv[1]))
+    end.sendmsg([json.dumps(asdict(renounce(confine(NICENESS)))).encode()])
+    gc.disable()  # it would go through all values again and again, and find nothing to free
+    gc.freeze()
+    end.settimeout(IDLE_S)
+    while True:
+        try:
+            answer = _answer(channel.receive(end, wait=True), end)
+            channel.send(end, answer, sealed=True)
+        except (channel.Closed, TimeoutError):
+            return
+        del answer
+        gc.collect()
+        trim()
+
+
+def _answer(work: Work, end: socket.socket) -> Any:
+    try:
+        bound(BASE_BYTES + TIMES * work.memory, work.seconds)
+        # A signal when the parent hangs up, whose default is to end: also in the middle of the scanner's loop.
+        fcntl.fcntl(end, fcntl.F_SETOWN, os.getpid())
+        fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) | os.O_ASYNC)
+        return PARSERS[work.kind](work.config, work.body)
+    except ServiceError as error:
+        return error
+    except MemoryError:
+        return TooLarge("Reading this body takes more memory than allowed (SUNBOX_MAX_JSON_MEMORY).")
+    except Exception as error:
+        return Failed(f"{type(error).__name__}: {error}"[:2000])
+    finally:
+        fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) & ~os.O_ASYNC)
+        unbind()
+
+
+if __name__ == "__main__":
+    main()

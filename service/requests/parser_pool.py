@@ -1,0 +1,157 @@
+"""Large JSON bodies parsed in processes of their own, within bounds of memory and time."""
+
+from __future__ import annotations
+
+import importlib
+import logging
+import pickle
+import signal
+import threading
+from collections import deque
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext
+from typing import Any
+
+from service.config import MIB, Config
+from service.ipc import channel
+from service.problems import ServiceError, TooLarge, Unavailable
+from service.requests.parser_child import Failed, Work
+from service.requests.request_parser import Kind, ParsedRequest
+from service.scene import MeshShape
+from service.scene.text import most_bytes
+from service.system.child_processes import Child, Children, Closed
+from service.system.garbage import collector_paused
+from service.system.memory import MemoryBudget
+
+BODIES = 1000  # for one child
+SECONDS_PER_BYTE = 0.25 / MIB  # twice what the slowest body there is was seen to take
+
+# What an answer is made of: the modules of its classes, and numpy's own functions for arrays.
+ANSWERS = {
+    "service.storage.documents",
+    "service.problems",
+    "service.quality",
+    "service.requests.bsdf_request",
+    "service.requests.parser_child",
+    "service.requests.request_parser",
+}
+ARRAYS = {("numpy", "dtype"), ("numpy._core.numeric", "_frombuffer"), ("numpy.core.numeric", "_frombuffer")}
+
+log = logging.getLogger(__name__)
+
+
+class ParserFailed(Exception):
+    """The parser failed, which is a defect of the service and not of the body."""
+
+
+class ParserPool:
+    """Processes that parse, started on demand: one for each thread that calls `parse` at the same time."""
+
+    def __init__(self, config: Config, memory: MemoryBudget | None = None) -> None:
+        self._config = config.model_copy(update={"api_key": []})  # a process that reads strangers' texts needs no key
+        self._children = Children("service.requests.parser_child", BODIES)
+        self._memory = memory or MemoryBudget(config.memory)
+        self._room = _Room(config.max_json_memory)
+
+    def parse(self, kind: Kind, body: bytearray, counted: bool = False) -> Any:
+        """What PARSERS[kind] makes of it, or raises; TooLarge where that takes too much memory or time.
+
+        `counted`: the caller has counted the memory that it takes."""
+        needed, most = most_bytes(body), self._config.max_json_memory
+        if needed > most:
+            detail = f"What this body holds may take {needed // MIB} MiB of memory: no more than {most // MIB} MiB"
+            raise TooLarge(f"{detail} are allowed (SUNBOX_MAX_JSON_MEMORY)")
+        seconds = self._config.parse_seconds + SECONDS_PER_BYTE * len(body)
+        work = Work(kind, pickle.PickleBuffer(body), self._config, needed, seconds)
+        try:
+            with (
+                self._room.taken(needed),
+                nullcontext() if counted else self._memory.held("bodies", needed),
+                self._children.one() as child,
+            ):
+                answer = _ask(child, work)
+        except Closed:
+            raise Unavailable("The server is shutting down.") from None
+        if isinstance(answer, ServiceError):
+            raise answer
+        if isinstance(answer, Failed):
+            raise ParserFailed(answer.detail)
+        return answer
+
+    def close(self) -> None:
+        """Ends the processes that wait; one that parses ends with its body."""
+        self._children.close()
+
+
+class _Room:
+    """A budget of bytes: a thread that finds too few left waits until others return theirs, in the order of arrival.
+
+    Smaller ones that overtake it would keep a large one waiting for ever.
+    """
+
+    def __init__(self, size: int) -> None:
+        self._left = size
+        self._changed = threading.Condition()
+        self._waiting: deque[object] = deque()
+
+    @contextmanager
+    def taken(self, size: int) -> Iterator[None]:
+        me = object()
+        with self._changed:
+            self._waiting.append(me)
+            self._changed.wait_for(lambda: self._waiting[0] is me and self._left >= size)
+            self._waiting.popleft()
+            self._left -= size
+            self._changed.notify_all()  # there may be room for the next one
+        try:
+            yield
+        finally:
+            with self._changed:
+                self._left += size
+                self._changed.notify_all()
+
+
+def _ask(child: Child, work: Work) -> Any:
+    """The answer. Raises TooLarge where the child died or took too long; it must be killed then."""
+    try:
+        channel.send(child.link, work)
+        if not child.answers(work.seconds):
+            raise TooLarge(f"Reading this body takes longer than the {work.seconds:.0f} s allowed.")
+        with collector_paused():
+            return _believed(channel.receive(child.link, wait=True, find=allowed))
+    except channel.Closed:
+        raise _death(child, work) from None
+    except (pickle.UnpicklingError, AttributeError, ImportError) as error:
+        raise ParserFailed(f"the parser's answer was refused: {error}") from None
+
+
+def allowed(module: str, name: str) -> Any:
+    """The class of that name, where an answer may have it: models of documents, errors, what PARSERS return, and
+    arrays of numbers. Whoever took over the parser cannot name a function. Raises UnpicklingError."""
+    if (module, name) in ARRAYS:
+        return getattr(importlib.import_module(module), name)
+    if module in ANSWERS or module.startswith("service.scene."):
+        found = getattr(importlib.import_module(module), name, None)
+        if isinstance(found, type) and found.__module__ == module:
+            return found
+    raise pickle.UnpicklingError(f"{module}.{name} is no part of an answer")
+
+
+def _believed(answer: Any) -> Any:
+    """The answer. Its meshes are looked at again: compiled code reads the vertices that faces name."""
+    for shape in answer.scene.shapes if isinstance(answer, ParsedRequest) else ():
+        if isinstance(shape, MeshShape) and shape.vertices is not None and not shape.has_its_vertices():
+            raise ParserFailed("the parser's answer has a mesh whose faces name vertices that are not there")
+    return answer
+
+
+def _death(child: Child, work: Work) -> Exception:
+    code = child.exit_code()
+    if code is None:
+        return ParserFailed("the parser hung up")
+    log.warning("parser of a large body died code=%d", code)
+    if code == -signal.SIGXCPU:
+        return TooLarge(f"Reading this body takes more than the {work.seconds:.0f} s of processor time allowed.")
+    if code == -signal.SIGKILL:
+        return TooLarge("Reading this body was stopped: the machine ran out of memory.")
+    return ParserFailed(f"the parser died: {code}")

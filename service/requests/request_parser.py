@@ -1,0 +1,141 @@
+"""JSON becomes a valid scene and settings within the service's limits. Nothing is loaded, packed or kept."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import zlib
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter
+
+from service.config import Config
+from service.problems import FieldError, InvalidDocument
+from service.quality import ResolvedSettings, resolve
+from service.requests.bsdf_request import parse_albedo, parse_terms, parse_values
+from service.scene import Scene, load_json, parse_scene, parse_settings, references
+from service.scene.base import Model
+from service.scene.document import Parsed
+from service.scene.validation import validated
+from service.storage.documents import checked
+
+LONGEST_LABEL = 200  # characters
+HIGHEST_PRIORITY = 10
+
+
+class _Request(Model):
+    scene: Any
+    settings: Any = Field(default_factory=dict)
+
+
+class _RenderRequest(_Request):
+    label: Annotated[str, Field(max_length=LONGEST_LABEL)] | None = None
+    priority: Annotated[int, Field(ge=-HIGHEST_PRIORITY, le=HIGHEST_PRIORITY)] = 0
+
+
+_REQUEST = TypeAdapter(_Request)
+_RENDER_REQUEST = TypeAdapter(_RenderRequest)
+
+
+@dataclass(frozen=True)
+class ParsedRequest:
+    """A whole request; `document` is its scene as it was written, folded."""
+
+    settings: ResolvedSettings
+    scene: Scene
+    document: bytes
+    assets: list[str] = field(default_factory=list)  # that the scene refers to
+    label: str | None = None
+    priority: int = 0
+    digest: str = ""  # of the body as parsed JSON, where that was asked for
+
+
+class RequestParser:
+    """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
+
+    def __init__(self, config: Config) -> None:
+        self._config = config
+
+    def request(self, body: bytearray | memoryview) -> ParsedRequest:
+        """A whole `{scene, settings}`. Raises MalformedJson too."""
+        request = validated(_REQUEST, load_json(body), "")
+        scene, settings = self.both(request.scene, request.settings)
+        return ParsedRequest(settings, scene, folded(request.scene))
+
+    def render(self, body: bytearray | memoryview, keyed: bool = False) -> ParsedRequest:
+        """A whole `{scene, settings, label, priority}`; `keyed`: with its digest. Raises MalformedJson too."""
+        document = load_json(body)
+        request = validated(_RENDER_REQUEST, document, "")
+        scene, settings = self.both(request.scene, request.settings)
+        assets, digest = references.references(request.scene), digest_of(document) if keyed else ""
+        folded_scene = folded(request.scene)
+        return ParsedRequest(settings, scene, folded_scene, assets, request.label, request.priority, digest)
+
+    def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
+        """The scene and the settings. Raises InvalidDocument with the mistakes of both."""
+        errors: list[FieldError] = []
+        understood: list[Any] = []
+        for parse, document in ((self.scene, scene), (self.settings, settings)):
+            try:
+                understood.append(parse(document))
+            except InvalidDocument as error:
+                errors += error.errors
+        if errors:
+            raise InvalidDocument(errors)
+        return understood[0], understood[1]
+
+    def scene(self, document: Any, before: Parsed | None = None) -> Scene:
+        """The scene of a document; with the one `before`, only what an edit changed is validated."""
+        return parse_scene(document, "/scene", self._config, before)
+
+    def settings(self, document: Any) -> ResolvedSettings:
+        settings = parse_settings(document, "/settings", self._config)
+        most = self._config.max_seconds
+        if most is not None and settings.time_limit is not None and settings.time_limit > most:
+            detail = f"must be at most {most:g} (SUNBOX_MAX_SECONDS)"
+            raise InvalidDocument([FieldError("/settings/time_limit", detail)])
+        resolved = resolve(settings)
+        return replace(resolved, time_limit=most) if most is not None and resolved.time_limit is None else resolved
+
+
+def folded(document: Any) -> bytes:
+    """The JSON (ASCII) of a document, compressed: it is seldom read and may contain a mesh."""
+    return zlib.compress(json.dumps(document, separators=(",", ":")).encode(), 1)
+
+
+def unfolded(data: bytes) -> str:
+    """The JSON text."""
+    return zlib.decompress(data).decode("ascii")
+
+
+def digest_of(value: Any) -> str:
+    """The same for equal JSON values: the order of keys, blanks, and whether 1 is written 1.0 do not matter."""
+    text = json.dumps(_plain(value), sort_keys=True, separators=(",", ":"))
+    return hashlib.sha256(text.encode()).hexdigest()
+
+
+def _plain(value: Any) -> Any:
+    """The value with whole numbers as int."""
+    if type(value) is float:
+        return int(value) if value.is_integer() else value
+    if type(value) is list:
+        return [_plain(each) for each in value]
+    if type(value) is dict:
+        return {key: _plain(each) for key, each in value.items()}
+    return value
+
+
+Kind = Literal["render", "keyed_render", "request", "scenes", "materials", "bsdf", "albedo", "terms"]
+# What can be asked of a process that parses large bodies, by name.
+PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
+    "render": lambda config, body: RequestParser(config).render(body),
+    "keyed_render": lambda config, body: RequestParser(config).render(body, keyed=True),
+    "request": lambda config, body: RequestParser(config).request(body),
+    "scenes": lambda config, body: checked("scenes", load_json(body), config),
+    "materials": lambda config, body: checked("materials", load_json(body), config),
+    "bsdf": lambda config, body: parse_values(body),
+    "albedo": lambda config, body: parse_albedo(body),
+    "terms": lambda config, body: parse_terms(body),
+}

@@ -1,0 +1,61 @@
+"""A caller's documents become packed scenes, with the service's limits and assets. Not for the event loop."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+
+from service.assets import Assets
+from service.config import Config
+from service.ipc.messages import StopRule
+from service.pack import CacheBudget, PackCache, Packed, pack
+from service.problems import InvalidDocument
+from service.quality import ResolvedSettings
+from service.requests.request_parser import RequestParser
+from service.requests.stream_memory import StreamMemory
+from service.scene import Scene
+from service.storage.asset_access import AssetAccess
+from service.system.memory import MemoryBudget
+
+ENVIRONMENTS = 4  # that renders share: the tables of a map of 512 x 256 texels take 70 ms to make
+
+
+class RequestReader(RequestParser):
+    """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
+
+    def __init__(
+        self, config: Config, assets: Assets, budget: MemoryBudget | None = None, access: AssetAccess | None = None
+    ) -> None:
+        """`access` says which assets an owner may use; without it each may use all."""
+        super().__init__(config)
+        self.budget = budget or MemoryBudget(config.memory)
+        self.memory = StreamMemory(config.max_stream_memory, self.budget)
+        self.caches = CacheBudget(config.keep_packed)
+        self.budget.cache("scenes", lambda: self.caches.bytes, self.caches.shrink)
+        self._assets = assets
+        self._access = access
+        self._environments = PackCache(ENVIRONMENTS, self.caches)
+
+    def pack(self, scene: Scene, cache: PackCache | None = None, owner: str = "") -> Packed:
+        """`owner`: whose assets the scene may use; "": all."""
+        assets = self._assets if self._access is None else self._access.view(owner, scene)
+        with _under("/scene"):
+            return pack(scene, assets, cache, self._config, self._environments)
+
+
+def stop_rule(settings: ResolvedSettings) -> StopRule:
+    return StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
+
+
+def weight(packed: Packed) -> int:
+    """The bytes that the arrays of a packed scene take."""
+    parts = [vars(part) for part in (packed.arrays, packed.arrays.textures) if part is not None]
+    return sum(getattr(value, "nbytes", 0) for part in parts for value in part.values())
+
+
+@contextmanager
+def _under(pointer: str) -> Iterator[None]:
+    try:
+        yield
+    except InvalidDocument as error:
+        raise error.under(pointer) from None

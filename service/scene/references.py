@@ -1,0 +1,45 @@
+"""The assets that a scene's document refers to, valid or not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from typing import Any
+
+Step = str | int
+
+
+def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
+    """Where a document (valid or not) refers to an asset, step by step, and to which."""
+    if not isinstance(scene, dict):
+        return
+    holders: list[tuple[tuple[Step, ...], Any]] = [(("environment",), scene.get("environment"))]
+    if isinstance(textures := scene.get("textures"), dict):
+        holders += [(("textures", name), texture) for name, texture in textures.items()]
+    if isinstance(shapes := scene.get("shapes"), list):
+        holders += [(("shapes", i), shape) for i, shape in enumerate(shapes)]
+    for place, holder in holders:
+        if not isinstance(holder, dict):
+            continue
+        if isinstance(ref := holder.get("asset"), str):
+            yield (*place, "asset"), ref
+        if isinstance(several := holder.get("assets"), dict):
+            yield from (((*place, "assets", key), ref) for key, ref in several.items() if isinstance(ref, str))
+
+
+def references(scene: Any) -> list[str]:
+    """Every asset that a document refers to, once, in order."""
+    return list(dict.fromkeys(ref for _, ref in places(scene)))
+
+
+def renamed(scene: Any, name: Callable[[str], str]) -> Any:
+    """The document with other names for its assets; what need not differ is shared with the one given."""
+    if not isinstance(scene, dict):
+        return scene
+    copies: dict[tuple[Step, ...], Any] = {(): scene.copy()}
+    for place, ref in places(scene):
+        for depth in range(1, len(place)):
+            holder, step = copies[place[: depth - 1]], place[depth - 1]
+            if place[:depth] not in copies:
+                copies[place[:depth]] = holder[step] = holder[step].copy()
+        copies[place[:-1]][place[-1]] = name(ref)
+    return copies[()]

@@ -1,0 +1,13 @@
+"""The data folder: what users saved, what renders left, and how much room there is.
+
+stores         what is kept in the data folder
+database       the SQLite file: its version, its connections
+migrations     its tables, as the ordered steps that made them
+data_lock      one server at a time on a data folder
+data_check     whether that is sound
+quota          room on the disk
+documents      what users saved, in SQLite
+asset_shares   what the assets of one key take
+asset_access   which assets a key may use
+lost_pictures  pictures of renders that the database does not know
+"""

@@ -1,0 +1,86 @@
+"""Which assets a key may use: those of others are answered as if they were not here."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Collection, Iterator
+from pathlib import Path
+
+from service.assets import Assets, AssetStore, ImageData, MeshData
+from service.assets.store import ID, unknown
+from service.problems import AssetError
+from service.scene import Scene
+from service.storage.database import Database
+
+# Of the assets in a JSON array those that others uploaded and this owner did not, and that nothing it can read uses.
+_FOREIGN = """
+    SELECT wanted.value FROM json_each(:ids) AS wanted
+    WHERE EXISTS (SELECT 1 FROM asset_owners WHERE asset = wanted.value)
+    AND NOT EXISTS (SELECT 1 FROM asset_owners WHERE asset = wanted.value AND owner = :owner)
+    AND NOT EXISTS (
+        SELECT 1 FROM uses JOIN documents USING (kind, name, owner)
+        WHERE uses.asset = wanted.value AND (documents.owner = :owner OR documents.shared)
+    )
+    AND NOT EXISTS (
+        SELECT 1 FROM render_uses JOIN renders USING (number)
+        WHERE render_uses.asset = wanted.value AND renders.owner = :owner AND NOT renders.gone
+    )
+"""
+
+
+class AssetAccess:
+    """For any number of threads; not for an event loop. Methods raise Unavailable where the disk fails.
+
+    An owner is a text; "" may use every asset. Nothing is stored here, so that an answer is never out of date.
+    """
+
+    def __init__(self, folder: Path, assets: AssetStore) -> None:
+        self._database = Database(folder)
+        self._assets = assets
+
+    def check(self, owner: str, id: str) -> None:
+        """Raises NotFound for an asset that this owner may not use, with the words for one that does not exist."""
+        if self.foreign(owner, [id]):
+            raise unknown(id)
+
+    def foreign(self, owner: str, ids: Collection[str]) -> set[str]:
+        """Those of these assets, which may not exist, that this owner may not use."""
+        asked = [id for id in set(ids) if ID.fullmatch(id) and not self._assets.is_builtin(id)] if owner else []
+        if not asked or not self._database.exists():
+            return set()
+        with self._database.open() as database:
+            rows = database.execute(_FOREIGN, {"owner": owner, "ids": json.dumps(asked)})
+            return {id for (id,) in rows}
+
+    def view(self, owner: str, scene: Scene) -> Assets:
+        """The assets as this owner sees them, for packing this scene."""
+        foreign = self.foreign(owner, set(_references(scene))) if owner else set()
+        return _Visible(self._assets, foreign) if foreign else self._assets
+
+
+class _Visible:
+    """Assets without the foreign ones."""
+
+    def __init__(self, assets: Assets, foreign: set[str]) -> None:
+        self._assets = assets
+        self._foreign = foreign
+
+    def mesh(self, ref: str) -> MeshData:
+        self._check(ref)
+        return self._assets.mesh(ref)
+
+    def image(self, ref: str) -> ImageData:
+        self._check(ref)
+        return self._assets.image(ref)
+
+    def _check(self, ref: str) -> None:
+        if ref in self._foreign:
+            raise AssetError(unknown(ref).detail)
+
+
+def _references(scene: Scene) -> Iterator[str]:
+    for holder in (scene.environment, *scene.textures.values(), *scene.shapes):
+        if (ref := getattr(holder, "asset", None)) is not None:
+            yield ref
+        if (faces := getattr(holder, "assets", None)) is not None:
+            yield from faces.model_dump().values()

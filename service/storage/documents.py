@@ -1,0 +1,293 @@
+"""Scenes and materials that users saved: documents by kind and name, in an SQLite file that survives a power cut."""
+
+from __future__ import annotations
+
+import hashlib
+import logging
+import sqlite3
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, nullcontext, suppress
+from dataclasses import dataclass
+from itertools import islice
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+from pydantic import TypeAdapter
+
+from service.assets import AssetStore
+from service.assets.store import unknown
+from service.problems import (
+    FieldError,
+    Forbidden,
+    InvalidDocument,
+    NotFound,
+    PreconditionFailed,
+    TooLarge,
+    Unavailable,
+)
+from service.scene import Material, parse_scene, references
+from service.scene.base import MOST_MISTAKES
+from service.scene.document import Limits
+from service.scene.text import dump_json
+from service.scene.validation import escaped, validated
+from service.storage.asset_access import AssetAccess
+from service.storage.database import Database
+from service.storage.quota import Quota
+from service.system.disk_usage import Usage, expected
+
+log = logging.getLogger(__name__)
+
+Kind = Literal["scenes", "materials"]
+PRIVATE, SHARED, BY_LINK = range(3)  # whose a document is: its owner's, listed to all, or whose knows its name
+LINK_DAYS = 90  # after which a document that only a link leads to is deleted, if nobody has read it
+DAY_S = 86_400.0
+MOST_NAMES = 1000  # of one page
+KINDS: tuple[Kind, ...] = get_args(Kind)
+LONGEST_NAME = 100  # characters
+_MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
+
+
+@dataclass(frozen=True)
+class CheckedDocument:
+    """A valid document as it is stored, and its references to assets, which may be missing."""
+
+    body: str
+    uses: list[tuple[str, str]]  # JSON pointer, reference
+
+
+def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDocument:
+    """Raises InvalidDocument with pointers from the document's root. A large document takes seconds."""
+    if kind == "materials":
+        validated(_MATERIAL, document, "")
+    else:
+        parse_scene(document, limits=limits)
+    places = references.places(document) if kind == "scenes" else ()
+    uses = [("".join(f"/{escaped(step)}" for step in place), reference) for place, reference in places]
+    return CheckedDocument(dump_json(document), uses)
+
+
+def etag(body: bytes) -> str:
+    """The strong entity tag (RFC 9110) of a document as it is stored."""
+    return f'"{hashlib.sha256(body).hexdigest()[:32]}"'
+
+
+@dataclass(frozen=True)
+class Condition:
+    """What must be true of the document that there is, by the headers If-Match and If-None-Match of RFC 9110."""
+
+    is_match: tuple[str, ...] | None = None  # one of these tags, or "*" for any document
+    is_none: tuple[str, ...] | None = None  # none of these tags, or "*" for no document
+
+    def check(self, body: bytes | None) -> None:
+        """`body`: the document, None where there is none. Raises PreconditionFailed."""
+        if self.is_match is not None and not _matches(self.is_match, body):
+            raise PreconditionFailed("Another document has this name by now, or none has: get it, and try again.")
+        if self.is_none is not None and _matches(self.is_none, body):
+            raise PreconditionFailed("A document of this name is there already.")
+
+
+ALWAYS = Condition()
+_OWN = "FROM documents WHERE kind = ? AND name = ? AND owner = ?"
+
+
+def _matches(tags: tuple[str, ...], body: bytes | None) -> bool:
+    return body is not None and ("*" in tags or etag(body) in tags)
+
+
+class Documents:
+    """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails.
+
+    `quota` makes room for documents; without it there always is room. `each`: most bytes of one owner's documents. An
+    owner is a text; "" has no such bound, and what it saves is shared by default.
+    """
+
+    def __init__(self, folder: Path, assets: AssetStore, quota: Quota | None = None, each: int | None = None) -> None:
+        self._each = each
+        self._database = Database(folder)
+        self._assets = assets
+        self._access = AssetAccess(folder, assets)
+        self._quota = quota
+
+    def prepare(self) -> None:
+        """To be called once, before the server starts. Raises DamagedFile."""
+        self._database.prepare()
+        if self._database.exists():
+            with suppress(Unavailable), self._database.open() as database, database:
+                _expire(database)
+
+    def names(
+        self, kind: str, owner: str = "", limit: int = MOST_NAMES, after: str | None = None
+    ) -> tuple[list[dict[str, str]], bool]:
+        """`[{name, title}]` of what this owner may read but for documents by link, in the order of the titles: of the
+        first `limit` names behind `after`; and whether there are more. Raises NotFound for an unknown kind."""
+        check_kind(kind)
+        with self._database.open() as database:
+            rows = database.execute(
+                "SELECT name, title FROM documents WHERE kind = ? AND shared <> ? AND (owner = ? OR shared) "
+                "AND name > ? ORDER BY name, owner = ?",
+                (kind, BY_LINK, owner, after or "", owner),
+            )
+            titles = dict[str, str]()  # the owner's own come last, and count
+            for name, title in rows:
+                if name not in titles and len(titles) == limit:
+                    return _listed(titles), True
+                titles[name] = title
+        return _listed(titles), False
+
+    def get(self, kind: str, name: str, owner: str = "") -> bytes:
+        """The bare document, as JSON: the owner's own of that name, or else one that is shared. Raises NotFound."""
+        check_kind(kind)
+        with self._database.open() as database:
+            row = database.execute(
+                "SELECT body, shared, owner FROM documents WHERE kind = ? AND name = ? AND (owner = ? OR shared) "
+                "ORDER BY owner = ? DESC, rowid LIMIT 1",
+                (kind, name, owner, owner),
+            ).fetchone()
+            if row is None:
+                raise _missing(kind, name)
+            if row[1] == BY_LINK:
+                _note_read(database, kind, name, row[2])
+        text: str = row[0]
+        return text.encode()
+
+    def put(
+        self,
+        kind: str,
+        name: str,
+        document: CheckedDocument,
+        title: str | None = None,
+        owner: str = "",
+        shared: int | None = None,
+        condition: Condition = ALWAYS,
+    ) -> tuple[str, bool]:
+        """Save an owner's document under a name; its title, and whether the name is new.
+
+        `shared`: PRIVATE, SHARED, or BY_LINK; None leaves that as it is, and a new one is its owner's alone. Raises
+        InvalidDocument, with pointers from the document's root, where there is no such asset for its owner, TooLarge
+        where it is too much for its owner, PreconditionFailed.
+        """
+        check_kind(kind)
+        body, uses = document.body, list(dict.fromkeys(reference for _, reference in document.uses))
+        key, size = (kind, name, owner), len(body.encode())
+        # These assets stay while others make room, so that a refused document costs no asset.
+        with self._quota.pinned(uses) if self._quota else nullcontext():
+            foreign = self._access.foreign(owner, uses)
+            self._find_assets(document, uses, foreign)
+            room = self._quota.room(expected([size])) if self._quota else nullcontext()
+            with room, self._database.open() as database, database:
+                database.execute("BEGIN IMMEDIATE")
+                self._find_assets(document, uses, foreign)  # again: another process may have made room
+                old = database.execute(f"SELECT title, shared, bytes, body {_OWN}", key).fetchone()
+                condition.check(None if old is None else old[3].encode())
+                self._check_share(database, owner, size - (old[2] if old else 0))
+                kept = title or (old[0] if old else name)
+                if shared is None:
+                    shared = old[1] if old else (PRIVATE if owner else SHARED)
+                row = (*key, int(shared), kept, size, body)
+                database.execute("INSERT OR REPLACE INTO documents VALUES (?, ?, ?, ?, ?, ?, ?)", row)
+                database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
+                database.executemany("INSERT INTO uses VALUES (?, ?, ?, ?)", [(asset, *key) for asset in uses])
+                database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
+                if shared == BY_LINK:
+                    database.execute("INSERT INTO document_links VALUES (?, ?, ?, ?)", (*key, time.time()))
+                _expire(database)
+        log.info("document saved kind=%s name=%s bytes=%d", kind, name, size)
+        return kept, old is None
+
+    def delete(self, kind: str, name: str, owner: str = "", condition: Condition = ALWAYS) -> None:
+        """Delete an owner's document, or else one that was saved before there were owners.
+
+        Raises NotFound, Forbidden for one that another owner shares, PreconditionFailed.
+        """
+        check_kind(kind)
+        with self._database.open() as database, database:
+            database.execute("BEGIN IMMEDIATE")
+            for key in dict.fromkeys(((kind, name, owner), (kind, name, ""))):
+                found = database.execute(f"SELECT body {_OWN}", key).fetchone()
+                if found is not None:
+                    break
+            else:
+                shared = "SELECT 1 FROM documents WHERE kind = ? AND name = ? AND shared"
+                if database.execute(shared, (kind, name)).fetchone():
+                    raise Forbidden("This document is shared by another key, which alone may delete it.")
+                raise _missing(kind, name)
+            condition.check(found[0].encode())
+            database.execute("DELETE FROM documents WHERE kind = ? AND name = ? AND owner = ?", key)
+            database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
+            database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
+        log.info("document deleted kind=%s name=%s", kind, name)
+
+    @contextmanager
+    def assets_in_use(self) -> Iterator[set[str]]:
+        """The ids of all assets that saved documents and renders refer to; while it lasts none of these is stored."""
+        if not self._database.exists():
+            yield set()
+            return
+        with self._database.open() as database, database:
+            database.execute("BEGIN IMMEDIATE")
+            yield {
+                asset for (asset,) in database.execute("SELECT asset FROM uses UNION SELECT asset FROM render_uses")
+            }
+
+    def usage(self) -> Usage:
+        """Of the database, whose unused pages don't count."""
+        return self._database.usage()
+
+    def _check_share(self, database: sqlite3.Connection, owner: str, more: int) -> None:
+        """Raises TooLarge where an owner's documents would take too much with `more` bytes."""
+        if self._each is None or not owner or more <= 0:
+            return
+        (bytes,) = database.execute("SELECT total(bytes) FROM documents WHERE owner = ?", (owner,)).fetchone()
+        if bytes + more > self._each:
+            raise TooLarge(
+                f"With it your saved documents would take {int(bytes) + more} bytes; {self._each} are allowed "
+                "(SUNBOX_MAX_KEY_DOCUMENTS). Delete some first."
+            )
+
+    def _find_assets(self, document: CheckedDocument, uses: list[str], foreign: set[str]) -> None:
+        """Raises InvalidDocument where one of them is not here, or is foreign."""
+
+        def why_not(ref: str) -> str | None:
+            return unknown(ref).detail if ref in foreign else self._assets.missing(ref)
+
+        missing = ((ref, why) for ref in uses if (why := why_not(ref)) is not None)
+        first = dict(islice(missing, MOST_MISTAKES))
+        if first:
+            told = (FieldError(pointer, first[ref]) for pointer, ref in document.uses if ref in first)
+            raise InvalidDocument(islice(told, MOST_MISTAKES))
+
+
+def _listed(titles: dict[str, str]) -> list[dict[str, str]]:
+    return [{"name": name, "title": title} for title, name in sorted((titles[name], name) for name in titles)]
+
+
+def _note_read(database: sqlite3.Connection, kind: str, name: str, owner: str) -> None:
+    """Note that a document by link was read; once a day, and not where the disk takes nothing."""
+    now = time.time()
+    with suppress(sqlite3.OperationalError), database:
+        database.execute(
+            "UPDATE document_links SET read_at = ? WHERE kind = ? AND name = ? AND owner = ? AND read_at < ?",
+            (now, kind, name, owner, now - DAY_S),
+        )
+
+
+def _expire(database: sqlite3.Connection) -> None:
+    """Delete documents by link that nobody has read for long: their assets may make room from then on."""
+    last = time.time() - LINK_DAYS * DAY_S
+    old = database.execute("SELECT kind, name, owner FROM document_links WHERE read_at < ?", (last,)).fetchall()
+    for table in ("documents", "uses", "document_links"):
+        database.executemany(f"DELETE FROM {table} WHERE kind = ? AND name = ? AND owner = ?", old)
+    if old:
+        log.info("deleted documents that nobody had read by their links for %d days count=%d", LINK_DAYS, len(old))
+
+
+def check_kind(kind: str) -> Kind:
+    """Raises NotFound for an unknown kind."""
+    if kind not in KINDS:
+        raise NotFound(f"there are no documents of {kind[:80]!r}; there are {', '.join(KINDS)}")
+    return kind
+
+
+def _missing(kind: str, name: str) -> NotFound:
+    return NotFound(f"there is no {name[:LONGEST_NAME]!r} among the saved {kind}")

@@ -1,0 +1,70 @@
+"""What is kept in the data folder: assets, documents and the pictures of renders, within one quota."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable
+from contextlib import suppress
+from dataclasses import dataclass
+from pathlib import Path
+
+from service.assets import AssetStore
+from service.config import Config
+from service.storage.asset_access import AssetAccess
+from service.storage.asset_shares import AssetShares
+from service.storage.documents import Documents
+from service.storage.lost_pictures import LostPictures
+from service.storage.quota import Quota, reserve_bytes
+from service.system.disk_usage import Usage, usage
+
+
+@dataclass(frozen=True)
+class Storage:
+    assets: AssetStore
+    documents: Documents
+    quota: Quota
+    shares: AssetShares
+    access: AssetAccess
+
+
+RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
+
+
+def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Storage:
+    """`pictures`: what the pictures of renders take, for a server that counts them; else they are looked at."""
+    renders = config.data_dir / RENDERS
+    beside, lost = pictures or (lambda: _pictures(renders)), LostPictures(renders)
+    # They depend on each other: assets need room, the quota the documents' references, documents the assets.
+    limit = Usage(config.data_quota, config.data_files)
+    quota = Quota(
+        config.data_dir,
+        limit,
+        lambda: documents.assets_in_use(),
+        lambda: documents.usage() + beside() + lost.usage(),
+        lost,
+        lambda ids: shares.forget(ids),
+        lambda: shares.owned(),
+        reserve_bytes(config.data_quota),
+    )
+    assets = AssetStore(config.data_dir, config, _builtin_assets, quota.room)
+    documents = Documents(config.data_dir, assets, quota, config.max_key_documents)
+    shares = AssetShares(config.data_dir, quota, config.max_key_assets)
+    return Storage(assets, documents, quota, shares, AssetAccess(config.data_dir, assets))
+
+
+def _pictures(folder: Path) -> Usage:
+    total = Usage()
+    if not folder.is_dir():
+        return total
+    with suppress(FileNotFoundError), os.scandir(folder) as entries:
+        for entry in entries:
+            with suppress(FileNotFoundError):  # a checkpoint that the server replaced just now
+                if entry.is_file(follow_symlinks=False):
+                    total += usage(entry.stat(follow_symlinks=False))
+    return total
+
+
+def _builtin_assets() -> dict[str, bytes]:
+    from service import presets  # the command line seldom needs them
+
+    return presets.builtin_assets()

@@ -1,0 +1,200 @@
+"""A stream's scene as it is edited: its documents, their meaning, and the part that the renderer already has."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import Any
+
+from service.ipc.messages import Update
+from service.pack import PackCache, pack_camera, pack_materials, pack_microfacets, pack_turn, repacked, scene_delta
+from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
+from service.quality import ResolvedSettings
+from service.renders.memory import COPIES, picture_bytes
+from service.requests.request_reader import RequestReader, stop_rule, weight
+from service.scene import Scene, merge_patch
+from service.scene.document import Parsed
+from service.scene.text import weigh
+from service.streams import protocol
+from service.streams.scene_diff import may_be_refused, scene_diff
+
+MOST_GOOD = 4  # generations; while the renderer compiles for one, dragging a slider makes hundreds
+
+
+@dataclass(frozen=True)
+class Version:
+    """One generation: the documents as the client wrote them, and as they are understood."""
+
+    generation: int
+    scene_document: Any
+    settings_document: Any
+    scene: Scene
+    settings: ResolvedSettings
+
+
+@dataclass(frozen=True)
+class Accepted:
+    """A version, and the arrays that it was last packed as."""
+
+    version: Version
+    arrays: Any
+
+
+class EditSession:
+    """The documents of one stream. Its methods parse and pack: not on the event loop, and one call at a time."""
+
+    def __init__(self, reader: RequestReader, task: int, owner: str = "") -> None:
+        self.version: Version | None = None  # the last valid one
+        self._reader = reader
+        self._task = task
+        self._owner = owner  # whose assets it may use
+        self._cache = PackCache(budget=reader.caches)
+        self._picture_bytes = 0
+        self._bytes = 0  # that the scene's document takes at most
+        self._given: Version | None = None  # the last one that the renderer has
+        self._good: dict[int, Accepted] = {}  # that the renderer may go back to, by generation
+        self.packs = False  # `settle` will pack more than a camera and materials
+        self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
+        self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
+
+    def take(self, message: protocol.Start | protocol.Update) -> Update | None:
+        """The update that the renderer needs at once; None where that can wait for `settle`, after newer ones.
+
+        Raises InvalidDocument or Conflict, and nothing has changed then.
+        """
+        if self.version is not None and message.generation <= self.version.generation:
+            last = self.version.generation
+            raise InvalidDocument([FieldError("/generation", f"must rise: {message.generation} comes after {last}")])
+        version = self._started(message) if isinstance(message, protocol.Start) else self._updated(message)
+        # Whether such a scene can be packed is known when it was; then the update is as good as made.
+        update = (
+            self._give(version) if self._given is None or may_be_refused(self._given.scene, version.scene) else None
+        )
+        self.version = version
+        self.packs = update is None and self._given is not None and scene_diff(self._given.scene, version.scene).whole
+        return update
+
+    def settle(self) -> Update | None:
+        """The update that brings the renderer up to the documents; None when it is there."""
+        version = self.version
+        if version is None or version is self._given:
+            return None
+        try:
+            return self._give(version)
+        except ServiceError:
+            self.version = self._given
+            raise
+
+    def failed(self, generation: int, fallback: int | None) -> Update | None:
+        """The renderer failed at `generation` and goes on with `fallback`: the update that it needs then, if any."""
+        version, given = self.version, self._given
+        good = None if fallback is None else self._good.get(fallback)
+        self._given = None
+        if good is not None:
+            self._given, self._arrays = good.version, good.arrays
+        if version is None or version.generation <= generation:
+            self.version = self._given
+        elif given is not None and given.generation > generation:  # it was sent as a change of the one that failed
+            self._given = None
+            return self._give(version)
+        return None
+
+    def close(self) -> None:
+        self._reader.memory.release(self)
+
+    @contextmanager
+    def _held(self, document: Any, most: int) -> Iterator[None]:
+        """Counts the scene's document, which takes `most` bytes or less; as before where it is refused after all.
+
+        Raises TooLarge, Unavailable.
+        """
+        before, memory = self._bytes, self._reader.memory
+        size = weigh(document) if most > memory.each else most
+        memory.hold(self, size)
+        self._bytes = size
+        try:
+            yield
+        except BaseException:
+            memory.hold(self, before)
+            self._bytes = before
+            raise
+
+    def _started(self, message: protocol.Start) -> Version:
+        with self._held(message.scene, weigh(message.scene)):
+            scene, settings = self._reader.both(message.scene, message.settings)
+        return Version(message.generation, message.scene, message.settings, scene, settings)
+
+    def _updated(self, message: protocol.Update) -> Version:
+        old = self.version
+        if old is None:
+            raise Conflict("Nothing was started yet: send start before update.")
+        new = replace(old, generation=message.generation)
+        if "scene" in message.model_fields_set:
+            document = merge_patch(old.scene_document, message.scene)
+            with self._held(document, self._bytes + weigh(message.scene)):
+                scene = self._reader.scene(document, Parsed(old.scene_document, old.scene))
+            new = replace(new, scene_document=document, scene=scene)
+        if "settings" in message.model_fields_set:
+            document = merge_patch(old.settings_document, message.settings)
+            new = replace(new, settings_document=document, settings=self._reader.settings(document))
+        return new
+
+    def _give(self, version: Version) -> Update:
+        with self._room(version):
+            update = self._difference(version)
+        self._given = version
+        newest = max((g for g in self._good if g <= self.works), default=None)
+        if newest is not None:
+            self._good = {g: kept for g, kept in self._good.items() if g >= newest}
+        self._good[version.generation] = Accepted(version, self._arrays)
+        if len(self._good) > MOST_GOOD:  # the one that works, and the newest
+            del self._good[sorted(self._good)[1]]
+        return update
+
+    @contextmanager
+    def _room(self, version: Version) -> Iterator[None]:
+        """Counts the version's picture; as before where it is refused after all. Raises TooLarge, Unavailable."""
+        budget, before, after = self._reader.budget, self._picture_bytes, picture_bytes(version.settings)
+        budget.hold("pictures", self, max(before, after))
+        try:
+            yield
+            self._picture_bytes = after
+        finally:
+            budget.hold("pictures", self, self._picture_bytes)
+
+    def _difference(self, new: Version) -> Update:
+        old, update = self._given, Update(self._task, new.generation, interactive=True)
+        if old is None or old.settings.for_gpu() != new.settings.for_gpu():
+            update = replace(update, settings=new.settings.for_gpu())
+        if old is None or stop_rule(old.settings) != stop_rule(new.settings):
+            update = replace(update, stop=stop_rule(new.settings))
+        if old is None or old.settings.denoise != new.settings.denoise:
+            update = replace(update, denoise=new.settings.denoise)
+        touched = scene_diff(old.scene, new.scene) if old is not None else None
+        if touched is None or touched.whole:
+            packed = self._reader.pack(new.scene, self._cache, self._owner)
+            arrays = packed.arrays
+            self._reader.budget.hold("scenes", self, COPIES * weight(packed))
+            delta = None if old is None else scene_delta(self._arrays, arrays)
+            self._arrays, lit = arrays, arrays.environment
+            if old is None or delta is None:
+                return replace(update, scene=arrays)
+            return replace(
+                update, base=old.generation, moved=delta.moved, camera=arrays.camera, materials=arrays.materials,
+                texture_words=None if arrays.textures is None else arrays.textures.words,
+                microfacets=arrays.microfacets if len(arrays.microfacets) else None,
+                environment=None if lit is None else (lit.rotation, lit.scale),
+                environment_map=delta.environment_map,
+            )  # fmt: skip
+        environment = new.scene.environment
+        textures = self._arrays.textures
+        return replace(
+            update,
+            base=None if old is None else old.generation,
+            camera=pack_camera(new.scene.camera, self._arrays.origin) if touched.camera else None,
+            materials=pack_materials(new.scene) if touched.materials else None,
+            texture_words=repacked(textures, new.scene) if touched.materials and textures else None,
+            microfacets=pack_microfacets(new.scene) if touched.materials and len(self._arrays.microfacets) else None,
+            environment=pack_turn(environment) if touched.environment and environment is not None else None,
+        )

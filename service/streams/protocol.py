@@ -1,0 +1,116 @@
+"""The messages that a client may send on the stream, and how a frame is written."""
+
+from __future__ import annotations
+
+import json
+import struct
+from typing import Annotated, Any, Literal
+
+from pydantic import Field, TypeAdapter
+
+from service import images
+from service.ipc import messages
+from service.problems import TooLarge
+from service.scene.base import Model, hint
+from service.scene.text import load_json, most_bytes
+from service.scene.validation import validated
+from service.views import DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, Bits, StreamFormat, ToneMap
+
+MOST_MEMORY = 32 << 20  # bytes, of a message's values: a mesh of 1 MiB takes 12 MB, as many empty arrays 36
+GENERATIONS = 2**53  # what every JSON reader keeps exact
+QUALITY, LAST_QUALITY = 80, 90  # JPEG: 4:2:0 while it converges, 4:4:4 for the frame that stays
+MOST_FPS = 240
+
+
+class View(Model):
+    """How frames are to look; fields that a message leaves out stay as they were."""
+
+    format: StreamFormat = "jpeg"
+    quality: Annotated[int, Field(ge=1, le=100)] | None = None
+    exposure: Annotated[
+        float,
+        Field(ge=LEAST_EXPOSURE, le=MOST_EXPOSURE),
+        hint("Exposure", "In stops: each doubles the brightness.", unit="stops", widget="slider", soft=(-10, 10)),
+    ] = 0.0
+    tone_map: Annotated[
+        ToneMap,
+        hint("Tone map", "How radiance beyond white is brought onto the screen."),
+    ] = DEFAULT_TONE_MAP
+    aov: Aov = "color"
+    max_fps: Annotated[float, Field(gt=0, le=MOST_FPS)] | None = None
+    bits: Annotated[Bits, Field(description="Of a PNG's channels.")] = 8
+
+    def for_renderer(self) -> messages.View:
+        encoding = images.FORMATS[self.format].encoding(self.bits)
+        return messages.View(self.aov, self.exposure, self.tone_map, encoding)
+
+    def over(self, view: View) -> View:
+        """`view` with the fields that this message gives."""
+        said = {name: getattr(self, name) for name in self.model_fields_set if name in View.model_fields}
+        return view.model_copy(update=said)
+
+
+class ViewMessage(View):
+    type: Literal["view"]
+
+
+class Start(Model):
+    type: Literal["start"]
+    generation: Annotated[int, Field(ge=-GENERATIONS, le=GENERATIONS)]
+    scene: Any
+    settings: Any = Field(default_factory=dict)
+    view: View | None = None
+    renderers: Annotated[int, Field(ge=1, description="Most renderers that trace it; more than there are: all.")] = 1
+
+
+class Update(Model):
+    type: Literal["update"]
+    generation: Annotated[int, Field(ge=-GENERATIONS, le=GENERATIONS)]
+    scene: Any = Field(default_factory=dict)
+    settings: Any = Field(default_factory=dict)
+
+
+class Ack(Model):
+    type: Literal["ack"]
+    seq: int
+
+
+class Bare(Model):
+    type: Literal["pause", "resume", "stop", "ping"]
+
+
+Message = Start | Update | ViewMessage | Ack | Bare
+_MESSAGE: TypeAdapter[Message] = TypeAdapter(Annotated[Message, Field(discriminator="type")])
+
+
+def parse(text: str) -> Message:
+    """Raises MalformedJson, TooLarge, or InvalidDocument with pointers from the message's root."""
+    if most_bytes(text) > MOST_MEMORY:
+        raise TooLarge("What this message holds takes too much memory: big geometry goes through assets.")
+    return validated(_MESSAGE, load_json(text), "")
+
+
+def frame_bytes(frame: messages.Frame, view: View, seq: int) -> bytes:
+    """A frame's message: header length, header, image. Takes milliseconds."""
+    quality = view.quality or (LAST_QUALITY if frame.last else QUALITY)
+    body = images.encode(frame.pixels, view.format, bits=view.bits, quality=quality)
+    height, width = frame.pixels.shape[:2]
+    progress = frame.progress
+    header = {
+        "generation": frame.generation,
+        "seq": seq,
+        "samples": progress.samples,
+        "width": width,
+        "height": height,
+        "mime": images.FORMATS[view.format].mime,
+        "noise": progress.noise,
+        "elapsed_s": progress.elapsed_s,
+        "eta_s": progress.eta_s,
+        "scale": frame.scale,
+    }
+    if frame.denoised:
+        header["denoised"] = True
+    if progress.missing is not None:
+        header["missing_light"] = progress.missing
+    text = json.dumps(header, separators=(",", ":")).encode()
+    return b"".join((struct.pack("<I", len(text)), text, body))

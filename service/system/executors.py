@@ -1,0 +1,119 @@
+"""Threads for the server's slow work: neither the event loop nor another kind of work waits for it."""
+
+from __future__ import annotations
+
+import asyncio
+import os
+import threading
+from collections import Counter, deque
+from collections.abc import Callable
+from concurrent.futures import Future, ThreadPoolExecutor
+from contextvars import copy_context
+from dataclasses import dataclass
+from functools import partial
+from typing import Any, TypeVar
+
+from service.system.priority import raise_thread_niceness
+from service.system.turns import CALLER
+
+# Steps of niceness above the event loop and the encoders; the renderer is 10 above.
+NICENESS = 5  # of threads that parse and pack scenes, for which a client waits
+WRITING_NICENESS = 12  # of threads that write large pictures to files while every stream goes on
+
+T = TypeVar("T")
+
+
+def _yield_to_others(niceness: int = NICENESS) -> None:
+    raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, os.getpid()) + niceness)
+
+
+@dataclass(frozen=True)
+class _Work:
+    run: Callable[[], Any]
+    result: Future[Any]
+    client: str
+
+
+class Pool:
+    """Threads for one kind of work, which waits for no other kind: `await pool(work, client)`.
+
+    Turns go round the clients that have work here, and then in the order of arrival: one client with much work delays
+    itself. No client has more than `each` threads at a time: work of minutes is for fewer than all threads, or else
+    nobody had a turn until it ended.
+    """
+
+    def __init__(self, name: str, threads: int, niceness: int = 0, each: int | None = None) -> None:
+        self._threads = ThreadPoolExecutor(threads, name, _yield_to_others, (niceness,))
+        self._most = threads
+        self._each = threads if each is None else each
+        self._lock = threading.Lock()
+        self._waiting = dict[str, deque[_Work]]()  # by client; the first one's turn is next
+        self._running: Counter[str] = Counter()  # works, by client
+        self._busy = 0  # threads that have work, or look for some
+
+    async def __call__(self, work: Callable[[], T], client: str | None = None) -> T:
+        """The result of `work`, in the caller's context. `client` is by default the caller that it is for."""
+        client = CALLER.get() if client is None else client
+        context, result = copy_context(), Future[T]()
+        context.run(CALLER.set, client)
+        with self._lock:
+            self._waiting.setdefault(client, deque()).append(_Work(partial(context.run, work), result, client))
+            if self._busy < self._most:
+                self._busy += 1
+                self._threads.submit(self._work)
+        return await asyncio.wrap_future(result)
+
+    def _work(self) -> None:
+        while (work := self._next()) is not None:
+            if work.result.set_running_or_notify_cancel():
+                try:
+                    work.result.set_result(work.run())
+                except BaseException as error:
+                    work.result.set_exception(error)
+            with self._lock:
+                self._running[work.client] -= 1
+
+    def _next(self) -> _Work | None:
+        """The work whose turn it is; None where no client may have another thread."""
+        with self._lock:
+            client = next((each for each in self._waiting if self._running[each] < self._each), None)
+            if client is None:
+                self._busy -= 1
+                return None
+            works = self._waiting.pop(client)
+            work = works.popleft()
+            if works:
+                self._waiting[client] = works  # behind the others
+            self._running += Counter([client])  # which drops those that have none
+            return work
+
+
+parsing = Pool("parsing", 2, NICENESS)  # small bodies: milliseconds
+waiting_for_parsers = Pool("waiting", 3, each=2)  # waits for processes that parse large bodies: seconds
+packing = Pool("packing", 3, NICENESS, each=2)  # scenes: seconds for the largest
+storing = Pool("storing", 3, NICENESS, each=2)  # assets, which are parsed and hashed first: minutes for the largest
+storing_small = Pool("small", 3, NICENESS, each=2)  # those of up to a megabyte: milliseconds
+opening = Pool("opening", 3, NICENESS, each=2)  # finds assets and keeps them from being deleted: milliseconds
+saving = Pool("saving", 2)  # documents: the disk's time
+encoding = Pool("encoding", 2)  # frames to JPEG and the like: milliseconds, while a person watches
+writing = Pool("writing", 2, WRITING_NICENESS)  # pictures to files: seconds for the largest
+recording = Pool("recording", 1)  # the rows of renders, in order: the disk's time
+saving_pictures = Pool("pictures", 1)  # small ones of renders to the disk and back: milliseconds
+saving_large_pictures = Pool("large", 1, NICENESS)  # seconds for the largest, while others' renders end
+reading_large_pictures = Pool("reading", 1)  # for which somebody waits
+sending = Pool("sending", 2)  # scenes to the renderer: copied to shared memory
+tending = Pool("tending", 2)  # ends and replaces renderers, and restores what they had rendered
+measuring = Pool("measuring", 1)  # /metrics
+
+
+class ClientExecutor:
+    """A thread for one client's parsing and packing, started at first use: no client delays another."""
+
+    def __init__(self, name: str) -> None:
+        self._threads = ThreadPoolExecutor(1, name, _yield_to_others)
+
+    async def run(self, work: Callable[[], T]) -> T:
+        return await asyncio.get_running_loop().run_in_executor(self._threads, copy_context().run, work)
+
+    def close(self) -> None:
+        self._threads.shutdown(wait=False, cancel_futures=True)

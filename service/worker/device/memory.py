@@ -1,0 +1,75 @@
+"""The memory of all tasks on the device; where it is too much, those that have rested longest make room."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable, Iterable, Mapping
+from typing import Any, Protocol
+
+from gpu import OutOfMemory
+from service.system.memory import MemoryBudget
+
+GPU_SHARE = 0.8  # of a GPU's memory: drivers, desktops and other programs need some
+UNLIMITED = 1 << 62
+
+log = logging.getLogger(__name__)
+
+
+class Holder(Protocol):
+    @property
+    def rested_since(self) -> float: ...
+
+    @property
+    def bytes(self) -> int: ...
+
+    @property
+    def idle(self) -> bool:
+        """Whether its memory on the device can be taken, and restored later."""
+
+    def evict(self) -> None: ...
+
+
+class Memory:
+    """Counts the bytes that were requested from the driver, which does not say what it really takes."""
+
+    def __init__(self, limit: int, holders: Callable[[], Iterable[Holder]]) -> None:
+        self.limit = limit
+        self._holders = holders
+
+    @property
+    def used(self) -> int:
+        return sum(holder.bytes for holder in self._holders())
+
+    def make_room(self, needed: int, asking: Holder) -> None:
+        """Evict idle tasks, the longest at rest first, until that many bytes fit. Raises OutOfMemory."""
+        while self.used + needed > self.limit and self.evict_one(asking):
+            pass
+        if self.used + needed > self.limit:
+            raise OutOfMemory(
+                f"this needs {_mib(needed)} MiB on the device; of {_mib(self.limit)} MiB (SUNBOX_GPU_MEMORY) "
+                f"{_mib(self.used)} are in use"
+            )
+
+    def evict_one(self, asking: Holder) -> bool:
+        idle = [holder for holder in self._holders() if holder.idle and holder.bytes and holder is not asking]
+        if not idle:
+            return False
+        oldest = min(idle, key=lambda holder: holder.rested_since)
+        log.info("evicted bytes=%d used=%d", oldest.bytes, self.used)
+        oldest.evict()
+        return True
+
+
+def default_limit(info: Mapping[str, Any], host_memory: int | None) -> int:
+    """Bytes, by what `gpu.Renderer.info` says.
+
+    Where the device's memory is the machine's, the kernel would kill somebody; there it is `host_memory`, by default
+    half of the machine's. A GPU's driver says no by itself; what it is not asked for is left to other programs.
+    """
+    if info["software"]:
+        return host_memory or MemoryBudget().limit
+    return int(GPU_SHARE * info["memory"]) if info["memory"] else UNLIMITED
+
+
+def _mib(size: int) -> int:
+    return -(-size // 2**20)

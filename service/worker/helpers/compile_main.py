@@ -1,0 +1,111 @@
+"""Compiles kernels: `python -m service.worker.helpers.compile_main DESCRIPTOR --parent PID`.
+
+A process of its own with its own context: what it compiles the renderer loads from the driver's disk cache. Where the
+renderer is lost, the kernel under way is finished, for the next one: killed every few seconds on a starved machine,
+they would never have it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import fcntl
+import os
+import select
+import signal
+import socket
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
+from pathlib import Path
+from typing import get_args
+
+from service.ipc import channel
+from service.system.confined import hide
+from service.system.priority import HIGHEST, raise_thread_niceness
+from service.worker.helpers.compile_client import Compiled, Priority, records
+from service.worker.helpers.lifeline import end_with, end_with_pipe, hung_up
+
+IDLE_S = 600.0  # then it ends, and gives back what the driver and its compiler hold (some 100 MB)
+LOCKS: dict[Priority, str] = {"now": ".lock", "soon": ".soon", "spare": ".spare"}  # endings of the files
+LOOK_S = 0.05  # between two looks whether another one has the kernel that both want
+SPARE_IDLE_S = 5.0  # ... where kernels come seldom
+SOON_NICENESS = 2  # steps above the renderer's: beside tracing on two cores it gets half of one
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(prog="python -m service.worker.helpers.compile_main")
+    parser.add_argument("descriptor", type=int)
+    parser.add_argument("--parent", type=int, required=True)
+    parser.add_argument("--driver", required=True, help="its name and version, which records go by")
+    parser.add_argument("--lifeline", type=int, help="a pipe, whose other end the server holds")
+    parser.add_argument("--device", type=int)
+    parser.add_argument("--priority", choices=get_args(Priority), default="now")
+    arguments = parser.parse_args()
+    priority: Priority = arguments.priority
+    if priority == "soon":
+        raise_thread_niceness(os.getpriority(os.PRIO_PROCESS, 0) + SOON_NICENESS)
+    elif priority == "spare":
+        try:
+            os.sched_setscheduler(0, os.SCHED_IDLE, os.sched_param(0))
+        except OSError:  # a container's runtime may refuse it
+            raise_thread_niceness(HIGHEST)
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    if not (end_with(arguments.parent) if arguments.lifeline is None else end_with_pipe(arguments.lifeline)):
+        return 0
+    hide()
+    from gpu.errors import GpuError
+    from gpu.precompile.precompiler import Precompiler
+
+    with socket.socket(fileno=arguments.descriptor) as end:
+        try:
+            ahead = Precompiler(arguments.device)
+            while select.select([end], [], [], IDLE_S if priority == "now" else SPARE_IDLE_S)[0]:
+                key = channel.receive(end, wait=True)
+                record = records() / key.digest(arguments.driver)
+                try:
+                    # What compiles with less of the processor can take as long as it likes: only its like waits for
+                    # it, that of the other renderers, which all have the same list.
+                    with _alone(record, end, LOCKS[priority]):
+                        compiled = Compiled(0.0, True) if os.path.exists(record) else Compiled(*ahead.compile(key))
+                        if compiled.cached:
+                            _record(record)
+                except GpuError as error:  # the renderer meets it too, and says it to whom it concerns
+                    compiled = Compiled(0.0, True, str(error))
+                channel.send(end, compiled)
+        except (channel.Closed, GpuError):
+            pass
+    return 0
+
+
+@contextmanager
+def _alone(record: Path, end: socket.socket, lock_suffix: str) -> Iterator[None]:
+    """Wait for a lock, so that no other process of its kind compiles the same kernel. Raises channel.Closed."""
+    path = record.with_suffix(lock_suffix)
+    try:
+        record.parent.mkdir(parents=True, exist_ok=True)
+        lock = os.open(path, os.O_CREAT | os.O_RDWR | os.O_CLOEXEC, 0o600)
+    except OSError:  # nobody can write there: then each compiles for itself
+        yield
+        return
+    try:
+        while True:
+            try:
+                fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+                break
+            except BlockingIOError:
+                if hung_up(end.fileno()):
+                    raise channel.Closed from None
+                time.sleep(LOOK_S)
+        yield
+        path.unlink(missing_ok=True)
+    finally:
+        os.close(lock)
+
+
+def _record(record: Path) -> None:
+    with suppress(OSError):
+        record.touch()
+
+
+if __name__ == "__main__":
+    raise SystemExit(main())

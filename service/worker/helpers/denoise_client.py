@@ -1,0 +1,119 @@
+"""The renderer's side of the process that denoises: one picture at a time, and no task waits for it."""
+
+from __future__ import annotations
+
+import logging
+import select
+import socket
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpu import denoise
+from service.ipc import channel
+from service.worker.helpers.process import HelperProcess
+
+# How long a stream waits for its denoised frame, and in times of what the last one took; then it goes on without.
+PATIENCE_S, PATIENCE = 3.0, 3.0
+TRIES = 3  # deaths in a row; then nothing is denoised any more, and the reason is told
+NOT_INSTALLED = "Open Image Denoise (the Python package pyoidn) is not installed"
+DIED = "the denoiser ended unexpectedly"
+
+log = logging.getLogger(__name__)
+
+
+@dataclass(frozen=True)
+class DenoiseRequest:
+    """A picture to denoise, as gpu.denoise.denoise takes it."""
+
+    color: np.ndarray
+    albedo: np.ndarray
+    normal: np.ndarray
+    fine: bool
+
+
+@dataclass(frozen=True)
+class DenoiseResult:
+    """The denoised picture; or None and why not, `missing` when no other will fare better."""
+
+    pixels: np.ndarray | None
+    detail: str = ""
+    missing: bool = False
+
+
+class DenoiseClient:
+    """Denoises in a process that starts at the first request and ends when idle for a while."""
+
+    def __init__(self) -> None:
+        self.missing: str | None = NOT_INSTALLED if denoise.version() is None else None  # why nothing is denoised
+        self._helper = HelperProcess("service.worker.helpers.denoise_main")
+        self._told: Callable[[DenoiseResult], None] | None = None
+        self._deaths = 0
+        self._asked_at = self._took_s = 0.0
+
+    @property
+    def busy(self) -> bool:
+        return self._told is not None
+
+    @property
+    def left_s(self) -> float | None:
+        """How much longer its answer is worth waiting for, at least 0; None when there is none to come."""
+        patience_s = max(PATIENCE_S, PATIENCE * self._took_s)
+        return max(self._asked_at + patience_s - time.monotonic(), 0.0) if self.busy else None
+
+    @property
+    def late(self) -> bool:
+        """Busier machines starve it, as it runs at the lowest priority: what waits for it is to go on."""
+        return self.left_s == 0.0
+
+    @property
+    def ends(self) -> list[socket.socket]:
+        """The sockets to wait on."""
+        return self._helper.ends
+
+    @property
+    def process_id(self) -> int | None:
+        return self._helper.process_id
+
+    def ask(self, order: DenoiseRequest, told: Callable[[DenoiseResult], None]) -> None:
+        """Begins; `told` is called from `hear` when it is done. Only when not `busy`."""
+        self._told, self._asked_at = told, time.monotonic()
+        self._helper.ask(order)
+
+    def hear(self) -> None:
+        """Pass on a denoised picture, if there is one."""
+        try:
+            delivery: DenoiseResult = self._helper.hear()
+        except BlockingIOError:
+            return
+        except channel.Closed:
+            self.close()
+            if not self.busy:
+                return
+            self._deaths += 1
+            delivery = DenoiseResult(None, DIED, missing=self._deaths >= TRIES)
+        else:
+            self._deaths = 0
+            self._took_s = time.monotonic() - self._asked_at
+        if delivery.detail:
+            log.warning("could not denoise error=%s", delivery.detail)
+        if delivery.missing:
+            self.missing = delivery.detail
+        told, self._told = self._told, None
+        if told is not None:
+            told(delivery)
+
+    def sleep(self, other: socket.socket | None = None, timeout_s: float | None = None) -> None:
+        """Sleep until there is an answer here, or a message on `other`."""
+        select.select([*self.ends, *([] if other is None else [other])], [], [], timeout_s)
+
+    def close(self) -> None:
+        self._helper.close()
+
+
+def denoise_request(color: np.ndarray, guides: tuple[np.ndarray, np.ndarray], fine: bool) -> DenoiseRequest:
+    return DenoiseRequest(
+        np.ascontiguousarray(color), np.ascontiguousarray(guides[0]), np.ascontiguousarray(guides[1]), fine
+    )

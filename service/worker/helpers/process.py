@@ -1,0 +1,81 @@
+"""A process beside the renderer that does one kind of work for it: started on demand, ended when not needed."""
+
+from __future__ import annotations
+
+import os
+import socket
+import subprocess
+import sys
+from pathlib import Path
+from typing import Any
+
+from service.ipc import channel
+from service.system.child_processes import inherited_environment
+
+ROOT = Path(__file__).parents[3]
+
+
+class HelperProcess:
+    """Runs `python -m MODULE DESCRIPTOR --parent PID ARGUMENTS`, which may end by itself when idle."""
+
+    def __init__(self, module: str, *arguments: str, lifeline: int | None = None) -> None:
+        """With `lifeline`, a pipe of the server's, it may end something that its parent does not see the end of."""
+        self._module, self._arguments = module, arguments
+        self._passed: list[int] = []
+        if lifeline is not None:
+            self._passed = [lifeline]
+            self._arguments = *arguments, "--lifeline", str(lifeline)
+        self._process: subprocess.Popen[bytes] | None = None
+        self._end: socket.socket | None = None
+
+    @property
+    def ends(self) -> list[socket.socket]:
+        """The sockets to wait on."""
+        return [] if self._end is None else [self._end]
+
+    @property
+    def process_id(self) -> int | None:
+        return None if self._process is None else self._process.pid
+
+    def ask(self, message: object) -> None:
+        """Send a request. Raises channel.Closed where the process ends at once, OSError where it cannot start."""
+        try:
+            channel.send(self._begin(), message)
+        except channel.Closed:  # it had just ended, being idle
+            self.close()
+            channel.send(self._begin(), message)
+
+    def hear(self) -> Any:
+        """The next answer. Raises BlockingIOError where there is none, channel.Closed when the process has ended."""
+        if self._end is None:
+            raise BlockingIOError
+        return channel.receive(self._end)
+
+    def close(self) -> None:
+        if self._end is not None:
+            self._end.close()
+        if self._process is not None:
+            self._process.kill()
+            self._process.wait()
+        self._end = self._process = None
+
+    def _begin(self) -> socket.socket:
+        if self._end is not None:
+            return self._end
+        self._end, theirs = channel.pair()
+        with theirs:
+            command = [sys.executable, "-m", self._module, str(theirs.fileno()), "--parent", str(os.getpid())]
+            try:
+                self._process = subprocess.Popen(
+                    [*command, *self._arguments],
+                    pass_fds=[theirs.fileno(), *self._passed],
+                    env=inherited_environment(),
+                    cwd=ROOT,
+                    stdin=subprocess.DEVNULL,
+                    stdout=subprocess.DEVNULL,
+                    process_group=0,  # Ctrl-C in a terminal is for the parent
+                )
+            except OSError:
+                self.close()
+                raise
+        return self._end

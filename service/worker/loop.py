@@ -1,0 +1,299 @@
+"""One loop: the newest messages, a slice of work, what is wanted of the result."""
+
+from __future__ import annotations
+
+import logging
+import select
+import socket
+import time
+from collections import defaultdict, deque
+from collections.abc import Callable, Iterator
+from functools import partial
+
+from gpu import GpuError, KernelKey, OutOfMemory, Renderer, SceneTooLarge
+from gpu.precompile import kernel_keys
+from service.ipc import channel
+from service.ipc.heartbeat import Heartbeat
+from service.ipc.kernel_messages import MeasureKernel
+from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
+from service.ipc.messages import (
+    EvaluateBsdf,
+    Evicted,
+    Failed,
+    Foresee,
+    FromRenderer,
+    Read,
+    Restore,
+    ToRenderer,
+    Update,
+    Usage,
+    Want,
+)
+from service.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
+from service.worker.bsdf_task import BsdfTask
+from service.worker.context import WorkerContext
+from service.worker.device.loaded_scene import begin_key, slider_keys
+from service.worker.device.memory import Memory
+from service.worker.division.assistant import Assistant
+from service.worker.helpers.compile_client import CompileClient
+from service.worker.helpers.denoise_client import DenoiseClient
+from service.worker.scheduler import Scheduler
+from service.worker.task import Task
+
+Turns = Task | Assistant | BsdfTask  # what has turns
+
+REPORT_S = 0.25  # between two accounts of the GPU time that was used
+COMPILING_S = 60.0  # no hang: some drivers take this long for a kernel with every feature
+
+log = logging.getLogger(__name__)
+
+
+class Loop:
+    def __init__(
+        self,
+        end: socket.socket,
+        renderer: Renderer,
+        heartbeat: Heartbeat,
+        memory_limit: int,
+        device: int | None,
+        checkpoint_s: float,
+        lifeline: int | None = None,
+    ) -> None:
+        self._end = end
+        self._renderer = renderer
+        self._heartbeat = heartbeat
+        self._tasks: dict[int, Task] = {}
+        self._questions: dict[int, BsdfTask] = {}
+        self._assistants: dict[int, Assistant] = {}  # of tasks whose home is elsewhere
+        self._memory = Memory(memory_limit, lambda: [*self._tasks.values(), *self._assistants.values()])
+        self._scheduler = Scheduler()
+        self._denoiser = DenoiseClient()
+        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline=lifeline)
+        self._soon = CompileClient(renderer.info, device, lambda: True, "soon")
+        self._spare = CompileClient(renderer.info, device, lambda: True, "spare")
+        self._context = WorkerContext(
+            renderer,
+            self._send,
+            self._denoiser,
+            self._spare,
+            self._soon,
+            self._compiler,
+            self._memory,
+            self._forget,
+            checkpoint_s,
+            self._scheduler.sharers,
+        )
+        self._foreseen = kernel_keys.bsdf_keys()  # to be compiled when nothing else is, so that no panel has to wait
+        self._scenes = deque[KernelKey]()  # with which streams may begin; compiled after those that edits need
+        self._sliders = deque[KernelKey]()  # of those scenes; compiled while nothing is traced
+        self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
+        self._traced = self._evicted = 0
+        self._reported = 0.0
+
+    def run(self) -> None:
+        """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
+        busy = False
+        self._spare.prepare(kernel_keys.common_keys())
+        while True:
+            for message in coalesced(self._pending(wait=not busy)):
+                self._take(message)
+            self._denoiser.hear()
+            self._compiler.hear()
+            self._soon.hear()
+            self._spare.hear()
+            chosen = self._scheduler.choose(self._everyone)
+            if chosen is not None:
+                began = time.monotonic()
+                self._work(chosen, chosen.turn)
+                self._heartbeat.lasted(time.monotonic() - began)
+            for task in list(self._tasks.values()):
+                if task.wanted:
+                    self._work(task, partial(self._answer, task))
+            busy = any(each.ready for each in self._everyone)
+            self._account(at_once=not busy)
+            busy = self._foresee(idle=not busy) or busy or self._measure_kernel()
+
+    @property
+    def _everyone(self) -> list[Turns]:
+        return [*self._tasks.values(), *self._assistants.values(), *self._questions.values()]
+
+    def _pending(self, wait: bool) -> Iterator[ToRenderer]:
+        """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
+        if wait:
+            ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._soon.ends, *self._spare.ends]
+            waits = [self._compiler.left_s, self._soon.left_s, self._spare.left_s, self._renderer.tidy()]
+            waits.append(None if self._denoiser.late else self._denoiser.left_s)
+            waits += [task.left_s for task in self._tasks.values()]
+            select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
+        try:
+            while True:
+                message = channel.receive(self._end)
+                self._heartbeat.take()
+                yield message
+        except BlockingIOError:
+            return
+
+    def _answer(self, task: Task) -> None:
+        if task.answer():
+            self._scheduler.shown(task)
+
+    def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None, spare: bool = False) -> None:
+        """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
+        in time that nobody wanted, which is not held against it."""
+        began = time.perf_counter()
+        with self._heartbeat.working(task.number, COMPILING_S if task.loads or spare else 0.0):
+            self._guard(task, work, read)
+        seconds = time.perf_counter() - began
+        if not spare:
+            self._scheduler.charge(task, seconds)
+        self._used_s[task.number] += seconds
+
+    def _measure_kernel(self) -> bool:
+        """A step of what is only done when there is nothing else; whether there was one."""
+        task = next((task for task in self._tasks.values() if task.savings.due), None)
+        if task is not None:
+            self._work(task, task.measure_kernel, spare=True)
+        return task is not None
+
+    def _foresee(self, idle: bool) -> bool:
+        """Whether another kernel could be handed to a compiler which is free; one at a time, as others may soon have
+        something for it that is needed more."""
+        waiting = self._scenes or (self._sliders if idle else None)
+        soon = waiting.popleft() if waiting and self._soon.left_s is None else None
+        if soon is not None:
+            self._soon.prepare([soon])
+        spare = next(self._foreseen, None) if self._spare.left_s is None else None
+        if spare is not None:
+            self._spare.prepare([spare])
+        return soon is not None or spare is not None
+
+    def _crowded(self) -> bool:
+        return sum(each.awaited for each in self._everyone) > 1
+
+    def _account(self, at_once: bool) -> None:
+        """Report the GPU time that was used, now and then, and at once before the loop sleeps."""
+        now = time.monotonic()
+        if self._used_s and (at_once or now - self._reported >= REPORT_S):
+            pictures: list[Task | Assistant] = [*self._tasks.values(), *self._assistants.values()]
+            traced = sum(each.traced for each in pictures)
+            used = dict(self._used_s)
+            self._renderer.tidy()
+            kernels, evicted = self._renderer.kernels, self._renderer.kernels_evicted
+            now_held = len(self._tasks), self._memory.used, kernels
+            self._send(Usage(used, traced - self._traced, *now_held, evicted - self._evicted))
+            self._used_s.clear()
+            self._evicted = evicted
+            self._traced, self._reported = traced, now
+
+    def _take(self, message: ToRenderer) -> None:
+        task, assistant = self._tasks.get(message.task), self._assistants.get(message.task)
+        if isinstance(message, Assist):
+            self._assistants[message.task] = Assistant(self._context, message.task)
+        elif assistant is not None:
+            self._take_for(assistant, message)
+        elif isinstance(message, Update):
+            if task is None:
+                task = Task(self._context, message.task, message.client)
+                self._tasks[message.task] = task
+            task.update(message)
+        elif isinstance(message, Foresee):
+            self._scenes.append(begin_key(message))
+            self._sliders += slider_keys(message)
+        elif isinstance(message, EvaluateBsdf):
+            self._questions[message.task] = BsdfTask(self._context, message)
+        elif isinstance(message, Drop) and message.task in self._questions:
+            self._questions.pop(message.task).release()
+        elif task is None:
+            if isinstance(
+                message, Read | MeasureKernel
+            ):  # evicted, and the server had not heard of it when it sent this
+                self._send(Evicted(message.task))
+        elif isinstance(message, Assistants):
+            self._work(task, lambda: task.home.assist(message.ids))
+        elif isinstance(message, LeaseDone):
+            self._work(task, lambda: task.home.heard(message))
+        elif isinstance(message, Want):
+            task.look(message)
+        elif isinstance(message, Read):
+            self._work(task, lambda: task.read(message), message)
+        elif isinstance(message, Settle):
+            self._work(task, task.settle)
+        elif isinstance(message, Restore):
+            self._work(task, lambda: task.restore(message))
+        elif isinstance(message, TakeCheckpoint):
+            task.take_checkpoint()
+        elif isinstance(message, CheckpointStored):
+            task.checkpoint_stored(message.took_s)
+        elif isinstance(message, MeasureKernel):
+            task.savings.ask()
+        elif isinstance(message, Pause):
+            task.pause(message.away)
+        elif isinstance(message, Resume):
+            task.resume()
+        elif isinstance(message, Hold):
+            task.hold()
+        elif isinstance(message, Stop):
+            self._work(task, task.stop)
+        elif isinstance(message, Drop):
+            self._remove(task)
+
+    def _take_for(self, assistant: Assistant, message: ToRenderer) -> None:
+        if isinstance(message, Update):
+            assistant.update(message)
+        elif isinstance(message, Lease):
+            assistant.lease(message)
+        elif isinstance(message, Drop):
+            self._traced -= assistant.traced
+            del self._assistants[assistant.number]
+            assistant.release()
+
+    def _forget(self, number: int) -> None:
+        """The server has this finished picture, and brings it back when somebody asks for it."""
+        self._remove(self._tasks[number])
+        self._send(Evicted(number))
+
+    def _remove(self, task: Task) -> None:
+        self._traced -= task.traced
+        del self._tasks[task.number]
+        task.release()
+
+    def _guard(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
+        try:
+            work()
+            return
+        except channel.Closed:
+            raise
+        except GpuError as error:
+            log.warning("task failed task=%d kind=%s error=%s", task.number, type(error).__name__, error)
+            detail, refused = str(error), isinstance(error, SceneTooLarge | OutOfMemory)
+        except Exception:
+            log.exception("task failed task=%d", task.number)
+            detail, refused = "The renderer made a mistake; its log says which.", False
+        if read is None:
+            task.fail()
+        if isinstance(task, Assistant):
+            return self._send(LeaseFailed(task.number, task.attempted, detail))
+        self._send(Failed(task.number, task.attempted, detail, refused, read.serial if read else None))
+
+    def _send(self, message: FromRenderer) -> None:
+        channel.send(self._end, message)
+
+
+def coalesced(messages: Iterator[ToRenderer]) -> Iterator[ToRenderer]:
+    """The messages in order, a run of updates of one task joined into its last. A Want in between changes nothing."""
+    updates: dict[int, Update] = {}
+    wants: dict[int, Want] = {}
+    for message in messages:
+        earlier = updates.get(message.task)
+        if isinstance(message, Update):
+            updates[message.task] = earlier.then(message) if earlier else message
+        elif isinstance(message, Want):
+            wants[message.task] = message
+        else:
+            if earlier is not None:
+                yield updates.pop(message.task)
+            if message.task in wants:
+                yield wants.pop(message.task)
+            yield message
+    yield from updates.values()
+    yield from wants.values()

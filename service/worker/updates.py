@@ -1,0 +1,94 @@
+"""The update of a task that waits to be applied; it is joined with later ones, and may wait for its kernel."""
+
+from __future__ import annotations
+
+from gpu import RenderSettings
+from gpu.precompile import kernel_keys
+from service.ipc.messages import Update
+from service.worker.context import WorkerContext
+from service.worker.device.loaded_scene import KernelRequest, kernel_request
+from service.worker.device.residency import Residency
+from service.worker.helpers.kernel_wait import KernelWait
+from service.worker.progress.progress import ProgressTracker
+from service.worker.view.fallback_preview import FallbackPreview
+
+
+class Updates:
+    """At most one update is pending. While its kernel is compiled, `preview` may show it with another one."""
+
+    def __init__(
+        self, context: WorkerContext, number: int, client: str, residency: Residency, tracker: ProgressTracker
+    ) -> None:
+        self.pending: Update | None = None
+        self.stops = False  # the render ends as soon as the pending update is applied
+        self.settings: RenderSettings | None = None  # of the last update that was applied
+        self.preview = FallbackPreview(number, context.send, context.renderer, context.spare)
+        self._residency, self._tracker, self._soon, self._client = residency, tracker, context.soon, client
+        self._wait = KernelWait(context.compiler, client)
+        self._request: KernelRequest | None = None  # of the pending update, once it was looked at
+
+    @property
+    def compiling(self) -> bool:
+        """Whether the pending update waits for its kernel."""
+        return self._wait.compiling
+
+    @property
+    def previews(self) -> bool:
+        """Whether there is a slice to trace of what shows the pending update meanwhile."""
+        return self.compiling and self.preview.due
+
+    def join(self, update: Update) -> None:
+        """Take an update, unless it changes one that failed: the server will hear of that, and say what it wants."""
+        known = self._tracker.generation if self.pending is None else self.pending.generation
+        if update.base is not None and update.base != known:
+            return
+        self.pending = self.pending.then(update) if self.pending is not None else update
+        self.stops = False
+        self._wait.stop()
+
+    def begin_to_wait(self, update: Update, paused: bool) -> bool:
+        """Whether the update's kernel is being compiled, so that the update has to wait for it."""
+        self._request = None
+        if self._wait.compiler is None:
+            return False
+        request = kernel_request(update, self.settings, self._residency.loaded, self._residency.offloaded)
+        self._request = request
+        if request is None:
+            return False
+        watched = (update.interactive or self._tracker.interactive) and not paused
+        shows = watched and not self._wait.compiler.knows(request.key) and self.preview.can(request)
+        if not self._wait.begin(request.key, shows):
+            return False
+        if shows:
+            self.preview.begin(request, update.generation)
+        else:
+            self.preview.release()
+        return True
+
+    def applied(self, update: Update) -> None:
+        """The pending update was applied, or refused; in the first case the renderer has met its kernel."""
+        self.preview.release()
+        if self._request is not None and self._tracker.generation == update.generation:
+            self._wait.met(self._request.key)
+        self._request = None
+
+    def take_compile_ms(self) -> float:
+        """Milliseconds that the kernel of the last update took to compile elsewhere; 0 when asked again."""
+        return self._wait.take_ms()
+
+    def foresee(self, settings: RenderSettings) -> None:
+        """Have compiled what moving a large mesh would need, and the first touch of some sliders."""
+        if self._soon is not None and self._tracker.interactive:
+            arrays = self._residency.full.scene.arrays
+            moved = kernel_keys.key_after_move(arrays, settings)
+            first = self.preview.prepare(arrays, settings)  # with which any of them can be shown
+            keys = [*first, *([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
+            self._soon.prepare(keys, self._client, self._foreseen)
+
+    def _foreseen(self, milliseconds: float) -> None:
+        """A foreseen kernel was compiled: nobody waits for it."""
+
+    def release(self) -> None:
+        """Wait for no kernel, and show nothing meanwhile; what is pending stays so."""
+        self._wait.forget()
+        self.preview.release()

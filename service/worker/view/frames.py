@@ -1,0 +1,245 @@
+"""One task's picture as clients see it: frames and images on demand, and the denoised form of both."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import TYPE_CHECKING, NamedTuple
+
+import numpy as np
+
+from gpu import FIRST_HIT_AOVS, picture_bytes
+from gpu.denoise import GUIDE_SAMPLES
+from gpu.precompile import kernel_keys
+from service.ipc.messages import Frame, Image, Read, Reason, View, Want
+from service.worker.context import WorkerContext
+from service.worker.device.residency import Residency
+from service.worker.helpers.kernel_wait import KernelWait
+from service.worker.progress.progress import ProgressTracker
+from service.worker.view.denoise_policy import Denoised, DenoisePolicy
+
+if TYPE_CHECKING:
+    from gpu import Picture
+
+SLICE_S = 0.015  # how long a message may have to wait, and how finely the GPU is shared
+
+
+class _Content(NamedTuple):
+    """What a frame shows: one with equal content would show nothing new."""
+
+    generation: int
+    scale: float
+    samples: int
+    reason: Reason | None  # why the render has ended
+    fine: bool  # denoised with the fine network
+
+
+class FrameSource:
+    """Frames and images of a task; what cannot be shown at once is prepared in steps, while `due`."""
+
+    def __init__(
+        self,
+        context: WorkerContext,
+        number: int,
+        client: str,
+        residency: Residency,
+        tracker: ProgressTracker,
+        denoising: DenoisePolicy,
+        finish: Callable[[], None],
+    ) -> None:
+        """`finish` says that the task has ended, where that waited for the denoised picture (`owes_done`)."""
+        self.want: Want | None = None
+        self.scale: float | None = None  # of what there is to see
+        self.owes_done = False
+        self.denoising = denoising
+        self._number, self._send, self._finish = number, context.send, finish
+        self._residency, self._tracker = residency, tracker
+        self._wait = KernelWait(context.compiler, client)  # for the kernel of the AOVs of the first hit
+        self._served: _Content | None = None  # of the last frame that was sent
+        self._reads: list[Read] = []  # waiting for AOVs of the first hit, which are traced when asked for
+        self._guided: Picture | None = None  # whose they are, while some are missing
+        self._denoised_reads: list[Read] = []  # waiting for the denoised picture
+        self._denoiser_answered = False  # the denoiser has answered, and pending reads are to be served
+
+    def restart(self) -> None:
+        """Begin with another picture, of which nothing was shown yet."""
+        self.part()
+        self.denoising.restart()
+        self._denoiser_answered = False
+        self.scale = None
+
+    def part(self) -> None:
+        """Let go of the pictures, which are about to leave the device."""
+        self._guided = None
+        self._wait.forget()
+
+    def forget(self) -> None:
+        """Forget everything; pending reads are answered with no image."""
+        reads = self._reads + self._denoised_reads
+        self._reads, self._denoised_reads = [], []
+        self.restart()
+        self.owes_done = False
+        for read in reads:
+            self.read(read)
+
+    @property
+    def awaited(self) -> bool:
+        """Whether a client waits for something that takes steps."""
+        return self._guided is not None or bool(self._reads) or self._denoiser_answered or self._denoising_due
+
+    @property
+    def due(self) -> bool:
+        """Whether there is a step to be done."""
+        return self.awaited and not self._wait.compiling
+
+    def step(self) -> bool:
+        """Do a step; whether there was one."""
+        return self._denoise() or self._trace_guides()
+
+    def answer(self) -> bool:
+        """Send the frame that is wanted, if it would show something new."""
+        want, shown, tracker = self.want, self.scale, self._tracker
+        if want is None or shown is None:
+            return False
+        if self._residency.offloaded is not None:  # at rest: there is nothing new in it
+            if self._served and self._served.reason == tracker.reason and not want.anyway:
+                return False
+            self._residency.wake()
+        if self._residency.loaded is None:
+            return False
+        picture = self._residency.ladder.picture(shown)
+        if self._needs_guides(picture, want.view):
+            return False
+        clean = None
+        if shown == 1.0 and self.denoising.covers(want.view.aov, tracker.meter.noise):
+            clean = self._denoised_frame()
+            if clean is None and self._holds_frame(want):
+                return False
+        progress = clean.progress if clean else tracker.progress(self._residency, shown)
+        whole = clean is None or clean is self.denoising.has(picture.samples)
+        fine = clean is not None and clean.fine
+        content = _Content(tracker.generation, shown, progress.samples, tracker.reason, fine)
+        if content == self._served and not want.anyway:
+            return False
+        pixels = pixels_of(picture, want.view, clean)
+        last = tracker.reason is not None and whole
+        self._served, self.want = content, None
+        denoised = clean is not None
+        self._send(Frame(self._number, want.serial, tracker.generation, pixels, progress, shown, last, denoised))
+        return True
+
+    def _denoised_frame(self) -> Denoised | None:
+        """The newest denoised picture, unless the client has seen more, or as much and waits no longer."""
+        latest, served = self.denoising.latest, self._served
+        if latest is None or served is None or (served.generation, served.scale) != (self._tracker.generation, 1.0):
+            return latest
+        samples, seen = latest.progress.samples, served.samples
+        stale = samples == seen < self._residency.full.samples and not self.denoising.under_way
+        return None if samples < seen or stale else latest
+
+    def _holds_frame(self, want: Want) -> bool:
+        """Whether the client has something to look at until the denoised picture comes, which can't be long."""
+        seen = self._served is not None and self._served.generation == self._tracker.generation
+        return self.denoising.under_way and seen and not want.anyway
+
+    def read(self, read: Read) -> None:
+        self._residency.wake()
+        full = self._residency.full if self._residency.loaded and self._residency.full.samples else None
+        if full is not None and self._needs_guides(full, read.view):
+            self._reads.append(read)
+            return
+        clean = None
+        if full is not None and self.denoising.covers(read.view.aov, self._tracker.meter.read(full, fresh=True)):
+            clean = self.denoising.has(full.samples)
+            if clean is None:
+                self._denoised_reads.append(read)
+                return
+        self._give(read, full, clean)
+
+    def _give(self, read: Read, full: Picture | None, clean: Denoised | None) -> None:
+        pixels = pixels_of(full, read.view, clean) if full else None
+        progress = clean.progress if clean else self._tracker.progress(self._residency)
+        self._residency.rests()
+        self._send(Image(self._number, read.serial, pixels, progress, clean is not None))
+
+    @property
+    def _denoising_due(self) -> bool:
+        """Whether somebody waits for the picture to be denoised, and it can be."""
+        if self._residency.loaded is None or self.scale != 1.0 or not self.denoising.wanted:
+            return False
+        want = self.want if self._tracker.interactive else None
+        watched = want is not None and self.denoising.covers(want.view.aov, self._tracker.meter.noise)
+        if not (watched or self.owes_done or self._denoised_reads):
+            return False
+        return self.denoising.due(self._residency.full.samples, fine=self._denoises_finely)
+
+    @property
+    def _denoises_finely(self) -> bool:
+        return self._tracker.reason is not None or bool(self._denoised_reads)
+
+    def _denoise(self) -> bool:
+        """Do a slice of the renderer's part of denoising, where any is due."""
+        if self._denoiser_answered:
+            self._denoiser_answered = False
+            reads, self._denoised_reads = self._denoised_reads, []
+            for read in reads:
+                self._give(read, self._residency.full, None if self.denoising.warning else self.denoising.latest)
+            if self.owes_done:
+                self._finish()
+            return True
+        if not self._denoising_due:
+            return False
+        full, tracker = self._residency.full, self._tracker
+        if self._waits(full):
+            return True
+        if full.trace_guides(SLICE_S, GUIDE_SAMPLES):
+            tracker.meter.read(full, fresh=True)
+            self.denoising.begin(full, tracker.progress(self._residency), self._denoises_finely, self._hear_denoised)
+        return True
+
+    def _hear_denoised(self) -> None:
+        self._denoiser_answered = True
+
+    def _waits(self, picture: Picture) -> bool:
+        """Whether the kernel for the AOVs of the first hit is being compiled, where others would wait for it."""
+        if self._wait.compiler is None or picture.guided_yet:
+            return False
+        scene = picture.scene
+        wanted = kernel_keys.kernel_key(scene.arrays, picture.settings, scene.flags, kernel_keys.GUIDES)
+        if not self._wait.begin(wanted):
+            self._wait.met(wanted)  # in a moment
+        return self._wait.compiling
+
+    def _needs_guides(self, picture: Picture, view: View) -> bool:
+        if view.aov not in FIRST_HIT_AOVS:
+            return False
+        if not picture.guided:
+            more = picture_bytes(picture.settings, guided=True) - picture_bytes(picture.settings)
+            self._residency.make_room(more)
+        if picture.trace_guides(0.0):
+            return False
+        self._guided = picture
+        return True
+
+    def _trace_guides(self) -> bool:
+        """Trace a slice of the AOVs of the first hit where a read waits for them; then answer those reads."""
+        picture = self._guided
+        if picture is None and self._reads and self._residency.loaded is not None:  # it was aside meanwhile
+            picture = self._residency.full
+        if picture is None:
+            return False
+        if self._waits(picture):
+            return True
+        if picture.trace_guides(SLICE_S):
+            self._guided = None
+            reads, self._reads = self._reads, []
+            for read in reads:
+                self.read(read)
+        return True
+
+
+def pixels_of(picture: Picture, view: View, clean: Denoised | None) -> np.ndarray:
+    """The pixels of a picture, (height, width, 4), as the view wants them."""
+    color = clean.pixels if clean else None
+    if view.encoding == "linear":
+        return picture.read(view.aov) if color is None else color
+    return picture.display(view.aov, view.exposure, view.tone_map, view.encoding, color)
