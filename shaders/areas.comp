@@ -3,7 +3,7 @@
 // bound from the first row of an area on.
 #include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
-#include "luminance_variance.glsl"
+#include "accumulate/luminance_variance.glsl"
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 seen[]; };
 uniform uvec2 size; // of the bound rows

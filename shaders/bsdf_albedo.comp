@@ -2,12 +2,12 @@
 // multiply radiance by; the host adds up the batches, in double precision. Transmitted light counts as basic radiance.
 #include "layout.glsl"
 layout(local_size_x = BSDF_GROUP) in;
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "surface.glsl"
-#include "bsdf.glsl"
-#include "bsdf_lone.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "material/surface.glsl"
+#include "bsdf/bsdf.glsl"
+#include "bsdf/bsdf_alone.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer direction_buffer { vec4 directions[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer sum_buffer { vec4 sums[]; }; // of weights; of their squares
 uniform uint first; // of the batches

@@ -2,12 +2,12 @@
 // that is neither masked nor shadowed, and the reflectance of one.
 #include "layout.glsl"
 layout(local_size_x = BSDF_GROUP) in;
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "surface.glsl"
-#include "bsdf.glsl"
-#include "bsdf_lone.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "material/surface.glsl"
+#include "bsdf/bsdf.glsl"
+#include "bsdf/bsdf_alone.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer direction_buffer { vec4 directions[]; }; // wo, then every w
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer term_buffer { vec4 terms[]; };       // F and D; G, whether facets
 uniform uint first; // of the w to evaluate

@@ -1,14 +1,14 @@
 // Entry: f, without the cosine of wi, and the density of wi, for pairs of a wo and a wi, both in the frame of
-// bsdf_lone.glsl; and what is perfectly specular as seen from each wo.
+// bsdf/bsdf_alone.glsl; and what is perfectly specular as seen from each wo.
 #include "layout.glsl"
 layout(local_size_x = BSDF_GROUP) in;
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "surface.glsl"
-#include "bsdf.glsl"
-#include "bsdf_lone.glsl"
-#include "bsdf_deltas.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "material/surface.glsl"
+#include "bsdf/bsdf.glsl"
+#include "bsdf/bsdf_alone.glsl"
+#include "bsdf/bsdf_deltas.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer direction_buffer { vec4 directions[]; }; // every wo, then every wi
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer value_buffer { vec4 values[]; };     // f and its density
 layout(std430, binding = SLOT_MOMENTS) writeonly buffer delta_buffer { vec4 deltas[]; };    // wi and chance; weight

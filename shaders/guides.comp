@@ -6,13 +6,13 @@ layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; 
 layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
 layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec4 met[]; }; // index + 1 of shape and material, 0: none; the sum of
                                                                       // angles of incidence in degrees, as a float
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "shapes.glsl"
-#include "texture.glsl"
-#include "camera.glsl"
-#include "transparency.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "shapes/shapes.glsl"
+#include "material/texture.glsl"
+#include "camera/camera.glsl"
+#include "shapes/transparency.glsl"
 
 void main() {
     uvec2 pixel;

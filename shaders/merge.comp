@@ -1,7 +1,7 @@
 // Entry: merges a block of samples into the total, for pixels [first, first + count) of the bound part, and clears it.
 #include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
-#include "accumulated.glsl"
+#include "accumulate/accumulated.glsl"
 layout(std430, binding = SLOT_SUM) buffer sum_buffer { vec4 sums[]; };
 layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 compensations[]; };
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };

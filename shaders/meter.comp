@@ -3,8 +3,8 @@
 // values of the metered pixels; variances only with METER_VARIANCE.
 #include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
-#include "luminance_variance.glsl"
-#include "accumulators.glsl"
+#include "accumulate/luminance_variance.glsl"
+#include "accumulate/accumulators.glsl"
 
 #if METER_WEIGH
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { float weights[]; };

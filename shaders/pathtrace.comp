@@ -7,16 +7,16 @@ layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 co
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };
 layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
     uint path_ended; // paths that their throughput has ended
-    uint path_cut;   // samples that are short: see path.glsl
+    uint path_cut;   // samples that are short: see path/path.glsl
 };
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "shapes.glsl"
-#include "texture.glsl"
-#include "camera.glsl"
-#include "path.glsl"
-#include "plan.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "shapes/shapes.glsl"
+#include "material/texture.glsl"
+#include "camera/camera.glsl"
+#include "path/path.glsl"
+#include "camera/sample_plan.glsl"
 
 precise vec4 sum, lost;
 vec4 moment; // w: samples

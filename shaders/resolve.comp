@@ -1,8 +1,8 @@
 // Entry: turns the accumulators into an exposed, tone-mapped, sRGB-encoded picture with straight alpha.
 #include "layout_constants.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
-#include "constants.glsl"
-#include "accumulators.glsl"
+#include "math/constants.glsl"
+#include "accumulate/accumulators.glsl"
 #include "tonemap/linear.glsl"
 #include "tonemap/exponential.glsl"
 #include "tonemap/reinhard.glsl"

@@ -9,7 +9,7 @@ from tempfile import TemporaryDirectory
 from gpu.kernels.source import SHADERS
 from gpu.renderer import Renderer
 
-_FILE = "budget.glsl"
+_FILE = "shapes/budget.glsl"
 _TURNS = re.compile(r"(?<=const int BUDGET_TURNS = )\d+(?=;)")
 MOST = 2**31 - 1  # turns of a path: as many as an int holds
 

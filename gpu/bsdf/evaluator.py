@@ -1,7 +1,7 @@
 """Values, densities and albedos of one material, in slices of bounded time between which the caller renders pictures.
 
 A material comes as a scene that holds it and nothing else.
-Directions are in the frame of `shaders/bsdf_lone.glsl`: z is the outward normal, x the tangent.
+Directions are in the frame of `shaders/bsdf/bsdf_alone.glsl`: z is the outward normal, x the tangent.
 """
 
 from __future__ import annotations
@@ -24,7 +24,7 @@ from gpu.kernels.cache import KernelCache
 from gpu.layout import BSDF_GROUP, MaterialModel, bindings
 from gpu.layout.bindings import Slot
 
-DELTAS = 3  # as in shaders/bsdf_deltas.glsl
+DELTAS = 3  # as in shaders/bsdf/bsdf_deltas.glsl
 BATCH = 64  # samples of one invocation: their sums in single precision are right to 4e-6
 SLICE_S = 0.01  # seconds of a slice
 _FIRST = 1024  # invocations of the first slice; the time that a slice takes decides the size of the next one

@@ -8,8 +8,8 @@ from gpu.layout import MaterialModel
 
 
 class Lobe(IntEnum):
-    """Numbers of shaders/lobe.glsl. `MULTISCATTER` is light that leaves the microfacets after several of them, on
-    either side; `TRANSMISSION` is refracted light."""
+    """Numbers of shaders/bsdf/lobe.glsl. `MULTISCATTER` is light that leaves the microfacets after several of them,
+    on either side; `TRANSMISSION` is refracted light."""
 
     DIFFUSE = 0
     SPECULAR = 1
@@ -34,6 +34,6 @@ OF_MODEL: dict[MaterialModel, tuple[Lobe, ...]] = {
 
 
 def defines() -> dict[str, object]:
-    """What shaders/lobe.glsl needs defined to let single lobes through."""
+    """What shaders/bsdf/lobe.glsl needs defined to let single lobes through."""
     numbers = {f"LOBE_{lobe.name}": f"{lobe.value}u" for lobe in Lobe}
     return {"LOBE_CHOICE": 1, "LOBE_EVERY": f"{EVERY}u", **numbers}

@@ -87,7 +87,7 @@ def _mirrors(materials: np.ndarray) -> np.ndarray:
 
 def _spreads(s: SceneArrays) -> bool:
     """Whether kernels need the lobes of `principled`: not where all such materials only mirror or refract, and among
-    them is clear glass, whose paths then take the short loop of delta_chain.glsl."""
+    them is clear glass, whose paths then take the short loop of path/delta_chain.glsl."""
     m = s.materials
     given = m["model"] == MaterialModel.PRINCIPLED
     sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))

@@ -115,7 +115,7 @@ class Accumulators:
         self.open, self._clean = False, True
 
     def bind(self, kernel: Any, first: int, count: int) -> None:
-        """Bind these pixels for a kernel that includes `accumulators.glsl`."""
+        """Bind these pixels for a kernel that includes `accumulate/accumulators.glsl`."""
         block = self.block if self.open else None
         bind(kernel, self.total, block, self._zero, first, count, self.moment_scale)
 
@@ -191,8 +191,8 @@ def bind(
     kernel: Any, total: dict[Slot, Any], block: dict[Slot, Any] | None, zero: Any, first: int, count: int,
     moment_scale: float,
 ) -> None:  # fmt: skip
-    """Bind pixels [first, first + count) for a kernel that includes `accumulators.glsl`; `zero` where there is no
-    buffer."""
+    """Bind pixels [first, first + count) for a kernel that includes `accumulate/accumulators.glsl`; `zero` where
+    there is no buffer."""
     for slot in SLOTS:
         places = (int(slot), total.get(slot)), (int(_BESIDE[slot]), None if block is None else block[slot])
         for place, buffer in places:

@@ -58,8 +58,8 @@ class Sums(NamedTuple):
 
 
 def merged(total: Sums, block: Sums, moment_scale: float) -> Sums:
-    """The sums of the samples of both, as `merge.comp` computes them (see `accumulated.glsl` for the formulas).
-    Pixels that have no sample in the block keep their bits."""
+    """The sums of the samples of both, as `merge.comp` computes them (`accumulate/accumulated.glsl` has the
+    formulas). Pixels that have no sample in the block keep their bits."""
     sum_, lost = (_chosen(both, total, block, k) for k, both in enumerate(_added(total, block)))
     return Sums(sum_, lost, merged_moments(total, block, moment_scale))
 

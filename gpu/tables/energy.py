@@ -1,7 +1,7 @@
 """Tables of the albedos of `principled`'s lobes, for the terms that put back the energy that they lose.
 
 `gpu.tables.build.energy_tables` computes them into `energy.npz`. Runs without GL. The kernels' side is
-`shaders/energy.glsl`.
+`shaders/bsdf/energy.glsl`.
 """
 
 from __future__ import annotations

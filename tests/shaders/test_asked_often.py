@@ -52,7 +52,7 @@ def pictures(gpu: Renderer, scene: dict[str, Any], samples: int, **settings: Any
 
     def changed(name: str, folders: Any) -> str:
         text = read(name, folders)
-        assert name != "direct.glsl" or "&& surface_is_broad(s)" in text
+        assert name != "path/direct.glsl" or "&& surface_is_broad(s)" in text
         return text.replace("&& surface_is_broad(s)", "&& false")
 
     with pytest.MonkeyPatch.context() as patch:

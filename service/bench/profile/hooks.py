@@ -37,15 +37,15 @@ def _ray(kind: str) -> str:
 HOOKS = (
     Edit("pathtrace.comp", "    uvec2 pixel;", "    profile_begin();"),
     Edit("pathtrace.comp", "    sums[slot] = sum;", "    profile_end();"),
-    Edit("path.glsl", "Surface s = interaction_surface(here, m);", _event("bounce")),
-    Edit("direct.glsl", "LightSample light = lights_sample(", _event("light")),
-    Edit("direct.glsl", "uvec2 skip = uvec2(at.flat_id, light.id);", _ray("shadow")),
-    Edit("delta_chain.glsl", "delta_chain_step(here, m, rng, path);", _event("mirror")),
-    Edit("path_trace.glsl", "path.hit = transparency_nearest(", f"if (path.bounce == 0u) {_ray('camera')}"),
-    Edit("path_trace.glsl", "path.hit = transparency_nearest(", f"if (path.bounce > 0u) {_ray('extension')}"),
-    Edit("traverse.glsl", "uvec4 node = node_words[", _event("box")),
-    Edit("traverse.glsl", "traverse_test(tree, ray, range.kind", _event("shape")),
-    Edit("traverse.glsl", "found = traverse_boxes(", _event("leaves")),
+    Edit("path/path.glsl", "Surface s = interaction_surface(here, m);", _event("bounce")),
+    Edit("path/direct.glsl", "LightSample light = lights_sample(", _event("light")),
+    Edit("path/direct.glsl", "uvec2 skip = uvec2(at.flat_id, light.id);", _ray("shadow")),
+    Edit("path/delta_chain.glsl", "delta_chain_step(here, m, rng, path);", _event("mirror")),
+    Edit("path/path_trace.glsl", "path.hit = transparency_nearest(", f"if (path.bounce == 0u) {_ray('camera')}"),
+    Edit("path/path_trace.glsl", "path.hit = transparency_nearest(", f"if (path.bounce > 0u) {_ray('extension')}"),
+    Edit("shapes/traverse.glsl", "uvec4 node = node_words[", _event("box")),
+    Edit("shapes/traverse.glsl", "traverse_test(tree, ray, range.kind", _event("shape")),
+    Edit("shapes/traverse.glsl", "found = traverse_boxes(", _event("leaves")),
 )
 
 FUNCTIONS = f"""

@@ -87,8 +87,8 @@ def test_counting_does_not_change_the_picture(gpu: Renderer, subjects: dict[str,
 
 def test_a_hook_without_its_line_is_an_error(gpu: Renderer) -> None:
     for line, many in (("no such line", "0"), ("}", r"[1-9]\d+")):
-        with pytest.raises(LineGone, match=f"traverse.glsl: {many} lines contain"):
-            InstrumentedRenderer([Edit("traverse.glsl", line, "profile();")], "", 1)
+        with pytest.raises(LineGone, match=f"shapes/traverse.glsl: {many} lines contain"):
+            InstrumentedRenderer([Edit("shapes/traverse.glsl", line, "profile();")], "", 1)
 
 
 def test_loads_are_timed_by_kind_and_lanes(gpu: Renderer) -> None:

@@ -2,11 +2,11 @@
 // largest channel's weight over `samples`, and whether all was finite. Transmitted light as basic radiance.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "surface.glsl"
-#include "bsdf.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "material/surface.glsl"
+#include "bsdf/bsdf.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
 uniform uint count;

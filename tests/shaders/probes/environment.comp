@@ -1,11 +1,11 @@
 // What shines from a direction (asks[i].xyz), or with SAMPLE a pick by two words of random bits.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "shapes.glsl"
-#include "lights.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "shapes/shapes.glsl"
+#include "lights/lights.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
 layout(std430, binding = SLOT_MOMENTS) writeonly buffer answer_buffer { vec4 answers[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer direction_buffer { vec4 directions[]; };

@@ -2,11 +2,11 @@
 // of the light i, its chance, and the least importance of the nodes on the way to it.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "shapes.glsl"
-#include "lights.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "shapes/shapes.glsl"
+#include "lights/lights.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { uvec4 asks[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
 uniform vec3 p;

@@ -2,10 +2,10 @@
 // of refraction and its coat's roughness.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "surface.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "material/surface.glsl"
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
 uniform uint count;
 

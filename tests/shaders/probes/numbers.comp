@@ -1,9 +1,9 @@
 // The sampler's and the warps' output for sample indices 0, 1, 2 ... of one pixel: xy in WHAT's domain.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
 uniform uvec2 pixel;
 uniform uint pair;

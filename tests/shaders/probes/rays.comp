@@ -1,8 +1,8 @@
 // Nearest hits of rays (origins, directions), and whether a ray leaving each hit towards `away` meets anything.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "shapes.glsl"
+#include "math/constants.glsl"
+#include "shapes/shapes.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer origin_buffer { vec4 origins[]; };
 layout(std430, binding = SLOT_COMPENSATION) readonly buffer direction_buffer { vec4 directions[]; };
 layout(std430, binding = SLOT_MOMENTS) readonly buffer away_buffer { vec4 aways[]; };

@@ -1,10 +1,10 @@
 // The tangent at the first corner of triangle i, as its normals' record has it.
 layout(local_size_x = 64) in;
 #include "layout.glsl"
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "shapes.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "shapes/shapes.glsl"
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
 uniform uint count;
 

@@ -3,11 +3,11 @@ layout(local_size_x = 64) in;
 #include "layout.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
-#include "constants.glsl"
-#include "sobol.glsl"
-#include "sampling.glsl"
-#include "shapes.glsl"
-#include "texture.glsl"
+#include "math/constants.glsl"
+#include "math/sobol.glsl"
+#include "math/sampling.glsl"
+#include "shapes/shapes.glsl"
+#include "material/texture.glsl"
 uniform uint count;
 
 void main() {

@@ -1,20 +1,20 @@
-// The estimator: the light that reaches the camera along one path. path_trace.glsl follows a ray to what it meets and
-// adds what shines there, interaction.glsl says what that is, direct.glsl adds what the lights send there,
-// bsdf_world.glsl picks the next direction and path_extend.glsl turns the path there.
-#include "surface.glsl"
-#include "bsdf.glsl"
-#include "lights.glsl"
-#include "transparency.glsl"
-#include "medium.glsl"
-#include "arriving.glsl"
-#include "facing.glsl"
-#include "path_extend.glsl"
-#include "interaction.glsl"
-#include "normal_map.glsl"
-#include "bsdf_world.glsl"
-#include "direct.glsl"
-#include "path_trace.glsl"
-#include "delta_chain.glsl"
+// The estimator: the light that reaches the camera along one path. path/path_trace.glsl follows a ray to what it meets and
+// adds what shines there, path/interaction.glsl says what that is, path/direct.glsl adds what the lights send there,
+// path/bsdf_world.glsl picks the next direction and path/path_extend.glsl turns the path there.
+#include "material/surface.glsl"
+#include "bsdf/bsdf.glsl"
+#include "lights/lights.glsl"
+#include "shapes/transparency.glsl"
+#include "path/medium.glsl"
+#include "path/found_light.glsl"
+#include "path/sides.glsl"
+#include "path/path_extend.glsl"
+#include "path/interaction.glsl"
+#include "path/normal_map.glsl"
+#include "path/bsdf_world.glsl"
+#include "path/direct.glsl"
+#include "path/path_trace.glsl"
+#include "path/delta_chain.glsl"
 
 bool path_was_cut;   // the last path's budget did not last
 bool path_was_lost;  // the driver has ended the last path before its time

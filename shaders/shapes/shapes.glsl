@@ -22,14 +22,14 @@ struct SurfacePoint {
 #endif
 };
 
-#include "frame.glsl"
-#include "material.glsl"
+#include "math/basis.glsl"
+#include "material/material.glsl"
 #include "shapes/sphere.glsl"
 #include "shapes/quad.glsl"
 #include "shapes/solid.glsl"
 #include "shapes/instance.glsl"
 #include "shapes/triangle.glsl"
-#include "traverse.glsl"
+#include "shapes/traverse.glsl"
 
 void shapes_take(uint kind, uint index, float t, vec2 uv, uvec2 skip, inout Hit hit) {
     uint id = (kind << LEAF_KIND_SHIFT) | index;
@@ -132,7 +132,7 @@ SurfacePoint shapes_point(Hit hit, vec3 o, vec3 d) {
     SurfacePoint r = shapes_analytic_point(hit, o, d);
 #if HAS_INSTANCES
     // Ids of triangles in instances are negative and below NONE. Written as `hit.id != NONE && ...` this goes wrong: a
-    // driver (Mesa 22.3) takes hit.id for NONE in lanes that have left the loop of transparency.glsl.
+    // driver (Mesa 22.3) takes hit.id for NONE in lanes that have left the loop of shapes/transparency.glsl.
     bool within = int(hit.id) < -1;
     if (within || kind == SHAPE_TRIANGLE) {
         Instance it = instance_none();

@@ -1,5 +1,5 @@
 // What the pixels of the bound part have accumulated: the total, and the block of samples under way, if there is one.
-#include "accumulated.glsl"
+#include "accumulate/accumulated.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer sum_buffer { vec4 sums[]; };
 layout(std430, binding = SLOT_COMPENSATION) readonly buffer compensation_buffer { vec4 compensations[]; };
 layout(std430, binding = SLOT_MOMENTS) readonly buffer moment_buffer { vec4 moments[]; };

@@ -48,7 +48,7 @@ void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
     }
 }
 
-// Takes the path on in the direction `next`. Where a light is sampled 1 / share times (direct.glsl), the density of
+// Takes the path on in the direction `next`. Where a light is sampled 1 / share times (path/direct.glsl), the density of
 // finding it by chance counts only that share.
 void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Path path) {
     path.alive = next.valid;

@@ -23,7 +23,7 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 #include "lights/quad.glsl"
 #include "lights/triangle.glsl"
 #include "lights/ellipsoid.glsl"
-#include "light_tree.glsl"
+#include "lights/light_tree.glsl"
 
 // Picks a light from the alias table of all.
 Light lights_table_pick(uint bits) {

@@ -1,5 +1,5 @@
 // Diffuse reflection with its retro-reflection, and a flattened variant for thin subsurface [Burley 2012, section 5.3].
-// bsdf.glsl has checked that wo.z and wi.z are positive.
+// bsdf/bsdf.glsl has checked that wo.z and wi.z are positive.
 vec3 disney_diffuse_eval(Surface s, vec3 wo, vec3 wi, float cos_d) {
     float fi = fresnel_schlick(wi.z), fo = fresnel_schlick(wo.z);
     float fss90 = cos_d * cos_d * s.roughness;

@@ -3,7 +3,7 @@
 const uint PAIR_TRANSPARENCY = 0x8000u; // the first pair, beyond those of any path; each bounce has TRANSPARENCY_MAX
 const uint TRANSPARENCY_MAX = 4096u;    // layers that a ray passes at most; it ends on the next one
 
-#include "transparency_walk.glsl"
+#include "shapes/transparency_walk.glsl"
 
 // Counts a surface that the ray has come to; whether the ray may pass it.
 bool transparency_counts(inout uint layer) {

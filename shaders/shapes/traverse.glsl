@@ -17,7 +17,7 @@ const float TRAVERSE_SLACK = 1.0000007;
 // lamps. A shape nearer to a lamp than 2^-16 of the distance casts no shadow.
 const float TRAVERSE_REACH = 0.9999847;
 
-#include "budget.glsl"
+#include "shapes/budget.glsl"
 
 struct Hit {
     float t;

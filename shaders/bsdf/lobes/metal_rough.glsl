@@ -1,5 +1,5 @@
 // The core BRDF of glTF 2.0, a simplified appendix B: Lambert under GGX, by the share that Fresnel leaves [Khronos
-// 2021]. The highlight is lobes/disney/specular.glsl with one alpha for distribution and masking.
+// 2021]. The highlight is bsdf/lobes/disney/specular.glsl with one alpha for distribution and masking.
 
 #if HAS_METAL_ROUGH
 vec3 metal_rough_eval(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {

@@ -1,5 +1,5 @@
 // A material at a point of a surface, ready for the lobes. Here, and only here, roughness becomes alpha.
-#include "material.glsl"
+#include "material/material.glsl"
 
 struct Surface {
     uint model;

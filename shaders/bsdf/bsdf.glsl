@@ -1,27 +1,27 @@
 // The material models: which lobes each of them has, and with what weights. Directions are in the shading frame.
-#include "lobe.glsl"
-#include "fresnel.glsl"
-#include "ggx.glsl"
-#include "lobes/lambert.glsl"
-#include "lobes/disney/diffuse.glsl"
-#include "lobes/disney/sheen.glsl"
-#include "lobes/disney/specular.glsl"
-#include "lobes/disney/clearcoat.glsl"
-#include "lobes/metal_rough.glsl"
-#include "lobes/blinn_phong.glsl"
-#include "lobes/phong.glsl"
-#include "lobes/microfacet/precise.glsl"
-#include "lobes/microfacet/distribution.glsl"
-#include "lobes/microfacet/geometry.glsl"
-#include "lobes/microfacet/fresnel.glsl"
-#include "lobes/microfacet/diffuse.glsl"
-#include "lobes/microfacet/model.glsl"
-#include "energy.glsl"
-#include "lobes/principled/diffuse.glsl"
-#include "lobes/principled/sheen_charlie.glsl"
-#include "lobes/principled/clearcoat.glsl"
-#include "lobes/principled/multiscatter.glsl"
-#include "lobes/principled/microfacet.glsl"
+#include "bsdf/lobe.glsl"
+#include "math/fresnel.glsl"
+#include "bsdf/ggx.glsl"
+#include "bsdf/lobes/lambert.glsl"
+#include "bsdf/lobes/disney/diffuse.glsl"
+#include "bsdf/lobes/disney/sheen.glsl"
+#include "bsdf/lobes/disney/specular.glsl"
+#include "bsdf/lobes/disney/clearcoat.glsl"
+#include "bsdf/lobes/metal_rough.glsl"
+#include "bsdf/lobes/blinn_phong.glsl"
+#include "bsdf/lobes/phong.glsl"
+#include "bsdf/lobes/microfacet/precise.glsl"
+#include "bsdf/lobes/microfacet/distribution.glsl"
+#include "bsdf/lobes/microfacet/geometry.glsl"
+#include "bsdf/lobes/microfacet/fresnel.glsl"
+#include "bsdf/lobes/microfacet/diffuse.glsl"
+#include "bsdf/lobes/microfacet/model.glsl"
+#include "bsdf/energy.glsl"
+#include "bsdf/lobes/principled/diffuse.glsl"
+#include "bsdf/lobes/principled/sheen_charlie.glsl"
+#include "bsdf/lobes/principled/clearcoat.glsl"
+#include "bsdf/lobes/principled/multiscatter.glsl"
+#include "bsdf/lobes/principled/microfacet.glsl"
 
 struct Scatter {
     vec3 f;    // BSDF times |cos theta_i|
@@ -76,7 +76,7 @@ vec3 bsdf_turn_back(Surface s, vec3 w) {
     return vec3(s.tangent.x * w.x - s.tangent.y * w.y, s.tangent.y * w.x + s.tangent.x * w.y, w.z);
 }
 
-#include "principled.glsl"
+#include "bsdf/principled.glsl"
 
 Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_TRANSMISSION
