@@ -269,11 +269,11 @@ def test_dropped_files_find_their_places(editor: Editor) -> None:
 def test_a_dropped_mesh_is_in_sight(editor: Editor) -> None:
     """Of a few centimetres, and inside of the ball where its file has it."""
     before = editor.settled()
-    tiny = b"v -.02 .98 0\nv .02 .98 0\nv 0 1.02 0\nv 0 1 .03\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\n"
+    tiny = b"v -.02 .98 0\nv .02 .98 0\nv 0 1.02 0\nv 0 1 .03\nf 1 2 3\nf 1 2 4\nf 2 3 4\nf 3 1 4\nf 1 2 9\n"
     editor.drop("#stage", {"tiny.obj": tiny})
     editor.tab("scene")
     editor.wait("the mesh", lambda: editor.text("#thing-title") == "Mesh")
-    assert "tiny.obj: taken as it is. 3 edges" in " ".join(editor.text("#messages").split())
+    assert "tiny.obj: taken as it is. 1 face" in " ".join(editor.text("#messages").split())
     editor.settled()
     editor.page.click("#outline-list [data-thing='/camera']")
     editor.click_until("what is in the middle", lambda: editor.text("#thing-title") == "Mesh")
