@@ -56,9 +56,11 @@ tradeoff: setup
 gallery: setup
 	.venv/bin/python -m service.bench.gallery "$(or $(DATA),$(error name the folder with the models: make gallery DATA=...))"
 
+# JavaScript's formatter has no package for pip: it is run where it is there (npm install --global @biomejs/biome@2).
 lint: setup
 	.venv/bin/ruff check .
 	.venv/bin/mypy
+	if command -v biome >/dev/null; then biome format --config-path=.ci web; fi
 
 setup:
 	@.ci/setup

@@ -22,7 +22,9 @@ function sizeOf({ shapes }, { position, target, vfov }) {
 
 export class Adder {
   // `acts` is the editor, `controller` knows what is seen.
-  constructor({ acts, controller }) { Object.assign(this, { acts, controller }); }
+  constructor({ acts, controller }) {
+    Object.assign(this, { acts, controller });
+  }
 
   // One of `additions` in outliner.js.
   async add({ kind, title, make }) {
@@ -49,13 +51,25 @@ export class Adder {
   #apart(light) {
     const { lights = [] } = this.acts.state.scene;
     const { right } = axes(this.acts.camera);
-    const isTaken = ({ position, direction }) => lights.some((each) => String(each.position) === String(position)
-      && (position !== undefined || String(each.direction) === String(direction)));
+    const isTaken = ({ position, direction }) =>
+      lights.some(
+        (each) =>
+          String(each.position) === String(position) &&
+          (position !== undefined || String(each.direction) === String(direction)),
+      );
     let placed = light;
     for (let i = 0; i <= lights.length && isTaken(placed); i += 1) {
       placed = placed.position
-        ? { ...placed, position: add(placed.position, scale(right, this.controller.radius())).map((x) => Number(x.toPrecision(4))) }
-        : { ...placed, direction: turn(placed.direction, [0, 1, 0], SUNS_APART).map((x) => Number(x.toPrecision(4))) };
+        ? {
+            ...placed,
+            position: add(placed.position, scale(right, this.controller.radius())).map((x) =>
+              Number(x.toPrecision(4)),
+            ),
+          }
+        : {
+            ...placed,
+            direction: turn(placed.direction, [0, 1, 0], SUNS_APART).map((x) => Number(x.toPrecision(4))),
+          };
     }
     return placed;
   }
@@ -70,7 +84,12 @@ export class Adder {
   // The things of another scene; `around` is the box around them, where that is known.
   addScene(document, around) {
     const { shapes, ...others } = adapted(document, this.acts.state.scene);
-    return this.#put(shapes, { ...others, around: around ?? sizeOf(document, this.acts.cameraOf(document)), stands: true, isFramed: true });
+    return this.#put(shapes, {
+      ...others,
+      around: around ?? sizeOf(document, this.acts.cameraOf(document)),
+      stands: true,
+      isFramed: true,
+    });
   }
 
   // Adds shapes as one thing, with materials and textures that the scene lacks. `around` is their box where the
@@ -90,7 +109,8 @@ export class Adder {
       scene: {
         ...scene,
         ...(Object.keys(textures).length ? { textures: { ...scene.textures, ...textures } } : {}),
-        materials: { ...scene.materials, ...materials }, shapes: [...scene.shapes, ...placed],
+        materials: { ...scene.materials, ...materials },
+        shapes: [...scene.shapes, ...placed],
         camera: isSeen ? scene.camera : { ...scene.camera, ...this.#framed(stand, way?.neighbour) },
       },
       chosen: { ...chosen, thing: pointer("shapes", scene.shapes.length), material: placed[0].material },

@@ -23,7 +23,7 @@ async function left(complain) {
 
 // {schema, library, calls, name, scene, left}. Asks until the server answers; `told(problem)` says why it waits.
 export async function boot({ keyDialog, told, complain }) {
-  for (let wasWrong = false; ;) {
+  for (let wasWrong = false; ; ) {
     try {
       const [schema, library, api] = await Promise.all([fetchSchema(), openLibrary(), fetchApi()]);
       const names = library.scenes.map(({ name }) => name);
@@ -37,7 +37,9 @@ export async function boot({ keyDialog, told, complain }) {
         wasWrong = true;
       } else {
         told(problem);
-        await new Promise((wake) => { setTimeout(wake, BOOT_RETRY_MS); });
+        await new Promise((wake) => {
+          setTimeout(wake, BOOT_RETRY_MS);
+        });
       }
     }
   }

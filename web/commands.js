@@ -7,7 +7,9 @@ import { saveAs } from "./lib/files.js";
 class Clipboard {
   #own = null;
 
-  get isEmpty() { return this.#own === null && !navigator.clipboard?.readText; }
+  get isEmpty() {
+    return this.#own === null && !navigator.clipboard?.readText;
+  }
 
   write(material) {
     this.#own = material;
@@ -24,7 +26,20 @@ class Clipboard {
 // {does, canPaste}: the commands by name. `find(id)` elements; `page` is the PageState, `madeFrom` as pictureRecipes has
 // it; `complain(error)`, `say(text)`; `refresh()` shows what has changed, `push()` tells the streams.
 export function makeCommands({
-  find, page, editor, ui, stream, controller, panel, importer, savePage, madeFrom, complain, say, refresh, push,
+  find,
+  page,
+  editor,
+  ui,
+  stream,
+  controller,
+  panel,
+  importer,
+  savePage,
+  madeFrom,
+  complain,
+  say,
+  refresh,
+  push,
 }) {
   const clipboard = new Clipboard();
 
@@ -48,13 +63,18 @@ export function makeCommands({
       button.querySelector("span").textContent = page.isPaused ? "Resume" : "Pause";
       push();
     },
-    toggleTheme: () => ui.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
-    toggleLobe: () => { if (!find("show-lobe").hidden) ui.set({ lobe: !ui.state.lobe }); },
+    toggleTheme: () =>
+      ui.set({ theme: getComputedStyle(document.documentElement).colorScheme === "light" ? "dark" : "light" }),
+    toggleLobe: () => {
+      if (!find("show-lobe").hidden) ui.set({ lobe: !ui.state.lobe });
+    },
     pickTool: (tool) => ui.set({ tool }),
     nextLayer: () => ui.set({ layer: page.layers[(page.layers.indexOf(ui.state.layer) + 1) % page.layers.length] }),
     undo: () => travel(() => editor.undo()),
     redo: () => travel(() => editor.redo()),
-    remove: () => { if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing); },
+    remove: () => {
+      if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing);
+    },
     copyMaterial() {
       clipboard.write(editor.material);
       say("Material copied");
@@ -88,14 +108,30 @@ export function makeCommands({
       button.disabled = false;
     },
   };
-  return { does, get canPaste() { return !clipboard.isEmpty; } };
+  return {
+    does,
+    get canPaste() {
+      return !clipboard.isEmpty;
+    },
+  };
 }
 
 // The command of each button, by the button's id.
 const BUTTONS = {
-  pause: "togglePause", download: "download", compare: "toggleCompare", help: "showKeys", undo: "undo", redo: "redo",
-  frame: "frame", "reset-view": "resetView", "open-file": "openFiles", "add-file": "addFiles", theme: "toggleTheme",
-  "copy-material": "copyMaterial", "paste-material": "pasteMaterial", "reset-material": "resetMaterial",
+  pause: "togglePause",
+  download: "download",
+  compare: "toggleCompare",
+  help: "showKeys",
+  undo: "undo",
+  redo: "redo",
+  frame: "frame",
+  "reset-view": "resetView",
+  "open-file": "openFiles",
+  "add-file": "addFiles",
+  theme: "toggleTheme",
+  "copy-material": "copyMaterial",
+  "paste-material": "pasteMaterial",
+  "reset-material": "resetMaterial",
   "show-lobe": "toggleLobe",
 };
 
@@ -104,7 +140,10 @@ export function watchButtons(find, does) {
 }
 
 const TOOLS = {
-  orbit: "orbit and select", fly: "look around", focus: "focus by clicking", inspect: "zoom to pixels; arrows move the cross",
+  orbit: "orbit and select",
+  fly: "look around",
+  focus: "focus by clicking",
+  inspect: "zoom to pixels; arrows move the cross",
 };
 
 // The keys of the commands and the words of the sheet that explains them: [{keys, shift, ctrl, does, says, group}].
@@ -115,13 +154,25 @@ export function keyTable(does) {
     { keys: ["z"], ctrl: true, shift: true, does: does.redo, says: "redo", group: "Work" },
     { keys: ["y"], ctrl: true, does: does.redo, says: "redo", group: "Work" },
     { keys: ["c"], ctrl: true, notInText: true, does: does.copyMaterial, says: "copy the material", group: "Work" },
-    { keys: ["v"], ctrl: true, notInText: true, does: does.pasteMaterial, says: "paste a material or a scene", group: "Work" },
+    {
+      keys: ["v"],
+      ctrl: true,
+      notInText: true,
+      does: does.pasteMaterial,
+      says: "paste a material or a scene",
+      group: "Work",
+    },
     { keys: ["delete"], does: does.remove, says: "delete the selected thing", group: "Work" },
     { keys: ["o"], ctrl: true, does: does.openFiles, says: "open a model or a scene", group: "Work" },
     { keys: [" "], does: does.togglePause, says: "pause, resume", group: "Work" },
     { keys: ["p"], does: does.download, says: "the picture as a PNG", group: "Work" },
     { keys: ["n"], does: does.snapshot, says: "take a snapshot", group: "Work" },
-    ...Object.entries(TOOLS).map(([tool, says], i) => ({ keys: [String(i + 1)], does: () => pickTool(tool), says, group: "Tools" })),
+    ...Object.entries(TOOLS).map(([tool, says], i) => ({
+      keys: [String(i + 1)],
+      does: () => pickTool(tool),
+      says,
+      group: "Tools",
+    })),
     { keys: ["f"], does: does.frame, says: "frame the selection", group: "View" },
     { keys: ["home"], does: does.resetView, says: "back to the first view", group: "View" },
     { keys: ["escape"], does: () => pickTool("orbit"), says: "put the tool away", group: "Tools" },

@@ -10,13 +10,21 @@ function element(tag, properties = {}, ...children) {
 
 function resolved(schema, description) {
   if (!schema?.$ref) return schema ?? {};
-  return schema.$ref.slice(2).split("/").reduce((at, key) => at[key], description);
+  return schema.$ref
+    .slice(2)
+    .split("/")
+    .reduce((at, key) => at[key], description);
 }
 
 function values(schema) {
-  if (schema.anyOf) return schema.anyOf.filter(({ type }) => type !== "null").map(values).join(" | ");
+  if (schema.anyOf)
+    return schema.anyOf
+      .filter(({ type }) => type !== "null")
+      .map(values)
+      .join(" | ");
   if (schema.enum) return schema.enum.join(" | ");
-  const low = schema.minimum ?? "", high = schema.maximum ?? "";
+  const low = schema.minimum ?? "",
+    high = schema.maximum ?? "";
   return [schema.type, low === "" && high === "" ? "" : `${low} … ${high}`].filter(Boolean).join(" ");
 }
 
@@ -25,27 +33,45 @@ function parameters(call, description) {
   const rows = call.parameters.map((parameter) => {
     const schema = resolved(parameter.schema, description);
     const normally = parameter.schema?.default ?? schema.default;
-    return element("tr", {},
+    return element(
+      "tr",
+      {},
       element("td", {}, element("code", { textContent: parameter.name })),
       element("td", { textContent: parameter.in }),
       element("td", { textContent: values(schema) }),
-      element("td", { textContent: normally === undefined ? "" : String(normally) }));
+      element("td", { textContent: normally === undefined ? "" : String(normally) }),
+    );
   });
-  const head = element("tr", {}, ...["name", "in", "values", "default"].map((textContent) => element("th", { textContent })));
+  const head = element(
+    "tr",
+    {},
+    ...["name", "in", "values", "default"].map((textContent) => element("th", { textContent })),
+  );
   return [element("table", {}, head, ...rows)];
 }
 
 function section(method, path, call, description) {
-  const heading = element("h3", {},
+  const heading = element(
+    "h3",
+    {},
     element("span", { className: "method", textContent: method.toUpperCase() }),
-    element("code", { textContent: path }));
+    element("code", { textContent: path }),
+  );
   const bodies = Object.keys(call.requestBody?.content ?? {});
-  const answers = Object.entries(call.responses ?? {}).filter(([status]) => status < 300).map(([status]) => status);
-  const facts = [bodies.length ? `Body: ${bodies.join(", ")}. ` : "", answers.length ? `Answers ${answers.join(", ")}.` : ""];
-  return element("section", {},
+  const answers = Object.entries(call.responses ?? {})
+    .filter(([status]) => status < 300)
+    .map(([status]) => status);
+  const facts = [
+    bodies.length ? `Body: ${bodies.join(", ")}. ` : "",
+    answers.length ? `Answers ${answers.join(", ")}.` : "",
+  ];
+  return element(
+    "section",
+    {},
     heading,
     element("p", { textContent: `${call.summary ?? ""}. ${facts.join("")}` }),
-    ...parameters(call, description));
+    ...parameters(call, description),
+  );
 }
 
 async function show() {
@@ -56,9 +82,15 @@ async function show() {
     return;
   }
   const description = await answer.json();
-  document.getElementById("about").textContent = `${description.info.description} Version ${description.info.version}.`;
-  calls.replaceChildren(...Object.entries(description.paths).flatMap(([path, methods]) =>
-    METHODS.filter((method) => methods[method]).map((method) => section(method, path, methods[method], description))));
+  document.getElementById("about").textContent =
+    `${description.info.description} Version ${description.info.version}.`;
+  calls.replaceChildren(
+    ...Object.entries(description.paths).flatMap(([path, methods]) =>
+      METHODS.filter((method) => methods[method]).map((method) =>
+        section(method, path, methods[method], description),
+      ),
+    ),
+  );
 }
 
 show();

@@ -20,7 +20,11 @@ const ORDER = ["json", "scene", "mesh", "light", "image"]; // a texture comes af
 
 const ACCEPT = accepted(ORDER);
 
-const stem = (file) => file.name.replace(/\.[^.]*$/, "").replaceAll(/[^\w-]+/g, "-").slice(0, 40) || "image";
+const stem = (file) =>
+  file.name
+    .replace(/\.[^.]*$/, "")
+    .replaceAll(/[^\w-]+/g, "-")
+    .slice(0, 40) || "image";
 
 export class Importer {
   // `acts` is the editor, `adder` sets things beside others; `messages` tells; `controller` knows what is seen;
@@ -31,7 +35,9 @@ export class Importer {
   }
 
   // Files that the person picks, one way or the other.
-  async browse(way) { await this.take(await browse(ACCEPT), { way }); }
+  async browse(way) {
+    await this.take(await browse(ACCEPT), { way });
+  }
 
   // One after the other. `way` is "open", for models and scenes in place of this scene, or "add"; without one the
   // person is asked about whole scenes. `at` is where files were dropped.
@@ -44,7 +50,10 @@ export class Importer {
       try {
         if (await this.#take(file, place, next)) next = "add"; // the others of these files belong to it
       } catch (problem) {
-        this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem, {}, fileValueWords) });
+        this.messages.show("refusal", {
+          title: `${file.name} was not taken.`,
+          detail: problemText(problem, {}, fileValueWords),
+        });
       }
       this.messages.hide("upload");
     }
@@ -60,7 +69,7 @@ export class Importer {
       this.reopen(recipe, stem(file));
       return true;
     }
-    const chosen = kind === "scene" ? way ?? (await this.#ask(file)) : way;
+    const chosen = kind === "scene" ? (way ?? (await this.#ask(file))) : way;
     if (kind === "scene" && chosen === null) return false;
     const info = await this.upload(file);
     if (info.kind === "scene") return this.#takeScene(info, file, chosen);
@@ -73,8 +82,12 @@ export class Importer {
   // "add", "open", or null.
   #ask(file) {
     return question({
-      title: `${file.name} is a whole scene`, detail: "Its things can be added beside what is here, or it is opened in place of this scene.",
-      choices: [{ label: "Add", value: "add" }, { label: "Open", value: "open" }],
+      title: `${file.name} is a whole scene`,
+      detail: "Its things can be added beside what is here, or it is opened in place of this scene.",
+      choices: [
+        { label: "Add", value: "add" },
+        { label: "Open", value: "open" },
+      ],
     });
   }
 
@@ -83,7 +96,10 @@ export class Importer {
     this.#paint(this.#colorField(), info, file);
     if (isCertain) return;
     const material = inWords(this.acts.state.chosen.material);
-    this.messages.show("import", { title: `${file.name} is on ${material}.`, detail: "The picture was not ready to tell what it fell on, so the selected material took it." });
+    this.messages.show("import", {
+      title: `${file.name} is on ${material}.`,
+      detail: "The picture was not ready to tell what it fell on, so the selected material took it.",
+    });
   }
 
   // Selects what an image fell on, if it is not the background; false where that can't be told.
@@ -105,7 +121,7 @@ export class Importer {
 
   async #takeJson(document, file, way) {
     const scene = document?.scene?.shapes ? document.scene : document?.shapes && document;
-    const chosen = scene ? way ?? (await this.#ask(file)) : "open";
+    const chosen = scene ? (way ?? (await this.#ask(file))) : "open";
     if (chosen === "add") return this.#addScene(scene, file);
     if (chosen === "open") this.openDocument(document, stem(file));
     return Boolean(scene) && chosen === "open";
@@ -124,7 +140,8 @@ export class Importer {
     if (way === "add") return this.#addScene(document, file, { bounds, warnings });
     if (bounds) remember(document.shapes, { low: bounds[0], high: bounds[1] });
     this.acts.openScene(document, stem(file), exposure);
-    const taken = exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
+    const taken =
+      exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
     const action = isUnderNoSky(document) && { label: "Add the studio", does: () => this.#addStudio(exposure) };
     this.#tell(file, [...taken, ...warnings], "good to know.", action);
     return true;
@@ -134,7 +151,11 @@ export class Importer {
   async #addScene(document, file, { bounds, warnings = [] } = {}) {
     await this.adder.addScene(document, bounds ? { low: bounds[0], high: bounds[1] } : null);
     const left = document.lights?.length ?? 0;
-    const told = left ? [`Its ${left === 1 ? "light was" : `${left} lights were`} left out, since this scene has light of its own. Open brings all.`] : [];
+    const told = left
+      ? [
+          `Its ${left === 1 ? "light was" : `${left} lights were`} left out, since this scene has light of its own. Open brings all.`,
+        ]
+      : [];
     this.#tell(file, [...told, ...warnings.filter(({ pointer: about = "" }) => !STAYS.test(about))], "good to know.");
     return false;
   }
@@ -166,12 +187,18 @@ export class Importer {
   // A scene of one mesh alone, as the server frames and lights it, of a material that is named like the file.
   async #alone(id, material) {
     const document = await fetchAssetScene(id);
-    return { ...document, materials: { [material]: PLAIN }, shapes: document.shapes.map((shape) => ({ ...shape, material })) };
+    return {
+      ...document,
+      materials: { [material]: PLAIN },
+      shapes: document.shapes.map((shape) => ({ ...shape, material })),
+    };
   }
 
   #colorField() {
     const { type } = this.acts.material;
-    const field = fields(this.schema, materialModels(this.schema)[type]).find(({ widget, takesTexture }) => widget === "color" && takesTexture);
+    const field = fields(this.schema, materialModels(this.schema)[type]).find(
+      ({ widget, takesTexture }) => widget === "color" && takesTexture,
+    );
     return field && `${this.acts.materialPlace}/${field.name}`;
   }
 
@@ -180,7 +207,10 @@ export class Importer {
     try {
       await this.#paint(place, await this.upload(file), file);
     } catch (problem) {
-      this.messages.show("refusal", { title: `${file.name} was not taken.`, detail: problemText(problem, {}, fileValueWords) });
+      this.messages.show("refusal", {
+        title: `${file.name} was not taken.`,
+        detail: problemText(problem, {}, fileValueWords),
+      });
     }
     this.messages.hide("upload");
   }
@@ -205,7 +235,9 @@ export function watchDrops(page, { take, tell }) {
   page.addEventListener("dragleave", (event) => {
     if (isFiles(event) && (depth -= 1) <= 0) tell(null);
   });
-  page.addEventListener("dragover", (event) => { if (isFiles(event)) event.preventDefault(); });
+  page.addEventListener("dragover", (event) => {
+    if (isFiles(event)) event.preventDefault();
+  });
   page.addEventListener("drop", (event) => {
     depth = 0;
     tell(null);

@@ -18,7 +18,9 @@ class Flight {
   #held = new Set();
   #at = 0;
 
-  constructor(move) { this.move = move; }
+  constructor(move) {
+    this.move = move;
+  }
 
   press(key) {
     if (!this.#held.size) {
@@ -32,14 +34,19 @@ class Flight {
     if (this.#held.delete(key) && !this.#held.size) this.move.rest();
   }
 
-  stop() { for (const key of [...this.#held]) this.lift(key); }
+  stop() {
+    for (const key of [...this.#held]) this.lift(key);
+  }
 
   #step(now) {
     if (!this.#held.size) return;
     const amount = FLY_PER_S * Math.min(0.1, Math.max(0, now - this.#at) / 1000);
     this.#at = now;
     const sum = [0, 0, 0];
-    for (const key of this.#held) FLIGHT[key].forEach((x, i) => { sum[i] += x * amount; });
+    for (const key of this.#held)
+      FLIGHT[key].forEach((x, i) => {
+        sum[i] += x * amount;
+      });
     if (amount > 0) this.move.fly(...sum);
     requestAnimationFrame((next) => this.#step(next));
   }
@@ -50,15 +57,21 @@ export function watchKeys(move, acts) {
   const flight = new Flight(move);
   const inText = ({ target }) => target instanceof Element && target.closest(WRITING);
   // Whether what has the focus needs the key itself.
-  const isTaken = (key, { target }) => inText({ target })
-    || (target.type === "range" && MOVING.includes(key)) || (target.type === "checkbox" && key === " ");
+  const isTaken = (key, { target }) =>
+    inText({ target }) ||
+    (target.type === "range" && MOVING.includes(key)) ||
+    (target.type === "checkbox" && key === " ");
 
   document.addEventListener("keydown", (event) => {
     const key = event.key.toLowerCase();
     const ctrl = event.ctrlKey || event.metaKey;
     if (event.altKey || document.querySelector("dialog[open]")) return;
-    const act = acts.find((each) => each.keys.includes(key) && Boolean(each.ctrl) === ctrl
-      && (each.shift === undefined || each.shift === event.shiftKey));
+    const act = acts.find(
+      (each) =>
+        each.keys.includes(key) &&
+        Boolean(each.ctrl) === ctrl &&
+        (each.shift === undefined || each.shift === event.shiftKey),
+    );
     if (act?.ctrl) {
       if (event.target.dataset?.dirty || (act.notInText && inText(event))) return;
     } else {
@@ -83,34 +96,66 @@ export function watchKeys(move, acts) {
   window.addEventListener("blur", () => flight.stop());
 }
 
-const FINGERS = ["Fingers on the picture", [
-  ["drag", "orbit"], ["two fingers", "slide the view"], ["pinch", "come nearer, go away"], ["tap", "select a thing and its material"],
-]];
+const FINGERS = [
+  "Fingers on the picture",
+  [
+    ["drag", "orbit"],
+    ["two fingers", "slide the view"],
+    ["pinch", "come nearer, go away"],
+    ["tap", "select a thing and its material"],
+  ],
+];
 const MOVES = [
-  ["The picture", [
-    ["drag", "orbit"], ["Shift", "drag", "slide the view; also the right button, or two fingers"],
-    ["scroll", "come nearer, go away; also a pinch"], ["Alt", "drag", "turn the environment"], ["click", "select a thing and its material"],
-    ["←", "→", "↑", "↓", "orbit; with Shift slide"], ["+", "−", "come nearer, go away"],
-    ["W", "A", "S", "D", "fly; E rises, Q sinks"],
-  ]],
+  [
+    "The picture",
+    [
+      ["drag", "orbit"],
+      ["Shift", "drag", "slide the view; also the right button, or two fingers"],
+      ["scroll", "come nearer, go away; also a pinch"],
+      ["Alt", "drag", "turn the environment"],
+      ["click", "select a thing and its material"],
+      ["←", "→", "↑", "↓", "orbit; with Shift slide"],
+      ["+", "−", "come nearer, go away"],
+      ["W", "A", "S", "D", "fly; E rises, Q sinks"],
+    ],
+  ],
 ];
 
 const NAMES = { " ": "Space", escape: "Esc", home: "Home", delete: "Del" };
 const shown = ({ keys: [key], ctrl, shift }) => [
-  ...(ctrl ? ["Ctrl"] : []), ...(shift ? ["Shift"] : []), NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key),
+  ...(ctrl ? ["Ctrl"] : []),
+  ...(shift ? ["Shift"] : []),
+  NAMES[key] ?? (key.length === 1 ? key.toUpperCase() : key),
 ];
 
 // The sheet: every act with its keys, by groups; what fingers do comes first where there are fingers.
 export function fillSheet(root, acts) {
   const isTouched = matchMedia("(pointer: coarse)").matches;
-  const groups = new Map((isTouched ? [FINGERS, ...MOVES] : MOVES).map(([name, rows]) => [name, rows.map((row) => [row.slice(0, -1), row.at(-1)])]));
+  const groups = new Map(
+    (isTouched ? [FINGERS, ...MOVES] : MOVES).map(([name, rows]) => [
+      name,
+      rows.map((row) => [row.slice(0, -1), row.at(-1)]),
+    ]),
+  );
   for (const act of acts) {
     if (!groups.has(act.group)) groups.set(act.group, []);
     groups.get(act.group).push([shown(act), act.says]);
   }
-  root.replaceChildren(...[...groups].map(([name, rows]) => element("section", {},
-    element("h3", {}, name),
-    element("dl", {}, ...rows.flatMap(([keys, says]) => [
-      element("dt", {}, ...keys.flatMap((key) => [element("kbd", {}, key), " "])), element("dd", {}, says),
-    ])))));
+  root.replaceChildren(
+    ...[...groups].map(([name, rows]) =>
+      element(
+        "section",
+        {},
+        element("h3", {}, name),
+        element(
+          "dl",
+          {},
+          ...rows.flatMap(([keys, says]) => [
+            element("dt", {}, ...keys.flatMap((key) => [element("kbd", {}, key), " "])),
+            element("dd", {}, says),
+          ]),
+        ),
+      ),
+    ),
+  );
 }

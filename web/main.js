@@ -38,19 +38,27 @@ const SAVE_REST_MS = 600;
 const find = (id) => document.getElementById(id);
 const root = find("stage");
 // A refusal goes with the next change of the picture, what was said of a file with its scene, a greeting at once.
-const ABOUT = { refusal: ({ scene, settings, compare }) => [scene, settings, compare], work: ({ scene, settings }) => [scene, settings] };
-const messages = new Messages(find("messages"), (kind) => (ABOUT[kind] ?? (({ home }) => [home]))(editor?.state ?? {}));
+const ABOUT = {
+  refusal: ({ scene, settings, compare }) => [scene, settings, compare],
+  work: ({ scene, settings }) => [scene, settings],
+};
+const messages = new Messages(find("messages"), (kind) =>
+  (ABOUT[kind] ?? (({ home }) => [home]))(editor?.state ?? {}),
+);
 const announcer = new Announcer(find("announcer"));
 const say = (text) => announcer.say(text);
 const status = new Status(document);
 const ui = new UiState();
 
 let titles = {};
-const complain = (problem) => { messages.show("refusal", { title: problemText(problem, titles) }); };
+const complain = (problem) => {
+  messages.show("refusal", { title: problemText(problem, titles) });
+};
 
 let editor = null;
 const { schema, library, calls, name, scene, left } = await boot({
-  keyDialog: find("key-dialog"), complain,
+  keyDialog: find("key-dialog"),
+  complain,
   told(problem) {
     if (!problem) return messages.hide("connection");
     status.state("Offline");
@@ -63,7 +71,12 @@ if (left) editor.amend(left.state);
 const page = new PageState({ schema, editor, ui, root, fit: (box) => comparison.fit(box) });
 
 const recipes = pictureRecipes({
-  schema, acts: editor, info: () => page.info, size: () => page.size, view: () => page.view, viewDefaults: page.viewDefaults,
+  schema,
+  acts: editor,
+  info: () => page.info,
+  size: () => page.size,
+  view: () => page.view,
+  viewDefaults: page.viewDefaults,
 });
 
 // --- the picture ---
@@ -106,7 +119,9 @@ const stream = new Stream({
     thumbnails.work();
   },
   refused(problem, valid) {
-    const places = editor.takeBack(problem, valid, (pointer, detail) => panel.mark(pointer, sentence(detailWords(detail))));
+    const places = editor.takeBack(problem, valid, (pointer, detail) =>
+      panel.mark(pointer, sentence(detailWords(detail))),
+    );
     // Said once: at the control, where that can be seen.
     preparing.end();
     if (!places.length || places.includes(null) || !panel.isMarkSeen) complain(problem);
@@ -121,14 +136,21 @@ const stream = new Stream({
       return;
     }
     messages.show("connection", {
-      title, detail: [detail, wait_ms === null ? "" : "Trying to reconnect…"].filter(Boolean).join(" "),
-      action: { label: wait_ms === null ? "Try again" : "Try now", does: () => stream.retry() }, lasting: true,
+      title,
+      detail: [detail, wait_ms === null ? "" : "Trying to reconnect…"].filter(Boolean).join(" "),
+      action: { label: wait_ms === null ? "Try again" : "Try now", does: () => stream.retry() },
+      lasting: true,
     });
   },
 });
 
 const preparing = new Preparing({
-  stage: root, label: find("preparing"), begun: () => { status.blank(); tellState(); },
+  stage: root,
+  label: find("preparing"),
+  begun: () => {
+    status.blank();
+    tellState();
+  },
   subject() {
     const { home, chosen } = editor.state;
     const isOther = home !== page.paintedHome;
@@ -139,10 +161,22 @@ const preparing = new Preparing({
 
 const controller = new ViewportController({ find, acts: editor, ui, stream, viewport, complain, say });
 const comparison = new Comparison(
-  { root: find("comparison"), stage: root, divider: find("divider"), canvas: find("picture-b"), difference: find("difference") },
   {
-    first: viewport, acts: editor, models: Object.keys(materialModels(schema.scene)), changed: refresh, names: namesOf, lost: () => {},
-    beside: () => stream.session, headerOfA: () => page.header,
+    root: find("comparison"),
+    stage: root,
+    divider: find("divider"),
+    canvas: find("picture-b"),
+    difference: find("difference"),
+  },
+  {
+    first: viewport,
+    acts: editor,
+    models: Object.keys(materialModels(schema.scene)),
+    changed: refresh,
+    names: namesOf,
+    lost: () => {},
+    beside: () => stream.session,
+    headerOfA: () => page.header,
   },
 );
 
@@ -151,12 +185,27 @@ const comparison = new Comparison(
 const thumbnails = new Thumbnails(() => page.isConnected && page.isDone && !page.isPaused);
 const textureThumbnails = new TextureThumbnails();
 const adder = new Adder({ acts: editor, controller });
-const importer = new Importer({ schema, acts: editor, adder, messages, controller, reopen: recipes.reopen, thumbnails: textureThumbnails });
+const importer = new Importer({
+  schema,
+  acts: editor,
+  adder,
+  messages,
+  controller,
+  reopen: recipes.reopen,
+  thumbnails: textureThumbnails,
+});
 const panel = new Panel(find("panel"), {
-  schema, library, acts: editor, stage: {
-    frame: (thing) => controller.frame(thing), add: (offer) => adder.add(offer), duplicate: (thing) => adder.duplicate(thing),
+  schema,
+  library,
+  acts: editor,
+  stage: {
+    frame: (thing) => controller.frame(thing),
+    add: (offer) => adder.add(offer),
+    duplicate: (thing) => adder.duplicate(thing),
     takeTexture: (place, file) => importer.texture(place, file),
-  }, paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch), say,
+  },
+  paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch),
+  say,
   textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
 });
 
@@ -164,7 +213,8 @@ const savePage = new SavePage(find("page-save"), {
   hasDocuments: Object.keys(calls).some((path) => path.startsWith("/v1/documents")),
   acts: {
     document: (kind) => (kind === "scenes" ? editor.state.scene : editor.material),
-    open: (kind, document, title) => (kind === "scenes" ? editor.openScene(document, title) : editor.putMaterial(document)),
+    open: (kind, document, title) =>
+      kind === "scenes" ? editor.openScene(document, title) : editor.putMaterial(document),
     state: () => essence(editor.state),
     restore: (kept) => editor.change(revived(kept)),
     async snapshot() {
@@ -172,25 +222,54 @@ const savePage = new SavePage(find("page-save"), {
       return { blob: new Blob([bytes], { type: header.mime }), note: `${header.samples} samples` };
     },
     link: () => linkTo(editor.state),
-    command: () => exporting.curl(editor.state.scene, exporting.exactSettings(page.settings, page.header?.samples ?? 1), page.view),
+    command: () =>
+      exporting.curl(
+        editor.state.scene,
+        exporting.exactSettings(page.settings, page.header?.samples ?? 1),
+        page.view,
+      ),
     png: (bits) => exporting.png(stream, bits, recipes.madeFrom),
     exr: () => exporting.exr(stream, page.layers, recipes.madeFrom),
-    complain, announce: say,
+    complain,
+    announce: say,
   },
 });
 
 const lobe = new LobePanel(find("lobe"), {
-  acts: editor, schema, calls, titles, mean: (texture, reads) => textureThumbnails.mean(texture, reads), close: () => ui.set({ lobe: false }),
+  acts: editor,
+  schema,
+  calls,
+  titles,
+  mean: (texture, reads) => textureThumbnails.mean(texture, reads),
+  close: () => ui.set({ lobe: false }),
 });
 find("show-lobe").hidden = !lobe.isPossible;
 for (const near of ["pointerenter", "focus"]) find("show-lobe").addEventListener(near, () => lobe.prepare());
 
 const output = new Output(find("output"), {
-  schema, acts: editor, order: () => ({ scene: editor.state.scene, settings: editor.state.settings }), view: () => page.view, complain, say,
+  schema,
+  acts: editor,
+  order: () => ({ scene: editor.state.scene, settings: editor.state.settings }),
+  view: () => page.view,
+  complain,
+  say,
 });
 
 const commands = makeCommands({
-  find, page, editor, ui, stream, controller, panel, importer, savePage, madeFrom: recipes.madeFrom, complain, say, refresh, push,
+  find,
+  page,
+  editor,
+  ui,
+  stream,
+  controller,
+  panel,
+  importer,
+  savePage,
+  madeFrom: recipes.madeFrom,
+  complain,
+  say,
+  refresh,
+  push,
 });
 const keys = keyTable(commands.does);
 watchButtons(find, commands.does);
@@ -262,13 +341,24 @@ ui.subscribe(showUi);
 let resizing = 0;
 new ResizeObserver(() => {
   clearTimeout(resizing);
-  resizing = setTimeout(() => { push(); controller.overlay(); controller.mark(); }, RESIZE_REST_MS);
+  resizing = setTimeout(() => {
+    push();
+    controller.overlay();
+    controller.mark();
+  }, RESIZE_REST_MS);
 }).observe(root);
 
 if (left?.from === "work") {
   messages.show("work", {
     title: "Your last work is back.",
-    action: { label: "Start afresh", does: () => { forgetWork(); messages.hide("work"); editor.openScene(scene, name); } },
+    action: {
+      label: "Start afresh",
+      does: () => {
+        forgetWork();
+        messages.hide("work");
+        editor.openScene(scene, name);
+      },
+    },
   });
 }
 showUi();

@@ -22,7 +22,8 @@ export function place(point, transform) {
   return add([x, y, z], translate);
 }
 
-const corners = (low, high) => Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high : low)[k]));
+const corners = (low, high) =>
+  Array.from({ length: 8 }, (_, i) => [0, 1, 2].map((k) => ((i >> k) & 1 ? high : low)[k]));
 
 const measured = new Map(); // the corners of uploaded meshes, by asset
 
@@ -31,7 +32,9 @@ export const measure = (asset, [low, high]) => measured.set(asset, corners(low, 
 
 function points(shape) {
   if (shape.type === "sphere") {
-    return [0, 1, 2].flatMap((k) => [-1, 1].map((side) => shape.center.map((x, i) => x + (i === k ? side * shape.radius : 0))));
+    return [0, 1, 2].flatMap((k) =>
+      [-1, 1].map((side) => shape.center.map((x, i) => x + (i === k ? side * shape.radius : 0))),
+    );
   }
   if (shape.type === "box") return corners(shape.min, shape.max);
   if (shape.type === "quad") {
@@ -67,19 +70,25 @@ export function boxAround(cloud) {
 
 const models = new WeakMap(); // the box around the whole model that a shape came with, while it stands as it came
 
-export const remember = (shapes, whole) => { for (const shape of shapes) models.set(shape, whole); };
+export const remember = (shapes, whole) => {
+  for (const shape of shapes) models.set(shape, whole);
+};
 
 // {low, high}, or null where neither the document nor its file tells.
 export function box(shape) {
   const cloud = cloudOf(shape);
-  return cloud ? boxAround(cloud) : models.get(shape) ?? null;
+  return cloud ? boxAround(cloud) : (models.get(shape) ?? null);
 }
 
 // Of several balls, the box around them.
 export function together(balls) {
   if (!balls.length) return null;
   const cloud = balls.flatMap(({ center, radius }) =>
-    corners(subtract(center, scale([1, 1, 1], radius)), add(center, scale([1, 1, 1], radius))));
+    corners(subtract(center, scale([1, 1, 1], radius)), add(center, scale([1, 1, 1], radius))),
+  );
   const { center } = around(cloud);
-  return { center, radius: balls.reduce((most, each) => Math.max(most, length(subtract(each.center, center)) + each.radius), 0) };
+  return {
+    center,
+    radius: balls.reduce((most, each) => Math.max(most, length(subtract(each.center, center)) + each.radius), 0),
+  };
 }

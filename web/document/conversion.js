@@ -7,9 +7,11 @@ const BASE_F0 = 0.04; // head-on reflectance of the dielectrics of `metal_rough`
 const ALPHA = { min: 0.001, max: 10 }; // of the distribution that `microfacet` begins with
 
 const tidy = (x) => Number(Math.min(1, x).toPrecision(4));
-const isPlain = ({ roughness, base_color, metallic }) => roughness !== undefined && ![roughness, base_color, metallic].some(isObject);
+const isPlain = ({ roughness, base_color, metallic }) =>
+  roughness !== undefined && ![roughness, base_color, metallic].some(isObject);
 const diffuse = ({ base_color = 0.5, metallic = 0 }) => linear(base_color).map((x) => tidy(x * (1 - metallic)));
-const reflectance = ({ base_color = 0.5, metallic = 0 }) => linear(base_color).map((x) => BASE_F0 * (1 - metallic) + x * metallic);
+const reflectance = ({ base_color = 0.5, metallic = 0 }) =>
+  linear(base_color).map((x) => BASE_F0 * (1 - metallic) + x * metallic);
 
 // Blinn and Phong's highlight for a roughness: its exponent 2 / alpha^2 - 2, alpha being roughness^2, and the
 // reflectance at normal incidence times (exponent + 8) / 8, the normalisation that this model leaves out
@@ -48,7 +50,12 @@ export function converted(old, from, to) {
   const material = { type: to.type };
   for (const field of to.fields) {
     const value = old[field.name];
-    const isTaken = value !== undefined && means(field, from.fields.find(({ name }) => name === field.name));
+    const isTaken =
+      value !== undefined &&
+      means(
+        field,
+        from.fields.find(({ name }) => name === field.name),
+      );
     if (isTaken && (field.takesTexture || !isObject(value))) material[field.name] = value;
   }
   const [color, own] = [colorName(from, old), colorName(to)];

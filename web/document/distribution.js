@@ -11,7 +11,10 @@ const PEAKS = {
   ggx: { slope: (a) => 2 / a ** 2 - 2, alpha: (s) => (s / 2 + 1) ** -0.5 },
   gtr: { slope: (a, g) => g / a ** 2 - g, alpha: (s, g) => (s / g + 1) ** -0.5 },
   abc: { slope: (a, g) => (a * g) / 2, alpha: (s, g) => (2 * s) / (g || 1) },
-  sgd: { slope: (a, g) => 1 / a + g / a ** 2 - 2, alpha: (s, g) => 2 / (Math.sqrt(1 + 4 * g * (s + 2)) - 1) * g || 1 / (s + 2) },
+  sgd: {
+    slope: (a, g) => 1 / a + g / a ** 2 - 2,
+    alpha: (s, g) => (2 / (Math.sqrt(1 + 4 * g * (s + 2)) - 1)) * g || 1 / (s + 2),
+  },
   gaussian: { slope: (a) => 1 / a ** 2, alpha: (s) => s ** -0.5 },
 };
 const FLATTEST = 1e-3; // a slope; below it, and above 0, all peaks are flat

@@ -17,9 +17,13 @@ function subject({ shapes }) {
 }
 
 const picked = (name, scene, exposure) => ({
-  scene, home: scene, compare: null,
+  scene,
+  home: scene,
+  compare: null,
   chosen: {
-    scene: name, environment: OWN, thing: pointer("shapes", subject(scene)),
+    scene: name,
+    environment: OWN,
+    thing: pointer("shapes", subject(scene)),
     material: scene.shapes[subject(scene)]?.material ?? Object.keys(scene.materials)[0],
     ...(exposure === undefined ? {} : { exposure }),
   },
@@ -40,19 +44,33 @@ export class Editor extends Store {
     this.complain = complain;
     this.forgive = forgive;
     this.#cameraDefaults = defaults(schema.scene, model(schema.scene, schema.scene, "camera"));
-    const move = (how) => (...amounts) => this.#setCamera(how(this.camera, ...amounts), "camera");
+    const move =
+      (how) =>
+      (...amounts) =>
+        this.#setCamera(how(this.camera, ...amounts), "camera");
     this.moves = {
-      orbit: move(moving.orbit), look: move(moving.look), pan: move(moving.pan), zoom: move(moving.zoom),
-      fly: move(moving.fly), turn: (share) => this.#turn(share), rest: () => this.seal(),
+      orbit: move(moving.orbit),
+      look: move(moving.look),
+      pan: move(moving.pan),
+      zoom: move(moving.zoom),
+      fly: move(moving.fly),
+      turn: (share) => this.#turn(share),
+      rest: () => this.seal(),
     };
   }
 
   // The camera with what its document leaves out.
-  get camera() { return this.cameraOf(this.state.scene); }
+  get camera() {
+    return this.cameraOf(this.state.scene);
+  }
 
-  cameraOf({ camera }) { return { ...this.#cameraDefaults, ...camera }; }
+  cameraOf({ camera }) {
+    return { ...this.#cameraDefaults, ...camera };
+  }
 
-  setCamera(members) { this.#setCamera(members, null); }
+  setCamera(members) {
+    this.#setCamera(members, null);
+  }
 
   #setCamera(members, gesture) {
     this.change({ scene: { ...this.state.scene, camera: { ...this.state.scene.camera, ...members } } }, gesture);
@@ -62,14 +80,17 @@ export class Editor extends Store {
   #turn(share) {
     const { environment } = this.state.scene;
     if (!environment) return;
-    const { min, max } = fields(this.#schema, environmentModels(this.#schema)[environment.type])
-      .find(({ name }) => name === "rotation").soft;
+    const { min, max } = fields(this.#schema, environmentModels(this.#schema)[environment.type]).find(
+      ({ name }) => name === "rotation",
+    ).soft;
     const wound = (environment.rotation ?? 0) + share * 360;
     const rotation = wound < min ? wound + 360 : wound > max ? wound - 360 : wound;
     this.change(put(this.state, "/scene/environment/rotation", Number(rotation.toFixed(2))), "turn");
   }
 
-  resetView() { this.change({ scene: { ...this.state.scene, camera: this.state.home.camera } }); }
+  resetView() {
+    this.change({ scene: { ...this.state.scene, camera: this.state.home.camera } });
+  }
 
   // A value at a place such as /scene/camera/vfov; undefined gives it back to its default. Edits of one gesture are
   // undone together.
@@ -82,12 +103,21 @@ export class Editor extends Store {
   choose(place, name, value, own) {
     const material = at(this.state, place);
     const isDistribution = own.some(({ ranges }) => ranges?.field === name);
-    const begun = own.filter(({ name: each, used, example }) => example && used?.field === name && used.values.includes(value) && material[each] === undefined)
+    const begun = own
+      .filter(
+        ({ name: each, used, example }) =>
+          example && used?.field === name && used.values.includes(value) && material[each] === undefined,
+      )
       .map(({ name: each, example }) => [each, example]);
-    this.edit(place, { ...(isDistribution ? redistributed(material, value, own) : { ...material, [name]: value }), ...Object.fromEntries(begun) });
+    this.edit(place, {
+      ...(isDistribution ? redistributed(material, value, own) : { ...material, [name]: value }),
+      ...Object.fromEntries(begun),
+    });
   }
 
-  rest() { this.seal(); }
+  rest() {
+    this.seal();
+  }
 
   async #fetch(kind, name, use) {
     const turn = ++this.#picks;
@@ -100,7 +130,9 @@ export class Editor extends Store {
     }
   }
 
-  pickScene(name) { return this.#fetch("scenes", name, (scene) => this.openScene(scene, name)); }
+  pickScene(name) {
+    return this.#fetch("scenes", name, (scene) => this.openScene(scene, name));
+  }
 
   // `exposure`: the view's that suits the scene's own lights; `members` of the state come with the scene.
   openScene(scene, name, exposure, members = {}) {
@@ -129,7 +161,9 @@ export class Editor extends Store {
     return isB ? "/compare/document" : pointer("scene", "materials", chosen.material);
   }
 
-  get material() { return at(this.state, this.materialPlace); }
+  get material() {
+    return at(this.state, this.materialPlace);
+  }
 
   pickMaterial(material) {
     const shape = this.state.scene.shapes.findIndex((each) => each.material === material);
@@ -137,14 +171,21 @@ export class Editor extends Store {
     this.amend({ chosen: { ...this.state.chosen, material, thing } });
   }
 
-  putMaterial(material) { this.change(put(this.state, this.materialPlace, material)); }
+  putMaterial(material) {
+    this.change(put(this.state, this.materialPlace, material));
+  }
 
   converted(old, type) {
     const models = materialModels(this.#schema);
-    return converted(old, ...[old.type, type].map((each) => ({ type: each, fields: fields(this.#schema, models[each]) })));
+    return converted(
+      old,
+      ...[old.type, type].map((each) => ({ type: each, fields: fields(this.#schema, models[each]) })),
+    );
   }
 
-  pickModel(type) { this.putMaterial(this.converted(this.material, type)); }
+  pickModel(type) {
+    this.putMaterial(this.converted(this.material, type));
+  }
 
   // --- two variants ---
 
@@ -154,14 +195,18 @@ export class Editor extends Store {
     this.change({ compare: { material: chosen.material, document: scene.materials[chosen.material], side: "a" } });
   }
 
-  stopComparing() { this.change({ compare: null }); }
+  stopComparing() {
+    this.change({ compare: null });
+  }
 
   editSide(side) {
     const { compare, chosen } = this.state;
     this.amend({ compare: { ...compare, side }, chosen: { ...chosen, material: compare.material } });
   }
 
-  putVariant(document) { this.change({ compare: { ...this.state.compare, document } }); }
+  putVariant(document) {
+    this.change({ compare: { ...this.state.compare, document } });
+  }
 
   swapVariants() {
     const { compare, scene } = this.state;

@@ -23,7 +23,9 @@ const isShape = (thing) => thing.startsWith("/shapes/");
 export function added({ scene, chosen }, wanted, document) {
   const name = fresh(wanted, scene.materials);
   const materials = { ...scene.materials, [name]: document };
-  const shapes = scene.shapes.map((shape, i) => (chosen.thing === pointer("shapes", i) ? { ...shape, material: name } : shape));
+  const shapes = scene.shapes.map((shape, i) =>
+    chosen.thing === pointer("shapes", i) ? { ...shape, material: name } : shape,
+  );
   return { scene: { ...scene, materials, shapes }, chosen: { ...chosen, material: name } };
 }
 
@@ -36,7 +38,8 @@ export function problem({ materials }, from, to) {
   return to === "__proto__" ? "This name can't be used." : null; // JavaScript would lose it
 }
 
-const dressed = (shapes, from, to) => shapes.map((shape) => (shape.material === from ? { ...shape, material: to } : shape));
+const dressed = (shapes, from, to) =>
+  shapes.map((shape) => (shape.material === from ? { ...shape, material: to } : shape));
 
 export function renamed({ scene, chosen, compare }, from, to) {
   const { [from]: document, ...others } = scene.materials;

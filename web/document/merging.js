@@ -6,24 +6,33 @@ import { isObject } from "../lib/patch.js";
 // Old names to new ones, none of which is taken.
 function names(documents, taken) {
   const all = { ...taken };
-  return Object.fromEntries(Object.keys(documents).map((name) => {
-    const free = fresh(name, all);
-    all[free] = true;
-    return [name, free];
-  }));
+  return Object.fromEntries(
+    Object.keys(documents).map((name) => {
+      const free = fresh(name, all);
+      all[free] = true;
+      return [name, free];
+    }),
+  );
 }
 
-const under = (documents, given) => Object.fromEntries(Object.entries(documents).map(([name, document]) => [given[name], document]));
+const under = (documents, given) =>
+  Object.fromEntries(Object.entries(documents).map(([name, document]) => [given[name], document]));
 
 // {textures, materials, shapes} of `other` as `scene` can take them over. Lights, camera and environment stay behind.
 export function adapted(other, scene) {
   const images = names(other.textures ?? {}, scene.textures ?? {});
   const given = names(other.materials, scene.materials);
-  const reads = (value) => (isObject(value) && images[value.texture] ? { ...value, texture: images[value.texture] } : value);
-  const materials = Object.fromEntries(Object.entries(other.materials).map(([name, material]) =>
-    [name, Object.fromEntries(Object.entries(material).map(([key, value]) => [key, reads(value)]))]));
+  const reads = (value) =>
+    isObject(value) && images[value.texture] ? { ...value, texture: images[value.texture] } : value;
+  const materials = Object.fromEntries(
+    Object.entries(other.materials).map(([name, material]) => [
+      name,
+      Object.fromEntries(Object.entries(material).map(([key, value]) => [key, reads(value)])),
+    ]),
+  );
   return {
-    textures: under(other.textures ?? {}, images), materials: under(materials, given),
+    textures: under(other.textures ?? {}, images),
+    materials: under(materials, given),
     shapes: other.shapes.map((shape) => ({ ...shape, material: given[shape.material] })),
   };
 }

@@ -36,19 +36,30 @@ export class PageState {
     if (!this.isWaiting) this.paintedHome = this.editor.state.home;
   }
 
-  get isDone() { return this.ended === this.painted && !this.isWaiting; }
+  get isDone() {
+    return this.ended === this.painted && !this.isWaiting;
+  }
 
   // The most samples that the picture gets, or null.
-  get limit() { return this.editor.state.settings.max_samples ?? this.knobs.max_samples ?? null; }
+  get limit() {
+    return this.editor.state.settings.max_samples ?? this.knobs.max_samples ?? null;
+  }
 
-  get view() { return { ...this.viewDefaults, ...this.editor.state.view }; }
+  get view() {
+    return { ...this.viewDefaults, ...this.editor.state.view };
+  }
 
   // Transparency shows where the scene asks for it, or the person does.
-  get isCheckered() { return this.ui.state.checker ?? this.editor.state.scene.environment?.background === false; }
+  get isCheckered() {
+    return this.ui.state.checker ?? this.editor.state.scene.environment?.background === false;
+  }
 
   // The pixels of the picture on the page.
   get size() {
-    const area = Math.min(this.info.renderer?.software === false ? AREA.hardware : AREA.software, this.info.limits.max_pixels);
+    const area = Math.min(
+      this.info.renderer?.software === false ? AREA.hardware : AREA.software,
+      this.info.limits.max_pixels,
+    );
     const { width, height } = this.editor.state.settings;
     const stageBox = this.root.getBoundingClientRect();
     const box = width && height ? contained(stageBox, { width, height }) : stageBox;
@@ -57,19 +68,27 @@ export class PageState {
   }
 
   // The settings as the stream is given them.
-  get settings() { return { ...this.editor.state.settings, ...this.size }; }
+  get settings() {
+    return { ...this.editor.state.settings, ...this.size };
+  }
 
   // What the stream is asked for: {scene, settings, view}.
   get wanted() {
     const view = viewOf({ ...this.ui.state, checkered: this.isCheckered }, this.view, {
-      isPaused: this.isPaused, quality: PAUSED_QUALITY, isExact: this.editor.sceneB !== null,
+      isPaused: this.isPaused,
+      quality: PAUSED_QUALITY,
+      isExact: this.editor.sceneB !== null,
     });
     return { scene: this.editor.state.scene, settings: this.settings, view };
   }
 
   // Looks up what the quality preset makes of the settings that are not given.
   resolve() {
-    const { quality = this.schema.settings.properties.quality.default, time_limit, target_noise } = this.editor.state.settings;
+    const {
+      quality = this.schema.settings.properties.quality.default,
+      time_limit,
+      target_noise,
+    } = this.editor.state.settings;
     const preset = this.info?.quality[quality] ?? {};
     this.knobs = time_limit || target_noise ? { ...preset, max_samples: null } : preset;
   }
@@ -84,6 +103,7 @@ export class PageState {
 }
 
 // The names behind the numbers of a layer that counts shapes or materials.
-export const namesOf = (layer, { shapes, materials }) => (layer === "shape_id"
-  ? shapes.map(({ type, material }, i) => `${i + 1} ${inWords(type)}, ${inWords(material)}`)
-  : Object.keys(materials).map(inWords));
+export const namesOf = (layer, { shapes, materials }) =>
+  layer === "shape_id"
+    ? shapes.map(({ type, material }, i) => `${i + 1} ${inWords(type)}, ${inWords(material)}`)
+    : Object.keys(materials).map(inWords);

@@ -24,7 +24,11 @@ export class Picker {
       this.#layers.clear();
     }
     if (!this.#layers.has(aov)) {
-      const { header, bytes, scene: shown } = await this.#stream.capture({ ...RAW, aov }, { patience_ms, rough: true });
+      const {
+        header,
+        bytes,
+        scene: shown,
+      } = await this.#stream.capture({ ...RAW, aov }, { patience_ms, rough: true });
       const layer = { floats: new Float32Array(bytes), width: header.width, height: header.height };
       const isStale = shown?.camera !== this.#camera || shown?.shapes !== this.#shapes; // things moved meanwhile
       if (isStale || header.scale < 1) return layer;
@@ -33,7 +37,9 @@ export class Picker {
     return this.#layers.get(aov);
   }
 
-  forget() { this.#layers.clear(); }
+  forget() {
+    this.#layers.clear();
+  }
 
   async #value(aov, scene, { x, y }) {
     const { floats, width, height } = await this.layer(aov, scene);
@@ -47,7 +53,9 @@ export class Picker {
   }
 
   // Along the ray, in metres; 0 where nothing is.
-  depth(scene, place) { return this.#value("depth", scene, place); }
+  depth(scene, place) {
+    return this.#value("depth", scene, place);
+  }
 
   // What can be seen of each shape: lists of points, by its index.
   async #clouds(scene, camera, patience_ms) {
@@ -87,10 +95,12 @@ export function drawOutline(canvas, { floats, width, height }, shape, color) {
   Object.assign(canvas, { width, height });
   const context = canvas.getContext("2d");
   context.fillStyle = color;
-  const has = (i, j) => i >= 0 && j >= 0 && i < width && j < height && Math.round(floats[4 * (j * width + i)]) === shape + 1;
+  const has = (i, j) =>
+    i >= 0 && j >= 0 && i < width && j < height && Math.round(floats[4 * (j * width + i)]) === shape + 1;
   for (let j = 0; j < height; j += 1) {
     for (let i = 0; i < width; i += 1) {
-      if (has(i, j) && !(has(i - 1, j) && has(i + 1, j) && has(i, j - 1) && has(i, j + 1))) context.fillRect(i - 0.5, j - 0.5, 2, 2);
+      if (has(i, j) && !(has(i - 1, j) && has(i + 1, j) && has(i, j - 1) && has(i, j + 1)))
+        context.fillRect(i - 0.5, j - 0.5, 2, 2);
     }
   }
 }

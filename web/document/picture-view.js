@@ -20,12 +20,17 @@ const NEARBY = 16; // pixels less across that a picture may have
 export function pictureSize({ width, height }, ratio, area) {
   const wanted = Math.max(1, width * ratio * height * ratio);
   const shrink = ratio * Math.min(1, Math.sqrt(area / wanted));
-  const size = (across) => ({ width: Math.max(16, across), height: Math.max(16, Math.round((across * height) / width)) });
+  const size = (across) => ({
+    width: Math.max(16, across),
+    height: Math.max(16, Math.round((across * height) / width)),
+  });
   const across = Math.round(width * shrink);
   if (shrink === ratio) return size(across);
   // Of the sizes nearby the one whose sides are to each other as the box's: else a line of the stage shows beside it.
   const gap = ({ width: w, height: h }) => Math.abs((w * height) / (h * width) - 1);
-  return Array.from({ length: NEARBY }, (_, i) => size(across - i)).reduce((best, each) => (gap(each) < gap(best) ? each : best));
+  return Array.from({ length: NEARBY }, (_, i) => size(across - i)).reduce((best, each) =>
+    gap(each) < gap(best) ? each : best,
+  );
 }
 
 // How frames are to come for a layer: numbers where the page paints them itself; without a loss where `isExact`, so
@@ -34,7 +39,10 @@ export function viewOf(ui, view, { isPaused, quality, isExact }) {
   const { layer } = ui;
   const painted = isPainted(layer);
   return {
-    ...view, aov: layer, bits: 8, quality: isPaused ? quality : null,
+    ...view,
+    aov: layer,
+    bits: 8,
+    quality: isPaused ? quality : null,
     format: painted ? "rgba32f" : ui.checkered || isExact ? "png" : "jpeg",
     max_fps: painted ? 4 : isExact ? 8 : null,
   };

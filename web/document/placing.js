@@ -18,8 +18,10 @@ export const solids = (boxes, eye) => boxes.filter((box) => box && !isFlat(box) 
 // The box around several, or null.
 export function union(boxes) {
   if (!boxes.length) return null;
-  const [low, high] = [[Math.min, "low"], [Math.max, "high"]].map(([pick, end]) =>
-    boxes.map((box) => box[end]).reduce((a, b) => a.map((x, k) => pick(x, b[k]))));
+  const [low, high] = [
+    [Math.min, "low"],
+    [Math.max, "high"],
+  ].map(([pick, end]) => boxes.map((box) => box[end]).reduce((a, b) => a.map((x, k) => pick(x, b[k]))));
   return { low, high };
 }
 
@@ -42,7 +44,8 @@ export function wayOut(box, others, right, { stands = false } = {}) {
   const gap = GAP * Math.max(...extents(box));
   let offset = [0, stands ? neighbour.low[1] - box.low[1] : 0, 0];
   let hit = neighbour;
-  for (let i = 0; hit && i < others.length; i += 1) { // each is left behind once
+  for (let i = 0; hit && i < others.length; i += 1) {
+    // each is left behind once
     offset = add(offset, scale(direction, Math.max(0, exit(shifted(box, offset), hit, direction)) + gap));
     hit = others.find((other) => overlap(shifted(box, offset), other));
   }

@@ -15,14 +15,18 @@ const CRC = Uint32Array.from({ length: 256 }, (_, n) => {
   for (let k = 0; k < 8; k += 1) c = c & 1 ? 0xedb88320 ^ (c >>> 1) : c >>> 1;
   return c;
 });
-const crc32 = (bytes) => (bytes.reduce((c, byte) => CRC[(c ^ byte) & 255] ^ (c >>> 8), 0xffffffff) ^ 0xffffffff) >>> 0;
+const crc32 = (bytes) =>
+  (bytes.reduce((c, byte) => CRC[(c ^ byte) & 255] ^ (c >>> 8), 0xffffffff) ^ 0xffffffff) >>> 0;
 
 const latin = (bytes) => new TextDecoder("latin1").decode(bytes);
 const ascii = (text) => new TextEncoder().encode(text);
 
 // JSON in ASCII: what is beyond it is escaped, for PNG's text chunks are Latin-1.
 export const recipeText = (recipe) =>
-  JSON.stringify(recipe).replaceAll(/[\u0080-\uffff]/g, (character) => `\\u${character.charCodeAt(0).toString(16).padStart(4, "0")}`);
+  JSON.stringify(recipe).replaceAll(
+    /[\u0080-\uffff]/g,
+    (character) => `\\u${character.charCodeAt(0).toString(16).padStart(4, "0")}`,
+  );
 
 async function through(bytes, transform) {
   const parts = [];
@@ -37,9 +41,10 @@ async function through(bytes, transform) {
 // The PNG with its recipe in a text chunk after the header.
 export async function pngWith(png, recipe) {
   const text = ascii(recipeText(recipe));
-  const body = text.length > LONG_TEXT
-    ? [ascii(`zTXt${KEY}\0\0`), await through(text, new CompressionStream("deflate"))]
-    : [ascii(`tEXt${KEY}\0`), text];
+  const body =
+    text.length > LONG_TEXT
+      ? [ascii(`zTXt${KEY}\0\0`), await through(text, new CompressionStream("deflate"))]
+      : [ascii(`tEXt${KEY}\0`), text];
   const chunk = new Uint8Array(await new Blob(body).arrayBuffer());
   const ends = [new DataView(new ArrayBuffer(4)), new DataView(new ArrayBuffer(4))];
   ends[0].setUint32(0, chunk.length - 4);
@@ -66,7 +71,7 @@ async function pngText(bytes) {
 // Of the attributes of the first header: name, type, size, value.
 function exrText(bytes) {
   const view = new DataView(bytes.buffer);
-  for (let at = 8; bytes[at];) {
+  for (let at = 8; bytes[at]; ) {
     const type = bytes.indexOf(0, at) + 1;
     const size = bytes.indexOf(0, type) + 1;
     if (!type || !size || size + 4 > bytes.length) return null;

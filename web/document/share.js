@@ -5,11 +5,16 @@ import { fetchSaved, save } from "../server/api.js";
 const LONGEST = 8000; // characters of a fragment that chat programs still pass on
 const MEMBERS = ["scene", "settings", "view", "compare", "chosen"];
 
-export const essence = (state) => Object.fromEntries(MEMBERS.filter((name) => state[name] !== null).map((name) => [name, state[name]]));
+export const essence = (state) =>
+  Object.fromEntries(MEMBERS.filter((name) => state[name] !== null).map((name) => [name, state[name]]));
 
 // The state that an essence stands for.
 export const revived = ({ scene, settings = {}, view = {}, compare = null, chosen }) => ({
-  scene, settings, view, compare, home: scene,
+  scene,
+  settings,
+  view,
+  compare,
+  home: scene,
   chosen: { environment: "", thing: "/camera", material: Object.keys(scene.materials)[0], scene: "", ...chosen },
 });
 

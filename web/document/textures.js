@@ -39,4 +39,6 @@ export function checkered(state, place, { soft }) {
 
 // How many parameters of the scene's materials show a texture.
 export const users = ({ materials }, name) =>
-  Object.values(materials).flatMap(Object.values).filter((value) => isObject(value) && value.texture === name).length;
+  Object.values(materials)
+    .flatMap(Object.values)
+    .filter((value) => isObject(value) && value.texture === name).length;

@@ -12,8 +12,23 @@ export function things({ environment, lights = [], shapes }) {
   };
   return [
     { thing: "/camera", icon: "camera", title: "Camera", note: "" },
-    { thing: "/environment", icon: "environment", title: "Environment", note: environment ? inWords(environment.type) : "None" },
-    ...lights.map(({ type }, i) => ({ thing: pointer("lights", i), icon: "light", title: title(`${type} light`), note: "" })),
-    ...shapes.map(({ type, material }, i) => ({ thing: pointer("shapes", i), icon: type, title: title(type), note: inWords(material) })),
+    {
+      thing: "/environment",
+      icon: "environment",
+      title: "Environment",
+      note: environment ? inWords(environment.type) : "None",
+    },
+    ...lights.map(({ type }, i) => ({
+      thing: pointer("lights", i),
+      icon: "light",
+      title: title(`${type} light`),
+      note: "",
+    })),
+    ...shapes.map(({ type, material }, i) => ({
+      thing: pointer("shapes", i),
+      icon: type,
+      title: title(type),
+      note: inWords(material),
+    })),
   ];
 }

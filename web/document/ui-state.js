@@ -7,7 +7,15 @@ const LASTING = ["tab", "theme", "lobe"];
 export class UiState {
   #listeners = [];
   state = {
-    tool: "orbit", layer: "color", histogram: false, clipping: false, checker: null, guides: false, tab: "material", theme: null, lobe: false,
+    tool: "orbit",
+    layer: "color",
+    histogram: false,
+    clipping: false,
+    checker: null,
+    guides: false,
+    tab: "material",
+    theme: null,
+    lobe: false,
   };
 
   constructor() {
@@ -18,12 +26,17 @@ export class UiState {
     }
   }
 
-  subscribe(listener) { this.#listeners.push(listener); }
+  subscribe(listener) {
+    this.#listeners.push(listener);
+  }
 
   set(members) {
     this.state = { ...this.state, ...members };
     try {
-      localStorage.setItem(STORED, JSON.stringify(Object.fromEntries(LASTING.map((name) => [name, this.state[name]]))));
+      localStorage.setItem(
+        STORED,
+        JSON.stringify(Object.fromEntries(LASTING.map((name) => [name, this.state[name]]))),
+      );
     } catch {
       // Storage is full or forbidden: the state ends with the page.
     }

@@ -5,7 +5,8 @@ const TAB = "sunbox.tab"; // in sessionStorage: this tab's name
 const WORK = "sunbox.work "; // in localStorage, followed by a tab's name: {saved, ...essence}
 const MOST = 8; // tabs whose work is remembered
 
-const fresh = () => [...crypto.getRandomValues(new Uint8Array(8))].map((x) => x.toString(16).padStart(2, "0")).join("");
+const fresh = () =>
+  [...crypto.getRandomValues(new Uint8Array(8))].map((x) => x.toString(16).padStart(2, "0")).join("");
 
 let tab = null;
 
@@ -32,8 +33,11 @@ const read = (name) => {
 const savedAt = (name) => Number(/^\{"saved":(\d+)/.exec(localStorage.getItem(WORK + name))?.[1] ?? 0);
 
 // The names of all tabs that left work, the newest first.
-const all = () => Object.keys(localStorage).filter((key) => key.startsWith(WORK)).map((key) => key.slice(WORK.length))
-  .sort((a, b) => savedAt(b) - savedAt(a));
+const all = () =>
+  Object.keys(localStorage)
+    .filter((key) => key.startsWith(WORK))
+    .map((key) => key.slice(WORK.length))
+    .sort((a, b) => savedAt(b) - savedAt(a));
 
 // The work that this tab goes on with, or null.
 export async function lastWork() {

@@ -17,7 +17,9 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
   const unit = unitText(field.unit);
   let latest = null;
   let scale = span(field.soft, field.step, Boolean(field.ranges));
-  const clean = () => { delete box.dataset.dirty; };
+  const clean = () => {
+    delete box.dataset.dirty;
+  };
   const take = () => {
     clean();
     if (box.value.trim() === "") {
@@ -31,7 +33,8 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     commit();
   };
   const step = (steps) => {
-    const from = parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
+    const from =
+      parseNumber(box.value, unit) ?? latest ?? parseNumber(box.placeholder) ?? field.initial ?? field.soft.min ?? 0;
     const to = Number((from + steps * scale.stepAt(from)).toPrecision(12));
     const { min, max, open } = field;
     if (to < min || to > max || to <= open.min || to >= open.max) return;
@@ -41,9 +44,15 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     box.select();
   };
   const box = element("input", {
-    type: "text", id, class: "entry number", autocomplete: "off", spellcheck: "false",
+    type: "text",
+    id,
+    class: "entry number",
+    autocomplete: "off",
+    spellcheck: "false",
     inputmode: field.min >= 0 ? "decimal" : undefined,
-    oninput: () => { box.dataset.dirty = "yes"; },
+    oninput: () => {
+      box.dataset.dirty = "yes";
+    },
     onblur: clean,
     onkeydown: (event) => {
       if (event.key === "Escape") {
@@ -55,7 +64,9 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
       event.preventDefault();
       step(up * (event.shiftKey ? 10 : 1));
     },
-    onkeyup: ({ key }) => { if (key === "ArrowUp" || key === "ArrowDown") commit(); },
+    onkeyup: ({ key }) => {
+      if (key === "ArrowUp" || key === "ArrowDown") commit();
+    },
     onchange: take,
   });
   const show = (value, effective, ends = field.soft) => {
@@ -77,7 +88,12 @@ function track(field, id, { input, commit }) {
     if (value <= field.open.min) return field.open.min + field.step;
     return value >= field.open.max ? field.open.max - field.step : value;
   };
-  const range = element("input", { type: "range", id, oninput: () => input(inside(range.valueAsNumber)), onchange: commit });
+  const range = element("input", {
+    type: "range",
+    id,
+    oninput: () => input(inside(range.valueAsNumber)),
+    onchange: commit,
+  });
   const over = (ends) => {
     if (scale && ends.min === scale.min && ends.max === scale.max) return;
     scale = span(ends, field.step, Boolean(field.ranges));
@@ -116,20 +132,39 @@ function slider(field, id, events) {
 }
 
 function choice(field, id, { input, commit }) {
-  const select = element("select", { id, onchange: () => { input(select.value || undefined); commit(); } });
+  const select = element("select", {
+    id,
+    onchange: () => {
+      input(select.value || undefined);
+      commit();
+    },
+  });
   if (field.initial === undefined && !field.required) select.append(element("option", { value: "" }, "Automatic"));
   for (const name of field.choices.filter((option) => option !== null)) {
     select.append(element("option", { value: name }, inWords(name)));
   }
-  return { element: select, show: (value) => { select.value = value ?? ""; } };
+  return {
+    element: select,
+    show: (value) => {
+      select.value = value ?? "";
+    },
+  };
 }
 
 function toggle(field, id, { input, commit }) {
   const box = element("input", {
-    type: "checkbox", id, class: "toggle", onchange: () => { input(box.checked); commit(); },
+    type: "checkbox",
+    id,
+    class: "toggle",
+    onchange: () => {
+      input(box.checked);
+      commit();
+    },
   });
   // Neither on nor off where neither document nor schema says: the server decides.
-  const show = (value) => { Object.assign(box, { checked: Boolean(value), indeterminate: (value ?? null) === null }); };
+  const show = (value) => {
+    Object.assign(box, { checked: Boolean(value), indeterminate: (value ?? null) === null });
+  };
   return { element: box, show };
 }
 
@@ -139,7 +174,10 @@ function vector(field, id, { input, commit, refuse, restore }) {
   let latest = null;
   const entries = names.map((axis, i) => {
     const entry = numberEntry({ ...field, required: true }, i === 0 ? id : `${id}-${axis}`, {
-      input: (value) => input(latest ? latest.map((x, k) => (k === i ? value : x)) : names.map(() => value)), commit, refuse, restore,
+      input: (value) => input(latest ? latest.map((x, k) => (k === i ? value : x)) : names.map(() => value)),
+      commit,
+      refuse,
+      restore,
     });
     entry.element.setAttribute("aria-label", `${field.title}, ${axis}`);
     return entry;
@@ -163,7 +201,9 @@ function color(field, id, { input, commit, refuse, restore }) {
   const give = () => input(tint.map((x) => Number((x * strength).toPrecision(5))));
 
   const swatch = element("input", {
-    type: "color", id, onchange: commit,
+    type: "color",
+    id,
+    onchange: commit,
     oninput: () => {
       tint = linear(swatch.value);
       if (bright && strength === 0) strength = 1;
@@ -171,10 +211,18 @@ function color(field, id, { input, commit, refuse, restore }) {
     },
   });
   const text = element("input", {
-    type: "text", class: "entry", spellcheck: "false", autocomplete: "off",
-    "aria-label": `${field.title}, #rrggbb or three linear numbers`, placeholder: field.absent ?? UNSET,
-    oninput: () => { text.dataset.dirty = "yes"; },
-    onblur: () => { delete text.dataset.dirty; },
+    type: "text",
+    class: "entry",
+    spellcheck: "false",
+    autocomplete: "off",
+    "aria-label": `${field.title}, #rrggbb or three linear numbers`,
+    placeholder: field.absent ?? UNSET,
+    oninput: () => {
+      text.dataset.dirty = "yes";
+    },
+    onblur: () => {
+      delete text.dataset.dirty;
+    },
     onkeydown: (event) => {
       if (event.key !== "Escape") return;
       delete text.dataset.dirty;
@@ -192,7 +240,10 @@ function color(field, id, { input, commit, refuse, restore }) {
     },
   });
   const mode = element("button", {
-    type: "button", class: "mode", "aria-label": `${field.title}: linear numbers`, "aria-pressed": "false",
+    type: "button",
+    class: "mode",
+    "aria-label": `${field.title}: linear numbers`,
+    "aria-pressed": "false",
     onclick: () => {
       isLinear = !isLinear;
       mode.setAttribute("aria-pressed", String(isLinear));
@@ -206,11 +257,17 @@ function color(field, id, { input, commit, refuse, restore }) {
     mode.textContent = isLinear ? "lin" : "hex";
   };
   const row = element("div", { class: "color" }, swatch, text, mode);
-  const power = bright && slider(
-    { ...field, title: `${field.title}, strength` },
-    `${id}-strength`,
-    { input: (value) => { strength = value ?? 0; give(); }, commit, refuse, restore },
-  );
+  const power =
+    bright &&
+    slider({ ...field, title: `${field.title}, strength` }, `${id}-strength`, {
+      input: (value) => {
+        strength = value ?? 0;
+        give();
+      },
+      commit,
+      refuse,
+      restore,
+    });
   if (power) power.element.querySelector("input").setAttribute("aria-label", `${field.title}, strength`);
 
   return {

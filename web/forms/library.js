@@ -27,23 +27,34 @@ export function materialButtons(root, entries, { pick, fail, paint }) {
     return documents.get(name);
   };
   let last = null; // the last one picked
-  const buttons = new Map(entries.map(({ name, title }) => {
-    const picture = element("img", { class: "thumb", alt: "", width: "64", height: "64" });
-    const button = element("button", {
-      type: "button", class: "preset", title, "aria-pressed": "false", "data-name": name,
-      onclick: async () => {
-        try {
-          const document = await fetchOne(name);
-          last = name;
-          pick(document);
-        } catch (problem) {
-          fail(problem);
-        }
-      },
-    }, picture, element("span", {}, title));
-    paint(picture, name, () => fetchOne(name));
-    return [name, button];
-  }));
+  const buttons = new Map(
+    entries.map(({ name, title }) => {
+      const picture = element("img", { class: "thumb", alt: "", width: "64", height: "64" });
+      const button = element(
+        "button",
+        {
+          type: "button",
+          class: "preset",
+          title,
+          "aria-pressed": "false",
+          "data-name": name,
+          onclick: async () => {
+            try {
+              const document = await fetchOne(name);
+              last = name;
+              pick(document);
+            } catch (problem) {
+              fail(problem);
+            }
+          },
+        },
+        picture,
+        element("span", {}, title),
+      );
+      paint(picture, name, () => fetchOne(name));
+      return [name, button];
+    }),
+  );
   root.replaceChildren(...buttons.values());
   return {
     show(material) {

@@ -19,7 +19,7 @@ export function forecast(target, { samples, elapsed_s, noise }) {
 
 // What a preset costs. `live`: the header of the newest frame.
 export function price(preset, live) {
-  const { seconds, noise } = isKnown(live) ? forecast(preset.max_samples, live) : preset.cost ?? {};
+  const { seconds, noise } = isKnown(live) ? forecast(preset.max_samples, live) : (preset.cost ?? {});
   if (typeof seconds !== "number") return "";
   const reached = typeof noise === "number" ? ` to ${percent(noise)} noise` : "";
   return isKnown(live) ? `≈ ${duration(seconds)}${reached} here` : `listed: ${duration(seconds)}${reached}`;
@@ -34,7 +34,8 @@ export function taken({ max_samples, max_bounces, cost }, live) {
   if (typeof here === "number") return `${text}; beyond them ${share(here)} of this scene's light is missing`;
   if (!cost) return text;
   const { missing_light: usual, worst_missing_light: worst } = cost;
-  const listed = worst.share < UNSEEN ? share(worst.share) : `${share(usual)}, in ${worst.scene} ${percent(worst.share)},`;
+  const listed =
+    worst.share < UNSEEN ? share(worst.share) : `${share(usual)}, in ${worst.scene} ${percent(worst.share)},`;
   return `${text}; beyond them ${listed} of the listed scenes' light is missing`;
 }
 
@@ -46,17 +47,22 @@ export function qualityChoice(root, pick) {
     if (presets !== made) {
       made = presets;
       places.clear();
-      root.replaceChildren(...Object.keys(presets).map((name) => {
-        places.set(name, { price: element("span", { class: "price" }), taken: element("span", { class: "what" }) });
-        return element(
-          "button", { type: "button", role: "radio", class: "quality", "data-name": name },
-          element("span", {}, inWords(name)), ...Object.values(places.get(name)),
-        );
-      }));
+      root.replaceChildren(
+        ...Object.keys(presets).map((name) => {
+          places.set(name, { price: element("span", { class: "price" }), taken: element("span", { class: "what" }) });
+          return element(
+            "button",
+            { type: "button", role: "radio", class: "quality", "data-name": name },
+            element("span", {}, inWords(name)),
+            ...Object.values(places.get(name)),
+          );
+        }),
+      );
     }
     for (const [name, place] of places) {
       const texts = { price: price(presets[name], live), taken: taken(presets[name], live) };
-      for (const [part, text] of Object.entries(texts)) if (place[part].textContent !== text) place[part].textContent = text;
+      for (const [part, text] of Object.entries(texts))
+        if (place[part].textContent !== text) place[part].textContent = text;
     }
     mark((button) => button.dataset.name === chosen);
   };

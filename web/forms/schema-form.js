@@ -30,14 +30,27 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
   };
   let latest;
   const widget = control(field, id, {
-    input: (value) => { mark(null); change(field.name, value); },
+    input: (value) => {
+      mark(null);
+      change(field.name, value);
+    },
     commit,
     refuse: mark,
-    restore: () => { mark(null); widget.show(latest); forgive(); },
+    restore: () => {
+      mark(null);
+      widget.show(latest);
+      forgive();
+    },
   });
   const reset = element("button", {
-    type: "button", class: "reset", "aria-label": `Reset ${field.title}`,
-    onclick: () => { mark(null); change(field.name, undefined); commit(); },
+    type: "button",
+    class: "reset",
+    "aria-label": `Reset ${field.title}`,
+    onclick: () => {
+      mark(null);
+      change(field.name, undefined);
+      commit();
+    },
   });
   const label = element("label", { for: id }, field.title);
   if (field.unit) {
@@ -45,9 +58,16 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
     label.append(unit.length < 3 ? "\u00a0" : " ", element("span", { class: "unit" }, unit));
   }
   const hint = field.hint ? element("p", { class: "unseen", id: `${id}-hint` }, field.hint) : null;
-  const image = field.takesTexture ? slot?.(field, () => { change(field.name, undefined); commit(); }) : undefined;
+  const image = field.takesTexture
+    ? slot?.(field, () => {
+        change(field.name, undefined);
+        commit();
+      })
+    : undefined;
   const under = image && beneath?.(field);
-  const parts = [label, widget.element, image?.chip, image?.button, reset, under?.element, hint, trouble].filter(Boolean);
+  const parts = [label, widget.element, image?.chip, image?.button, reset, under?.element, hint, trouble].filter(
+    Boolean,
+  );
   const node = element("div", { class: image ? "field pictured" : "field", "data-field": field.name }, ...parts);
   if (image && takeFile) acceptFiles(node, (file) => takeFile(field.name, file));
   for (const input of node.querySelectorAll("input, select")) {
@@ -55,7 +75,8 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
   }
   if (hint) describe(node, label, field.hint);
   return {
-    element: node, mark,
+    element: node,
+    mark,
     // `effective`: what holds where neither the document nor the schema has a value; `ends`: of a slider whose range
     // depends on another field.
     show(value, initial = field.initial, effective = undefined, ends = undefined) {
@@ -87,7 +108,10 @@ export function schemaForm(fields, acts) {
         const valueOf = (leader) => values[leader] ?? fields.find((one) => one.name === leader)?.initial;
         const ends = field.ranges && endsOf(field, valueOf(field.ranges.field));
         each.show(values[name], initials[name], followed(field, valueOf(field.follows?.field)), ends);
-        each.element.classList.toggle("unused", Boolean(field.used) && !field.used.values.includes(valueOf(field.used.field)));
+        each.element.classList.toggle(
+          "unused",
+          Boolean(field.used) && !field.used.values.includes(valueOf(field.used.field)),
+        );
       }
     },
     // Says at a field what is wrong with it; false where this form has no such field.

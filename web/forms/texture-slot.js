@@ -7,7 +7,8 @@ import { accepted, browse } from "../lib/files.js";
 import { isObject } from "../lib/patch.js";
 import { checkered, used, users } from "../document/textures.js";
 
-const ICON = "M2 3h12v10H2zm1.4 1.4v5.2l2.7-2.9 2.6 2.8 1.6-1.5 2.3 2.2V4.4zm7.3.9a1.1 1.1 0 1 1 0 2.2 1.1 1.1 0 0 1 0-2.2";
+const ICON =
+  "M2 3h12v10H2zm1.4 1.4v5.2l2.7-2.9 2.6 2.8 1.6-1.5 2.3 2.2V4.4zm7.3.9a1.1 1.1 0 1 1 0 2.2 1.1 1.1 0 0 1 0-2.2";
 const NAMED = "texture:";
 
 function icon() {
@@ -23,13 +24,15 @@ function icon() {
 const isTexture = (value) => isObject(value) && value.texture !== undefined;
 
 // What the slots of the parameters at each place do.
-export const textureActs = ({ editor, importer, thumbnails }) => (place, field) => ({
-  scene: () => editor.state.scene,
-  paint: (canvas, texture) => thumbnails.paint(canvas, texture),
-  useFile: (file) => importer.texture(place, file),
-  useTexture: (name) => editor.change(used(editor.state, place, name)),
-  makeChecker: () => editor.change(checkered(editor.state, place, field)),
-});
+export const textureActs =
+  ({ editor, importer, thumbnails }) =>
+  (place, field) => ({
+    scene: () => editor.state.scene,
+    paint: (canvas, texture) => thumbnails.paint(canvas, texture),
+    useFile: (file) => importer.texture(place, file),
+    useTexture: (name) => editor.change(used(editor.state, place, name)),
+    makeChecker: () => editor.change(checkered(editor.state, place, field)),
+  });
 
 // `acts` as textureActs makes them for this parameter, and `remove()`.
 export class TextureSlot {
@@ -38,14 +41,43 @@ export class TextureSlot {
     const open = () => this.#choose();
     const isOnly = field.widget === "texture"; // nothing but a texture can stand here
     this.button = isOnly
-      ? element("button", { type: "button", class: "button small choose", "aria-label": `Choose an image for ${field.title}`, onclick: open }, icon(), "Choose an image…")
-      : element("button", { type: "button", class: "image", "aria-label": `Image for ${field.title}`, title: "Image", onclick: open }, icon());
+      ? element(
+          "button",
+          {
+            type: "button",
+            class: "button small choose",
+            "aria-label": `Choose an image for ${field.title}`,
+            onclick: open,
+          },
+          icon(),
+          "Choose an image…",
+        )
+      : element(
+          "button",
+          { type: "button", class: "image", "aria-label": `Image for ${field.title}`, title: "Image", onclick: open },
+          icon(),
+        );
     this.canvas = element("canvas", { class: "thumb", "aria-hidden": "true" });
     this.name = element("span", { class: "name" });
-    const remove = element("button", {
-      type: "button", class: "forget", "aria-label": `Remove the image from ${field.title}`, onclick: () => { acts.remove(); this.button.focus(); },
-    }, "×");
-    this.change = element("button", { type: "button", class: "open", title: "Another image", onclick: open }, this.canvas, this.name);
+    const remove = element(
+      "button",
+      {
+        type: "button",
+        class: "forget",
+        "aria-label": `Remove the image from ${field.title}`,
+        onclick: () => {
+          acts.remove();
+          this.button.focus();
+        },
+      },
+      "×",
+    );
+    this.change = element(
+      "button",
+      { type: "button", class: "open", title: "Another image", onclick: open },
+      this.canvas,
+      this.name,
+    );
     this.chip = element("div", { class: "texture", hidden: true }, this.change, remove);
   }
 
@@ -61,7 +93,13 @@ export class TextureSlot {
   }
 
   #tile(value, title, note, picture) {
-    return element("button", { class: "tile", value }, picture, element("span", {}, title), element("span", { class: "dim" }, note));
+    return element(
+      "button",
+      { class: "tile", value },
+      picture,
+      element("span", {}, title),
+      element("span", { class: "dim" }, note),
+    );
   }
 
   async #choose() {
@@ -71,18 +109,33 @@ export class TextureSlot {
       const canvas = element("canvas", { class: "thumb", "aria-hidden": "true" });
       acts.paint(canvas, texture);
       const count = users(scene, name);
-      return this.#tile(NAMED + name, name, count ? `used ${count === 1 ? "once" : `${count} times`}` : "not used", canvas);
+      return this.#tile(
+        NAMED + name,
+        name,
+        count ? `used ${count === 1 ? "once" : `${count} times`}` : "not used",
+        canvas,
+      );
     });
     const checker = element("canvas", { class: "thumb", "aria-hidden": "true" });
     acts.paint(checker, { type: "checker", a: 0.8, b: 0.2 });
     const chosen = await question({
       title: `Image for ${field.title}`,
-      body: [element(
-        "div", { class: "tiles" },
-        this.#tile("browse", "Browse…", "PNG, JPEG, WebP, EXR, HDR", element("span", { class: "thumb sign" }, icon())),
-        ...(field.widget === "texture" ? [] : [this.#tile("checker", "New checker", "two values by turns", checker)]),
-        ...textures,
-      )],
+      body: [
+        element(
+          "div",
+          { class: "tiles" },
+          this.#tile(
+            "browse",
+            "Browse…",
+            "PNG, JPEG, WebP, EXR, HDR",
+            element("span", { class: "thumb sign" }, icon()),
+          ),
+          ...(field.widget === "texture"
+            ? []
+            : [this.#tile("checker", "New checker", "two values by turns", checker)]),
+          ...textures,
+        ),
+      ],
     });
     if (chosen === "browse") {
       const [file] = await browse(accepted(["image", "light"]));

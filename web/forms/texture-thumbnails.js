@@ -10,7 +10,9 @@ const MEAN_SAMPLES = 16; // of a pixel, which spread evenly over it
 
 // A square that shines as the image tells, and fills the picture.
 const lit = (texture, looks = { emission: { texture: "image" } }) => ({
-  version: 1, camera: { position: [0, 0, 1], target: [0, 0, 0], vfov: 90 }, textures: { image: texture },
+  version: 1,
+  camera: { position: [0, 0, 1], target: [0, 0, 0], vfov: 90 },
+  textures: { image: texture },
   materials: { image: { type: "diffuse", albedo: 0, ...looks } },
   shapes: [{ type: "quad", origin: [-1, -1, 0], u: [2, 0, 0], v: [0, 2, 0], material: "image" }],
 });
@@ -18,7 +20,8 @@ const lit = (texture, looks = { emission: { texture: "image" } }) => ({
 const OPACITY = { emission: 1, alpha: { texture: "image", channel: "a" } };
 const SETTINGS = { width: SIDE, height: SIDE, max_bounces: 0, filter: "box" };
 
-const rendered = async (asset) => createImageBitmap(await renderPicture(lit({ asset }), { ...SETTINGS, max_samples: 4 }));
+const rendered = async (asset) =>
+  createImageBitmap(await renderPicture(lit({ asset }), { ...SETTINGS, max_samples: 4 }));
 
 // The mean colour of a square's picture, whose pixels are single-precision numbers behind the header of a .npy file.
 async function meanOf(scene) {
@@ -51,7 +54,14 @@ export class TextureThumbnails {
   #last = Promise.resolve();
 
   // An image that is on its way to the server needs not come back from there.
-  keep(asset, file) { this.#bitmaps.set(asset, shrink(file).catch(() => rendered(asset)).catch(() => null)); }
+  keep(asset, file) {
+    this.#bitmaps.set(
+      asset,
+      shrink(file)
+        .catch(() => rendered(asset))
+        .catch(() => null),
+    );
+  }
 
   #bitmap(asset) {
     if (!this.#bitmaps.has(asset)) {
@@ -80,8 +90,14 @@ export class TextureThumbnails {
     const key = JSON.stringify([asset, color_space, reads === "a"]);
     if (!this.#means.has(key)) {
       const image = { asset, ...(color_space ? { color_space } : {}) };
-      const made = reads === "a" ? meanOf(lit(image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity]) : meanOf(lit(image)).then((color) => [...color, 1]);
-      this.#means.set(key, made.catch(() => [1, 1, 1, 1]));
+      const made =
+        reads === "a"
+          ? meanOf(lit(image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity])
+          : meanOf(lit(image)).then((color) => [...color, 1]);
+      this.#means.set(
+        key,
+        made.catch(() => [1, 1, 1, 1]),
+      );
     }
     return this.#means.get(key);
   }

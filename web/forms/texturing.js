@@ -18,8 +18,11 @@ export class TextureForm {
     this.body = element("div", {});
     this.shared = element("p", { class: "dim" });
     this.element = element(
-      "details", { class: "more beneath", hidden: true },
-      element("summary", {}, this.kind, " ", element("span", { class: "unseen" }, `of ${field.title}`)), this.body, this.shared,
+      "details",
+      { class: "more beneath", hidden: true },
+      element("summary", {}, this.kind, " ", element("span", { class: "unseen" }, `of ${field.title}`)),
+      this.body,
+      this.shared,
     );
   }
 
@@ -33,7 +36,10 @@ export class TextureForm {
     const made = JSON.stringify([value.texture, texture.type]);
     if (made !== this.#made) {
       this.#made = made;
-      this.parts = [this.#part(this.field.reference, this.place), this.#part(textureModel(this.schema, texture), pointer("scene", "textures", value.texture))];
+      this.parts = [
+        this.#part(this.field.reference, this.place),
+        this.#part(textureModel(this.schema, texture), pointer("scene", "textures", value.texture)),
+      ];
       this.body.replaceChildren(...this.parts.map((part) => part.element));
     }
     for (const { place, show } of this.parts) show(at(this.acts.state, place) ?? {});

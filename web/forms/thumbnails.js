@@ -10,7 +10,8 @@ const SETTINGS = { width: SIDE, height: SIDE, max_samples: 32, max_bounces: 6, s
 // The stage that every material stands on: the one that `service/bench/thumbnails.py` takes the presets in.
 export async function studio() {
   const [set, environment] = await Promise.all([
-    fetch(beside("studio.json")).then((answer) => answer.json()), fetchPreset("environments", "studio"),
+    fetch(beside("studio.json")).then((answer) => answer.json()),
+    fetchPreset("environments", "studio"),
   ]);
   return { ...set, environment };
 }
@@ -37,7 +38,9 @@ export class Thumbnails {
 
   // The picture of a preset, or of what `get` gives where there is none.
   async preset(image, name, get) {
-    this.#index ??= fetch(beside("index.json")).then((answer) => answer.json()).catch(() => ({}));
+    this.#index ??= fetch(beside("index.json"))
+      .then((answer) => answer.json())
+      .catch(() => ({}));
     if ((await this.#index)[name]) image.src = beside(`${encodeURIComponent(name)}.webp`).href;
     else this.#queue.push({ image, get });
   }

@@ -15,4 +15,11 @@ export function linear(color) {
 
 // "#rrggbb" (sRGB) of a linear colour; what does not fit into 0..1 is cut off.
 export const hex = (color) =>
-  "#" + color.map((x) => Math.round(255 * toSrgb(Math.min(Math.max(x, 0), 1))).toString(16).padStart(2, "0")).join("");
+  "#" +
+  color
+    .map((x) =>
+      Math.round(255 * toSrgb(Math.min(Math.max(x, 0), 1)))
+        .toString(16)
+        .padStart(2, "0"),
+    )
+    .join("");

@@ -2,13 +2,32 @@
 
 import { element } from "./dom.js";
 
-const KINDS = { gltf: "scene", glb: "scene", zip: "scene", obj: "mesh", ply: "mesh", stl: "mesh", hdr: "light", exr: "light", png: "image", jpg: "image", jpeg: "image", webp: "image", json: "json", sunbox: "json" };
+const KINDS = {
+  gltf: "scene",
+  glb: "scene",
+  zip: "scene",
+  obj: "mesh",
+  ply: "mesh",
+  stl: "mesh",
+  hdr: "light",
+  exr: "light",
+  png: "image",
+  jpg: "image",
+  jpeg: "image",
+  webp: "image",
+  json: "json",
+  sunbox: "json",
+};
 
 // What a file is by its ending: scene, mesh, light, image or json; undefined for others.
 export const kindOf = (file) => KINDS[file.name.split(".").at(-1).toLowerCase()];
 
 // The endings of files of these kinds, as a file picker takes them.
-export const accepted = (kinds) => Object.keys(KINDS).filter((ending) => kinds.includes(KINDS[ending])).map((ending) => `.${ending}`).join(",");
+export const accepted = (kinds) =>
+  Object.keys(KINDS)
+    .filter((ending) => kinds.includes(KINDS[ending]))
+    .map((ending) => `.${ending}`)
+    .join(",");
 
 // Calls `take(file)` with the first file dropped onto an element; the page's own drop stays out of it.
 export function acceptFiles(node, take) {
@@ -32,9 +51,20 @@ export function acceptFiles(node, take) {
 export function browse(accept) {
   return new Promise((resolve) => {
     const input = element("input", {
-      type: "file", accept, multiple: true, class: "unseen", tabindex: "-1", "aria-label": "File",
-      onchange: () => { input.remove(); resolve([...input.files]); },
-      oncancel: () => { input.remove(); resolve([]); },
+      type: "file",
+      accept,
+      multiple: true,
+      class: "unseen",
+      tabindex: "-1",
+      "aria-label": "File",
+      onchange: () => {
+        input.remove();
+        resolve([...input.files]);
+      },
+      oncancel: () => {
+        input.remove();
+        resolve([]);
+      },
     });
     document.body.append(input); // some browsers forget one that stands nowhere
     input.click();
@@ -50,4 +80,5 @@ export function saveAs(blob, name) {
   setTimeout(() => URL.revokeObjectURL(link.href), 10000);
 }
 
-export const jsonBlob = (document) => new Blob([`${JSON.stringify(document, null, 2)}\n`], { type: "application/json" });
+export const jsonBlob = (document) =>
+  new Blob([`${JSON.stringify(document, null, 2)}\n`], { type: "application/json" });

@@ -2,9 +2,24 @@
 
 const UNITS = { degrees: "°", "W/(m^2 sr)": "W/(m² sr)", "W/m^2": "W/m²" };
 const NAMES = {
-  aces: "ACES", agx: "AgX", pbr_neutral: "PBR neutral", mis: "MIS", bsdf: "BSDF", blackman_harris: "Blackman\u2013Harris", blinn_phong: "Blinn-Phong",
-  ggx: "GGX", gtr: "GTR", abc: "ABC", sgd: "SGD", eon: "EON", oren_nayar: "Oren\u2013Nayar", cook_torrance: "Cook\u2013Torrance", schlick_ggx: "Schlick\u2013GGX",
-  color: "Colour", shape_id: "Shapes", material_id: "Materials",
+  aces: "ACES",
+  agx: "AgX",
+  pbr_neutral: "PBR neutral",
+  mis: "MIS",
+  bsdf: "BSDF",
+  blackman_harris: "Blackman\u2013Harris",
+  blinn_phong: "Blinn-Phong",
+  ggx: "GGX",
+  gtr: "GTR",
+  abc: "ABC",
+  sgd: "SGD",
+  eon: "EON",
+  oren_nayar: "Oren\u2013Nayar",
+  cook_torrance: "Cook\u2013Torrance",
+  schlick_ggx: "Schlick\u2013GGX",
+  color: "Colour",
+  shape_id: "Shapes",
+  material_id: "Materials",
 };
 
 export const unitText = (unit) => UNITS[unit] ?? unit;
@@ -16,7 +31,11 @@ export function inWords(name) {
 }
 
 // Four digits that count, without trailing zeros; of a number for each channel, all three.
-export const compact = (value) => [value].flat().map((each) => String(Number(each.toPrecision(4)))).join(", ");
+export const compact = (value) =>
+  [value]
+    .flat()
+    .map((each) => String(Number(each.toPrecision(4))))
+    .join(", ");
 
 export function duration(seconds) {
   if (seconds < 9.95) return `${seconds.toFixed(1)} s`;

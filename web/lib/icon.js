@@ -4,8 +4,10 @@ const ICONS = {
   camera: "M2 5h2.5l1-1.5h5l1 1.5H14v8H2zm6 1.6a2.3 2.3 0 1 0 0 4.6 2.3 2.3 0 0 0 0-4.6",
   environment: "M8 1.5a6.5 6.5 0 1 1 0 13 6.5 6.5 0 0 1 0-13M2.8 8h10.4v1H2.8z",
   light: "M8 1.5A4.5 4.5 0 0 1 10.5 9.7V12h-5V9.7A4.5 4.5 0 0 1 8 1.5M6 13h4v1.5H6z",
-  sphere: "M8 2a6 6 0 1 1 0 12A6 6 0 0 1 8 2", box: "m8 1.5 5.8 3v7L8 14.5l-5.8-3v-7z",
-  quad: "M4.5 4H15l-3.5 8H1z", mesh: "M8 1.5 14.5 14h-13zM8 5.2 4.3 12.4h7.4z",
+  sphere: "M8 2a6 6 0 1 1 0 12A6 6 0 0 1 8 2",
+  box: "m8 1.5 5.8 3v7L8 14.5l-5.8-3v-7z",
+  quad: "M4.5 4H15l-3.5 8H1z",
+  mesh: "M8 1.5 14.5 14h-13zM8 5.2 4.3 12.4h7.4z",
 };
 
 export function icon(name) {

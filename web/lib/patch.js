@@ -23,7 +23,8 @@ export function merge(target, patch) {
 }
 
 // Only texts and absence count: in a table of materials, "type" may be somebody's material.
-const changesType = (from, to) => from.type !== to.type && [from.type, to.type].every((kind) => kind === undefined || typeof kind === "string");
+const changesType = (from, to) =>
+  from.type !== to.type && [from.type, to.type].every((kind) => kind === undefined || typeof kind === "string");
 
 // The patch that leads from one document to another, or undefined where they are the same.
 export function diff(from, to) {
@@ -39,7 +40,10 @@ export function diff(from, to) {
 }
 
 const parts = (pointer) =>
-  pointer.split("/").slice(1).map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
+  pointer
+    .split("/")
+    .slice(1)
+    .map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
 
 export const pointer = (...keys) =>
   keys.map((key) => `/${String(key).replaceAll("~", "~0").replaceAll("/", "~1")}`).join("");

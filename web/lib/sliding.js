@@ -6,7 +6,13 @@ const STILL = 6; // CSS pixels that a finger moves before its direction is known
 const GLIDE_MS = 100; // after a scroll event: a finger that comes down now stops a gliding panel
 
 let scrolled = -Infinity;
-document.addEventListener("scroll", () => { scrolled = performance.now(); }, { capture: true, passive: true });
+document.addEventListener(
+  "scroll",
+  () => {
+    scrolled = performance.now();
+  },
+  { capture: true, passive: true },
+);
 
 // `input(value)` is called while a finger slides or taps, `commit()` when it is lifted.
 export function slideByTouch(range, { input, commit }) {
@@ -19,11 +25,15 @@ export function slideByTouch(range, { input, commit }) {
   };
 
   // What the browser makes of the touch is undone before anybody else hears of it.
-  range.addEventListener("input", (event) => {
-    if (!finger) return;
-    event.stopImmediatePropagation();
-    range.value = String(finger.value);
-  }, { capture: true });
+  range.addEventListener(
+    "input",
+    (event) => {
+      if (!finger) return;
+      event.stopImmediatePropagation();
+      range.value = String(finger.value);
+    },
+    { capture: true },
+  );
 
   range.addEventListener("pointerdown", ({ pointerType, pointerId: id, clientX: x, clientY: y }) => {
     if (pointerType !== "touch" || finger) return;

@@ -12,9 +12,13 @@ export function span({ min, max }, step, mayBeLog) {
   const [low, range] = min > 0 ? [Math.log(min), Math.log(max / min)] : [0, Math.log1p(max)];
   const inside = (value) => Math.min(Math.max(value, min), max);
   return {
-    min, max, isLog, step: 1 / STEPS,
+    min,
+    max,
+    isLog,
+    step: 1 / STEPS,
     toShare: (value) => ((min > 0 ? Math.log(inside(value)) : Math.log1p(inside(value))) - low) / range,
-    fromShare: (share) => inside(Number((min > 0 ? Math.exp(low + share * range) : Math.expm1(share * range)).toPrecision(DIGITS))),
+    fromShare: (share) =>
+      inside(Number((min > 0 ? Math.exp(low + share * range) : Math.expm1(share * range)).toPrecision(DIGITS))),
     stepAt: (value) => 10 ** (Math.floor(Math.log10(Math.max(Math.abs(value), min, 1e-3)) + 1e-9) - 1),
   };
 }

@@ -14,7 +14,10 @@ function open(row, text) {
   bubble.hidden = false;
   const box = row.getBoundingClientRect();
   const below = box.bottom + bubble.offsetHeight + 8 < window.innerHeight;
-  bubble.style.setProperty("left", `${Math.max(8, Math.min(box.left, window.innerWidth - bubble.offsetWidth - 8))}px`);
+  bubble.style.setProperty(
+    "left",
+    `${Math.max(8, Math.min(box.left, window.innerWidth - bubble.offsetWidth - 8))}px`,
+  );
   bubble.style.setProperty("top", `${below ? box.bottom + 4 : box.top - bubble.offsetHeight - 4}px`);
 }
 
@@ -34,5 +37,7 @@ export function describe(row, handle, text) {
   });
   row.addEventListener("focusout", closeTooltip);
   row.addEventListener("pointerdown", closeTooltip);
-  row.addEventListener("keydown", (event) => { if (event.key === "Escape") closeTooltip(); });
+  row.addEventListener("keydown", (event) => {
+    if (event.key === "Escape") closeTooltip();
+  });
 }

@@ -31,10 +31,14 @@ export function furnace(values, errors) {
   };
 }
 
-const numbers = (data) => Object.entries(data).map(([side, { albedo, error }]) => {
-  const { value, error: own } = furnace(albedo.map(luminance), error.map((each) => luminance(each.map((x) => x ?? 0))));
-  return { side, value, error: own, most: Math.max(...albedo.flat()) };
-});
+const numbers = (data) =>
+  Object.entries(data).map(([side, { albedo, error }]) => {
+    const { value, error: own } = furnace(
+      albedo.map(luminance),
+      error.map((each) => luminance(each.map((x) => x ?? 0))),
+    );
+    return { side, value, error: own, most: Math.max(...albedo.flat()) };
+  });
 
 const said = ({ value, error }) => `${value.toFixed(3)} ± ${Math.max(SURE * error, 0.001).toFixed(3)}`;
 
@@ -42,29 +46,44 @@ function draw(data, { channels, size }) {
   const lines = curves(data, channels, ({ albedo }) => albedo);
   const greatest = Math.max(1, ...lines.flatMap(({ values }) => values));
   return chart({
-    ...size, label: `Directional albedo over the angle; white furnace ${numbers(data).map(said).join(" and ")}`,
+    ...size,
+    label: `Directional albedo over the angle; white furnace ${numbers(data).map(said).join(" and ")}`,
     x: { min: 0, max: 90, ticks: [0, 15, 30, 45, 60, 75, 90], label: "angle of the view, degrees" },
-    y: { min: 0, max: greatest > 2 ? niceCeiling(greatest) : greatest > 1.05 ? Math.ceil(10 * greatest + 0.3) / 10 : 1.05, label: "albedo" },
-    curves: lines.map(({ values, class: name }) => ({ class: name, points: values.map((value, i) => [ANGLES[i], value]) })),
+    y: {
+      min: 0,
+      max: greatest > 2 ? niceCeiling(greatest) : greatest > 1.05 ? Math.ceil(10 * greatest + 0.3) / 10 : 1.05,
+      label: "albedo",
+    },
+    curves: lines.map(({ values, class: name }) => ({
+      class: name,
+      points: values.map((value, i) => [ANGLES[i], value]),
+    })),
     bands: lines.map(({ side, channel, values, class: name }) => ({
       class: name,
       points: values.map((value, i) => {
-        const error = SURE * CHANNELS[channels].find((each) => each.name === channel).of(data[side].error[i].map((x) => x ?? 0));
+        const error =
+          SURE * CHANNELS[channels].find((each) => each.name === channel).of(data[side].error[i].map((x) => x ?? 0));
         return [ANGLES[i], value - error, value + error];
       }),
     })),
-    marks: (toX, toY, box) => [line(box.left, toY(1), box.right, toY(1), { class: "limit" }), text(box.left + 6, toY(1) + 13, "all of the light", { class: "dim" })],
+    marks: (toX, toY, box) => [
+      line(box.left, toY(1), box.right, toY(1), { class: "limit" }),
+      text(box.left + 6, toY(1) + 13, "all of the light", { class: "dim" }),
+    ],
   });
 }
 
 // What is said under the plot.
 function note(data) {
-  return numbers(data).map(({ side, most, ...own }) => {
-    const whose = Object.keys(data).length > 1 ? `${side.toUpperCase()}: ` : "";
-    const gain = most > 1.003 ? ` It sends back more light than it gets, up to ${most.toFixed(3)}.` : "";
-    const grey = isGrey(data[side].albedo) ? "" : " in luminance";
-    return `${whose}White furnace ${said(own)}${grey}.${gain}`;
-  }).join(" ").concat(" That is the share of uniform light that comes back.");
+  return numbers(data)
+    .map(({ side, most, ...own }) => {
+      const whose = Object.keys(data).length > 1 ? `${side.toUpperCase()}: ` : "";
+      const gain = most > 1.003 ? ` It sends back more light than it gets, up to ${most.toFixed(3)}.` : "";
+      const grey = isGrey(data[side].albedo) ? "" : " in luminance";
+      return `${whose}White furnace ${said(own)}${grey}.${gain}`;
+    })
+    .join(" ")
+    .concat(" That is the share of uniform light that comes back.");
 }
 
 const RGB = ["r", "g", "b"];
@@ -72,11 +91,27 @@ const RGB = ["r", "g", "b"];
 function table(data) {
   const sides = Object.keys(data);
   return {
-    columns: ["theta_deg", ...sides.flatMap((side) => [
-      ...RGB.map((c) => column(data, side, `albedo_${c}`)), ...RGB.map((c) => column(data, side, `error_${c}`)),
-    ])],
-    rows: ANGLES.map((angle, i) => [angle, ...sides.flatMap((side) => [...data[side].albedo[i], ...data[side].error[i]])]),
+    columns: [
+      "theta_deg",
+      ...sides.flatMap((side) => [
+        ...RGB.map((c) => column(data, side, `albedo_${c}`)),
+        ...RGB.map((c) => column(data, side, `error_${c}`)),
+      ]),
+    ],
+    rows: ANGLES.map((angle, i) => [
+      angle,
+      ...sides.flatMap((side) => [...data[side].albedo[i], ...data[side].error[i]]),
+    ]),
   };
 }
 
-export const albedo = { title: "Albedo", needs: "/v1/bsdf/albedo", hasChannels: true, first, finer, draw, note, table };
+export const albedo = {
+  title: "Albedo",
+  needs: "/v1/bsdf/albedo",
+  hasChannels: true,
+  first,
+  finer,
+  draw,
+  note,
+  table,
+};

@@ -10,7 +10,9 @@ const LEAST_GAP = 0.02; // degrees between two directions, below which a curve i
 const short = (x) => Number(x.toFixed(8)); // what single precision keeps: half the bytes on the way to the server
 
 export const direction = (theta, phi) => [
-  short(Math.sin(theta * RADIAN) * Math.cos(phi * RADIAN)), short(Math.sin(theta * RADIAN) * Math.sin(phi * RADIAN)), short(Math.cos(theta * RADIAN)),
+  short(Math.sin(theta * RADIAN) * Math.cos(phi * RADIAN)),
+  short(Math.sin(theta * RADIAN) * Math.sin(phi * RADIAN)),
+  short(Math.cos(theta * RADIAN)),
 ];
 export const inPlane = (degrees) => direction(degrees, 0);
 export const angleOf = ([x, , z]) => Math.atan2(x, z) / RADIAN;
@@ -23,7 +25,9 @@ export function sweep(incidence) {
   const every = Array.from({ length: 180 }, (_, i) => 2 * i - 178);
   const near = NEAR_MIRROR.flatMap((gap) => [incidence - gap, incidence + gap]);
   const edges = [-90.1, -89.9, 89.9, 90.1];
-  return sorted([...every, ...near, ...edges, incidence]).filter((angle) => !isGrazing(angle) && Math.abs(angle) <= 180);
+  return sorted([...every, ...near, ...edges, incidence]).filter(
+    (angle) => !isGrazing(angle) && Math.abs(angle) <= 180,
+  );
 }
 
 // Angles between those of a curve where its height jumps by more than `least`, at most `most` of them.
@@ -34,15 +38,20 @@ export function refined(angles, heights, least, most) {
     const gap = angles[i] - angles[i - 1];
     if (jump > least && gap > LEAST_GAP) jumps.push({ jump, gap, from: angles[i - 1] });
   }
-  return jumps.sort((a, b) => b.jump - a.jump).slice(0, most)
-    .flatMap(({ from, gap }) => [from + gap / 3, from + (2 * gap) / 3]).filter((angle) => !isGrazing(angle));
+  return jumps
+    .sort((a, b) => b.jump - a.jump)
+    .slice(0, most)
+    .flatMap(({ from, gap }) => [from + gap / 3, from + (2 * gap) / 3])
+    .filter((angle) => !isGrazing(angle));
 }
 
 // The rings and spokes of a mesh over the sphere, denser round the mirror direction: {thetas, phis}.
 export function meshAngles(incidence) {
   const rings = Array.from({ length: 15 }, (_, i) => 6 * (i + 1) - (i === 14 ? 0.1 : 0));
   const near = [-6, -3, -1.2, 0, 1.2, 3, 6];
-  const thetas = sorted([...rings, ...near.map((gap) => incidence + gap)]).filter((theta) => theta > 0.5 && theta < 89.95);
+  const thetas = sorted([...rings, ...near.map((gap) => incidence + gap)]).filter(
+    (theta) => theta > 0.5 && theta < 89.95,
+  );
   const phis = sorted([...Array.from({ length: 30 }, (_, i) => 12 * i - 180), -6, -2, 2, 6]);
   return { thetas, phis };
 }

@@ -1,13 +1,23 @@
 // A plot as files: its numbers as CSV, its drawing as an SVG that needs no style sheet.
 
 const STYLES = [
-  "fill", "fill-opacity", "stroke", "stroke-width", "stroke-opacity", "stroke-dasharray", "stroke-linejoin", "opacity",
-  "font-family", "font-size", "font-weight", "text-anchor",
+  "fill",
+  "fill-opacity",
+  "stroke",
+  "stroke-width",
+  "stroke-opacity",
+  "stroke-dasharray",
+  "stroke-linejoin",
+  "opacity",
+  "font-family",
+  "font-size",
+  "font-weight",
+  "text-anchor",
 ];
 
 // RFC 4180; numbers with the digits of single precision.
 export function csv({ columns, rows }) {
-  const cell = (value) => (typeof value === "number" ? String(Number(value.toPrecision(7))) : value ?? "");
+  const cell = (value) => (typeof value === "number" ? String(Number(value.toPrecision(7))) : (value ?? ""));
   return [columns, ...rows].map((row) => row.map(cell).join(",")).join("\r\n") + "\r\n";
 }
 
@@ -19,7 +29,8 @@ export function standalone(plot, background) {
   from.forEach((node, i) => {
     if (node instanceof HTMLElement) return;
     const style = getComputedStyle(node);
-    for (const name of STYLES) if (style.getPropertyValue(name)) to[i].setAttribute(name, style.getPropertyValue(name));
+    for (const name of STYLES)
+      if (style.getPropertyValue(name)) to[i].setAttribute(name, style.getPropertyValue(name));
     to[i].removeAttribute("class");
   });
   // What a canvas shows is an image in the file.
@@ -31,7 +42,8 @@ export function standalone(plot, background) {
     box.replaceWith(image);
   });
   const paper = copy.ownerDocument.createElementNS(copy.namespaceURI, "rect");
-  for (const [name, value] of Object.entries({ width: "100%", height: "100%", fill: background })) paper.setAttribute(name, value);
+  for (const [name, value] of Object.entries({ width: "100%", height: "100%", fill: background }))
+    paper.setAttribute(name, value);
   copy.prepend(paper);
   copy.setAttribute("xmlns", copy.namespaceURI);
   return new XMLSerializer().serializeToString(copy);

@@ -12,9 +12,10 @@ export const isTextured = (value) => isObject(value) && value.texture !== undefi
 const readOf = ({ channel = "r" }, { widget }) => (widget === "color" ? "color" : channel);
 
 // The names of the textures whose values a material shows, each with what is read of it: [{texture, reads}].
-export const texturesOf = (material, fields) => fields
-  .filter(({ name, widget }) => isTextured(material[name]) && widget !== "texture")
-  .map((field) => ({ texture: material[field.name].texture, reads: readOf(material[field.name], field) }));
+export const texturesOf = (material, fields) =>
+  fields
+    .filter(({ name, widget }) => isTextured(material[name]) && widget !== "texture")
+    .map((field) => ({ texture: material[field.name].texture, reads: readOf(material[field.name], field) }));
 
 function constant({ channel = "r", factor = 1 }, { widget, min = -Infinity, max = Infinity }, mean) {
   const inside = (x) => Number(Math.min(Math.max(x, min), max).toPrecision(6));

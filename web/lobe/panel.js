@@ -3,14 +3,16 @@
 
 import { albedo } from "./albedo.js";
 import { csv, standalone } from "./files.js";
+import { watchHand } from "./hand.js";
 import { Latest } from "./latest.js";
 import { plain, texturesOf } from "./material.js";
-import { angleAt, isBelow, lit, polar, readingAt } from "./polar.js";
+import { legend } from "./legend.js";
+import { angleAt, isBelow, polar, readingAt } from "./polar.js";
 import { slice } from "./slice.js";
 import { solid } from "./solid.js";
 import { Table } from "./table.js";
 import { terms } from "./terms.js";
-import { channelClass, isGrey } from "./values.js";
+import { isGrey } from "./values.js";
 import { Warming } from "./warming.js";
 import { askBsdf } from "../server/api.js";
 import { element, freshId } from "../lib/dom.js";
@@ -30,7 +32,15 @@ const STALE_MS = 400; // without an answer, after which the old plot is dimmed
 const REFINE_REST_MS = 150; // without a change, before more is asked of the server
 
 export class LobePanel {
-  #options = { view: "polar", incidence: 45, isLog: true, channels: "luminance", byLobe: false, turn: -0.6, height: 0.42 };
+  #options = {
+    view: "polar",
+    incidence: 45,
+    isLog: true,
+    channels: "luminance",
+    byLobe: false,
+    turn: -0.6,
+    height: 0.42,
+  };
   #data = null; // of the last answer, by variant: {a, b?}
   #shown = null; // {view, data} that the plot shows
   #wanted = null; // the key of what was asked for last
@@ -50,25 +60,54 @@ export class LobePanel {
     new ResizeObserver(() => this.#draw()).observe(this.plot);
   }
 
-  get isPossible() { return this.views.length > 0; }
+  get isPossible() {
+    return this.views.length > 0;
+  }
 
-  get #view() { return VIEWS[this.#options.view]; }
+  get #view() {
+    return VIEWS[this.#options.view];
+  }
 
   #build(close) {
     const id = freshId("incidence");
     this.title = element("h2", {});
-    const views = element("div", { class: "cluster", role: "radiogroup", "aria-label": "What is plotted" }, ...this.views.map((name) => element(
-      "button", { type: "button", role: "radio", class: "button small", "data-value": name }, VIEWS[name].title)));
+    const views = element(
+      "div",
+      { class: "cluster", role: "radiogroup", "aria-label": "What is plotted" },
+      ...this.views.map((name) =>
+        element(
+          "button",
+          { type: "button", role: "radio", class: "button small", "data-value": name },
+          VIEWS[name].title,
+        ),
+      ),
+    );
     this.markView = watchChoice(views, "button", ({ dataset }) => this.#set({ view: dataset.value }));
     this.plot = element("div", { class: "lobe-plot" });
     this.reading = element("p", { class: "lobe-reading", "aria-hidden": "true" });
-    this.plot.addEventListener("pointerleave", () => { this.reading.textContent = ""; });
-    this.angle = element("input", {
-      type: "range", id, min: "0", max: "89.5", step: "0.5", oninput: () => this.#set({ incidence: this.#inRange(this.angle.valueAsNumber) }),
+    this.plot.addEventListener("pointerleave", () => {
+      this.reading.textContent = "";
     });
-    slideByTouch(this.angle, { input: (incidence) => this.#set({ incidence: this.#inRange(incidence) }), commit() {} });
+    this.angle = element("input", {
+      type: "range",
+      id,
+      min: "0",
+      max: "89.5",
+      step: "0.5",
+      oninput: () => this.#set({ incidence: this.#inRange(this.angle.valueAsNumber) }),
+    });
+    slideByTouch(this.angle, {
+      input: (incidence) => this.#set({ incidence: this.#inRange(incidence) }),
+      commit() {},
+    });
     this.degrees = element("output", { for: id });
-    this.angleRow = element("div", { class: "field lobe-angle" }, element("label", { for: id }, "Incidence"), this.angle, this.degrees);
+    this.angleRow = element(
+      "div",
+      { class: "field lobe-angle" },
+      element("label", { for: id }, "Incidence"),
+      this.angle,
+      this.degrees,
+    );
     const check = (title, change) => {
       const box = element("input", { type: "checkbox", class: "toggle", onchange: () => change(box.checked) });
       return { box, row: element("label", {}, box, title) };
@@ -82,39 +121,53 @@ export class LobePanel {
     this.trouble = element("p", { class: "note", role: "status", hidden: true });
     this.table = new Table();
     const save = (title, does) => element("button", { type: "button", class: "button small", onclick: does }, title);
-    this.files = element("div", { class: "row" },
-      save("Save SVG", () => this.#save("svg", "image/svg+xml", () => standalone(this.plot.firstElementChild, getComputedStyle(this.root).backgroundColor))),
-      save("Save CSV", () => this.#save("csv", "text/csv", () => csv(this.#shown.view.table(this.#shown.data)))));
+    this.files = element(
+      "div",
+      { class: "row" },
+      save("Save SVG", () =>
+        this.#save("svg", "image/svg+xml", () =>
+          standalone(this.plot.firstElementChild, getComputedStyle(this.root).backgroundColor),
+        ),
+      ),
+      save("Save CSV", () => this.#save("csv", "text/csv", () => csv(this.#shown.view.table(this.#shown.data)))),
+    );
     this.root.append(
-      element("header", { class: "lobe-head" }, this.title, views, element("button", { type: "button", class: "button icon", "aria-label": "Close the lobe", onclick: close }, "×")),
-      this.plot, this.reading, this.trouble, this.angleRow,
-      element("div", { class: "checks" }, this.log.row, this.lobes.row, this.colors.row), this.legend, this.note, this.replaced, this.table.element, this.files);
+      element(
+        "header",
+        { class: "lobe-head" },
+        this.title,
+        views,
+        element(
+          "button",
+          { type: "button", class: "button icon", "aria-label": "Close the lobe", onclick: close },
+          "×",
+        ),
+      ),
+      this.plot,
+      this.reading,
+      this.trouble,
+      this.angleRow,
+      element("div", { class: "checks" }, this.log.row, this.lobes.row, this.colors.row),
+      this.legend,
+      this.note,
+      this.replaced,
+      this.table.element,
+      this.files,
+    );
     this.#watchHand();
   }
 
   // A hand on the plot sets the angle of incidence, or turns the solid; so do the arrows while the plot has the focus.
   #watchHand() {
-    let last = null;
-    this.plot.addEventListener("pointerdown", (event) => {
-      if (!this.#shown || event.button !== 0) return;
-      last = { x: event.clientX, y: event.clientY };
-      this.plot.setPointerCapture(event.pointerId);
-      this.#drag(event, last);
-    });
-    this.plot.addEventListener("pointermove", (event) => {
-      this.#read(event);
-      if (!last) return;
-      this.#drag(event, last);
-      last = { x: event.clientX, y: event.clientY };
-    });
-    for (const end of ["pointerup", "pointercancel"]) this.plot.addEventListener(end, () => { last = null; });
-    this.plot.addEventListener("keydown", (event) => {
-      const [right, up] = { ArrowRight: [1, 0], ArrowLeft: [-1, 0], ArrowUp: [0, 1], ArrowDown: [0, -1] }[event.key] ?? [0, 0];
-      if (!right && !up) return;
-      event.preventDefault();
-      event.stopPropagation();
-      if (this.#view.turns) this.#turn(right * KEY_TURN, up * KEY_TURN);
-      else if (this.#view.hasIncidence) this.#set({ incidence: this.#inRange(this.#options.incidence + right + up) });
+    watchHand(this.plot, {
+      isPossible: () => this.#shown !== null,
+      drag: (event, last) => this.#drag(event, last),
+      read: (event) => this.#read(event),
+      step: (right, up) => {
+        if (this.#view.turns) this.#turn(right * KEY_TURN, up * KEY_TURN);
+        else if (this.#view.hasIncidence)
+          this.#set({ incidence: this.#inRange(this.#options.incidence + right + up) });
+      },
     });
   }
 
@@ -122,14 +175,18 @@ export class LobePanel {
     if (this.#view.turns) this.#turn(-(clientX - last.x) * TURN, (clientY - last.y) * TURN);
     if (this.#view !== polar || this.#shown.view !== polar) return;
     const { left, top } = this.plot.getBoundingClientRect();
-    this.#set({ incidence: this.#inRange(Math.abs(angleAt(this.#shown.data, this.#drawn(), clientX - left, clientY - top))) });
+    this.#set({
+      incidence: this.#inRange(Math.abs(angleAt(this.#shown.data, this.#drawn(), clientX - left, clientY - top))),
+    });
   }
 
   // What the curves say at the mouse.
   #read({ clientX, clientY, pointerType }) {
     const isRead = pointerType === "mouse" && this.#view === polar && this.#shown?.view === polar;
     const { left, top } = this.plot.getBoundingClientRect();
-    this.reading.textContent = isRead ? readingAt(this.#shown.data, this.#drawn(), clientX - left, clientY - top) : "";
+    this.reading.textContent = isRead
+      ? readingAt(this.#shown.data, this.#drawn(), clientX - left, clientY - top)
+      : "";
   }
 
   // Not along the surface, where there is no side.
@@ -150,10 +207,16 @@ export class LobePanel {
   }
 
   // The options of a drawing, with its size.
-  #drawn() { return { ...this.#options, size: { width: this.plot.clientWidth, height: this.plot.clientHeight } }; }
+  #drawn() {
+    return { ...this.#options, size: { width: this.plot.clientWidth, height: this.plot.clientHeight } };
+  }
 
   #save(ending, mime, make) {
-    if (this.#shown) saveAs(new Blob([make()], { type: mime }), `sunbox-${this.#options.view}-${this.acts.state.chosen.material}.${ending}`);
+    if (this.#shown)
+      saveAs(
+        new Blob([make()], { type: mime }),
+        `sunbox-${this.#options.view}-${this.acts.state.chosen.material}.${ending}`,
+      );
   }
 
   // The variants of the selected material without textures: {materials: {a, b?}, replaced}.
@@ -162,13 +225,21 @@ export class LobePanel {
     const isCompared = compare?.material === chosen.material;
     const documents = { a: scene.materials[chosen.material], ...(isCompared ? { b: compare.document } : {}) };
     const replaced = new Set();
-    const materials = Object.fromEntries(Object.entries(documents).filter(([, document]) => document).map(([side, document]) => {
-      const own = fields(this.schema, this.models[document.type]);
-      this.#learn(texturesOf(document, own), scene.textures ?? {});
-      const made = plain(document, own, (texture, reads) => this.#means.get(JSON.stringify([scene.textures?.[texture], reads])) ?? [1, 1, 1, 1]);
-      made.replaced.forEach((title) => replaced.add(title));
-      return [side, made.material];
-    }));
+    const materials = Object.fromEntries(
+      Object.entries(documents)
+        .filter(([, document]) => document)
+        .map(([side, document]) => {
+          const own = fields(this.schema, this.models[document.type]);
+          this.#learn(texturesOf(document, own), scene.textures ?? {});
+          const made = plain(
+            document,
+            own,
+            (texture, reads) => this.#means.get(JSON.stringify([scene.textures?.[texture], reads])) ?? [1, 1, 1, 1],
+          );
+          made.replaced.forEach((title) => replaced.add(title));
+          return [side, made.material];
+        }),
+    );
     return { materials, replaced: [...replaced] };
   }
 
@@ -210,7 +281,12 @@ export class LobePanel {
     this.plot.classList.toggle("aims", this.#view === polar);
     this.plot.classList.toggle("tall", this.#view === terms);
     // No view reads what it does not show: another angle asks for no new albedo.
-    const key = JSON.stringify([view, materials, this.#view.hasIncidence ? incidence : null, this.#view.hasLobes ? byLobe : null]);
+    const key = JSON.stringify([
+      view,
+      materials,
+      this.#view.hasIncidence ? incidence : null,
+      this.#view.hasLobes ? byLobe : null,
+    ]);
     if (key === this.#wanted) return this.#draw();
     this.#wanted = key;
     this.#warming.end();
@@ -223,13 +299,20 @@ export class LobePanel {
 
   async #load(view, materials, options, isStale) {
     try {
-      const each = async (load) => Object.fromEntries(await Promise.all(Object.entries(materials).map(async ([side, material]) => [side, await load(side, material)])));
+      const each = async (load) =>
+        Object.fromEntries(
+          await Promise.all(
+            Object.entries(materials).map(async ([side, material]) => [side, await load(side, material)]),
+          ),
+        );
       let data = await each((_, material) => view.first(askBsdf, material, options));
       this.#answered();
       if (isStale()) this.#await();
       this.#show(view, data);
       if (!isStale()) this.root.setAttribute("aria-busy", "false"); // the newest that was wanted; finer curves may follow
-      await new Promise((resolve) => { setTimeout(resolve, view.finer ? REFINE_REST_MS : 0); });
+      await new Promise((resolve) => {
+        setTimeout(resolve, view.finer ? REFINE_REST_MS : 0);
+      });
       for (let round = 0, isBetter = true; view.finer && isBetter && !isStale(); round += 1) {
         isBetter = false;
         const last = data;
@@ -267,7 +350,9 @@ export class LobePanel {
     ]);
   }
 
-  #await() { this.#waiting ??= setTimeout(() => this.plot.classList.add("stale"), STALE_MS); }
+  #await() {
+    this.#waiting ??= setTimeout(() => this.plot.classList.add("stale"), STALE_MS);
+  }
 
   #answered() {
     clearTimeout(this.#waiting);
@@ -279,7 +364,8 @@ export class LobePanel {
     this.#data = data;
     this.#shown = { view, data };
     this.trouble.hidden = true;
-    const isWhole = Object.values(data).some((own) => own.lower?.length) || (view === polar && Object.values(data).some(isBelow));
+    const isWhole =
+      Object.values(data).some((own) => own.lower?.length) || (view === polar && Object.values(data).some(isBelow));
     this.angle.max = isWhole || this.#options.incidence > 90 ? "180" : "89.5"; // from inside, where light gets through
     this.#draw();
   }
@@ -294,22 +380,13 @@ export class LobePanel {
     this.plot.replaceChildren(drawn);
     this.note.textContent = view.note?.(data, options) ?? "";
     this.note.hidden = !this.note.textContent;
-    this.#showLegend(view, data);
-    this.table.show(view, data);
-  }
-
-  #showLegend(view, data) {
-    const isColored = view.hasChannels && this.#options.channels === "rgb";
-    const channels = isColored ? [["r", "red"], ["g", "green"], ["b", "blue"]] : [["y", ""]];
     const { compare, scene, chosen } = this.acts.state;
     const models = { a: scene.materials[chosen.material]?.type, b: compare?.document.type };
-    const keys = view === slice ? [] : Object.keys(data).flatMap((side) => channels.map(([channel, title]) => element("span", { class: "key" },
-      element("i", { class: `swatch ${side} ${channelClass(channel)}` }),
-      [Object.keys(data).length > 1 ? `${side.toUpperCase()}, ${inWords(models[side] ?? "")}` : inWords(models.a ?? ""), title].filter(Boolean).join(", "))));
-    const names = view.hasLobes ? [...new Set(Object.values(data).flatMap((own) => lit(own).map(({ name }) => name)))] : [];
-    const lobes = names.map((name) => element("span", { class: "key" }, element("i", { class: `swatch lobe-${name}` }), name));
-    const deltas = Object.values(data).some((own) => own.deltas?.length) ? [element("span", { class: "key" }, element("i", { class: "swatch delta" }), "perfectly specular, share of the light")] : [];
-    this.legend.replaceChildren(...keys, ...lobes, ...deltas);
-    this.colors.row.classList.toggle("dim", Object.values(data).every(({ f, albedo: all }) => isGrey(f ?? all ?? [])));
+    this.legend.replaceChildren(...legend(view, data, this.#options.channels, models));
+    this.colors.row.classList.toggle(
+      "dim",
+      Object.values(data).every(({ f, albedo: all }) => isGrey(f ?? all ?? [])),
+    );
+    this.table.show(view, data);
   }
 }

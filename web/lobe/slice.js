@@ -40,7 +40,11 @@ async function first(ask, material) {
 // Whether two directions see something else when both are turned about the normal.
 async function isAnisotropic(ask, material) {
   const turns = [0, 35, 80];
-  const { f } = await ask("", { material, wo: turns.map((turn) => direction(50, turn)), wi: turns.map((turn) => direction(40, turn + 150)) });
+  const { f } = await ask("", {
+    material,
+    wo: turns.map((turn) => direction(50, turn)),
+    wi: turns.map((turn) => direction(40, turn + 150)),
+  });
   const [first, ...others] = turns.map((_, i) => luminance(f[i][i]));
   return others.some((value) => Math.abs(value - first) > SAME * first);
 }
@@ -51,7 +55,11 @@ async function finer(ask, material, data, options, round) {
   const values = [];
   for (const theta of thetas) {
     const apart = halves(theta).map((half) => apartAt(theta, half) / 2);
-    const { f } = await ask("", { material, wo: apart.map((phi) => direction(theta, -phi)), wi: apart.map((phi) => direction(theta, phi)) });
+    const { f } = await ask("", {
+      material,
+      wo: apart.map((phi) => direction(theta, -phi)),
+      wi: apart.map((phi) => direction(theta, phi)),
+    });
     values.push(f.map((row, j) => row[j]));
   }
   return { values };
@@ -83,9 +91,13 @@ function picture({ values }, scale) {
   for (let y = 0; y < SIDE; y += 1) {
     for (let x = 0; x < SIDE; x += 1) {
       const color = lookUp(values, angle(x), angle(SIDE - 1 - y));
-      const shown = scale.decades ? Array(3).fill(share(luminance(color), scale)) : color.map((v) => toSrgb(Math.min(1, Math.max(0, v))));
+      const shown = scale.decades
+        ? Array(3).fill(share(luminance(color), scale))
+        : color.map((v) => toSrgb(Math.min(1, Math.max(0, v))));
       const at = 4 * (y * SIDE + x);
-      shown.forEach((v, k) => { image.data[at + k] = Math.round(255 * Math.min(1, v)); });
+      shown.forEach((v, k) => {
+        image.data[at + k] = Math.round(255 * Math.min(1, v));
+      });
       image.data[at + 3] = 255;
     }
   }
@@ -97,8 +109,12 @@ const STEP = 10; // degrees between the values of the table
 const cells = Array.from({ length: 81 }, (_, k) => [5 + STEP * (k % 9), 5 + STEP * Math.floor(k / 9)]);
 
 // All but the brightest 2 % of the image: towards grazing angles a BRDF may grow without bounds.
-const scaleFor = (data, isLog) => scaleOf(
-  Object.values(data).flatMap(({ values }) => cells.map(([h, d]) => luminance(lookUp(values, h, d)))), isLog, 0.98);
+const scaleFor = (data, isLog) =>
+  scaleOf(
+    Object.values(data).flatMap(({ values }) => cells.map(([h, d]) => luminance(lookUp(values, h, d)))),
+    isLog,
+    0.98,
+  );
 
 function draw(data, { isLog, size }) {
   const { width, height } = size;
@@ -113,26 +129,49 @@ function draw(data, { isLog, size }) {
     const box = svg("foreignObject", { x, y: top, width: side, height: side, class: "pixels" });
     box.append(picture(data[name], scale));
     return [
-      box, svg("rect", { x, y: top, width: side, height: side, class: "frame" }),
-      ...[0, 30, 60, 90].map((at) => text(x + (side * at) / 90, top + side + 14, `${at}°`, { "text-anchor": { 0: "start", 90: "end" }[at] ?? "middle", class: "ticks" })),
+      box,
+      svg("rect", { x, y: top, width: side, height: side, class: "frame" }),
+      ...[0, 30, 60, 90].map((at) =>
+        text(x + (side * at) / 90, top + side + 14, `${at}°`, {
+          "text-anchor": { 0: "start", 90: "end" }[at] ?? "middle",
+          class: "ticks",
+        }),
+      ),
       text(x + side / 2, top + side + 28, "θh, half angle", { "text-anchor": "middle", class: "axis" }),
       sides.length > 1 ? text(x + 5, top - 4, name.toUpperCase(), { class: "axis" }) : null,
     ];
   });
-  const words = [0, 30, 60, 90].map((at) => text(left - 5, top + side * (1 - at / 90) + 4, `${at}°`, { "text-anchor": "end", class: "ticks" }));
-  const title = svg("text", { transform: `translate(${left - 29} ${top + side / 2}) rotate(-90)`, "text-anchor": "middle", class: "axis" }, "θd, difference angle");
+  const words = [0, 30, 60, 90].map((at) =>
+    text(left - 5, top + side * (1 - at / 90) + 4, `${at}°`, { "text-anchor": "end", class: "ticks" }),
+  );
+  const title = svg(
+    "text",
+    { transform: `translate(${left - 29} ${top + side / 2}) rotate(-90)`, "text-anchor": "middle", class: "axis" },
+    "θd, difference angle",
+  );
   return figure(width, height, "Image of the BRDF over the half angle and the difference angle", parts, words, title);
 }
 
 function note(data, { isLog }) {
   const { most, decades } = scaleFor(data, isLog);
-  const shown = isLog ? `Luminance of f, from ${tickText(most * 10 ** -decades)} (black) to ${tickText(most)} 1/sr (white).` : "f in 1/sr as a colour; 1 and more is white.";
+  const shown = isLog
+    ? `Luminance of f, from ${tickText(most * 10 ** -decades)} (black) to ${tickText(most)} 1/sr (white).`
+    : "f in 1/sr as a colour; 1 and more is white.";
   return `${shown} φd is 90°, the half vector lies over the tangent.`;
 }
 
 function table(data) {
-  const colors = colorTable(data, "theta_h_deg", cells.map(([h]) => h), ({ values }) => cells.map(([h, d]) => lookUp(values, h, d)), "f");
-  return { columns: [colors.columns[0], "theta_d_deg", ...colors.columns.slice(1)], rows: colors.rows.map(([h, ...rest], i) => [h, cells[i][1], ...rest]) };
+  const colors = colorTable(
+    data,
+    "theta_h_deg",
+    cells.map(([h]) => h),
+    ({ values }) => cells.map(([h, d]) => lookUp(values, h, d)),
+    "f",
+  );
+  return {
+    columns: [colors.columns[0], "theta_d_deg", ...colors.columns.slice(1)],
+    rows: colors.rows.map(([h, ...rest], i) => [h, cells[i][1], ...rest]),
+  };
 }
 
 export const slice = { title: "Slice", needs: "/v1/bsdf", hasLog: true, first, finer, draw, note, table };

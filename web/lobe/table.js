@@ -8,8 +8,18 @@ export class Table {
   #made = null;
 
   constructor() {
-    this.body = element("div", { class: "lobe-table", tabindex: "0", role: "region", "aria-label": "Values of the plot" });
-    this.element = element("details", { class: "more", ontoggle: () => this.#fill() }, element("summary", {}, "Values"), this.body);
+    this.body = element("div", {
+      class: "lobe-table",
+      tabindex: "0",
+      role: "region",
+      "aria-label": "Values of the plot",
+    });
+    this.element = element(
+      "details",
+      { class: "more", ontoggle: () => this.#fill() },
+      element("summary", {}, "Values"),
+      this.body,
+    );
   }
 
   // Made only while it is open.
@@ -24,9 +34,26 @@ export class Table {
     const { view, data } = this.#made;
     const { columns, rows, isShown = () => true } = view.table(data);
     const shown = (value) => (value === null ? "–" : String(Number(value.toPrecision(DIGITS))));
-    this.body.replaceChildren(element("table", {},
-      element("thead", {}, element("tr", {}, ...columns.map((name) => element("th", { scope: "col" }, name)))),
-      element("tbody", {}, ...rows.filter(isShown).map(([first, ...rest]) => element("tr", {},
-        element("th", { scope: "row" }, shown(first)), ...rest.map((value) => element("td", {}, shown(value))))))));
+    this.body.replaceChildren(
+      element(
+        "table",
+        {},
+        element("thead", {}, element("tr", {}, ...columns.map((name) => element("th", { scope: "col" }, name)))),
+        element(
+          "tbody",
+          {},
+          ...rows
+            .filter(isShown)
+            .map(([first, ...rest]) =>
+              element(
+                "tr",
+                {},
+                element("th", { scope: "row" }, shown(first)),
+                ...rest.map((value) => element("td", {}, shown(value))),
+              ),
+            ),
+        ),
+      ),
+    );
   }
 }

@@ -23,18 +23,39 @@ const PARTS = [
 function part({ name, letter, title, over }, data, { isLog, channels, size }) {
   const sides = Object.entries(data).filter(([, own]) => own[name]);
   if (!sides.length) return null;
-  const lines = sides.flatMap(([side, own]) => (name === "fresnel"
-    ? CHANNELS[channels].map((channel) => ({ class: `${side} ${channelClass(channel.name)}`, values: own.fresnel.map(channel.of) }))
-    : [{ class: `${side} y`, values: own[name] }]));
+  const lines = sides.flatMap(([side, own]) =>
+    name === "fresnel"
+      ? CHANNELS[channels].map((channel) => ({
+          class: `${side} ${channelClass(channel.name)}`,
+          values: own.fresnel.map(channel.of),
+        }))
+      : [{ class: `${side} y`, values: own[name] }],
+  );
   const greatest = Math.max(...lines.flatMap(({ values }) => values));
   const isLogHere = isLog && name === "distribution";
-  const top = name !== "distribution" ? 1 : isLogHere ? 10 ** Math.ceil(Math.log10(greatest) - 1e-9) : niceCeiling(greatest);
-  const least = isLogHere ? Math.max(LEAST * top, 10 ** Math.floor(Math.log10(Math.min(...lines.flatMap(({ values }) => values.filter((x) => x > 0)))))) : 0;
+  const top =
+    name !== "distribution" ? 1 : isLogHere ? 10 ** Math.ceil(Math.log10(greatest) - 1e-9) : niceCeiling(greatest);
+  const least = isLogHere
+    ? Math.max(
+        LEAST * top,
+        10 ** Math.floor(Math.log10(Math.min(...lines.flatMap(({ values }) => values.filter((x) => x > 0))))),
+      )
+    : 0;
   return chart({
-    ...size, label: `${letter} over the ${over}; largest value ${Number(greatest.toPrecision(3))}`,
+    ...size,
+    label: `${letter} over the ${over}; largest value ${Number(greatest.toPrecision(3))}`,
     x: { min: 0, max: 90, ticks: [0, 30, 60, 90], label: `${over}, degrees` },
-    y: { min: Math.min(least, top / 10), max: top, log: isLogHere, ticks: isLogHere ? decades(least, top, 4) : undefined, label: title },
-    curves: lines.map(({ values, class: own }) => ({ class: own, points: values.map((value, i) => [ANGLES[i], value]) })),
+    y: {
+      min: Math.min(least, top / 10),
+      max: top,
+      log: isLogHere,
+      ticks: isLogHere ? decades(least, top, 4) : undefined,
+      label: title,
+    },
+    curves: lines.map(({ values, class: own }) => ({
+      class: own,
+      points: values.map((value, i) => [ANGLES[i], value]),
+    })),
   });
 }
 
@@ -46,16 +67,31 @@ function draw(data, options) {
   const whole = isRow ? { width, height } : { width, height: size.height * has.length };
   const parts = has.map((each, i) => {
     const node = part(each, data, { ...options, size });
-    for (const [name, value] of [["x", isRow ? i * size.width : 0], ["y", isRow ? 0 : i * size.height]]) node.setAttribute(name, String(value));
+    for (const [name, value] of [
+      ["x", isRow ? i * size.width : 0],
+      ["y", isRow ? 0 : i * size.height],
+    ])
+      node.setAttribute(name, String(value));
     return node;
   });
-  return svg("svg", { ...whole, viewBox: `0 0 ${whole.width} ${whole.height}`, class: "plot", role: "group", "aria-label": "D, G and F" },
-    parts);
+  return svg(
+    "svg",
+    {
+      ...whole,
+      viewBox: `0 0 ${whole.width} ${whole.height}`,
+      class: "plot",
+      role: "group",
+      "aria-label": "D, G and F",
+    },
+    parts,
+  );
 }
 
 function note(data) {
   const mirrors = Object.values(data).filter((own) => !own.distribution).length;
-  return mirrors ? "A perfect mirror has no distribution and no geometry term." : `G is for light from ${Object.values(data)[0].incidence}°.`;
+  return mirrors
+    ? "A perfect mirror has no distribution and no geometry term."
+    : `G is for light from ${Object.values(data)[0].incidence}°.`;
 }
 
 const RGB = ["r", "g", "b"];
@@ -63,14 +99,32 @@ const RGB = ["r", "g", "b"];
 function table(data) {
   const sides = Object.keys(data);
   return {
-    columns: ["theta_deg", ...sides.flatMap((side) => [
-      ...(data[side].distribution ? [column(data, side, "D"), column(data, side, "G")] : []), ...RGB.map((c) => column(data, side, `F_${c}`)),
-    ])],
-    rows: ANGLES.map((angle, i) => [angle, ...sides.flatMap((side) => [
-      ...(data[side].distribution ? [data[side].distribution[i], data[side].geometry[i]] : []), ...data[side].fresnel[i],
-    ])]),
+    columns: [
+      "theta_deg",
+      ...sides.flatMap((side) => [
+        ...(data[side].distribution ? [column(data, side, "D"), column(data, side, "G")] : []),
+        ...RGB.map((c) => column(data, side, `F_${c}`)),
+      ]),
+    ],
+    rows: ANGLES.map((angle, i) => [
+      angle,
+      ...sides.flatMap((side) => [
+        ...(data[side].distribution ? [data[side].distribution[i], data[side].geometry[i]] : []),
+        ...data[side].fresnel[i],
+      ]),
+    ]),
     isShown: ([angle]) => angle % 5 === 0,
   };
 }
 
-export const terms = { title: "D G F", needs: "/v1/bsdf/terms", hasIncidence: true, hasLog: true, hasChannels: true, first, draw, note, table };
+export const terms = {
+  title: "D G F",
+  needs: "/v1/bsdf/terms",
+  hasIncidence: true,
+  hasLog: true,
+  hasChannels: true,
+  first,
+  draw,
+  note,
+  table,
+};

@@ -13,14 +13,17 @@ export const luminance = ([r, g, b]) => 0.2126 * r + 0.7152 * g + 0.0722 * b;
 export const CHANNELS = {
   luminance: [{ name: "y", title: "luminance", of: luminance }],
   rgb: [
-    { name: "r", title: "red", of: ([r]) => r }, { name: "g", title: "green", of: ([, g]) => g }, { name: "b", title: "blue", of: ([, , b]) => b },
+    { name: "r", title: "red", of: ([r]) => r },
+    { name: "g", title: "green", of: ([, g]) => g },
+    { name: "b", title: "blue", of: ([, , b]) => b },
   ],
 };
 
 // The class of a channel's curve.
 export const channelClass = (name) => (name === "y" ? "y" : `channel-${name}`);
 
-export const isGrey = (colors) => colors.every(([r, g, b]) => Math.abs(r - g) + Math.abs(g - b) <= 1e-4 * Math.max(r, g, b));
+export const isGrey = (colors) =>
+  colors.every(([r, g, b]) => Math.abs(r - g) + Math.abs(g - b) <= 1e-4 * Math.max(r, g, b));
 
 // {most, decades}: the scale that shows these values, decades 0 where it is linear. `most` is a round number; beyond it
 // lies what is brighter than the share `bright` of the values.
@@ -40,10 +43,18 @@ export function share(value, { most, decades }) {
 }
 
 // The variants' curves: [{side, channel, title, class, values}].
-export const curves = (data, channels, of) => Object.entries(data).flatMap(([side, own]) => CHANNELS[channels].map((channel) => ({
-  side, channel: channel.name, class: `${side} ${channelClass(channel.name)}`, values: of(own).map(channel.of),
-  title: [Object.keys(data).length > 1 ? side.toUpperCase() : "", channels === "rgb" ? channel.title : ""].filter(Boolean).join(", "),
-})));
+export const curves = (data, channels, of) =>
+  Object.entries(data).flatMap(([side, own]) =>
+    CHANNELS[channels].map((channel) => ({
+      side,
+      channel: channel.name,
+      class: `${side} ${channelClass(channel.name)}`,
+      values: of(own).map(channel.of),
+      title: [Object.keys(data).length > 1 ? side.toUpperCase() : "", channels === "rgb" ? channel.title : ""]
+        .filter(Boolean)
+        .join(", "),
+    })),
+  );
 
 // The name of a column: "f_r", and with two variants "A_f_r".
 export const column = (data, side, name) => (Object.keys(data).length > 1 ? `${side.toUpperCase()}_${name}` : name);

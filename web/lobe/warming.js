@@ -17,7 +17,9 @@ export class Warming {
   #done = new Set();
   #round = 0;
 
-  constructor(ask) { this.ask = ask; }
+  constructor(ask) {
+    this.ask = ask;
+  }
 
   // `wanted` are [{material, needs}] in the order of their need. What was begun before ends.
   async begin(wanted, rest_ms = REST_MS) {
@@ -25,7 +27,9 @@ export class Warming {
     for (const { material, needs } of wanted) {
       const key = `${material.type} ${needs}`;
       if (this.#done.has(key) || !(needs in QUESTIONS)) continue;
-      await new Promise((resolve) => { setTimeout(resolve, rest_ms); });
+      await new Promise((resolve) => {
+        setTimeout(resolve, rest_ms);
+      });
       if (round !== this.#round) return;
       this.#done.add(key);
       const [path, body] = QUESTIONS[needs];
@@ -33,5 +37,7 @@ export class Warming {
     }
   }
 
-  end() { this.#round += 1; }
+  end() {
+    this.#round += 1;
+  }
 }

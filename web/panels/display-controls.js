@@ -4,7 +4,12 @@ import { element } from "../lib/dom.js";
 import { inWords } from "../lib/format-text.js";
 import { watchTabs } from "../lib/tabs.js";
 
-const OVERLAYS = { histogram: "Histogram", clipping: "Clipped pixels", checker: "Checker behind alpha", guides: "Guides" };
+const OVERLAYS = {
+  histogram: "Histogram",
+  clipping: "Clipped pixels",
+  checker: "Checker behind alpha",
+  guides: "Guides",
+};
 
 export class DisplayControls {
   // `page` is the PageState, `does` the commands.
@@ -14,11 +19,21 @@ export class DisplayControls {
     this.layer = find("layer");
     this.layer.append(...page.layers.map((each) => element("option", { value: each }, inWords(each))));
     this.layer.addEventListener("change", () => ui.set({ layer: this.layer.value }));
-    find("overlays").append(...Object.entries(OVERLAYS).map(([member, title]) => element("label", {},
-      element("input", {
-        type: "checkbox", class: "toggle", id: `show-${member}`,
-        onchange: () => (member === "checker" ? does.toggleChecker() : does.toggle(member)),
-      }), title)));
+    find("overlays").append(
+      ...Object.entries(OVERLAYS).map(([member, title]) =>
+        element(
+          "label",
+          {},
+          element("input", {
+            type: "checkbox",
+            class: "toggle",
+            id: `show-${member}`,
+            onchange: () => (member === "checker" ? does.toggleChecker() : does.toggle(member)),
+          }),
+          title,
+        ),
+      ),
+    );
   }
 
   show() {

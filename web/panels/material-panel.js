@@ -22,21 +22,30 @@ export class MaterialPanel {
     for (const [id, does] of Object.entries(clicks)) this.#find(id).addEventListener("click", does);
   }
 
-  #find(id) { return this.root.querySelector(`#${id}`); }
+  #find(id) {
+    return this.root.querySelector(`#${id}`);
+  }
 
-  get #name() { return this.acts.state.chosen.material; }
+  get #name() {
+    return this.acts.state.chosen.material;
+  }
 
   #add(make) {
     this.acts.change(make(this.acts.state));
     this.say(`${inWords(this.#name)}: ${this.#users()}`);
   }
 
-  #copy() { this.#add((state) => materials.copied(state, this.acts.material)); }
+  #copy() {
+    this.#add((state) => materials.copied(state, this.acts.material));
+  }
 
   async #rename() {
     const from = this.#name;
     const to = await askName({
-      title: "Rename the material", label: "Name", value: from, action: "Rename",
+      title: "Rename the material",
+      label: "Name",
+      value: from,
+      action: "Rename",
       problem: (name) => materials.problem(this.acts.state.scene, from, name),
     });
     if (to !== null && to !== from) this.acts.change(materials.renamed(this.acts.state, from, to));
@@ -47,11 +56,16 @@ export class MaterialPanel {
     const { scene } = this.acts.state;
     const others = Object.keys(scene.materials).filter((each) => each !== name);
     const count = materials.users(scene, name).length;
-    const instead = count === 0 ? others[0] : await askWhich({
-      title: `Delete ${inWords(name)}?`,
-      detail: count === 1 ? "One thing is made of it." : `${count} things are made of it.`,
-      label: count === 1 ? "It gets" : "They get", options: others.map((value) => ({ value, title: inWords(value) })), action: "Delete",
-    });
+    const instead =
+      count === 0
+        ? others[0]
+        : await askWhich({
+            title: `Delete ${inWords(name)}?`,
+            detail: count === 1 ? "One thing is made of it." : `${count} things are made of it.`,
+            label: count === 1 ? "It gets" : "They get",
+            options: others.map((value) => ({ value, title: inWords(value) })),
+            action: "Delete",
+          });
     if (instead !== null) this.acts.change(materials.removed(this.acts.state, name, instead));
   }
 

@@ -18,9 +18,18 @@ export class Messages {
   show(kind, { title, detail = "", list = [], action = null, lasting = false, progress = false }) {
     this.hide(kind);
     const button = action && element("button", { type: "button", onclick: action.does }, action.label);
-    const close = lasting ? null : element("button", {
-      type: "button", class: "close", "aria-label": "Close message", onclick: () => this.hide(kind),
-    }, "×");
+    const close = lasting
+      ? null
+      : element(
+          "button",
+          {
+            type: "button",
+            class: "close",
+            "aria-label": "Close message",
+            onclick: () => this.hide(kind),
+          },
+          "×",
+        );
     const text = element("div", {}, element("strong", {}, title), detail ? ` ${detail}` : "");
     if (list.length) text.append(element("ul", {}, ...list.map((line) => element("li", {}, line))));
     const bar = progress ? element("progress", { max: "1", value: "0", "aria-label": title }) : null;
@@ -29,7 +38,9 @@ export class Messages {
     this.root.append(node);
     // The message takes its height from the page above it: the field in hand stays in sight.
     document.activeElement?.closest?.(".page .field")?.scrollIntoView({ block: "nearest" });
-    return (share) => { if (bar) bar.value = share; };
+    return (share) => {
+      if (bar) bar.value = share;
+    };
   }
 
   hide(kind) {
@@ -56,6 +67,8 @@ export class Announcer {
 
   say(text) {
     clearTimeout(this.#timer);
-    this.#timer = setTimeout(() => { this.root.textContent = text; }, 400);
+    this.#timer = setTimeout(() => {
+      this.root.textContent = text;
+    }, 400);
   }
 }

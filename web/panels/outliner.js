@@ -35,7 +35,9 @@ export class Outliner {
     });
   }
 
-  #find(id) { return this.root.querySelector(`#${id}`); }
+  #find(id) {
+    return this.root.querySelector(`#${id}`);
+  }
 
   #walk(event) {
     const all = this.#shown.map(({ thing }) => thing);
@@ -52,10 +54,17 @@ export class Outliner {
     this.thing = list.some(({ thing }) => thing === chosen.thing) ? chosen.thing : "/camera";
     if (!equal(list, this.#shown)) {
       this.#shown = list;
-      this.list.replaceChildren(...list.map((each) => element(
-        "li", { role: "option", "data-thing": each.thing, id: `thing${each.thing.replaceAll("/", "-")}` },
-        icon(each.icon), element("span", {}, each.title), element("span", { class: "dim" }, each.note),
-      )));
+      this.list.replaceChildren(
+        ...list.map((each) =>
+          element(
+            "li",
+            { role: "option", "data-thing": each.thing, id: `thing${each.thing.replaceAll("/", "-")}` },
+            icon(each.icon),
+            element("span", {}, each.title),
+            element("span", { class: "dim" }, each.note),
+          ),
+        ),
+      );
     }
     for (const row of this.list.children) {
       const isIt = row.dataset.thing === this.thing;
@@ -63,12 +72,17 @@ export class Outliner {
       row.setAttribute("aria-selected", String(isIt));
     }
     this.list.setAttribute("aria-activedescendant", `thing${this.thing.replaceAll("/", "-")}`);
-    this.#showThing(scene, list.find(({ thing }) => thing === this.thing));
+    this.#showThing(
+      scene,
+      list.find(({ thing }) => thing === this.thing),
+    );
   }
 
   #model(document) {
     if (this.thing === "/camera") return model(this.schema, this.schema, "camera");
-    const models = { environment: environmentModels, lights: lightModels, shapes: shapeModels }[this.thing.split("/")[1]];
+    const models = { environment: environmentModels, lights: lightModels, shapes: shapeModels }[
+      this.thing.split("/")[1]
+    ];
     return models(this.schema)[document?.type];
   }
 
@@ -82,11 +96,16 @@ export class Outliner {
     if (isShape) {
       const names = Object.keys(scene.materials);
       this.#find("thing-material").replaceChildren(
-        ...names.map((name) => element("option", { value: name }, inWords(name))), element("hr"), this.#newMaterial,
+        ...names.map((name) => element("option", { value: name }, inWords(name))),
+        element("hr"),
+        this.#newMaterial,
       );
       this.#find("thing-material").value = document.material;
     }
-    const marks = [transforms.isSkewed(document?.transform) && "skewed", this.acts.removable(this.thing) && "removable"].filter(Boolean);
+    const marks = [
+      transforms.isSkewed(document?.transform) && "skewed",
+      this.acts.removable(this.thing) && "removable",
+    ].filter(Boolean);
     const kind = [this.thing, document?.type, ...marks].join(" ");
     if (kind !== this.#made) this.#make(kind, document, isShape);
     for (const { place, form, read } of this.#forms) form.show(read(at(scene, place)));
@@ -95,24 +114,39 @@ export class Outliner {
   #make(kind, document, isShape) {
     this.#made = kind;
     const own = this.#model(document);
-    const parts = own ? [{
-      place: this.thing, fields: fields(this.schema, own), read: (values) => values ?? {},
-      change: (name, value) => this.acts.edit(`/scene${this.thing}/${name}`, value),
-    }] : [];
+    const parts = own
+      ? [
+          {
+            place: this.thing,
+            fields: fields(this.schema, own),
+            read: (values) => values ?? {},
+            change: (name, value) => this.acts.edit(`/scene${this.thing}/${name}`, value),
+          },
+        ]
+      : [];
     if (isShape) parts.push(this.#transform(document));
     this.#forms = parts.map(({ fields: chosen, change, ...part }) => ({
-      ...part, form: schemaForm(chosen, { change, commit: () => this.acts.rest(), forgive: () => this.acts.forgive() }),
+      ...part,
+      form: schemaForm(chosen, { change, commit: () => this.acts.rest(), forgive: () => this.acts.forgive() }),
     }));
     const removable = this.acts.removable(this.thing);
-    const button = (label, does) => element("button", { type: "button", class: "button small", onclick: does }, label);
+    const button = (label, does) =>
+      element("button", { type: "button", class: "button small", onclick: does }, label);
     const thing = this.thing;
-    this.#find("thing-acts").replaceChildren(...[
-      isShape ? button("Frame", () => this.stage.frame(thing)) : null,
-      /^\/(shapes|lights)\//.test(thing) ? button("Duplicate", () => this.stage.duplicate(thing)) : null,
-      removable ? button("Delete", () => this.acts.remove(thing)) : null,
-    ].filter(Boolean));
-    this.#find("thing-form").replaceChildren(...this.#forms.flatMap(({ title, note, form }) =>
-      [title && element("h3", {}, title), note && element("p", { class: "note" }, note), form.element].filter(Boolean)));
+    this.#find("thing-acts").replaceChildren(
+      ...[
+        isShape ? button("Frame", () => this.stage.frame(thing)) : null,
+        /^\/(shapes|lights)\//.test(thing) ? button("Duplicate", () => this.stage.duplicate(thing)) : null,
+        removable ? button("Delete", () => this.acts.remove(thing)) : null,
+      ].filter(Boolean),
+    );
+    this.#find("thing-form").replaceChildren(
+      ...this.#forms.flatMap(({ title, note, form }) =>
+        [title && element("h3", {}, title), note && element("p", { class: "note" }, note), form.element].filter(
+          Boolean,
+        ),
+      ),
+    );
   }
 
   // Imported parts stand by a matrix: the form shows it as a move, a turn and a scale, which an edit makes of it.
@@ -120,9 +154,13 @@ export class Outliner {
     const place = `${this.thing}/transform`;
     const isSkewed = transforms.isSkewed(transform);
     return {
-      title: "Transform", place, read: transforms.shown,
+      title: "Transform",
+      place,
+      read: transforms.shown,
       note: isSkewed ? "This part is skewed in its file: it can be moved, but not turned or scaled." : "",
-      fields: fields(this.schema, transformModel(this.schema)).filter(({ name }) => !isSkewed || name === "translate"),
+      fields: fields(this.schema, transformModel(this.schema)).filter(
+        ({ name }) => !isSkewed || name === "translate",
+      ),
       change: (name, value) => {
         const now = at(this.acts.state.scene, place);
         this.acts.edit(`/scene${place}`, transforms.changed(now, name, value), `/scene${place}/${name}`);
@@ -140,7 +178,9 @@ export class Outliner {
     return null;
   }
 
-  forgive() { for (const { form } of this.#forms) form.forgive(); }
+  forgive() {
+    for (const { form } of this.#forms) form.forgive();
+  }
 }
 
 // New things, in the middle of what is looked at: [{title, kind, make(camera, materials)}].
@@ -150,27 +190,66 @@ export function additions(schema) {
   const near = ({ target }) => target.map((x) => Number(x.toFixed(3)));
   const above = ({ target, position }) => {
     const far = Math.hypot(...target.map((x, i) => x - position[i]));
-    return { point: target.map((x, i) => Number((x + [0.3, 0.6, 0.3][i] * far).toFixed(3))), strength: Number((far * far * 2).toPrecision(2)) };
+    return {
+      point: target.map((x, i) => Number((x + [0.3, 0.6, 0.3][i] * far).toFixed(3))),
+      strength: Number((far * far * 2).toPrecision(2)),
+    };
   };
   const all = [
-    { title: "Sphere", kind: "shapes", needs: shapes.sphere, make: (c, r, material) => ({ type: "sphere", center: near(c), radius: r, material }) },
     {
-      title: "Box", kind: "shapes", needs: shapes.box,
-      make: (c, r, material) => ({ type: "box", min: near(c).map((x) => x - r), max: near(c).map((x) => x + r), material }),
+      title: "Sphere",
+      kind: "shapes",
+      needs: shapes.sphere,
+      make: (c, r, material) => ({ type: "sphere", center: near(c), radius: r, material }),
     },
     {
-      title: "Quad", kind: "shapes", needs: shapes.quad,
-      make: (c, r, material) => ({ type: "quad", origin: near(c).map((x, i) => x + [-r, 0, r][i]), u: [2 * r, 0, 0], v: [0, 0, -2 * r], material }),
-    },
-    { title: "Point light", kind: "lights", needs: lights.point, make: (c) => ({ type: "point", position: above(c).point, intensity: above(c).strength }) },
-    {
-      title: "Spot light", kind: "lights", needs: lights.spot,
-      make: (c) => ({
-        type: "spot", position: above(c).point, direction: near(c).map((x, i) => Number((x - above(c).point[i]).toFixed(3))),
-        intensity: 2 * above(c).strength, inner_angle: 20, outer_angle: 30,
+      title: "Box",
+      kind: "shapes",
+      needs: shapes.box,
+      make: (c, r, material) => ({
+        type: "box",
+        min: near(c).map((x) => x - r),
+        max: near(c).map((x) => x + r),
+        material,
       }),
     },
-    { title: "Sun", kind: "lights", needs: lights.directional, make: () => ({ type: "directional", direction: [-0.4, -1, -0.5], irradiance: 3, angular_diameter: 0.53 }) },
+    {
+      title: "Quad",
+      kind: "shapes",
+      needs: shapes.quad,
+      make: (c, r, material) => ({
+        type: "quad",
+        origin: near(c).map((x, i) => x + [-r, 0, r][i]),
+        u: [2 * r, 0, 0],
+        v: [0, 0, -2 * r],
+        material,
+      }),
+    },
+    {
+      title: "Point light",
+      kind: "lights",
+      needs: lights.point,
+      make: (c) => ({ type: "point", position: above(c).point, intensity: above(c).strength }),
+    },
+    {
+      title: "Spot light",
+      kind: "lights",
+      needs: lights.spot,
+      make: (c) => ({
+        type: "spot",
+        position: above(c).point,
+        direction: near(c).map((x, i) => Number((x - above(c).point[i]).toFixed(3))),
+        intensity: 2 * above(c).strength,
+        inner_angle: 20,
+        outer_angle: 30,
+      }),
+    },
+    {
+      title: "Sun",
+      kind: "lights",
+      needs: lights.directional,
+      make: () => ({ type: "directional", direction: [-0.4, -1, -0.5], irradiance: 3, angular_diameter: 0.53 }),
+    },
   ];
   return all.filter(({ needs }) => needs);
 }

@@ -36,22 +36,40 @@ export class Output {
   constructor(root, { schema, acts, order, view, complain, say }) {
     Object.assign(this, { acts, order, view, complain, say });
     const id = freshId("shape");
-    this.shape = element("select", { id, onchange: () => this.#reshape(this.shape.value) },
+    this.shape = element(
+      "select",
+      { id, onchange: () => this.#reshape(this.shape.value) },
       element("option", { value: WINDOW }, "As the window"),
       ...SHAPES.map((shape) => element("option", { value: shape }, shape.replace(":", " : "))),
-      element("option", { value: FREE }, "Free"));
-    this.form = schemaForm(SIDES.map((name) => fields(schema.settings, schema.settings).find((field) => field.name === name)), {
-      change: (name, value) => this.#resize(name, value), commit: () => acts.rest(), forgive: () => acts.forgive(),
-    });
+      element("option", { value: FREE }, "Free"),
+    );
+    this.form = schemaForm(
+      SIDES.map((name) => fields(schema.settings, schema.settings).find((field) => field.name === name)),
+      {
+        change: (name, value) => this.#resize(name, value),
+        commit: () => acts.rest(),
+        forgive: () => acts.forgive(),
+      },
+    );
     this.note = element("p", { class: "note" });
     this.button = element("button", { type: "button", class: "button primary", onclick: () => this.render() });
-    this.cancel = element("button", { type: "button", class: "button", hidden: true, onclick: () => this.#stop() }, "Cancel");
+    this.cancel = element(
+      "button",
+      { type: "button", class: "button", hidden: true, onclick: () => this.#stop() },
+      "Cancel",
+    );
     this.bar = element("progress", { max: "1", value: "0", "aria-label": "Rendered of the job", hidden: true });
     this.told = element("p", { class: "note", role: "status" });
     this.result = element("div", { class: "result", hidden: true });
     root.append(
-      element("div", { class: "field whole" }, element("label", { for: id }, "Shape"), this.shape), this.form.element, this.note,
-      element("div", { class: "row" }, this.button, this.cancel), this.bar, this.told, this.result);
+      element("div", { class: "field whole" }, element("label", { for: id }, "Shape"), this.shape),
+      this.form.element,
+      this.note,
+      element("div", { class: "row" }, this.button, this.cancel),
+      this.bar,
+      this.told,
+      this.result,
+    );
     this.#resume();
   }
 
@@ -89,12 +107,16 @@ export class Output {
     const { width, height } = settings;
     if (!width || !height) {
       if (this.#shape !== FREE) this.#shape = WINDOW;
-    } else if (SHAPES.includes(this.#shape) && Math.abs(height - width / ratioOf(this.#shape)) > 1) this.#shape = FREE;
+    } else if (SHAPES.includes(this.#shape) && Math.abs(height - width / ratioOf(this.#shape)) > 1)
+      this.#shape = FREE;
     this.shape.value = this.#shape;
     this.form.show(settings, screen);
     const size = { ...screen, ...(width && height ? { width, height } : {}) };
     const seconds = forecast(size);
-    const words = [`On screen it has ${times(screen.width, screen.height)} pixels.`, seconds && `This size takes about ${duration(seconds)}.`];
+    const words = [
+      `On screen it has ${times(screen.width, screen.height)} pixels.`,
+      seconds && `This size takes about ${duration(seconds)}.`,
+    ];
     const text = words.filter(Boolean).join(" ");
     if (this.note.textContent !== text) this.note.textContent = text;
     this.button.textContent = `Render ${times(size.width, size.height)}`;
@@ -112,7 +134,9 @@ export class Output {
       this.#watch({ id, ...this.size });
     } catch (problem) {
       this.button.disabled = false;
-      const isSaid = (problem.errors ?? []).map(({ pointer, detail }) => this.form.mark(pointer.split("/")[2], sentence(detailWords(detail))));
+      const isSaid = (problem.errors ?? []).map(({ pointer, detail }) =>
+        this.form.mark(pointer.split("/")[2], sentence(detailWords(detail))),
+      );
       if (!isSaid.length || isSaid.includes(false)) this.complain(problem);
     }
   }
@@ -140,13 +164,15 @@ export class Output {
         const status = await api.renderStatus(job.id, wait);
         if (turn !== this.#turn) return;
         this.#tell(status);
-        if (status.state !== "queued" && status.state !== "running") return void await this.#end(status);
+        if (status.state !== "queued" && status.state !== "running") return void (await this.#end(status));
       } catch (problem) {
         if (turn !== this.#turn) return;
         if (problem.status === 404 || problem.status === 410) return this.#rest(""); // it was kept long enough
         // The server is away, or this page is: the job goes on, or comes back with the server.
         this.told.textContent = problem.message;
-        await new Promise((wake) => { setTimeout(wake, 1000 * WAIT_S); });
+        await new Promise((wake) => {
+          setTimeout(wake, 1000 * WAIT_S);
+        });
       }
     }
   }
@@ -154,7 +180,8 @@ export class Output {
   #tell({ state, samples, elapsed_s, eta_s }) {
     this.bar.value = eta_s === null ? 0 : elapsed_s / (elapsed_s + eta_s || 1);
     const left = eta_s === null ? "" : `, ${duration(eta_s)} left`;
-    if (state === "running") this.told.textContent = `${Math.round(100 * this.bar.value)} %, ${samples} samples${left}`;
+    if (state === "running")
+      this.told.textContent = `${Math.round(100 * this.bar.value)} %, ${samples} samples${left}`;
   }
 
   #rest(text) {
@@ -181,18 +208,34 @@ export class Output {
     const done = `${times(width, height)}, ${samples} samples`;
     this.#rest(state === "done" ? `Done: ${done}` : `Cancelled: ${done} so far`);
     if (warnings?.length) this.told.title = warnings.map((each) => each.detail ?? each).join("\n");
-    const file = (label, query, ending) => element("button", {
-      type: "button", class: "button small",
-      onclick: () => this.#save(id, query, `sunbox-${width}x${height}-${samples}.${ending}`),
-    }, label);
+    const file = (label, query, ending) =>
+      element(
+        "button",
+        {
+          type: "button",
+          class: "button small",
+          onclick: () => this.#save(id, query, `sunbox-${width}x${height}-${samples}.${ending}`),
+        },
+        label,
+      );
     const preview = element("img", { alt: "The rendered picture" });
-    this.result.replaceChildren(preview, element("div", { class: "row" },
-      file("Save as PNG", { format: "png" }, "png"), file("PNG, 16 bit", { format: "png", bits: "16" }, "png"),
-      file("EXR, all layers", { format: "exr", aov: "all" }, "exr")));
+    this.result.replaceChildren(
+      preview,
+      element(
+        "div",
+        { class: "row" },
+        file("Save as PNG", { format: "png" }, "png"),
+        file("PNG, 16 bit", { format: "png", bits: "16" }, "png"),
+        file("EXR, all layers", { format: "exr", aov: "all" }, "exr"),
+      ),
+    );
     this.result.hidden = false;
     this.say("The render is done");
     preview.src = URL.createObjectURL(await api.renderImage(id, { format: "webp", ...this.view() }));
-    return preview.decode().catch(() => {}).finally(() => URL.revokeObjectURL(preview.src));
+    return preview
+      .decode()
+      .catch(() => {})
+      .finally(() => URL.revokeObjectURL(preview.src));
   }
 
   #clear() {

@@ -36,10 +36,18 @@ export class Panel {
     this.schema = schema;
     const view = fields(schema.view, schema.view);
     const settings = fields(schema.settings, schema.settings).filter(({ name }) => !NOT_SETTINGS.includes(name));
-    this.#forms.view = this.#mount("view", view.filter(({ name }) => DISPLAY.includes(name)), "/view");
+    this.#forms.view = this.#mount(
+      "view",
+      view.filter(({ name }) => DISPLAY.includes(name)),
+      "/view",
+    );
     const main = MAIN_SETTINGS.map((name) => settings.find((field) => field.name === name)).filter(Boolean);
     this.#forms.settings = this.#mount("settings", main, "/settings");
-    this.#forms.more = this.#mount("more", settings.filter((field) => !main.includes(field)), "/settings");
+    this.#forms.more = this.#mount(
+      "more",
+      settings.filter((field) => !main.includes(field)),
+      "/settings",
+    );
     this.outliner = new Outliner(root, schema, acts, stage);
     this.materialPanel = new MaterialPanel(root, { acts, say });
     this.#qualities = qualityChoice(this.#find("qualities"), (name) => acts.edit("/settings/quality", name));
@@ -49,11 +57,17 @@ export class Panel {
 
   #qualities;
 
-  #find(id) { return this.root.querySelector(`#${id}`); }
+  #find(id) {
+    return this.root.querySelector(`#${id}`);
+  }
 
   #pickers(library, paint) {
     const { acts } = this;
-    fillPicker(this.#find("scene"), [{ name: "", title: "Your own" }, ...library.scenes], (name) => name && acts.pickScene(name));
+    fillPicker(
+      this.#find("scene"),
+      [{ name: "", title: "Your own" }, ...library.scenes],
+      (name) => name && acts.pickScene(name),
+    );
     this.#find("scene").options[0].hidden = true;
     const environments = [{ name: OWN, title: "" }, { name: NONE, title: "None (black)" }, ...library.environments];
     fillPicker(this.#find("environment"), environments, (name) => acts.pickEnvironment(name === NONE ? null : name));
@@ -61,7 +75,9 @@ export class Panel {
     const models = Object.keys(this.materials).map((name) => ({ name, title: inWords(name) }));
     fillPicker(this.#find("model"), models, (name) => acts.pickModel(name));
     this.presets = materialButtons(this.#find("material-presets"), library.materials, {
-      pick: (material) => acts.putMaterial(material), fail: acts.complain, paint,
+      pick: (material) => acts.putMaterial(material),
+      fail: acts.complain,
+      paint,
     });
   }
 
@@ -84,9 +100,14 @@ export class Panel {
       commit: () => this.acts.rest(),
       forgive: () => this.acts.forgive(),
       takeFile: (name, file) => this.stage.takeTexture(`${place}/${name}`, file),
-      slot: (field, remove) => new TextureSlot(field, { ...this.textureActs(`${place}/${field.name}`, field), remove }),
+      slot: (field, remove) =>
+        new TextureSlot(field, { ...this.textureActs(`${place}/${field.name}`, field), remove }),
       beneath: (field) => {
-        const made = new TextureForm(field, { schema: this.schema.scene, place: `${place}/${field.name}`, acts: this.acts });
+        const made = new TextureForm(field, {
+          schema: this.schema.scene,
+          place: `${place}/${field.name}`,
+          acts: this.acts,
+        });
         textures.push(made);
         return made;
       },
@@ -97,7 +118,8 @@ export class Panel {
 
   // A choice by which others change is made together with them.
   #edit(chosen, place, name, value) {
-    const isLeader = value !== undefined && chosen.some(({ ranges, used }) => ranges?.field === name || used?.field === name);
+    const isLeader =
+      value !== undefined && chosen.some(({ ranges, used }) => ranges?.field === name || used?.field === name);
     if (isLeader) this.acts.choose(place, name, value, chosen);
     else this.acts.edit(`${place}/${name}`, value);
   }
@@ -121,7 +143,9 @@ export class Panel {
     const names = Object.keys(scene.materials);
     if (!equal(names, this.#shape.names)) {
       this.#shape.names = names;
-      this.#find("material").replaceChildren(...names.map((name) => element("option", { value: name }, inWords(name))));
+      this.#find("material").replaceChildren(
+        ...names.map((name) => element("option", { value: name }, inWords(name))),
+      );
     }
     this.#find("material").value = chosen.material;
     const { material, materialPlace: place } = this.acts;
@@ -167,4 +191,3 @@ export class Panel {
     this.outliner.forgive();
   }
 }
-

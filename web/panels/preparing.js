@@ -14,7 +14,9 @@ export class Preparing {
     Object.assign(this, { stage, label, subject, begun });
   }
 
-  get isShown() { return !this.label.hidden; }
+  get isShown() {
+    return !this.label.hidden;
+  }
 
   // An update left, or was answered.
   wait(is) {

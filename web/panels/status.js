@@ -30,7 +30,8 @@ export class Status {
 
   // The readings of a picture that is no longer wanted are nobody's.
   blank() {
-    for (const name of ["samples", "rate", "noise", "elapsed", "left", "size"]) this.#places[name].textContent = NOTHING;
+    for (const name of ["samples", "rate", "noise", "elapsed", "left", "size"])
+      this.#places[name].textContent = NOTHING;
     this.#places.progress.value = 0;
     this.#places.preview.hidden = true;
   }

@@ -12,7 +12,14 @@ export function tint(index) {
 }
 
 // Dark violet to yellow, rising evenly in lightness.
-const HEAT = [[13, 8, 75], [106, 0, 168], [190, 50, 120], [240, 120, 60], [250, 200, 60], [252, 253, 191]];
+const HEAT = [
+  [13, 8, 75],
+  [106, 0, 168],
+  [190, 50, 120],
+  [240, 120, 60],
+  [250, 200, 60],
+  [252, 253, 191],
+];
 
 export function heat(t) {
   const at = Math.min(Math.max(t, 0), 1) * (HEAT.length - 1);
@@ -20,7 +27,8 @@ export function heat(t) {
   return HEAT[low].map((x, i) => x + (HEAT[low + 1][i] - x) * (at - low));
 }
 
-const significant = (x) => (x === 0 ? "0" : Math.abs(x) >= 1e4 || Math.abs(x) < 1e-3 ? x.toExponential(1) : x.toPrecision(3));
+const significant = (x) =>
+  x === 0 ? "0" : Math.abs(x) >= 1e4 || Math.abs(x) < 1e-3 ? x.toExponential(1) : x.toPrecision(3);
 
 // The least and greatest of the values that count, as a function of the pixel's index.
 function extent(floats, value) {
@@ -35,7 +43,12 @@ function extent(floats, value) {
   return least <= most ? [least, most] : [0, 0];
 }
 
-const ramp = (stops, low, high, note) => ({ ramp: stops.map((c) => `rgb(${c.map(Math.round).join(" ")})`), low, high, note });
+const ramp = (stops, low, high, note) => ({
+  ramp: stops.map((c) => `rgb(${c.map(Math.round).join(" ")})`),
+  low,
+  high,
+  note,
+});
 
 function depth(floats, paint) {
   const [near, far] = extent(floats, (i) => floats[i]);
@@ -44,7 +57,15 @@ function depth(floats, paint) {
     const grey = d > 0 ? 255 * (1 - 0.9 * ((d - near) / (far - near || 1))) : 0;
     return [grey, grey, grey];
   });
-  return ramp([[255, 255, 255], [26, 26, 26]], `${significant(near)} m`, `${significant(far)} m`, "Black: nothing was hit");
+  return ramp(
+    [
+      [255, 255, 255],
+      [26, 26, 26],
+    ],
+    `${significant(near)} m`,
+    `${significant(far)} m`,
+    "Black: nothing was hit",
+  );
 }
 
 function variance(floats, paint) {
@@ -53,7 +74,12 @@ function variance(floats, paint) {
   const least = most * 1e-6; // six decades: what is calmer is as good as still
   const place = (x) => Math.log(Math.max(x, least) / least) / Math.log(1e6);
   paint((i) => (most > 0 ? heat(place(mean(i))) : [0, 0, 0]));
-  return ramp([0, 0.2, 0.4, 0.6, 0.8, 1].map(heat), `≤ ${significant(least)}`, significant(most), "(W/(m² sr))², each step is a tenfold or so");
+  return ramp(
+    [0, 0.2, 0.4, 0.6, 0.8, 1].map(heat),
+    `≤ ${significant(least)}`,
+    significant(most),
+    "(W/(m² sr))², each step is a tenfold or so",
+  );
 }
 
 function ids(floats, paint, names) {
@@ -64,7 +90,9 @@ function ids(floats, paint, names) {
     return id ? tint(id) : [0, 0, 0];
   });
   const entries = [...seen].filter((id) => id > 0).sort((a, b) => a - b);
-  return { swatches: entries.map((id) => ({ color: `rgb(${tint(id).join(" ")})`, text: names[id - 1] ?? `No. ${id}` })) };
+  return {
+    swatches: entries.map((id) => ({ color: `rgb(${tint(id).join(" ")})`, text: names[id - 1] ?? `No. ${id}` })),
+  };
 }
 
 // {image, legend} of a frame of numbers, four floats a pixel. `names` are those of the shapes or materials.
@@ -87,7 +115,8 @@ export function paintLayer(aov, floats, width, height, names) {
 export const LEGENDS = {
   incidence: {
     swatches: [
-      { color: "rgb(64 153 89)", text: "0–45°" }, { color: "rgb(242 204 76)", text: "45–75°" },
+      { color: "rgb(64 153 89)", text: "0–45°" },
+      { color: "rgb(242 204 76)", text: "45–75°" },
       { color: "rgb(204 64 51)", text: "75–90°" },
     ],
     note: "The angle between the view and the surface's normal",
@@ -95,7 +124,8 @@ export const LEGENDS = {
   albedo: { note: "The share of light that comes back from the first surface" },
   normal: {
     swatches: [
-      { color: "rgb(255 128 128)", text: "+X" }, { color: "rgb(128 255 128)", text: "+Y" },
+      { color: "rgb(255 128 128)", text: "+X" },
+      { color: "rgb(128 255 128)", text: "+Y" },
       { color: "rgb(128 128 255)", text: "+Z" },
     ],
     note: "Grey: ½ + ½ n",

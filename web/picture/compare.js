@@ -47,23 +47,54 @@ export class Comparison {
   }
 
   #build(models) {
-    const radio = (name, title) => element("button", { type: "button", role: "radio", class: "button small", "data-value": name }, title);
-    const modes = element("div", { class: "cluster", role: "radiogroup", "aria-label": "How the variants are shown" }, ...Object.entries(MODES).map((each) => radio(...each)));
-    const sides = element("div", { class: "cluster", role: "radiogroup", "aria-label": "Which variant is edited" }, element("span", { class: "note" }, "Edit"), radio("a", "A"), radio("b", "B"));
-    const turn = element("select", {
-      "aria-label": "Turn variant B into another model",
-      onchange: () => {
-        const { compare, scene } = this.acts.state;
-        if (turn.value) this.acts.putVariant(this.acts.converted(scene.materials[compare.material], turn.value));
-        turn.value = "";
+    const radio = (name, title) =>
+      element("button", { type: "button", role: "radio", class: "button small", "data-value": name }, title);
+    const modes = element(
+      "div",
+      { class: "cluster", role: "radiogroup", "aria-label": "How the variants are shown" },
+      ...Object.entries(MODES).map((each) => radio(...each)),
+    );
+    const sides = element(
+      "div",
+      { class: "cluster", role: "radiogroup", "aria-label": "Which variant is edited" },
+      element("span", { class: "note" }, "Edit"),
+      radio("a", "A"),
+      radio("b", "B"),
+    );
+    const turn = element(
+      "select",
+      {
+        "aria-label": "Turn variant B into another model",
+        onchange: () => {
+          const { compare, scene } = this.acts.state;
+          if (turn.value) this.acts.putVariant(this.acts.converted(scene.materials[compare.material], turn.value));
+          turn.value = "";
+        },
       },
-    }, element("option", { value: "" }, "B as…"), ...models.map((name) => element("option", { value: name }, inWords(name))));
-    const swap = element("button", { type: "button", class: "button small", onclick: () => this.acts.swapVariants() }, "Swap");
-    const close = element("button", { type: "button", class: "button small close", onclick: () => this.acts.stopComparing() }, "Done");
-    this.gains = element("select", {
-      "aria-label": "How much the difference is brightened",
-      onchange: () => { this.gain = Number(this.gains.value); this.painted(); },
-    }, ...GAINS.map((gain) => element("option", { value: String(gain), selected: gain === USUAL }, `×${gain}`)));
+      element("option", { value: "" }, "B as…"),
+      ...models.map((name) => element("option", { value: name }, inWords(name))),
+    );
+    const swap = element(
+      "button",
+      { type: "button", class: "button small", onclick: () => this.acts.swapVariants() },
+      "Swap",
+    );
+    const close = element(
+      "button",
+      { type: "button", class: "button small close", onclick: () => this.acts.stopComparing() },
+      "Done",
+    );
+    this.gains = element(
+      "select",
+      {
+        "aria-label": "How much the difference is brightened",
+        onchange: () => {
+          this.gain = Number(this.gains.value);
+          this.painted();
+        },
+      },
+      ...GAINS.map((gain) => element("option", { value: String(gain), selected: gain === USUAL }, `×${gain}`)),
+    );
     this.metric = element("span", { class: "metric" });
     this.root.append(modes, this.gains, sides, turn, swap, close, this.metric);
     this.markMode = watchChoice(modes, "button", ({ dataset }) => this.pick(dataset.value));
@@ -75,7 +106,9 @@ export class Comparison {
     this.changed();
   }
 
-  get isOn() { return this.#stream !== null; }
+  get isOn() {
+    return this.#stream !== null;
+  }
 
   // Where both stand beside each other, each has half the width, and as much less height: all of the view stays.
   fit(box) {
@@ -108,12 +141,24 @@ export class Comparison {
   }
 
   #open() {
-    this.#viewport = new Viewport(this.canvas, { names: (aov) => this.names(aov, this.#stream.document), painted: ({ header }) => { this.#header = header; this.painted(); } });
-    this.#stream = new Stream({
-      hello: () => this.#viewport?.restart(),
-      frame: (header, bytes, view, acknowledge) => this.#viewport?.show(header, bytes, view, acknowledge),
-      done: () => this.painted(), waiting() {}, refused: (problem, valid) => this.#takeBack(problem, valid), lost: (reason) => this.lost(reason),
-    }, this.beside);
+    this.#viewport = new Viewport(this.canvas, {
+      names: (aov) => this.names(aov, this.#stream.document),
+      painted: ({ header }) => {
+        this.#header = header;
+        this.painted();
+      },
+    });
+    this.#stream = new Stream(
+      {
+        hello: () => this.#viewport?.restart(),
+        frame: (header, bytes, view, acknowledge) => this.#viewport?.show(header, bytes, view, acknowledge),
+        done: () => this.painted(),
+        waiting() {},
+        refused: (problem, valid) => this.#takeBack(problem, valid),
+        lost: (reason) => this.lost(reason),
+      },
+      this.beside,
+    );
     this.#stream.connect();
   }
 
@@ -140,10 +185,13 @@ export class Comparison {
   // After a frame of either: the difference and its measure follow at their own pace.
   painted() {
     if (!this.isOn || !this.#header || this.timer) return;
-    this.timer = setTimeout(() => {
-      this.timer = null;
-      this.#compare();
-    }, Math.max(0, this.#differed + DIFFERENCE_MS - performance.now()));
+    this.timer = setTimeout(
+      () => {
+        this.timer = null;
+        this.#compare();
+      },
+      Math.max(0, this.#differed + DIFFERENCE_MS - performance.now()),
+    );
   }
 
   // What the halves are: "A · Principled · 16 samples".
@@ -179,11 +227,18 @@ export class Comparison {
     const percent = (x) => `${(100 * x).toFixed(2)} %`;
     const [ofA, ofB] = headers.map(({ samples }) => samples);
     this.metric.replaceChildren(
-      "RMSE ", element("b", {}, percent(rmse)),
-      element("span", { class: "beside" }, [
-        "", ...(Number.isFinite(psnr) ? [`PSNR ${psnr.toFixed(1)} dB`] : []), `largest ${percent(most)}`,
-        ...(ofA === ofB ? [] : [`at ${ofA} and ${ofB} samples`]),
-      ].join(" · ")),
+      "RMSE ",
+      element("b", {}, percent(rmse)),
+      element(
+        "span",
+        { class: "beside" },
+        [
+          "",
+          ...(Number.isFinite(psnr) ? [`PSNR ${psnr.toFixed(1)} dB`] : []),
+          `largest ${percent(most)}`,
+          ...(ofA === ofB ? [] : [`at ${ofA} and ${ofB} samples`]),
+        ].join(" · "),
+      ),
     );
     this.metric.title = "Of the displayed colours, white being 100 %; noise counts until both are done";
   }

@@ -6,8 +6,13 @@ import { writeExr } from "./exr.js";
 import { KEY, pngWith, recipeText } from "../document/recipe.js";
 
 const CHANNELS = {
-  color: ["R", "G", "B", "A"], albedo: ["albedo.R", "albedo.G", "albedo.B"], normal: ["normal.X", "normal.Y", "normal.Z"],
-  depth: ["depth.Z"], variance: ["variance.R", "variance.G", "variance.B"], shape_id: ["shape_id.I"], material_id: ["material_id.I"],
+  color: ["R", "G", "B", "A"],
+  albedo: ["albedo.R", "albedo.G", "albedo.B"],
+  normal: ["normal.X", "normal.Y", "normal.Z"],
+  depth: ["depth.Z"],
+  variance: ["variance.R", "variance.G", "variance.B"],
+  shape_id: ["shape_id.I"],
+  material_id: ["material_id.I"],
   incidence: ["incidence.I"],
 };
 
@@ -25,11 +30,16 @@ export async function exr(stream, aovs, madeFrom) {
   let scene = null;
   for (const aov of known) {
     const { header: own, bytes, scene: shown } = await stream.capture({ format: "rgba32f", aov });
-    if (header && (own.generation !== header.generation)) throw new Error("The picture changed on the way. Try again.");
+    if (header && own.generation !== header.generation) throw new Error("The picture changed on the way. Try again.");
     [header, scene] = [own, shown];
     layers.push({ names: CHANNELS[aov], floats: new Float32Array(bytes) });
   }
-  return { blob: await writeExr(layers, header.width, header.height, { [KEY]: recipeText(madeFrom(scene, header.samples, { aov: "all" })) }), header };
+  return {
+    blob: await writeExr(layers, header.width, header.height, {
+      [KEY]: recipeText(madeFrom(scene, header.samples, { aov: "all" })),
+    }),
+    header,
+  };
 }
 
 const quoted = (text) => `'${text.replaceAll("'", "'\\''")}'`;
@@ -41,6 +51,6 @@ export function exactSettings({ time_limit, target_noise, ...settings }, samples
 
 export function curl(scene, settings, { exposure, tone_map }) {
   const url = renderUrl({ format: "png", exposure, tone_map });
-  const key = readKey() ? " -H \"Authorization: Bearer $SUNBOX_API_KEY\"" : "";
+  const key = readKey() ? ' -H "Authorization: Bearer $SUNBOX_API_KEY"' : "";
   return `curl -s ${quoted(url)}${key} -H 'Content-Type: application/json' -o sunbox.png -d ${quoted(JSON.stringify({ scene, settings }))}`;
 }

@@ -23,11 +23,16 @@ function header(channels, width, height, texts) {
   const note = (value) => [...new TextEncoder().encode(value)];
   return [
     ...int32(20000630, 2),
-    ...attribute("channels", "chlist", list), ...Object.entries(texts).flatMap(([name, value]) => attribute(name, "string", note(value))),
-    ...attribute("compression", "compression", [ZIP]), ...attribute("dataWindow", "box2i", box),
-    ...attribute("displayWindow", "box2i", box), ...attribute("lineOrder", "lineOrder", [0]),
-    ...attribute("pixelAspectRatio", "float", float32(1)), ...attribute("screenWindowCenter", "v2f", float32(0, 0)),
-    ...attribute("screenWindowWidth", "float", float32(1)), 0,
+    ...attribute("channels", "chlist", list),
+    ...Object.entries(texts).flatMap(([name, value]) => attribute(name, "string", note(value))),
+    ...attribute("compression", "compression", [ZIP]),
+    ...attribute("dataWindow", "box2i", box),
+    ...attribute("displayWindow", "box2i", box),
+    ...attribute("lineOrder", "lineOrder", [0]),
+    ...attribute("pixelAspectRatio", "float", float32(1)),
+    ...attribute("screenWindowCenter", "v2f", float32(0, 0)),
+    ...attribute("screenWindowWidth", "float", float32(1)),
+    0,
   ];
 }
 

@@ -78,11 +78,15 @@ export function watchGestures(stage, move, tool) {
   stage.addEventListener("pointerup", lift);
   stage.addEventListener("pointercancel", lift);
 
-  stage.addEventListener("wheel", (event) => {
-    event.preventDefault();
-    clearTimeout(turning);
-    turning = setTimeout(move.rest, WHEEL_REST_MS);
-    const scrolled = event.deltaY * WHEEL_UNITS[event.deltaMode] * WHEEL_ZOOM * (event.ctrlKey ? 4 : 1);
-    move.zoom(Math.exp(scrolled), event.clientX, event.clientY);
-  }, { passive: false });
+  stage.addEventListener(
+    "wheel",
+    (event) => {
+      event.preventDefault();
+      clearTimeout(turning);
+      turning = setTimeout(move.rest, WHEEL_REST_MS);
+      const scrolled = event.deltaY * WHEEL_UNITS[event.deltaMode] * WHEEL_ZOOM * (event.ctrlKey ? 4 : 1);
+      move.zoom(Math.exp(scrolled), event.clientX, event.clientY);
+    },
+    { passive: false },
+  );
 }

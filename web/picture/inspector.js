@@ -6,7 +6,8 @@ import { hex, toLinear } from "../lib/color.js";
 const FRESH_MS = 800; // between two readings of the linear picture while it gets better
 const MOST = 64;
 
-const linearText = (x) => (Math.abs(x) >= 1000 || (x !== 0 && Math.abs(x) < 1e-4) ? x.toExponential(2) : x.toFixed(4));
+const linearText = (x) =>
+  Math.abs(x) >= 1000 || (x !== 0 && Math.abs(x) < 1e-4) ? x.toExponential(2) : x.toFixed(4);
 
 export class Inspector {
   #zoom = 1;
@@ -57,7 +58,9 @@ export class Inspector {
     this.#place(zoom, px - (px - this.#x) * grown, py - (py - this.#y) * grown);
   }
 
-  slide(right, down) { this.#place(this.#zoom, this.#x + right, this.#y + down); }
+  slide(right, down) {
+    this.#place(this.#zoom, this.#x + right, this.#y + down);
+  }
 
   hover(clientX, clientY) {
     const place = this.viewport.place(clientX, clientY);

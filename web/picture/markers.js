@@ -32,7 +32,9 @@ export class Markers {
   // `root` lies over the picture, `acts` is the editor.
   constructor(root, acts) {
     Object.assign(this, { root, acts });
-    root.addEventListener("pointerdown", (event) => { if (event.target.closest("button")) event.stopPropagation(); }); // no orbit
+    root.addEventListener("pointerdown", (event) => {
+      if (event.target.closest("button")) event.stopPropagation();
+    }); // no orbit
     root.addEventListener("click", ({ target }) => {
       const mark = target.closest("[data-thing]");
       if (mark) acts.select(mark.dataset.thing);
@@ -46,16 +48,24 @@ export class Markers {
     const { state, camera } = this.acts;
     const { scene, chosen } = state;
     const lights = things({ lights: scene.lights, shapes: [] }).filter(({ thing }) => thing.startsWith("/lights/"));
-    const marks = [...lights, { thing: "/camera", icon: "camera", title: "What the camera looks at" }].map((each) => {
-      const point = each.thing === "/camera" ? camera.target : placeOf(at(scene, each.thing), camera);
-      return { ...each, isChosen: each.thing === chosen.thing, ...spot(camera, point, aspect) };
-    }).filter(({ isInside, isChosen }) => isInside || isChosen);
+    const marks = [...lights, { thing: "/camera", icon: "camera", title: "What the camera looks at" }]
+      .map((each) => {
+        const point = each.thing === "/camera" ? camera.target : placeOf(at(scene, each.thing), camera);
+        return { ...each, isChosen: each.thing === chosen.thing, ...spot(camera, point, aspect) };
+      })
+      .filter(({ isInside, isChosen }) => isInside || isChosen);
     const made = JSON.stringify(marks.map(({ thing, title }) => [thing, title]));
     if (made !== this.#shown) {
       this.#shown = made;
-      this.root.replaceChildren(...marks.map(({ thing, icon: name, title }) => element(
-        "button", { type: "button", class: "mark", tabindex: "-1", "data-thing": thing, "aria-label": title, title }, icon(name),
-      )));
+      this.root.replaceChildren(
+        ...marks.map(({ thing, icon: name, title }) =>
+          element(
+            "button",
+            { type: "button", class: "mark", tabindex: "-1", "data-thing": thing, "aria-label": title, title },
+            icon(name),
+          ),
+        ),
+      );
     }
     marks.forEach(({ x, y, isInside, isChosen }, i) => {
       const mark = this.root.children[i];

@@ -56,7 +56,12 @@ export function showClipped(root, { high, low }) {
     dot.style.setProperty("background", `rgb(${color.join(" ")})`);
     return element("span", { class: "key" }, dot, text);
   };
-  root.replaceChildren(...[[RED, `Clipped ${percent(high)}`], [BLUE, `Black ${percent(low)}`]].map(key));
+  root.replaceChildren(
+    ...[
+      [RED, `Clipped ${percent(high)}`],
+      [BLUE, `Black ${percent(low)}`],
+    ].map(key),
+  );
 }
 
 export function showLegend(root, legend) {

@@ -23,7 +23,8 @@ export function pictureRecipes({ schema, acts, info, size, view, viewDefaults })
       const { width, height, ...knobs } = settings;
       const { exposure, tone_map } = { ...viewDefaults, ...shown };
       acts.openScene(scene, title, undefined, {
-        settings: { ...givenOf(knobs, base(settings.quality)), width, height }, view: givenOf({ exposure, tone_map }, viewDefaults),
+        settings: { ...givenOf(knobs, base(settings.quality)), width, height },
+        view: givenOf({ exposure, tone_map }, viewDefaults),
       });
     },
   };

@@ -16,7 +16,8 @@ import { inWords } from "../lib/format-text.js";
 // A click before there is a picture.
 const EARLY = {
   focus: "Nothing can be focused on yet: the picture is still being prepared. Click again once it is there.",
-  select: "Nothing can be selected in the picture yet: it is still being prepared. The outline in the Scene tab has everything.",
+  select:
+    "Nothing can be selected in the picture yet: it is still being prepared. The outline in the Scene tab has everything.",
 };
 
 const OUTLINE_MS = 900;
@@ -36,21 +37,32 @@ export class ViewportController {
     this.root = find("stage");
     this.picker = new Picker(stream);
     this.inspector = new Inspector(
-      { stage: this.root, sheet: find("sheet"), probe: find("probe"), crosshair: find("crosshair") }, viewport, stream,
+      { stage: this.root, sheet: find("sheet"), probe: find("probe"), crosshair: find("crosshair") },
+      viewport,
+      stream,
     );
     this.markers = new Markers(find("markers"), acts);
     this.move = {
       ...acts.moves,
-      zoom: (factor, x, y) => (this.inspector.active ? this.inspector.magnify(1 / factor, x, y) : acts.moves.zoom(factor)),
+      zoom: (factor, x, y) =>
+        this.inspector.active ? this.inspector.magnify(1 / factor, x, y) : acts.moves.zoom(factor),
       slide: (right, down) => this.inspector.slide(right, down),
-      hover: (x, y) => { if (this.inspector.active) this.inspector.hover(x, y); },
+      hover: (x, y) => {
+        if (this.inspector.active) this.inspector.hover(x, y);
+      },
       tap: (x, y) => this.tap(x, y),
     };
     // The arrows move the cross where that is the tool.
     this.keyMove = {
       ...this.move,
-      orbit: (right, down) => (this.inspector.active ? this.inspector.step(Math.sign(right), Math.sign(down)) : acts.moves.orbit(right, down)),
-      pan: (right, down) => (this.inspector.active ? this.inspector.step(10 * Math.sign(right), 10 * Math.sign(down)) : acts.moves.pan(right, down)),
+      orbit: (right, down) =>
+        this.inspector.active
+          ? this.inspector.step(Math.sign(right), Math.sign(down))
+          : acts.moves.orbit(right, down),
+      pan: (right, down) =>
+        this.inspector.active
+          ? this.inspector.step(10 * Math.sign(right), 10 * Math.sign(down))
+          : acts.moves.pan(right, down),
     };
     watchGestures(this.root, this.move, () => ui.state.tool);
     this.markTool = watchChoice(find("tools"), "[data-tool]", ({ dataset }) => ui.set({ tool: dataset.tool }));
@@ -100,13 +112,16 @@ export class ViewportController {
     const { histogram, clipping, guides } = this.ui.state;
     if (guides) fitGuides(this.find("guides"), this.root, this.viewport.canvas);
     if ((!histogram && !clipping) || this.#timer) return;
-    this.#timer = setTimeout(() => {
-      this.#timer = null;
-      this.#overlaid = performance.now();
-      const image = this.viewport.pixels();
-      if (histogram) drawHistogram(this.find("histogram"), image);
-      if (clipping) showClipped(this.find("clipped"), drawClipping(this.find("clipping"), image));
-    }, Math.max(0, this.#overlaid + OVERLAY_MS - performance.now()));
+    this.#timer = setTimeout(
+      () => {
+        this.#timer = null;
+        this.#overlaid = performance.now();
+        const image = this.viewport.pixels();
+        if (histogram) drawHistogram(this.find("histogram"), image);
+        if (clipping) showClipped(this.find("clipped"), drawClipping(this.find("clipping"), image));
+      },
+      Math.max(0, this.#overlaid + OVERLAY_MS - performance.now()),
+    );
   }
 
   async tap(x, y) {
@@ -135,7 +150,12 @@ export class ViewportController {
     }
     this.acts.select(pointer("shapes", shape));
     this.say(`${inWords(scene.shapes[shape].material)} selected`);
-    drawOutline(this.find("outline"), await this.picker.layer("shape_id", scene), shape, getComputedStyle(this.root).getPropertyValue("--accent-bright"));
+    drawOutline(
+      this.find("outline"),
+      await this.picker.layer("shape_id", scene),
+      shape,
+      getComputedStyle(this.root).getPropertyValue("--accent-bright"),
+    );
     this.find("outline").classList.add("shown");
     clearTimeout(this.#outlining);
     this.#outlining = setTimeout(() => this.find("outline").classList.remove("shown"), OUTLINE_MS);
@@ -161,7 +181,9 @@ export class ViewportController {
   }
 
   // What of the camera has to change for a ball to fill the picture.
-  framed(around) { return frame(this.acts.camera, around, this.aspect); }
+  framed(around) {
+    return frame(this.acts.camera, around, this.aspect);
+  }
 
   // Brings a thing into the middle; without one, everything that is not endless.
   async frame(thing = this.acts.state.chosen.thing) {
@@ -169,8 +191,13 @@ export class ViewportController {
     const shape = thing.startsWith("/shapes/") ? at(scene, thing) : null;
     try {
       const around = shape
-        ? ball(shape) ?? (await this.picker.ball(scene, this.acts.camera, Number(thing.split("/")[2])))
-        : together(scene.shapes.filter(({ type }) => type !== "quad").map(ball).filter(Boolean));
+        ? (ball(shape) ?? (await this.picker.ball(scene, this.acts.camera, Number(thing.split("/")[2]))))
+        : together(
+            scene.shapes
+              .filter(({ type }) => type !== "quad")
+              .map(ball)
+              .filter(Boolean),
+          );
       if (around?.radius > 0) this.acts.setCamera(this.framed(around));
       else this.say("It can't be seen from here");
     } catch (error) {

@@ -7,7 +7,9 @@ export class Viewport {
   #context;
   #next = null; // the newest decoded frame that waits for the display
   #newest = -1; // its seq, or that of the frame on the canvas
-  #drop = () => { if (document.hidden) this.drop(); };
+  #drop = () => {
+    if (document.hidden) this.drop();
+  };
 
   // `painted({header, view, legend})` after each frame; `names(aov)` tells what the numbers of a layer stand for.
   constructor(canvas, { painted, names }) {

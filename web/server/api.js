@@ -23,7 +23,10 @@ const authorization = () => (readKey() ? { authorization: `Bearer ${readKey()}` 
 
 async function ask(method, path, { body, headers = {}, signal } = {}) {
   const response = await fetch(new URL(path, root), {
-    method, body, signal, headers: { accept: "application/json", ...authorization(), ...headers },
+    method,
+    body,
+    signal,
+    headers: { accept: "application/json", ...authorization(), ...headers },
   }).catch((error) => {
     throw error.name === "AbortError" ? error : new Error("The server does not answer. Your work is safe here.");
   });
@@ -42,7 +45,8 @@ export const fetchPreset = (kind, name) => get(`presets/${kind}/${encodeURICompo
 
 // Any words can be a document's title. Its name is a part of the address, and the few words that cannot be one
 // (a slash, or nothing but one or two dots) are replaced by their look-alikes.
-const nameOf = (title) => title.replaceAll("/", "\u2215").replace(/^\.{1,2}$/, (dots) => dots.replaceAll(".", "\u2024"));
+const nameOf = (title) =>
+  title.replaceAll("/", "\u2215").replace(/^\.{1,2}$/, (dots) => dots.replaceAll(".", "\u2024"));
 const saved = (kind, name) => `documents/${kind}/${encodeURIComponent(nameOf(name))}`;
 export const listSaved = (kind) => get(`documents/${kind}`);
 export const fetchSaved = (kind, name) => get(saved(kind, name));
@@ -66,9 +70,11 @@ export const askBsdf = async (question, body) => (await ask("POST", `bsdf${quest
 
 // A render as a job of the server's: {id, ...}; how far it is, asked for until it ends or `wait` seconds passed; its
 // picture so far.
-export const submitRender = async (scene, settings) => (await ask("POST", "renders", json({ scene, settings }))).json();
+export const submitRender = async (scene, settings) =>
+  (await ask("POST", "renders", json({ scene, settings }))).json();
 export const renderStatus = (id, wait) => get(`renders/${id}?${new URLSearchParams({ wait })}`);
-export const renderImage = async (id, query) => (await ask("GET", `renders/${id}/image?${new URLSearchParams(query)}`)).blob();
+export const renderImage = async (id, query) =>
+  (await ask("GET", `renders/${id}/image?${new URLSearchParams(query)}`)).blob();
 export const cancelRender = (id) => ask("DELETE", `renders/${id}`);
 
 export const renderUrl = (query) => new URL(`render?${new URLSearchParams(query)}`, root).href;

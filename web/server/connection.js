@@ -16,15 +16,24 @@ const REASONS = {
   1001: { title: "The server is shutting down.", detail: "This page comes back with it." },
   1009: {
     title: "The scene is too large for one message.",
-    detail: "Drop big meshes as files instead of writing them out; undo goes back.", final: true,
+    detail: "Drop big meshes as files instead of writing them out; undo goes back.",
+    final: true,
   },
   4401: { title: "The server asks for a key.", final: true, key: true },
   4403: {
     title: "The server does not take streams from this page's address.",
-    detail: "Its operator can name the address in SUNBOX_ALLOWED_ORIGINS.", final: true,
+    detail: "Its operator can name the address in SUNBOX_ALLOWED_ORIGINS.",
+    final: true,
   },
-  4409: { title: "This session goes on in another tab.", detail: "Continue there, or take a new one here.", final: true },
-  4429: { title: "The server is full.", detail: "Your scene is safe here; the picture comes as soon as somebody leaves." },
+  4409: {
+    title: "This session goes on in another tab.",
+    detail: "Continue there, or take a new one here.",
+    final: true,
+  },
+  4429: {
+    title: "The server is full.",
+    detail: "Your scene is safe here; the picture comes as soon as somebody leaves.",
+  },
   4500: { title: "The server lost its renderer.", detail: "Your scene is safe here." },
 };
 const LOST = { title: "The connection to the server was lost.", detail: "Your scene is safe here." };
@@ -47,8 +56,12 @@ export class Connection {
     this.beside = beside;
     this.watch = setInterval(() => this.#watch(), WATCH_MS);
     window.addEventListener("online", () => this.retry());
-    window.addEventListener("pageshow", (event) => { if (event.persisted) this.retry(); });
-    document.addEventListener("visibilitychange", () => { if (!document.hidden) this.retry(); });
+    window.addEventListener("pageshow", (event) => {
+      if (event.persisted) this.retry();
+    });
+    document.addEventListener("visibilitychange", () => {
+      if (!document.hidden) this.retry();
+    });
   }
 
   open() {
@@ -66,7 +79,9 @@ export class Connection {
       if (heard.type === "pong") this.#questions.shift()?.();
       else this.#on.text(heard);
     };
-    socket.onclose = (event) => { if (socket === this.#socket) this.#lose(event); };
+    socket.onclose = (event) => {
+      if (socket === this.#socket) this.#lose(event);
+    };
     this.#socket = socket;
   }
 
@@ -81,7 +96,9 @@ export class Connection {
   }
 
   // The session that the next opening takes up again.
-  keep(session) { this.#session = session ?? null; }
+  keep(session) {
+    this.#session = session ?? null;
+  }
 
   retry() {
     if (this.#closed || this.#attempt === 0) return;

@@ -8,27 +8,40 @@ const LONGEST_LIST = 100; // characters of what would have been right; a longer 
 const VERB = /^(must|is|are|has|have|needs?|cannot|can|does|do|refers?|lies|spans?)\b/;
 
 const BY_STATUS = {
-  401: "The server asks for a key.", 403: "The server does not allow this.", 404: "The server does not have this.",
-  413: "This is too large for the server.", 429: "The server is busy. Try again in a moment.",
+  401: "The server asks for a key.",
+  403: "The server does not allow this.",
+  404: "The server does not have this.",
+  413: "This is too large for the server.",
+  429: "The server is busy. Try again in a moment.",
   503: "The server is busy. Try again in a moment.",
 };
 
 // {name: title} of every field of a schema.
 export function fieldTitles(...schemas) {
   const owners = schemas.flatMap((schema) => [...Object.values(schema.$defs ?? {}), schema]);
-  return Object.fromEntries(owners.flatMap(({ properties = {} }) =>
-    Object.entries(properties).filter(([, { title }]) => title).map(([name, { title }]) => [name, title])));
+  return Object.fromEntries(
+    owners.flatMap(({ properties = {} }) =>
+      Object.entries(properties)
+        .filter(([, { title }]) => title)
+        .map(([name, { title }]) => [name, title]),
+    ),
+  );
 }
 
 const OWNERS = {
-  materials: (name) => `material ${inWords(name)}`, textures: (name) => `image ${name}`,
-  shapes: (index) => `shape ${Number(index) + 1}`, lights: (index) => `light ${Number(index) + 1}`,
+  materials: (name) => `material ${inWords(name)}`,
+  textures: (name) => `image ${name}`,
+  shapes: (index) => `shape ${Number(index) + 1}`,
+  lights: (index) => `light ${Number(index) + 1}`,
 };
 const SINGLES = { camera: "the camera", environment: "the environment" };
 
 // "/scene/materials/a/roughness" -> "Roughness of material A".
 export function placeWords(pointer, titles = {}) {
-  const parts = pointer.split("/").slice(1).map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
+  const parts = pointer
+    .split("/")
+    .slice(1)
+    .map((part) => part.replaceAll("~1", "/").replaceAll("~0", "~"));
   const [root, kind, ...rest] = parts;
   if (root !== "scene") return titles[kind] ?? (kind ? inWords(kind) : "This");
   if (!kind) return "The scene";
@@ -40,8 +53,19 @@ export function placeWords(pointer, titles = {}) {
 }
 
 const IN_FILE = {
-  materials: "Material", meshes: "Mesh", nodes: "Node", textures: "Texture", images: "Image", cameras: "Camera", lights: "Light",
-  accessors: "Accessor", bufferViews: "Buffer view", buffers: "Buffer", skins: "Skin", samplers: "Sampler", scenes: "Scene",
+  materials: "Material",
+  meshes: "Mesh",
+  nodes: "Node",
+  textures: "Texture",
+  images: "Image",
+  cameras: "Camera",
+  lights: "Light",
+  accessors: "Accessor",
+  bufferViews: "Buffer view",
+  buffers: "Buffer",
+  skins: "Skin",
+  samplers: "Sampler",
+  scenes: "Scene",
 };
 
 // "/materials/3/normalTexture" -> "Material 4": the place in a model file, or "" where its details say enough alone.
@@ -55,7 +79,10 @@ export function filePlaceWords(pointer) {
 // "/materials/3/alphaMode" -> "Material 4, alphaMode": a value that has to be mended in the file itself.
 export function fileValueWords(pointer) {
   const place = filePlaceWords(pointer);
-  const value = pointer.split("/").slice(3).findLast((part) => !/^\d+$/.test(part));
+  const value = pointer
+    .split("/")
+    .slice(3)
+    .findLast((part) => !/^\d+$/.test(part));
   return [place, place && value].filter(Boolean).join(", ");
 }
 
@@ -82,13 +109,18 @@ export function problemText(problem, titles = {}, place = (pointer) => placeWord
     const [, told = first.detail] = first.pointer ? first.detail.split(`${first.pointer}: `) : [];
     const words = detailWords(told);
     const where = place(first.pointer);
-    const more = others.length ? ` ${others.length === 1 ? "Another value is" : `${others.length} other values are`} wrong, too.` : "";
+    const more = others.length
+      ? ` ${others.length === 1 ? "Another value is" : `${others.length} other values are`} wrong, too.`
+      : "";
     if (!where) return sentence(words) + more;
     return (VERB.test(words) ? `${where} ${words}` : `${where}: ${words}`) + more;
   }
   if (problem instanceof SyntaxError) return "This is not valid JSON.";
   if (problem instanceof Problem && (problem.isGeneric || problem.status === 429 || problem.status === 503)) {
-    return BY_STATUS[problem.status] ?? (problem.status >= 500 ? "The server failed at this. Its log says why." : "The server does not take this.");
+    return (
+      BY_STATUS[problem.status] ??
+      (problem.status >= 500 ? "The server failed at this. Its log says why." : "The server does not take this.")
+    );
   }
   return ended(sentence(problem.message));
 }

@@ -4,14 +4,19 @@
 // A node with its references followed; what stands beside a reference wins.
 function resolve(schema, node) {
   if (!node?.$ref) return node ?? {};
-  const target = node.$ref.split("/").slice(1).reduce((place, key) => place[key], schema);
+  const target = node.$ref
+    .split("/")
+    .slice(1)
+    .reduce((place, key) => place[key], schema);
   const { $ref, ...beside } = node;
   return { ...resolve(schema, target), ...beside };
 }
 
 const branches = (schema, node) => {
   const options = node.anyOf ?? node.oneOf;
-  return options ? options.map((option) => resolve(schema, option)).filter((option) => option.type !== "null") : [node];
+  return options
+    ? options.map((option) => resolve(schema, option)).filter((option) => option.type !== "null")
+    : [node];
 };
 
 // What a property of a model is: the model's schema after references and optional wrappers.
@@ -35,17 +40,22 @@ export function variants(schema, union) {
 export const model = (schema, owner, name) =>
   branches(schema, property(schema, owner, name)).find((node) => node.properties);
 
-export const materialModels = (schema) => variants(schema, property(schema, schema, "materials").additionalProperties);
+export const materialModels = (schema) =>
+  variants(schema, property(schema, schema, "materials").additionalProperties);
 export const environmentModels = (schema) => variants(schema, schema.properties.environment);
 export const shapeModels = (schema) => variants(schema, schema.properties.shapes.items);
 export const lightModels = (schema) => variants(schema, schema.properties.lights.items);
 // Of a texture: one that is made from nothing says its type, the other is an image.
 export function textureModel(schema, { type }) {
   const union = property(schema, schema, "textures").additionalProperties;
-  return variants(schema, union)[type] ?? branches(schema, resolve(schema, union)).find((node) => !node.properties?.type);
+  return (
+    variants(schema, union)[type] ?? branches(schema, resolve(schema, union)).find((node) => !node.properties?.type)
+  );
 }
 export const transformModel = (schema) =>
-  branches(schema, property(schema, Object.values(shapeModels(schema))[0], "transform")).find((node) => node.properties?.translate);
+  branches(schema, property(schema, Object.values(shapeModels(schema))[0], "transform")).find(
+    (node) => node.properties?.translate,
+  );
 
 const bound = (nodes, key) => nodes.map((node) => node[key]).find((value) => value !== undefined);
 
@@ -61,7 +71,9 @@ function field(schema, name, raw, required) {
   const nodes = [top, ...options];
   const color = bound(nodes, "x-widget") === "color";
   const numeric = options.find((node) => ["number", "integer"].includes(node.type));
-  const vector = !color && options.find((node) => node.type === "array" && [2, 3].includes(node.maxItems) && node.items?.type === "number");
+  const vector =
+    !color &&
+    options.find((node) => node.type === "array" && [2, 3].includes(node.maxItems) && node.items?.type === "number");
   const reference = options.find((node) => node.properties?.texture);
   const whole = !options.some((node) => node.type === "number");
   const limits = [top, ...(numeric ? [numeric] : [])];
@@ -70,15 +82,30 @@ function field(schema, name, raw, required) {
   const min = bound(limits, "minimum") ?? open.min;
   const max = bound(limits, "maximum") ?? open.max;
   const soft = { min: bound(nodes, "x-soft-minimum") ?? min, max: bound(nodes, "x-soft-maximum") ?? max };
-  const widget = color ? "color"
-    : vector ? "vector"
-    : choices ? "choice"
-    : options.some((node) => node.type === "boolean") ? "toggle"
-    : numeric ? (bound(nodes, "x-widget") ?? "number")
-    : reference ? "texture" : null;
+  const widget = color
+    ? "color"
+    : vector
+      ? "vector"
+      : choices
+        ? "choice"
+        : options.some((node) => node.type === "boolean")
+          ? "toggle"
+          : numeric
+            ? (bound(nodes, "x-widget") ?? "number")
+            : reference
+              ? "texture"
+              : null;
   if (!widget || bound(nodes, "const") !== undefined) return null;
   return {
-    name, widget, choices, min, max, open, required, takesTexture: reference !== undefined, reference,
+    name,
+    widget,
+    choices,
+    min,
+    max,
+    open,
+    required,
+    takesTexture: reference !== undefined,
+    reference,
     length: vector?.maxItems,
     title: top.title ?? name,
     hint: bound(nodes, "description") ?? "",
@@ -108,7 +135,10 @@ export function fields(schema, owner) {
 export function followed({ follows }, value) {
   if (!follows || typeof value !== "number") return undefined;
   const { points } = follows;
-  const to = Math.max(1, points.findIndex(([x]) => x >= value));
+  const to = Math.max(
+    1,
+    points.findIndex(([x]) => x >= value),
+  );
   const [[x0, y0], [x1, y1]] = [points[to - 1], points[to]];
   return Number((y0 + ((y1 - y0) * (value - x0)) / (x1 - x0)).toPrecision(3));
 }

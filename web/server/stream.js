@@ -45,20 +45,29 @@ export class Stream {
   // `beside()`: the session of the same page's other stream, where there is one.
   constructor(on, beside) {
     this.#on = on;
-    this.#connection = new Connection({
-      text: (heard) => this.#hear(heard),
-      bytes: (buffer) => this.#receive(buffer),
-      lost: (reason, wait) => this.#lose(reason, wait),
-    }, beside);
+    this.#connection = new Connection(
+      {
+        text: (heard) => this.#hear(heard),
+        bytes: (buffer) => this.#receive(buffer),
+        lost: (reason, wait) => this.#lose(reason, wait),
+      },
+      beside,
+    );
     document.addEventListener("visibilitychange", this.#hide);
   }
 
-  get session() { return this.#session; }
+  get session() {
+    return this.#session;
+  }
 
   // The scene with its names in the server's order, by which its layers number them.
-  get document() { return this.#document; }
+  get document() {
+    return this.#document;
+  }
 
-  connect() { this.#connection.open(); }
+  connect() {
+    this.#connection.open();
+  }
 
   close() {
     document.removeEventListener("visibilitychange", this.#hide);
@@ -70,22 +79,32 @@ export class Stream {
   }
 
   // Tries at once instead of waiting for the next turn.
-  retry() { this.#connection.retry(); }
+  retry() {
+    this.#connection.retry();
+  }
 
   show(wanted) {
     this.#wanted = wanted;
     this.#soon();
   }
 
-  pause() { this.#halt("user", true); }
-  resume() { this.#halt("user", false); }
+  pause() {
+    this.#halt("user", true);
+  }
+  resume() {
+    this.#halt("user", false);
+  }
 
   // Whether a picture of this generation shows all that is wanted.
   isNewest(generation) {
     if (!this.#wanted) return false;
     const { scene, settings } = this.#sent ?? {};
-    return generation === this.#generation && this.#pending === null
-      && scene === this.#wanted.scene && equal(settings, this.#wanted.settings);
+    return (
+      generation === this.#generation &&
+      this.#pending === null &&
+      scene === this.#wanted.scene &&
+      equal(settings, this.#wanted.settings)
+    );
   }
 
   // The picture as the server has it now, seen otherwise: {header, bytes, scene}. Costs no sample. Raises NotReady
@@ -145,7 +164,10 @@ export class Stream {
   #soon() {
     if (this.#flushing) return;
     this.#flushing = true;
-    const flush = () => { this.#flushing = false; this.#flush(); };
+    const flush = () => {
+      this.#flushing = false;
+      this.#flush();
+    };
     // Hidden pages get no animation frames.
     if (document.hidden) setTimeout(flush);
     else requestAnimationFrame(flush);
@@ -246,7 +268,8 @@ export class Stream {
     if (!capture) return this.#on.frame(header, bytes, view, acknowledge);
     acknowledge();
     const captured = { header, bytes, scene: this.#sent?.scene };
-    if (header.scale < 1 && !this.#halted.user) { // a paused picture may never become larger
+    if (header.scale < 1 && !this.#halted.user) {
+      // a paused picture may never become larger
       if (capture.rough) capture.preview = captured;
       return;
     }
