@@ -6,10 +6,13 @@ import math
 from collections.abc import Callable, Mapping, Sequence
 from itertools import islice
 from types import NoneType
-from typing import Any, get_args
+from typing import Any, Literal, get_args
 
 from pydantic import BaseModel, ConfigDict, Field, GetCoreSchemaHandler, GetPydanticSchema, model_validator
 from pydantic_core import CoreSchema, PydanticCustomError
+
+# The parts of a material, under which the editor shows its parameters.
+Group = Literal["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface", "Film", "Emission", "Geometry"]
 
 REFUSAL = "refusal"  # the type of our own errors among pydantic's
 MOST_MISTAKES = 100  # that are searched for in one document: a list of ten thousand wrong spheres only repeats itself
@@ -49,6 +52,7 @@ def hint(
     title: str,
     description: str,
     *,
+    group: Group | None = None,
     unit: str | None = None,
     widget: str | None = None,
     soft: tuple[float, float] | float | None = None,
@@ -61,12 +65,15 @@ def hint(
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
-    `soft` is where a slider ends whose range goes on, or both its ends; `default` is told where the model's is None.
-    For a field that may be left out: `absent` is a word for what holds then; `follows` names the field, of the range
-    0 to 1, that sets it then, and how. `ranges` names a field with a choice, and the range for each of its values;
-    `used` the choices with which the field has a meaning, and `example` is what it begins with there.
+    `group` is the part of a material that the field belongs to. `soft` is where a slider ends whose range goes on,
+    or both its ends; `default` is given where the model's is None. For a field that may be left out: `absent` is a
+    word for what holds then; `follows` names the field, of the range 0 to 1, that sets it then, and how. `ranges`
+    names a field with a choice, and the range for each of its values; `used` the choices with which the field has a
+    meaning, and `example` is what it begins with there.
     """
     extra: dict[str, Any] = {}
+    if group is not None:
+        extra["x-group"] = group
     if unit is not None:
         extra["x-unit"] = unit
     if widget is not None:

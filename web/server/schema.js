@@ -108,6 +108,7 @@ function field(schema, name, raw, required) {
     reference,
     length: vector?.maxItems,
     title: top.title ?? name,
+    group: bound(nodes, "x-group"),
     hint: bound(nodes, "description") ?? "",
     unit: bound(nodes, "x-unit") ?? "",
     soft,

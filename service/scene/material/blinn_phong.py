@@ -15,13 +15,20 @@ class BlinnPhongMaterial(Surface):
     type: Literal["blinn_phong"]
     diffuse: Annotated[
         AnyReflectance,
-        hint("Diffuse", "Share of light that is sent back equally in all directions.", unit="", widget="color"),
+        hint(
+            "Diffuse",
+            "Share of light that is sent back equally in all directions.",
+            group="Base",
+            unit="",
+            widget="color",
+        ),
     ]
     specular: Annotated[
         AnyReflectance,
         hint(
             "Specular",
             "Colour of the highlight; not normalised: a sharper one sends back less light.",
+            group="Specular",
             unit="",
             widget="color",
         ),
@@ -31,6 +38,7 @@ class BlinnPhongMaterial(Surface):
         hint(
             "Shininess",
             "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
+            group="Specular",
             unit="",
             widget="slider",
             soft=1000,
@@ -41,6 +49,7 @@ class BlinnPhongMaterial(Surface):
         hint(
             "Ambient",
             "Radiance added wherever a path meets the surface; it is never sampled as a light.",
+            group="Emission",
             unit="W/(m^2 sr)",
             widget="color",
             soft=1,

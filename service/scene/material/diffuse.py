@@ -18,6 +18,7 @@ class DiffuseMaterial(Surface):
         hint(
             "Albedo",
             "Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04.",
+            group="Base",
             unit="",
             widget="color",
         ),

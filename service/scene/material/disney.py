@@ -20,6 +20,7 @@ class DisneyMaterial(Surface):
         hint(
             "Subsurface",
             "Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger).",
+            group="Subsurface",
             unit="",
             widget="slider",
         ),
@@ -30,6 +31,7 @@ class DisneyMaterial(Surface):
         hint(
             "Specular",
             "Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5.",
+            group="Specular",
             unit="",
             widget="slider",
         ),
@@ -39,6 +41,7 @@ class DisneyMaterial(Surface):
         hint(
             "Specular tint",
             "Tints the dielectric's reflection head-on to the base colour; grazing stays white.",
+            group="Specular",
             unit="",
             widget="slider",
         ),
@@ -49,23 +52,30 @@ class DisneyMaterial(Surface):
         hint(
             "Anisotropic",
             "Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1.",
+            group="Specular",
             unit="",
             widget="slider",
         ),
     ] = 0.0
     sheen: Annotated[
         AnyFraction,
-        hint("Sheen", "Extra light at grazing angles, for cloth.", unit="", widget="slider"),
+        hint("Sheen", "Extra light at grazing angles, for cloth.", group="Sheen", unit="", widget="slider"),
     ] = 0.0
     sheen_tint: Annotated[
         AnyFraction,
-        hint("Sheen tint", "Tints the sheen from white to the base colour.", unit="", widget="slider"),
+        hint("Sheen tint", "Tints the sheen from white to the base colour.", group="Sheen", unit="", widget="slider"),
     ] = 0.5
     clearcoat: Annotated[
         AnyFraction,
-        hint("Clearcoat", "A second, thin layer of lacquer with an index of 1.5.", unit="", widget="slider"),
+        hint(
+            "Clearcoat",
+            "A second, thin layer of lacquer with an index of 1.5.",
+            group="Coat",
+            unit="",
+            widget="slider",
+        ),
     ] = 0.0
     clearcoat_gloss: Annotated[
         AnyFraction,
-        hint("Clearcoat gloss", "1 is a gloss lacquer, 0 a satin one.", unit="", widget="slider"),
+        hint("Clearcoat gloss", "1 is a gloss lacquer, 0 a satin one.", group="Coat", unit="", widget="slider"),
     ] = 1.0

@@ -67,13 +67,15 @@ class MicrofacetMaterial(SolidSurface):
 
     type: Literal["microfacet"]
     distribution: Annotated[
-        Distribution, hint("Distribution", "How the normals of the microfacets are spread: D, normalised.")
+        Distribution,
+        hint("Distribution", "How the normals of the microfacets are spread: D, normalised.", group="Specular"),
     ] = "ggx"
     alpha: Annotated[
         AnyAlpha,
         hint(
             "Alpha",
             "The distribution's parameter: a width; for phong an exponent, for abc an inverse width.",
+            group="Specular",
             unit="",
             widget="slider",
             soft=(0.01, 1.0),
@@ -85,6 +87,7 @@ class MicrofacetMaterial(SolidSurface):
         hint(
             "Gamma",
             "How soon the tail falls off, for gtr, abc and sgd; the others do not use it.",
+            group="Specular",
             unit="",
             widget="slider",
             soft=(0.1, 10.0),
@@ -93,14 +96,18 @@ class MicrofacetMaterial(SolidSurface):
         ),
     ] = 2.0
     geometry: Annotated[
-        Geometry, hint("Geometry", "The share of the microfacets that is neither masked nor shadowed: G.")
+        Geometry,
+        hint("Geometry", "The share of the microfacets that is neither masked nor shadowed: G.", group="Specular"),
     ] = "smith"
-    fresnel: Annotated[Fresnel, hint("Fresnel", "The reflectance of one microfacet: F.")] = "schlick"
+    fresnel: Annotated[Fresnel, hint("Fresnel", "The reflectance of one microfacet: F.", group="Specular")] = (
+        "schlick"
+    )
     f0: Annotated[
         AnyReflectance,
         hint(
             "F0",
             "Reflectance head-on, for schlick and cook_torrance.",
+            group="Specular",
             unit="",
             widget="color",
             used=("fresnel", ["schlick", "cook_torrance"]),
@@ -111,6 +118,7 @@ class MicrofacetMaterial(SolidSurface):
         hint(
             "Index of refraction",
             "For dielectric: water 1.33, glass 1.5, diamond 2.42.",
+            group="Specular",
             unit="",
             widget="slider",
             used=("fresnel", ["dielectric"]),
@@ -122,6 +130,7 @@ class MicrofacetMaterial(SolidSurface):
         hint(
             "Conductor's index",
             "For conductor: its index of refraction, per channel.",
+            group="Specular",
             unit="",
             widget="number",
             used=("fresnel", ["conductor"]),
@@ -134,6 +143,7 @@ class MicrofacetMaterial(SolidSurface):
         hint(
             "Conductor's k",
             "For conductor: its extinction coefficient, per channel.",
+            group="Specular",
             unit="",
             widget="number",
             used=("fresnel", ["conductor"]),
@@ -142,14 +152,23 @@ class MicrofacetMaterial(SolidSurface):
     ] = None
     diffuse: Annotated[
         AnyReflectance,
-        hint("Diffuse", "Albedo of the diffuse lobe, which is added to the facets.", unit="", widget="color"),
+        hint(
+            "Diffuse",
+            "Albedo of the diffuse lobe, which is added to the facets.",
+            group="Base",
+            unit="",
+            widget="color",
+        ),
     ] = (0.0, 0.0, 0.0)
-    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "The shape of the diffuse lobe.")] = "lambert"
+    diffuse_model: Annotated[DiffuseModel, hint("Diffuse model", "The shape of the diffuse lobe.", group="Base")] = (
+        "lambert"
+    )
     diffuse_roughness: Annotated[
         Fraction,
         hint(
             "Diffuse roughness",
             "Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it.",
+            group="Base",
             unit="",
             widget="slider",
             used=("diffuse_model", ["oren_nayar", "disney", "eon"]),

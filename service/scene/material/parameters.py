@@ -12,6 +12,7 @@ BaseColor = Annotated[
     hint(
         "Base colour",
         "Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9.",
+        group="Base",
         unit="",
         widget="color",
     ),
@@ -21,6 +22,7 @@ Metallic = Annotated[
     hint(
         "Metallic",
         "0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance.",
+        group="Base",
         unit="",
         widget="slider",
     ),
@@ -30,6 +32,7 @@ Roughness = Annotated[
     hint(
         "Roughness",
         "0 is polished, 1 is matte; its square is the width of the highlight.",
+        group="Base",
         unit="",
         widget="slider",
     ),

@@ -37,6 +37,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Transmission",
             "Share of the base that is clear: 1 is solid glass, entered and left by refraction.",
+            group="Transmission",
             unit="",
             widget="slider",
         ),
@@ -47,6 +48,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Index of refraction",
             "Water 1.33, glass 1.5, diamond 2.42; in place of specular, which sets it otherwise.",
+            group="Specular",
             unit="",
             widget="slider",
             follows=("specular", index_of_specular),
@@ -57,6 +59,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Attenuation colour",
             "What is left of white light after the attenuation distance inside.",
+            group="Transmission",
             unit="",
             widget="color",
         ),
@@ -67,6 +70,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Attenuation distance",
             "How far inside light takes the attenuation colour; without it, clear.",
+            group="Transmission",
             unit="m",
             widget="slider",
             soft=5,
@@ -78,6 +82,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Specular colour",
             "Tints the dielectric's reflection head-on; grazing stays white.",
+            group="Specular",
             unit="",
             widget="color",
         ),
@@ -87,6 +92,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Anisotropic rotation",
             "Turns the stretch of the highlight, counter-clockwise from the tangent.",
+            group="Specular",
             unit="degrees",
             widget="angle",
             soft=(-180, 180),
@@ -98,6 +104,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Sheen colour",
             "Colour of the sheen, in place of white tinted by the sheen tint.",
+            group="Sheen",
             unit="",
             widget="color",
             absent="by tint",
@@ -108,6 +115,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Sheen roughness",
             "How far the sheen reaches from grazing angles inwards; satin is low, wool high.",
+            group="Sheen",
             unit="",
             widget="slider",
         ),
@@ -118,6 +126,7 @@ class PrincipledMaterial(DisneyMaterial):
         hint(
             "Clearcoat roughness",
             "Roughness of the coat, in place of its gloss; 0 is a perfect varnish.",
+            group="Coat",
             unit="",
             widget="slider",
             follows=("clearcoat_gloss", roughness_of_gloss),
@@ -126,5 +135,9 @@ class PrincipledMaterial(DisneyMaterial):
     clearcoat_normal_map: Annotated[
         NormalTexture | None,
         OMITTABLE,
-        hint("Coat normal map", "The coat's own; without it the coat is smooth over whatever is under it."),
+        hint(
+            "Coat normal map",
+            "The coat's own; without it the coat is smooth over whatever is under it.",
+            group="Coat",
+        ),
     ] = None

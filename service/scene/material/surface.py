@@ -12,6 +12,7 @@ Emission = Annotated[
     hint(
         "Emission",
         "Radiance that leaves the front side: above 0 the shape is an area light.",
+        group="Emission",
         unit="W/(m^2 sr)",
         widget="color",
         soft=20,
@@ -19,12 +20,16 @@ Emission = Annotated[
 ]
 EmissionSides = Annotated[
     Literal["front", "both"],
-    hint("Emitting sides", "Whether the emission leaves the outward side only, or the inward side as well."),
+    hint(
+        "Emitting sides",
+        "Whether the emission leaves the outward side only, or the inward side as well.",
+        group="Emission",
+    ),
 ]
 NormalMap = Annotated[
     NormalTexture | None,
     OMITTABLE,
-    hint("Normal map", "Bends the surface's normal without moving the surface."),
+    hint("Normal map", "Bends the surface's normal without moving the surface.", group="Geometry"),
 ]
 
 
@@ -44,6 +49,7 @@ class Surface(Model):
         hint(
             "Alpha",
             "The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh.",
+            group="Geometry",
             unit="",
             widget="slider",
         ),
@@ -54,6 +60,7 @@ class Surface(Model):
         hint(
             "Alpha cutoff",
             "Where given, an alpha of at least this counts as 1, any other as 0.",
+            group="Geometry",
             unit="",
             widget="slider",
             absent="off",

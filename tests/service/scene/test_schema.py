@@ -6,12 +6,13 @@ import json
 import math
 import re
 from collections.abc import Iterator
-from typing import Any
+from typing import Any, get_args
 
 import pytest
 
 from service.problems import InvalidDocument
 from service.scene import parse_scene, parse_settings, schema
+from service.scene.base import Group
 
 WHOLE = schema()
 UNITS = {"", "m", "degrees", "W/sr", "W/m^2", "W/(m^2 sr)", "s", "pixels"}
@@ -73,6 +74,12 @@ def test_numbers_carry_what_a_control_needs(name: str, prop: dict[str, Any]) -> 
     assert low is not None and high is not None and low < high <= 1024, "no slider can be so long"
     if isinstance(prop.get("default"), float):
         assert low <= prop["default"] <= high
+
+
+def test_every_parameter_of_a_material_belongs_to_a_group() -> None:
+    materials = [model for name, model in models().items() if name.endswith("Material")]
+    parameters = [p for model in materials for name, p in model["properties"].items() if name != "type"]
+    assert len(materials) >= 7 and {p["x-group"] for p in parameters} <= set(get_args(Group))
 
 
 def test_material_forms_begin_with_what_is_their_own() -> None:
