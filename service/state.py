@@ -57,7 +57,7 @@ class AppState:
     quota: Quota
     shares: AssetShares
     access: AssetAccess
-    renders: RenderQueue = field(default_factory=RenderQueue)
+    renders: RenderQueue
     traffic: Traffic = field(default_factory=Traffic)
     warming: asyncio.Task[None] | None = None  # renders a first frame, and prepares for changes of scene
     address: str = ""  # of the server; "" where there is none, as under a test's client

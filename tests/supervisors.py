@@ -11,9 +11,9 @@ from service.renderers.local.supervisor import Supervisor
 from tests.serving import PATIENCE_S
 
 
-def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], **options: Any) -> None:
+def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], checkpoint_s: float = 2.0, **options: Any) -> None:
     async def run() -> None:
-        supervisor = Supervisor(Options(**options))
+        supervisor = Supervisor(Options(checkpoint_s=checkpoint_s, **options))
         supervisor.start()
         try:
             await supervisor.ready(PATIENCE_S)

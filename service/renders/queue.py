@@ -10,7 +10,7 @@ import time
 from collections import Counter, OrderedDict
 from collections.abc import Callable, Collection, Coroutine, Iterator
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from itertools import islice
 from typing import Any
@@ -42,11 +42,11 @@ log = logging.getLogger(__name__)
 class QueueLimits:
     """How many renders run and wait at once, and which of the ended ones are kept."""
 
-    running: int = 8  # renders; the others wait, as each has its scene and its picture on the GPU
-    waiting: int = 256
-    each: int = 64  # running and waiting, of one owner
-    retention: Retention = field(default_factory=Retention)
-    disk_bytes: int | None = None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
+    running: int  # renders; the others wait, as each has its scene and its picture on the GPU
+    waiting: int
+    each: int  # running and waiting, of one owner
+    retention: Retention
+    disk_bytes: int | None  # of SUNBOX_DATA_QUOTA, of which the documents of what waits have a part
 
 
 @dataclass(frozen=True)
@@ -62,12 +62,12 @@ class RenderQueue:
 
     def __init__(
         self,
-        limits: QueueLimits | None = None,
+        limits: QueueLimits,
         store: RenderStore | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         """With a `store` renders outlive the server."""
-        self._limits = limits or QueueLimits()
+        self._limits = limits
         self.store = store
         self._jobs: dict[str, Job] = {}  # in the order of arrival
         self._followers = Followers[Job]()

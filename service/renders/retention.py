@@ -11,9 +11,9 @@ from typing import Generic, Protocol, TypeVar
 class Retention:
     """Which of the ended renders are kept."""
 
-    kept: int = 64  # of one owner ...
-    kept_bytes: int = 1 << 30  # ... what the pictures and documents of all of them may take ...
-    kept_s: float = 3600.0  # ... and for how long
+    kept: int  # renders of each owner
+    kept_bytes: int  # of the pictures and documents of all of them
+    kept_s: float  # after a render's end
 
 
 class Ended(Protocol):

@@ -12,6 +12,7 @@ import sys
 import time
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import inf
 from pathlib import Path
 from typing import Any, Literal, Protocol
 
@@ -93,7 +94,7 @@ class Options:
     patience_s: float = 10.0  # without progress
     memory: int | None = None  # bytes that may be held on the device; None: the worker decides
     host_memory: int | None = None  # the same where that is the machine's memory
-    checkpoint_s: float = 2.0  # between two of a render
+    checkpoint_s: float = inf  # between two of a render; inf: none before its end
 
 
 class Process:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import asyncio
 import time
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
 
@@ -13,7 +14,7 @@ import pytest
 from service.problems import Gone, InvalidDocument, NotFound, TooManyRequests, Unavailable
 from service.renders.followers import Changes
 from service.renders.queue import QueueLimits, RenderQueue
-from service.renders.retention import Retention
+from tests.queues import LIMITS
 
 
 class Job:
@@ -71,7 +72,7 @@ def test_the_oldest_of_an_owner_make_room() -> None:
         with pytest.raises(NotFound):
             renders.get("a0", "b")
 
-    keeping(QueueLimits(retention=Retention(kept=2)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept=2)), scenario)
 
 
 def test_who_holds_most_makes_room() -> None:
@@ -82,7 +83,7 @@ def test_who_holds_most_makes_room() -> None:
         assert renders.get("small", "b") is small and renders.get("a1", "a") is big[1]
         assert big[0].released and not small.released
 
-    keeping(QueueLimits(retention=Retention(kept_bytes=100)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept_bytes=100)), scenario)
 
 
 def test_the_newest_stays_however_large() -> None:
@@ -90,7 +91,7 @@ def test_the_newest_stays_however_large() -> None:
         await ended(renders, Job("a", size=1000))
         assert renders.get("a").id == "a"
 
-    keeping(QueueLimits(retention=Retention(kept_bytes=10)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept_bytes=10)), scenario)
 
 
 def test_time_makes_an_end() -> None:
@@ -103,7 +104,7 @@ def test_time_makes_an_end() -> None:
             renders.get("first")
         assert first.released and renders.kept == 0
 
-    keeping(QueueLimits(retention=Retention(kept_s=0.05)), scenario)
+    keeping(replace(LIMITS, retention=replace(LIMITS.retention, kept_s=0.05)), scenario)
 
 
 def test_others_do_not_hear_of_it() -> None:
@@ -115,7 +116,7 @@ def test_others_do_not_hear_of_it() -> None:
             assert renders.page(owner).renders == []
         await renders.close()
 
-    keeping(QueueLimits(), scenario)
+    keeping(LIMITS, scenario)
 
 
 def test_there_is_an_end_to_the_queue() -> None:
@@ -134,7 +135,7 @@ def test_there_is_an_end_to_the_queue() -> None:
         await renders.submit(Job("more", "a"))
         await renders.close()
 
-    keeping(QueueLimits(running=1, waiting=2, each=2), scenario)
+    keeping(replace(LIMITS, running=1, waiting=2, each=2), scenario)
 
 
 def test_a_full_queue_takes_renders_of_keys_with_less_than_their_share() -> None:
@@ -150,7 +151,7 @@ def test_a_full_queue_takes_renders_of_keys_with_less_than_their_share() -> None
         await renders.submit(Job("c0", "c"))
         await renders.close()
 
-    keeping(QueueLimits(running=1, waiting=6), scenario)
+    keeping(replace(LIMITS, running=1, waiting=6), scenario)
 
 
 async def order(renders: Any, jobs: list[Job]) -> list[str]:
@@ -178,7 +179,7 @@ def test_slots_go_round_the_keys_and_among_ones_own_by_priority() -> None:
         first.finished.set()
         assert await order(renders, jobs) == ["b0", "c0", "a2", "b1", "a0", "a3", "a1"]
 
-    keeping(QueueLimits(running=1), scenario)
+    keeping(replace(LIMITS, running=1), scenario)
 
 
 def test_a_key_with_many_renders_has_its_share_of_the_slots() -> None:
@@ -195,7 +196,7 @@ def test_a_key_with_many_renders_has_its_share_of_the_slots() -> None:
         assert other.state == "running" and jobs[3].state == "queued"
         await renders.close()
 
-    keeping(QueueLimits(running=3), scenario)
+    keeping(replace(LIMITS, running=3), scenario)
 
 
 def test_what_is_cancelled_while_it_waits_leaves_the_queue() -> None:
@@ -210,7 +211,7 @@ def test_what_is_cancelled_while_it_waits_leaves_the_queue() -> None:
         assert jobs[2].state == "running" and renders.queued == 0
         await renders.close()
 
-    keeping(QueueLimits(running=1), scenario)
+    keeping(replace(LIMITS, running=1), scenario)
 
 
 def test_pages() -> None:
@@ -234,4 +235,4 @@ def test_pages() -> None:
                 page(after=other)
         await renders.close()
 
-    keeping(QueueLimits(running=1), scenario)
+    keeping(replace(LIMITS, running=1), scenario)

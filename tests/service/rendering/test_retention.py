@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import asyncio
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -15,7 +16,7 @@ from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import Gone, TooManyRequests, Unavailable
 from service.renders.documents import WaitingDocuments
 from service.renders.job import Job
-from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.queue import RenderQueue
 from service.renders.retention import KeptRenders, Retention
 from service.renders.status import status
 from service.renders.store.record import Order, Outcome
@@ -24,6 +25,7 @@ from service.storage.quota import QuotaUsedUp, reserve_bytes
 from service.storage.stores import Storage, storage
 from service.system.disk_usage import Usage
 from tests.asset_files import OBJ
+from tests.queues import LIMITS
 from tests.service.rendering.test_job import SETTINGS, Renderers, load
 
 
@@ -94,7 +96,7 @@ class Disk:
         self.kept: Storage = storage(Config(data_dir=folder, data_quota=QUOTA))
         room = self.kept.quota.room
         self.store = RenderStore(folder, room, partial(room, reserved=True))
-        self.queue = RenderQueue(QueueLimits(running=1, disk_bytes=QUOTA), self.store)
+        self.queue = RenderQueue(replace(LIMITS, running=1, disk_bytes=QUOTA), self.store)
         self._count = 0
 
     async def submit(self, owner: str, size: int) -> Job:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 from typing import Any
@@ -15,17 +16,19 @@ from gpu import Renderer
 from service.ipc.messages import Done, Progress, Restore, SavedPicture, Update, View
 from service.pack import Packed
 from service.quality import ResolvedSettings
+from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
 from service.renders import preemption, slots
 from service.renders.job import Job
 from service.renders.memory import PICTURE_BYTES, SAVED_BYTES
 from service.renders.preemption import giving_way
-from service.renders.queue import QueueLimits, RenderQueue
+from service.renders.queue import RenderQueue
 from service.renders.slots import Slots
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
 from service.requests.request_reader import weight
 from service.system.memory import MemoryBudget
+from tests.queues import LIMITS
 from tests.service.rendering.test_job import PACKED, SETTINGS, Renderers, until
 
 
@@ -73,7 +76,7 @@ def test_renders_that_need_more_memory_to_be_read_all_end_after_a_restart(tmp_pa
         store, renderers = RenderStore(tmp_path), Quick()
         for id in range(8):
             await store.insert(Order(f"{id}", "", SETTINGS, bytes=8), Outcome("running"), b"document", [])
-        queue = RenderQueue(QueueLimits(running=8), store)
+        queue = RenderQueue(replace(LIMITS, running=8), store)
         budget.cache("pictures", lambda: 0, queue.shrink)
         made = lambda stored: Job(renderers, stored.order, load, outcome=stored.outcome, budget=budget)  # type: ignore[arg-type]  # noqa: E731
         queue.resume(store.load(), made)
@@ -97,7 +100,7 @@ def test_what_waits_for_memory_has_neither_memory_nor_a_slot(tmp_path: Path) -> 
     async def scenario() -> None:
         store = RenderStore(tmp_path)
         await store.insert(Order("a", "", SETTINGS, bytes=8), Outcome("running"), b"document", [])
-        queue = RenderQueue(QueueLimits(running=1), store)
+        queue = RenderQueue(replace(LIMITS, running=1), store)
         budget.hold("scenes", queue, 3 * PICTURE - 1)
         queue.resume(store.load(), lambda stored: Job(Renderers(), stored.order, load, budget=budget))  # type: ignore[arg-type]
         assert (queue.running, queue.queued, budget.used()["pictures"]) == (0, 1, 0)
@@ -321,10 +324,10 @@ def test_what_gave_way_ends_with_the_same_bits(
         return PACKED
 
     async def scenario() -> None:
-        supervisor = Supervisor()
+        supervisor = Supervisor(Options(checkpoint_s=2.0))
         supervisor.start()
         await supervisor.ready(30)
-        queue = RenderQueue(QueueLimits(running=1), RenderStore(tmp_path))
+        queue = RenderQueue(replace(LIMITS, running=1), RenderStore(tmp_path))
         job = {
             id: Job(supervisor, Order(id, owner, LONG, bytes=8), load, b"document", PACKED)
             for id, owner in (("undisturbed", "a"), ("a0", "a"), ("b0", "b"))
@@ -360,7 +363,7 @@ def test_a_render_that_ends_while_it_is_to_give_way_has_ended(tmp_path: Path) ->
 
     async def scenario() -> None:
         renderers: Any = Renderers()
-        queue = RenderQueue(QueueLimits(running=1), RenderStore(tmp_path))
+        queue = RenderQueue(replace(LIMITS, running=1), RenderStore(tmp_path))
         job = Job(renderers, Order("id", "a", SETTINGS, bytes=8), load, b"document", PACKED)
         await queue.submit(job)
         await until(lambda: renderers.sent)

@@ -1,0 +1,14 @@
+"""The limits of a queue of renders, for tests that change one of them."""
+
+from __future__ import annotations
+
+from service.renders.queue import QueueLimits
+from service.renders.retention import Retention
+
+LIMITS = QueueLimits(
+    running=8,
+    waiting=256,
+    each=64,
+    retention=Retention(kept=64, kept_bytes=1 << 30, kept_s=3600.0),
+    disk_bytes=None,
+)
