@@ -275,26 +275,3 @@ class Scene:
             texture.release()
         if self._key:
             self._shared.give_back(self._key)
-
-
-class Everything(Scene):
-    """A scene that is on the device, with every flag raised, to compare kernels. Release it before the other one."""
-
-    def __init__(self, scene: Scene) -> None:
-        self.__dict__.update(scene.__dict__)
-        self._everything = True
-        self._raise_flags()
-        missing = KINDS.keys() - self._details.keys() - self._images.keys()
-        self._own = {unit: placeholder(self._context, unit) for unit in missing}
-        if bindings.COLORS_TEXTURE in missing and len(self.arrays.triangles):
-            self._own[bindings.COLORS_TEXTURE].release()
-            self._own[bindings.COLORS_TEXTURE] = linear_texture(self._context, self.arrays.corner_colors, 4, "f2")
-        self._details = self._details | self._own
-        if not self._tables:
-            self._tables = upload_tables(self._context)
-            self._own |= self._tables
-
-    def release(self) -> None:
-        contexts.use(self._context)
-        for texture in self._own.values():
-            texture.release()

@@ -102,14 +102,6 @@ def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[Kerne
     ]
 
 
-def full_key(arrays: SceneArrays, settings: RenderSettings) -> KernelKey:
-    """The key with every flag raised, for a `scene.Everything`, which has a texture bound to every unit."""
-    own = kernel_key(arrays, settings, features.everything())
-    bound = {unit for unit, *_ in own.textures}
-    bare = ((unit, channels, dtype, 1, 1) for unit, (channels, dtype) in KINDS.items() if unit not in bound)
-    return replace(own, textures=(*own.textures, *bare))
-
-
 def common_keys() -> list[KernelKey]:
     """The keys of the kernels of any scene: those of the noise meter, of blocks and of `adaptive`, and those that
     show a picture."""

@@ -39,7 +39,7 @@ def run(arguments: argparse.Namespace) -> int:
             if packed is not None:
                 _print(kernel(renderer, packed))
             if packed is not None and arguments.measure:
-                _print(measured(renderer, packed, config.device))
+                _print(measured(renderer, packed))
             rows = [("sunbox", metadata.version("sunbox"))]
             rows += [(name, str(renderer.info[name])) for name in ("renderer", "version", "vendor")]
     except GpuError as error:
@@ -74,16 +74,12 @@ def kernel(renderer: Renderer, packed: Packed) -> list[tuple[str, str]]:
         scene.release()
 
 
-def measured(renderer: Renderer, packed: Packed, device: int | None) -> list[tuple[str, str]]:
+def measured(renderer: Renderer, packed: Packed) -> list[tuple[str, str]]:
     """What the scene's kernel saves beside one with every feature; both are compiled, and measured here and now."""
-    from gpu import RenderSettings
-    from gpu.analysis.kernel_cost import SIZE, full_kernel, kernel_cost
-    from service.worker.helpers.compile_client import CompileClient
+    from gpu.analysis.kernel_cost import kernel_cost
 
-    settings = RenderSettings(SIZE, SIZE)
     print("compiling and measuring; the kernel with every feature may take minutes", file=sys.stderr)
-    price = kernel_cost(renderer, packed.arrays, settings)
-    CompileClient(renderer.info, device, crowded=lambda: False).met(full_kernel(packed.arrays, settings))
+    price = kernel_cost(renderer, packed.arrays)
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
         ("not needed", " ".join(price.spared)),

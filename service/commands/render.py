@@ -78,8 +78,6 @@ def run(arguments: argparse.Namespace) -> int:
                 setup_s = time.perf_counter() - began
                 tracing.run(interrupt)
                 files.write(output.path, _encode(tracing, output, document, names))
-                if stats and interrupt.signal is None:
-                    tracing.measure_kernel()
                 tracing.close()
         except GpuError as error:
             raise Failed(str(error)) from None

@@ -14,7 +14,6 @@ from gpu import GpuError
 from service.commands import Failed
 from service.commands.progress import ProgressLine
 from service.ipc import messages
-from service.ipc.kernel_messages import KernelMeasured
 from service.ipc.messages import (
     Done,
     FromRenderer,
@@ -29,7 +28,6 @@ from service.ipc.messages import (
 )
 from service.quality import forecast
 from service.worker.context import WorkerContext
-from service.worker.helpers.compile_client import CompileClient
 from service.worker.helpers.denoise_client import DenoiseClient
 from service.worker.task import Task
 
@@ -39,7 +37,6 @@ if TYPE_CHECKING:
     from service.quality import ResolvedSettings
 
 NUMBER = 1  # of the only task
-UNMEASURED = KernelMeasured(NUMBER, "Not measured.")
 SIGNAL_S = 0.1  # how long a signal may go unnoticed while the denoiser works
 
 
@@ -72,15 +69,11 @@ class Tracing:
         self._line = ProgressLine()
         self._reason: str | None = None
         self._kernel: dict[str, Any] | None = None
-        self._kernel_measured = UNMEASURED
         self._pixels: np.ndarray | None = None
         self._answered = False
         stop = StopRule(settings.max_samples, settings.time_limit, settings.target_noise)
         self._denoiser = DenoiseClient()
-        at_hand = CompileClient(
-            renderer.info, None, crowded=lambda: False
-        )  # compiles nothing, but knows which kernels are compiled
-        self._task = Task(WorkerContext(renderer, self._hear, self._denoiser, at_hand), NUMBER)
+        self._task = Task(WorkerContext(renderer, self._hear, self._denoiser), NUMBER)
         update = Update(NUMBER, 1, packed.arrays, settings.for_gpu(), stop, denoise=settings.denoise)
         self._task.update(update)
 
@@ -104,12 +97,6 @@ class Tracing:
             raise Failed("stopped before the first sample: there is no picture yet")
         return self._pixels
 
-    def measure_kernel(self) -> None:
-        """Measure what the kernel saves, where that takes no compilation."""
-        self._task.savings.ask()
-        while self._task.savings.due:
-            self._task.measure_kernel()
-
     def close(self) -> None:
         self._denoiser.close()
 
@@ -130,7 +117,7 @@ class Tracing:
             "noise": now.noise,
             "elapsed_s": now.elapsed_s,
             "setup_s": setup_s,
-            "kernel": None if self._kernel is None else self._kernel | self._kernel_measured.kernel,
+            "kernel": self._kernel,
             "eta_s": now.eta_s,
             "forecast": forecast(now.samples, now.noise, now.elapsed_s, now.missing),
             "warnings": self.warnings,
@@ -140,8 +127,6 @@ class Tracing:
     def _hear(self, message: FromRenderer) -> None:
         if isinstance(message, Image):
             self._pixels, self._answered = message.pixels, True
-        elif isinstance(message, KernelMeasured):
-            self._kernel_measured = message
         elif isinstance(message, Progressed):
             if self._line.due():
                 self._line.show(message.progress)

@@ -8,7 +8,6 @@ from typing import Any, Literal, Protocol
 
 import numpy as np
 
-from service.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.views import DEFAULT_TONE_MAP, Encoding
@@ -347,7 +346,6 @@ ToRenderer = (
     | TakeCheckpoint
     | CheckpointStored
     | Restore
-    | MeasureKernel
     | EvaluateBsdf
     | Assist
     | Assistants
@@ -362,7 +360,6 @@ Heard = (  # of a renderer that has started
     | Progressed
     | Checkpoint
     | Done
-    | KernelMeasured
     | Evaluated
     | Evicted
     | Discarded

@@ -7,7 +7,6 @@ from dataclasses import dataclass, replace
 
 from service.ipc import channel
 from service.ipc.channel import Encoded
-from service.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.ipc.messages import (
     Checkpoint,
     Done,
@@ -49,7 +48,6 @@ class ReplayLog:
 
     def __init__(self, task: int) -> None:
         self.reads: dict[int, Read] = {}  # not answered yet
-        self.measure_kernel: MeasureKernel | None = None  # not answered yet
         self._question: EvaluateBsdf | None = None  # not answered yet: an answer ends its task
         self.saved: Kept | None = None  # a finished picture
         self._checkpoint: Kept | None = None  # one under way
@@ -104,8 +102,6 @@ class ReplayLog:
             self._want = message
         elif isinstance(message, Read):
             self.reads[message.serial] = message
-        elif isinstance(message, MeasureKernel):
-            self.measure_kernel = message
         elif isinstance(message, EvaluateBsdf):
             self._question = message
         elif isinstance(message, Pause | Resume):
@@ -122,8 +118,6 @@ class ReplayLog:
                 self._fall_back(message)
         elif isinstance(message, Image):
             self.reads.pop(message.serial, None)
-        elif isinstance(message, KernelMeasured):
-            self.measure_kernel = None
         elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
             self._works(message.generation)
         if isinstance(message, Checkpoint):
@@ -150,8 +144,6 @@ class ReplayLog:
         if kept is not None:
             out.append(kept)
         asked: list[ToRenderer] = [*self.reads.values()]
-        if self.measure_kernel is not None:
-            asked.append(self.measure_kernel)
         if self._question is not None:
             asked.append(self._question)
         if not out or self.saved is not None:

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from service.ipc.kernel_messages import KernelMeasured
 from service.renderers.protocol import Listener
 from service.renderers.replay_log import ReplayLog
 from service.renderers.statistics import Kind
@@ -24,8 +23,3 @@ class Task:
     def active(self) -> bool:
         """Whether it takes a renderer's time, as an attended stream does, and a render until it has ended."""
         return self.record.saved is None and not self.record.away
-
-    def not_measured(self, why: str) -> None:
-        """Answer that the kernel was not measured; to retry unasked might bring down one renderer after another."""
-        if (asked := self.record.measure_kernel) is not None:
-            self.listener.heard(self.record.heard(KernelMeasured(asked.task, why)))

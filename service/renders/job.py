@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from service.ipc.kernel_messages import KernelMeasured, MeasureKernel
 from service.ipc.messages import (
     Checkpoint,
     Done,
@@ -160,11 +159,9 @@ class Job(Resident):
             await self.recorder.store_now(partial(self.renderers.send, TakeCheckpoint(self._task)))
         await self.recorded()
 
-    async def settled(self, measured: bool) -> None:
-        """Return when the render is finished (`measured`: its kernel measured, too), or the server ends."""
+    async def settled(self) -> None:
+        """Return when the render is finished, or the server ends."""
         await self._over.wait()
-        if measured and self.finished.is_set() and self.outcome.kernel is not None and self._task is not None:
-            await self._kernel.answered.wait()
 
     async def changed(self) -> bool:
         """Return at the next change of the status: True; or when the server ends, which leaves it as it is."""
@@ -172,8 +169,7 @@ class Job(Resident):
         return self.finished.is_set() or not self._over.is_set()
 
     def status(self, kernel: bool = False) -> dict[str, Any]:
-        known = self._kernel.known if kernel else None
-        return status(self.order, self.outcome, self.renderers.tracing(self._task), known)
+        return status(self.order, self.outcome, self.renderers.tracing(self._task), kernel)
 
     async def image(self, view: View) -> tuple[np.ndarray, Progress]:
         """The picture so far. Raises Conflict before the first sample, and the render's own error where it failed."""
@@ -195,8 +191,6 @@ class Job(Resident):
     def heard(self, message: FromRenderer) -> None:
         if isinstance(message, Image):
             self._reads.answer(message.serial, message)
-        elif isinstance(message, KernelMeasured):
-            self._kernel.answer(message)
         elif isinstance(message, Failed) and message.serial is not None:
             self._reads.answer(message.serial, error_of(message))
         elif self._shown:
@@ -205,8 +199,6 @@ class Job(Resident):
                 self.release()
         elif isinstance(message, Loaded):
             self.outcome = self.outcome.loaded(message)
-            if self._kernel.awaited and self._task is not None:
-                self.renderers.send(MeasureKernel(self._task))
         elif isinstance(message, Progressed):
             if message.progress.samples >= self._least_samples and not self._gives_way:
                 self._progressed(message.progress)
@@ -322,7 +314,6 @@ class Job(Resident):
         self._scene.set_aside()
         self._memory.release()
         self._sampled.set()
-        self._kernel.answered.set()
         self._reads.answer_all(error)
 
     def _wake(self) -> None:

@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import asyncio
-import contextlib
 from dataclasses import replace
 
-from service.ipc.kernel_messages import MeasureKernel
 from service.ipc.messages import Restore, Update
 from service.pack import Packed
 from service.problems import Conflict, Internal, ServiceError
@@ -14,7 +12,6 @@ from service.renderers.protocol import Listener, Renderers
 from service.renders.ordered import Ordered
 from service.renders.reads import Reads
 from service.renders.scene import RenderScene
-from service.renders.status import KernelQuestion
 from service.renders.store.record import Order, Outcome
 from service.requests.request_reader import stop_rule
 
@@ -32,7 +29,6 @@ class Resident(Ordered, Listener):
         self._loading = asyncio.Lock()
         self._reads = Reads()
         self._looking = 0  # how many wait for an image
-        self._kernel = KernelQuestion()
         self._error: ServiceError | None = None
 
     @property
@@ -65,19 +61,10 @@ class Resident(Ordered, Listener):
     def rest(self) -> bool:
         """Release what can be brought back from the disk, if nobody waits for it; whether that was possible."""
         stored = self.recorder is not None and self.recorder.whole and self.finished.is_set()
-        possible = (stored or self._shown) and not self._reads and not self._looking and not self._kernel.awaited
+        possible = (stored or self._shown) and not self._reads and not self._looking
         if possible:
             self.release()
         return possible
-
-    async def measure_kernel(self) -> None:
-        """Have the renderer measure what the kernel saves, when it has nothing else to do."""
-        if self._error is None and self._kernel.ask():
-            if self.finished.is_set():
-                with contextlib.suppress(Conflict):
-                    await self._bring_back()
-            if self.outcome.kernel is not None and self._task is not None:
-                self.renderers.send(MeasureKernel(self._task))
 
     async def _bring_back(self) -> None:
         """Have the renderer show what was stored last. Raises Conflict where nothing was."""

@@ -2,49 +2,19 @@
 
 from __future__ import annotations
 
-import asyncio
 from datetime import UTC, datetime
 from typing import Any
 
-from service.ipc.kernel_messages import KernelMeasured
 from service.ipc.leases import undivided
 from service.ipc.messages import Failed
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError
 from service.quality import forecast
 from service.renders.store.record import Order, Outcome
 
-UNASKED = KernelMeasured(0, "Not measured yet: GET this render with ?saving=true, and wait=60 to wait for it.")
-ASKED = KernelMeasured(
-    0, "To be measured as soon as nothing is being rendered: ask again, or wait for it with wait=60."
-)
 
-
-class KernelQuestion:
-    """What a render's kernel saves, which the renderer measures once somebody asks."""
-
-    def __init__(self) -> None:
-        self.known = UNASKED
-        self.answered = asyncio.Event()
-
-    @property
-    def awaited(self) -> bool:
-        return self.known is ASKED
-
-    def ask(self) -> bool:
-        """Whether it has to be measured."""
-        if self.known.sample_s is None:
-            self.known = ASKED
-            self.answered.clear()
-        return self.awaited
-
-    def answer(self, known: KernelMeasured) -> None:
-        self.known = known
-        self.answered.set()
-
-
-def status(order: Order, outcome: Outcome, renderers: int, measured: KernelMeasured | None = None) -> dict[str, Any]:
-    """As JSON; `renderers` is how many trace it. With what is `measured` of its kernel, the kernel as well, whose
-    flags' names are longer than all the rest."""
+def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False) -> dict[str, Any]:
+    """As JSON; `renderers` is how many trace it. With `kernel`, what its kernel was compiled for as well: the flags'
+    names are longer than all the rest."""
     progress = outcome.progress
     known: dict[str, Any] = {
         "id": order.id,
@@ -66,8 +36,8 @@ def status(order: Order, outcome: Outcome, renderers: int, measured: KernelMeasu
         "not_divided": undivided(order.settings.adaptive, order.settings.time_limit),
         "settings": order.settings.document(),
     }
-    if measured is not None:
-        known["kernel"] = None if outcome.kernel is None else outcome.kernel | measured.kernel
+    if kernel:
+        known["kernel"] = outcome.kernel
     return known if outcome.problem is None else known | {"problem": outcome.problem}
 
 

@@ -82,11 +82,6 @@ class Kernel(BaseModel):
     raised: list[str] = Field(description="Features of the scene that the kernel was compiled with.")
     not_raised: list[str] = Field(description="Features that it was spared.")
     compile_ms: float
-    saving: float | None = Field(description="Share of the time of a kernel with everything on; measured.")
-    saving_unknown: str | None = Field(description="Why `saving` is null; null where it is not.")
-    sample_s: float | None = Field(description="Of this kernel, seconds a sample and pixel; null until measured.")
-    full_sample_s: float | None = Field(description="The same of the kernel with everything on.")
-    full_compile_ms: float | None = Field(description="How long that kernel took to compile or to load.")
 
 
 class Forecast(BaseModel):
@@ -111,9 +106,7 @@ class Render(BaseModel):
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
     elapsed_s: float = Field(description="From the first dispatch to the end of the last sample.")
     setup_s: float = Field(description="Loading, building and compiling before that.")
-    kernel: Kernel | None = Field(
-        None, description="With `kernel` or `saving` only; null until the scene is loaded, too."
-    )
+    kernel: Kernel | None = Field(None, description="With `kernel` only; null until the scene is loaded, too.")
     eta_s: float | None
     forecast: dict[str, Forecast] | None = Field(description="By quality preset; null until 16 samples tell.")
     warnings: list[str]

@@ -41,15 +41,7 @@ Wait = Annotated[
         description=f"Seconds. One caller has at most {MOST_WAITS} answers that wait, event streams included.",
     ),
 ]
-Saving = Annotated[
-    bool,
-    Query(
-        description="Have measured what this render's kernel saves beside the one with everything on. That happens "
-        "once, while nothing is being rendered; the other kernel may have to be compiled for it, in spare time (a "
-        "minute and a half of a core by llvmpipe). Answers with `kernel` bring it from then on."
-    ),
-]
-Kernel = Annotated[bool, Query(description="Answer with what the kernel was compiled for, too; so does `saving`.")]
+Kernel = Annotated[bool, Query(description="Answer with what the kernel was compiled for, too.")]
 Label = Annotated[str | None, Query(max_length=LONGEST_LABEL, description="Exactly this label.")]
 FLOAT_BYTES = 4  # of a number in a layer, as the renderer gives it
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
@@ -132,7 +124,7 @@ async def start(request: Request, wait: Wait = 0, idempotency_key: IdempotencyHe
     with waiting.place(request) if wait else contextlib.nullcontext():
         found = await submission.submitted(request, idempotency_key)
         if isinstance(found, Job) and wait:
-            if not await waiting.until(request, found.settled(False), wait):
+            if not await waiting.until(request, found.settled(), wait):
                 return Response(status_code=GONE)
             if found.finished.is_set():
                 code = 200
@@ -173,22 +165,17 @@ async def all_progress(request: Request, label: Label = None) -> Response:
 @router.get(
     "/renders/{id}",
     summary="How far it is",
-    description="With `wait`, answers at the render's end, or after that many seconds; with `saving`, once that is "
-    "measured as well.",
+    description="With `wait`, answers at the render's end, or after that many seconds.",
     response_class=Response,
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422, 429),
 )
-async def status(
-    request: Request, id: answers.RenderId, wait: Wait = 0, kernel: Kernel = False, saving: Saving = False
-) -> Response:
+async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel: Kernel = False) -> Response:
     renders = app_state(request).renders
     job = renders.get(id, owner(request))
     with waiting.place(request) if wait else contextlib.nullcontext(), renders.looking(job):
-        if saving:
-            await job.measure_kernel()
-        if wait and not await waiting.until(request, job.settled(saving), wait):
+        if wait and not await waiting.until(request, job.settled(), wait):
             return Response(status_code=GONE)
-    return JSONResponse(job.status(kernel=kernel or saving))
+    return JSONResponse(job.status(kernel=kernel))
 
 
 @router.get(

@@ -2,20 +2,19 @@
 
 `python -m service.worker DESCRIPTOR` with one end of `channel.pair()`.
 
-__main__        the process: its options, its device, its end
-list_devices    a program that prints EGL's devices
-loop            takes the newest messages, chooses whose turn it is, traces a slice, publishes
-scheduler       whose turn it is
-task            one client's picture, from its first update to its end
-bsdf_task       one question about the BSDF of a material, in its turns
-updates         the update that waits to be applied, perhaps for its kernel
-ending          how a render ends, and how its picture comes to the server
-context         what all tasks of a process share
-payloads        the payloads of messages by their types in gpu
-kernel_savings  what a scene's own kernel saves, measured on demand
-division        one picture on several renderers
-device          what a task has on the device
-progress        how far a picture is, and when it is finished
-view            what a client is shown
-helpers         processes that compile and denoise
+__main__      the process: its options, its device, its end
+list_devices  a program that prints EGL's devices
+loop          takes the newest messages, chooses whose turn it is, traces a slice, publishes
+scheduler     whose turn it is
+task          one client's picture, from its first update to its end
+bsdf_task     one question about the BSDF of a material, in its turns
+updates       the update that waits to be applied, perhaps for its kernel
+ending        how a render ends, and how its picture comes to the server
+context       what all tasks of a process share
+payloads      the payloads of messages by their types in gpu
+division      one picture on several renderers
+device        what a task has on the device
+progress      how far a picture is, and when it is finished
+view          what a client is shown
+helpers       processes that compile and denoise
 """

@@ -28,7 +28,7 @@ class WorkerContext:
     renderer: Renderer
     send: Callable[[FromRenderer], None]
     denoiser: DenoiseClient
-    spare: CompileClient | None = None  # compiles in idle time: for measuring, and what shows an edit meanwhile
+    spare: CompileClient | None = None  # compiles in idle time: what shows an edit meanwhile
     soon: CompileClient | None = None  # compiles for edits to come, beside tracing
     compiler: CompileClient | None = None  # compiles what a task waits for; None: in the task's own turn
     memory: Memory = field(default_factory=_unlimited)

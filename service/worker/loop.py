@@ -14,7 +14,6 @@ from gpu import GpuError, KernelKey, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
 from service.ipc import channel
 from service.ipc.heartbeat import Heartbeat
-from service.ipc.kernel_messages import MeasureKernel
 from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed
 from service.ipc.messages import (
     EvaluateBsdf,
@@ -111,7 +110,7 @@ class Loop:
                     self._work(task, partial(self._answer, task))
             busy = any(each.ready for each in self._everyone)
             self._account(at_once=not busy)
-            busy = self._foresee(idle=not busy) or busy or self._measure_kernel()
+            busy = self._foresee(idle=not busy) or busy
 
     @property
     def _everyone(self) -> list[Turns]:
@@ -137,23 +136,14 @@ class Loop:
         if task.answer():
             self._scheduler.shown(task)
 
-    def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None, spare: bool = False) -> None:
-        """Does the work on the task's account; what goes wrong in it is its misfortune and nobody else's. `spare`:
-        in time that nobody wanted, which is not held against it."""
+    def _work(self, task: Turns, work: Callable[[], object], read: Read | None = None) -> None:
+        """Do the work and charge the task's client for its time. An exception fails this task only."""
         began = time.perf_counter()
-        with self._heartbeat.working(task.number, COMPILING_S if task.loads or spare else 0.0):
+        with self._heartbeat.working(task.number, COMPILING_S if task.loads else 0.0):
             self._guard(task, work, read)
         seconds = time.perf_counter() - began
-        if not spare:
-            self._scheduler.charge(task, seconds)
+        self._scheduler.charge(task, seconds)
         self._used_s[task.number] += seconds
-
-    def _measure_kernel(self) -> bool:
-        """A step of what is only done when there is nothing else; whether there was one."""
-        task = next((task for task in self._tasks.values() if task.savings.due), None)
-        if task is not None:
-            self._work(task, task.measure_kernel, spare=True)
-        return task is not None
 
     def _foresee(self, idle: bool) -> bool:
         """Whether another kernel could be handed to a compiler which is free; one at a time, as others may soon have
@@ -204,9 +194,7 @@ class Loop:
         elif isinstance(message, Drop) and message.task in self._questions:
             self._questions.pop(message.task).release()
         elif task is None:
-            if isinstance(
-                message, Read | MeasureKernel
-            ):  # evicted, and the server had not heard of it when it sent this
+            if isinstance(message, Read):  # evicted, and the server had not heard of it when it sent this
                 self._send(Evicted(message.task))
         elif isinstance(message, Assistants):
             self._work(task, lambda: task.home.assist(message.ids))
@@ -224,8 +212,6 @@ class Loop:
             task.take_checkpoint()
         elif isinstance(message, CheckpointStored):
             task.checkpoint_stored(message.took_s)
-        elif isinstance(message, MeasureKernel):
-            task.savings.ask()
         elif isinstance(message, Pause):
             task.pause(message.away)
         elif isinstance(message, Resume):

@@ -14,7 +14,6 @@ from service.worker.device.residency import Residency
 from service.worker.device.resolution_ladder import FULL_S
 from service.worker.division.home import Home
 from service.worker.ending import Ending
-from service.worker.kernel_savings import KernelSavings
 from service.worker.payloads import saved_bands, saved_picture
 from service.worker.progress.progress import ProgressTracker
 from service.worker.scheduler import Account
@@ -59,7 +58,6 @@ class Task:
         )
         self._sharers = context.sharers
         self._updates = Updates(context, number, client, self._residency, self._tracker)
-        self.savings = KernelSavings(context, number)
         self._scale = 1.0  # of what is traced
         self._paused = self._away = False
         self._held_until = 0.0  # by the monotonic clock
@@ -320,11 +318,6 @@ class Task:
         """The server has the last checkpoint on the disk, that many seconds after it came."""
         self._ending.checkpoints.stored(took_s)
 
-    def measure_kernel(self) -> None:
-        """A step of `savings`."""
-        self._residency.wake()
-        self.savings.step(self._residency.full if self._residency.loaded is not None else None)
-
     def pause(self, away: bool = False) -> None:
         self._paused, self._away = True, away
         self.home.pause(True)
@@ -372,7 +365,6 @@ class Task:
         """Have all helpers of the task let go of resources that are about to leave the device."""
         self._frames.part()
         self._tracker.truncated.restart()
-        self.savings.part()
 
     def _restart(self) -> None:
         self._frames.restart()

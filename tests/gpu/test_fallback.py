@@ -15,7 +15,6 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, Scene
-from gpu.analysis.kernel_cost import full_kernel
 from gpu.kernels import features
 from gpu.precompile import fallback
 from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
@@ -116,7 +115,6 @@ def test_what_it_does_not_know() -> None:
         assert fallback.kernel_key(known, RenderSettings(24, 16, **other)) is None
     adaptive = RenderSettings(24, 16, adaptive=True)
     assert fallback.kernel_key(known, adaptive) is not None and not fallback.settings_for(adaptive).adaptive  # type: ignore[union-attr]
-    assert full_kernel(known, SMALL) != fallback.kernel_key(known, SMALL)
 
 
 def test_what_an_edit_tells_it() -> None:

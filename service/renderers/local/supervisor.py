@@ -11,7 +11,6 @@ from functools import partial
 from typing import Any
 
 from service.ipc import channel
-from service.ipc.kernel_messages import MeasureKernel
 from service.ipc.leases import Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.ipc.messages import (
     Checkpoint,
@@ -204,7 +203,7 @@ class Supervisor:
         held.record.told(message)
         if held.resident:
             self._keeper.send(message)
-        elif isinstance(message, Read | MeasureKernel):
+        elif isinstance(message, Read):
             self._keeper.do(self._bring_back(message.task, held))
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
@@ -260,7 +259,6 @@ class Supervisor:
 
     def _begin_again(self, number: int, task: Task) -> None:
         """Tell a process that has not heard of the task all that it needs."""
-        task.not_measured("The renderer was lost before it could answer: ask again.")
         task.resident = task.record.kept is None
         if task.resident:
             self._tell_all(number, task.record)
@@ -313,7 +311,6 @@ class Supervisor:
 
     def _hear(self, message: Heard, held: Task) -> None:
         if isinstance(message, Evicted):
-            held.not_measured("The render made room for others before it was measured: ask again.")
             held.resident = held.record.saved is None
             if held.resident:  # it ended before it had a sample
                 for read in list(held.record.reads.values()):
