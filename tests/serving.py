@@ -20,6 +20,7 @@ import numpy as np
 from websockets.sync.client import connect
 from websockets.typing import Origin, Subprotocol
 
+COLD_S = 150.0  # caches are empty: every kernel is compiled
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
 SCENE: dict[str, Any] = {
@@ -95,6 +96,27 @@ class Server:
             return self.process.wait(PATIENCE_S)
         finally:
             self.process.kill()
+
+
+@contextmanager
+def served(folder: Path, **options: Any) -> Iterator[Server]:
+    """A server that may have to compile every kernel, and ends well."""
+    server = Server(folder, **options)
+    try:
+        server.http.timeout = COLD_S
+        server.wait(COLD_S)
+        yield server
+    finally:
+        assert server.stop() == 0
+
+
+def kill(server: Server) -> None:
+    """Kill the server and all of its processes at once."""
+    for pid in [server.process.pid, *server.children()]:
+        with suppress(ProcessLookupError):
+            os.kill(pid, signal.SIGKILL)
+    server.process.wait()
+    server.http.close()
 
 
 def families(pid: int) -> Iterator[int]:

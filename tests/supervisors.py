@@ -1,14 +1,68 @@
-"""A supervisor with a renderer's process of its own, for as long as one test takes."""
+"""A supervisor with a renderer's process of its own, for as long as one test takes; scenes for it, and ears."""
 
 from __future__ import annotations
 
 import asyncio
 from collections.abc import Awaitable, Callable
+from pathlib import Path
 from typing import Any
 
+from gpu import RenderSettings
+from service.ipc.messages import FromRenderer, StopRule, View
+from service.pack import pack
 from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
-from tests.serving import PATIENCE_S
+from service.scene import parse_scene
+from tests.documents import Shelf
+from tests.serving import PATIENCE_S, SCENE
+
+SIZE = {"width": 32, "height": 32}
+ENDLESS = StopRule()
+LINEAR = View(encoding="linear")
+SCENES: dict[str, Any] = {
+    "plain": SCENE,
+    "rich": {
+        **SCENE,
+        "environment": {"type": "sky", "sun_elevation": 30, "sun_azimuth": 0},
+        "textures": {"t": {"type": "checker", "a": 0.1, "b": 0.8}},
+        "materials": {
+            "ball": {"type": "principled"},
+            "floor": {"type": "diffuse", "albedo": {"texture": "t"}},
+        },
+    },
+}
+SETTINGS = {name: RenderSettings(32, 32, max_bounces=2, adaptive=name == "rich") for name in SCENES}
+
+
+class Ears:
+    """Listens to tasks, and has their messages in order; `lost` and `again` are among them as text."""
+
+    def __init__(self) -> None:
+        self.messages: asyncio.Queue[FromRenderer | str] = asyncio.Queue()
+
+    def heard(self, message: FromRenderer) -> None:
+        self.messages.put_nowait(message)
+
+    def again(self) -> None:
+        self.messages.put_nowait("again")
+
+    def lost(self, detail: str) -> None:
+        self.messages.put_nowait(detail)
+
+    async def next(self, kind: Any) -> Any:
+        """The next message of that kind, of whichever task."""
+        while True:
+            message = await asyncio.wait_for(self.messages.get(), PATIENCE_S)
+            if isinstance(message, kind):
+                return message
+
+    async def next_of(self, task: int, *kinds: type) -> Any:
+        """The next message of these kinds about `task`. AssertionError where a renderer is lost first."""
+        while True:
+            message: Any = await asyncio.wait_for(self.messages.get(), PATIENCE_S)
+            assert not isinstance(message, str), message
+            if message.task == task and isinstance(message, kinds):
+                return message
 
 
 def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], checkpoint_s: float = 2.0, **options: Any) -> None:
@@ -22,3 +76,26 @@ def with_supervisor(test: Callable[[Supervisor], Awaitable[None]], checkpoint_s:
             await supervisor.close()
 
     asyncio.run(run())
+
+
+def settings(side: int = 32, **others: Any) -> dict[str, Any]:
+    return {"width": side, "height": side, **others}
+
+
+def arrays_of(name: str) -> Any:
+    """One of `SCENES`, packed."""
+    return pack(parse_scene(SCENES[name]), Shelf()).arrays
+
+
+def compile_helpers(parent: int | None) -> list[int]:
+    """Ids of the processes of `parent` that compile what somebody waits for."""
+    found = []
+    for path in Path("/proc").glob("[0-9]*"):
+        try:
+            of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
+            command = (path / "cmdline").read_bytes()
+            if of == parent and b"compile_main" in command and b"--priority\0now" in command:
+                found.append(int(path.name))
+        except OSError:
+            continue
+    return found

@@ -268,5 +268,14 @@ def test_lobe_light_or_shape_includes_no_sibling(path: Path) -> None:
         assert not included.startswith(f"{folder}/"), f"{path.relative_to(ROOT)} includes its sibling {included}"
 
 
+def test_no_test_file_takes_anything_from_another() -> None:
+    """Nor do the programs that it has in quotes: what two of them need stands in a module that says so."""
+    pattern = re.compile(r"^\s*(?:from|import) tests(?:\.\w+)*(?:\.| import (?:\w+, )*)(test_\w+)", re.MULTILINE)
+    assert pattern.findall("from tests.gpu.test_a import b\nfrom tests.gpu import c, test_d") == ["test_a", "test_d"]
+    for path in TESTS.glob("**/*.py"):
+        taken = set(pattern.findall(path.read_text())) - {path.stem}
+        assert not taken, f"{path.relative_to(ROOT)} imports from {taken}"
+
+
 def test_the_long_test_files_are_there() -> None:
     assert not [name for name in LONG_FILES if not (TESTS / name).exists()]

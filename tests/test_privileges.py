@@ -6,32 +6,17 @@ import os
 import shutil
 import subprocess
 import sys
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from tempfile import TemporaryDirectory
-from typing import Any
 
 import gpu.jit  # noqa: F401  # it chooses NUMBA_CACHE_DIR
 from gpu import Renderer
 from tests.privileges import capabilities, python_of
-from tests.serving import SCENE, SMALL, Server
+from tests.serving import SCENE, SMALL, Server, served
 
-COLD_S = 150.0  # caches are empty: every kernel is compiled
 USER = 47_123  # nobody's, on any machine
 TRIANGLE = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 MATERIAL = {"type": "diffuse", "albedo": 0.5}
-
-
-@contextmanager
-def served(folder: Path, **options: Any) -> Iterator[Server]:
-    server = Server(folder, **options)
-    try:
-        server.http.timeout = COLD_S
-        server.wait(COLD_S)
-        yield server
-    finally:
-        assert server.stop() == 0
 
 
 def user_of(process: int) -> int:

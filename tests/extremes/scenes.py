@@ -12,8 +12,8 @@ import numpy as np
 from gpu import Picture, Renderer, RenderSettings
 from service.pack import Packed, pack
 from service.scene import parse_scene
+from tests.rays import ball_mesh, to_world
 from tests.rendering import Images
-from tests.shaders.test_shapes import _icosphere, _matrix
 
 LONG = bool(os.environ.get("SUNBOX_EXTREMES"))  # every row and more samples: `make extremes`
 
@@ -32,7 +32,7 @@ def quad(material: str, origin: Sequence[float], u: Sequence[float], v: Sequence
 
 
 def icosphere(material: str, divisions: int = 2, **transform: Any) -> dict[str, Any]:
-    out = {**_icosphere(divisions), "material": material, "smooth": True}
+    out = {**ball_mesh(divisions), "material": material, "smooth": True}
     return {**out, "transform": transform} if transform else out
 
 
@@ -87,7 +87,7 @@ def everything(**changed: Any) -> dict[str, Any]:
 
 def placed(shape: dict[str, Any], matrix: np.ndarray) -> dict[str, Any]:
     """The shape under a further transform."""
-    return {**shape, "transform": {"matrix": (matrix @ _matrix(shape)).ravel().tolist()}}
+    return {**shape, "transform": {"matrix": (matrix @ to_world(shape)).ravel().tolist()}}
 
 
 def scaled(scene: dict[str, Any], factor: float) -> dict[str, Any]:

@@ -10,8 +10,8 @@ import pytest
 from gpu import Renderer
 from service.pack.geometry import instances
 from tests.extremes.scenes import Seen, ball, icosphere, packed, placed, quad, rows
+from tests.rays import to_world, trace
 from tests.rendering import document
-from tests.shaders.test_shapes import _matrix, _trace
 
 EDGES = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
 FACES = [(0, 1, 3, 2), (4, 6, 7, 5), (0, 4, 5, 1), (2, 3, 7, 6), (0, 2, 6, 4), (1, 5, 7, 3)]  # of that cube
@@ -71,7 +71,7 @@ def _corners(room: str) -> tuple[np.ndarray, np.ndarray]:
 @pytest.mark.parametrize("place", PLACES)
 @pytest.mark.parametrize("room", ROOMS)
 def test_no_ray_leaves_a_closed_room(gpu: Renderer, room: str, place: str) -> None:
-    matrix = _matrix({"transform": PLACES[place]})
+    matrix = to_world({"transform": PLACES[place]})
     made = packed(document([placed(s, matrix) for s in ROOMS[room]])).arrays
     rng = np.random.default_rng(1)
     a, b = _corners(room)
@@ -84,7 +84,7 @@ def test_no_ray_leaves_a_closed_room(gpu: Renderer, room: str, place: str) -> No
     d = target - o
     d /= np.linalg.norm(d, axis=1, keepdims=True)
     scene = gpu.load(made)
-    hits, _, leaves = _trace(gpu, scene, o, d, rng.normal(size=(N, 3)))
+    hits, _, leaves = trace(gpu, scene, o, d, rng.normal(size=(N, 3)))
     scene.release()
     assert (hits[:, 3] >= 0).all()
     assert (leaves[:, 0] == 1).all()

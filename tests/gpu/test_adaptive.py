@@ -17,7 +17,7 @@ from gpu.picture import adaptive
 from gpu.picture.noise_meter import FROM
 from gpu.picture.sample_plan import DECISIONS, LEAST, MOST, SamplePlan, pixels_of, weights_of
 from service.cli import main
-from tests.gpu.test_noise_meter import SCENES, SHAPES, luminance
+from tests.gpu.noisy_scenes import SCENES, SHAPES, luminance
 from tests.rendering import Images, document, picture
 from tests.serving import PATIENCE_S, SCENE, SMALL, Client, Server
 from tests.serving import client as opened

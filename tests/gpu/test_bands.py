@@ -11,8 +11,8 @@ import pytest
 from gpu import Band, Picture, Renderer, border_after
 from gpu.picture import passes
 from gpu.picture.blocks import FIRST, SIZE
+from tests.gpu.bits import assert_same, beside, saved, seen, slice_of
 from tests.gpu.conftest import SCENE, SETTINGS
-from tests.gpu.test_blocks import assert_same, beside, saved, seen, slice_of
 from tests.rendering import picture
 
 

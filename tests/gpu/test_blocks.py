@@ -10,40 +10,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Band, GpuError, OutOfMemory, Picture, Renderer, Saved, Steps, border_after
+from gpu import Band, GpuError, OutOfMemory, Picture, Renderer, border_after
 from gpu import context as contexts
 from gpu.picture import accumulators, noise_meter, passes
 from gpu.picture.blocks import FIRST, Sums, is_stop, merged, stop_after
+from tests.gpu.bits import assert_same, beside, saved, seen, slice_of
 from tests.gpu.conftest import SCENE, SETTINGS
 from tests.rendering import document, picture
-
-
-def seen(made: Picture) -> dict[str, np.ndarray]:
-    """All bits of a picture."""
-    out = {aov: made.read(aov) for aov in ("color", "variance")}
-    return out | {"display": made.display(), "noise": np.array(made.noise())}
-
-
-def assert_same(one: Picture, other: Picture) -> None:
-    assert one.samples == other.samples
-    theirs = seen(other)
-    for name, values in seen(one).items():
-        assert np.array_equal(values, theirs[name]), name
-
-
-def beside(made: Picture) -> Picture:
-    """A picture on another renderer: as `made`, without samples."""
-    other = Picture(made.context, made._passes._kernels, made._dispatcher._frame_buffer, made.scene, made.settings)
-    return other
-
-
-def saved(made: Picture) -> Saved:
-    return Steps(made.save()).finish()
-
-
-def slice_of(made: Picture, samples: int) -> None:
-    made.trace(0.0, samples)
-
 
 # What the blocks are.
 

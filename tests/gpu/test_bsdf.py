@@ -16,8 +16,8 @@ from gpu.precompile import kernel_keys
 from service.pack import pack_material
 from service.scene.material.microfacet import MicrofacetMaterial
 from tests import baseline, disney, microfacets
+from tests.lobes import PRINCIPLED, ROWS
 from tests.probing import materials
-from tests.shaders.test_lobes import PRINCIPLED, ROWS
 
 P = MaterialModel.PRINCIPLED
 GLASS = {"model": P, "transmission": 1, "base_color": (1, 0.8, 0.6)}

@@ -26,10 +26,9 @@ from service.worker.device.loaded_scene import KernelRequest
 from service.worker.helpers.compile_client import records
 from service.worker.view.fallback_preview import FallbackPreview
 from tests.documents import Shelf
-from tests.gpu.test_flags import IMAGES, SCENES
-from tests.gpu.test_precompile import Ears
+from tests.gpu.flag_scenes import IMAGES, SCENES
 from tests.serving import PATIENCE_S, SCENE
-from tests.supervisors import with_supervisor
+from tests.supervisors import Ears, with_supervisor
 
 SMALL = RenderSettings(24, 16, max_bounces=3, filter="box")
 SIZE = {"width": 256, "height": 256}
@@ -131,7 +130,7 @@ async def shown(supervisor: Supervisor, ears: Ears, task: int, generation: int) 
     serial = 100 * generation
     supervisor.send(Want(task, serial, View(encoding="linear")))
     while True:
-        message = await ears.next(task, Frame, Loaded)
+        message = await ears.next_of(task, Frame, Loaded)
         if message.generation != generation:
             continue
         told.append(message)
@@ -194,7 +193,7 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         ears = Ears()
         task = supervisor.open(ears)
         await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(64), interactive=True))
-        await ears.next(task, Loaded)
+        await ears.next_of(task, Loaded)
         async with asyncio.timeout(PATIENCE_S):
             while not record.exists():
                 await asyncio.sleep(0.1)
@@ -217,7 +216,7 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         open_lens["aperture_radius"] = 0.1
         supervisor.send(Update(task, 3, camera=open_lens, base=2))
         supervisor.send(Want(task, 300, View(encoding="linear")))
-        while (only := await ears.next(task, Frame, Loaded)).generation != 3:
+        while (only := await ears.next_of(task, Frame, Loaded)).generation != 3:
             pass
         # On a slow machine at less than full resolution, and there is no other one.
         assert isinstance(only, Frame) and not only.provisional, "at rest one first look is all it wants"

@@ -11,95 +11,13 @@ from gpu import Renderer, RenderSettings
 from gpu.analysis.kernel_cost import kernel_cost
 from gpu.arrays import SceneArrays
 from gpu.kernels.features import FLAGS, flags, grown
-from gpu.layout.microfacet_records import PLAIN, TERMS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
 from service.pack import Packed, pack
 from service.scene import parse_scene
-from tests.extremes.scenes import LONG, ball, icosphere, quad
-from tests.rendering import Images, document
+from tests.extremes.scenes import LONG, ball, icosphere
+from tests.gpu.flag_scenes import FLOOR, IMAGES, LAMP, SCENES, Doc, T, lit, made_of
+from tests.rendering import document
 
-Doc = dict[str, Any]
-RNG = np.random.default_rng(4)
-IMAGES = Images(
-    bytes=RNG.integers(0, 256, (4, 4, 3)).astype(np.uint8), floats=RNG.random((4, 8, 3)).astype(np.float32),
-    face=RNG.random((4, 4, 3)).astype(np.float32),
-)  # fmt: skip
-FLOOR = quad("m", (-4, -1, 4), (8, 0, 0), (0, 0, -8))
-SKY = {"type": "constant", "radiance": 0.5}
-MESH = {**icosphere("m", 0), "smooth": False}
-SMALL = [[0, 0, 0], [1, 0, 0], [0, 1, 0]]
-TRIANGLE = {"type": "mesh", "vertices": SMALL, "faces": [[0, 1, 2]], "smooth": False, "material": "m"}
-ODD = {"transform": {"scale": [1, 0.5, 0.7]}}
-BOX = {"type": "box", "min": [-1, -1, -1], "max": [1, 1, 1], "material": "m"}
-SUN = {"type": "directional", "direction": [0, -1, 0], "irradiance": 1}
-GLTF = {"type": "metal_rough", "base_color": 0.5, "metallic": 0.5, "roughness": 0.5}
-PHONG = {"type": "blinn_phong", "diffuse": 0.4, "specular": 0.4, "shininess": 20}
-GLASS = {"type": "principled", "transmission": 1, "roughness": 0.2}
-
-
-def many(shape: Doc) -> list[Doc]:
-    return [{**shape, "transform": {"translate": [i - 15, 0, -i], "scale": [0.3, 0.2, 0.3]}} for i in range(30)]
-
-
-def lit(*shapes: Doc, **more: Any) -> Doc:
-    return document(list(shapes) or [FLOOR], environment=SKY, **more)
-
-
-def made_of(material: Doc, *shapes: Doc, **more: Any) -> Doc:
-    return lit(*(shapes or [ball("m"), FLOOR]), materials={"m": material}, **more)
-
-
-def textured(material: Doc, *shapes: Doc, **texture: Any) -> Doc:
-    return made_of({"type": "principled", **material}, *shapes, textures={"t": {"asset": "bytes", **texture}})
-
-
-T = {"texture": "t"}
-MICROFACET = {"type": "microfacet", "conductor_eta": [0.2, 0.4, 1.4], "conductor_k": 2}
-LAMP = {"type": "diffuse", "albedo": 0, "emission": 3}
-SCENES: dict[str, Doc] = {
-    "SPHERES": lit(ball("m")), "QUADS": lit(), "BOXES": lit(BOX), "ELLIPSOIDS": lit(ball("m", **ODD)),
-    "TRIANGLES": lit(TRIANGLE), "VAST_SPHERES": lit(ball("m", (0, -1e5, 0), 1e5), ball("m")),
-    "BVH": lit(MESH), "BVH_TRIANGLES": lit(MESH),
-    "BVH_SPHERES": lit(*[ball("m", (i, 0, -i), 0.4) for i in range(30)]),
-    "BVH_ELLIPSOIDS": lit(*many(ball("m"))), "BVH_BOXES": lit(*many(BOX)), "BVH_QUADS": lit(*many(FLOOR)),
-    "SINGLE_SIDED": lit({**TRIANGLE, "double_sided": False}), "SMOOTH_NORMALS": lit(icosphere("m", 1)),
-    "HIDDEN_SHAPES": lit(FLOOR, ball("m", visible_to_camera=False)),
-    "OPACITY": made_of({"type": "diffuse", "albedo": 0.5, "alpha": 0.5}), "TEXTURES": textured({"base_color": T}),
-    "BYTE_TEXELS": textured({"roughness": T}), "FLOAT_TEXELS": textured({"base_color": T}, asset="floats"),
-    "SRGB_TEXELS": textured({"base_color": T}),
-    "CHECKERS": made_of({"type": "diffuse", "albedo": T}, textures={"t": {"type": "checker", "a": 0, "b": 1}}),
-    "UVS": textured({"base_color": T}, {**TRIANGLE, "uvs": [[0, 0], [1, 0], [0, 1]]}),
-    "VERTEX_COLORS": lit({**TRIANGLE, "colors": [[1, 0, 0], [0, 1, 0], [0, 0, 1]]}),
-    "NORMAL_MAPS": textured({"normal_map": T}, color_space="linear"),
-    "COAT_NORMALS": textured({"clearcoat": 1, "clearcoat_normal_map": T}, color_space="linear"),
-    "EMISSION": made_of(LAMP), "EMISSION_BOTH": made_of({**LAMP, "emission_sides": "both"}),
-    "SPHERE_LIGHTS": made_of(LAMP, ball("m")), "QUAD_LIGHTS": made_of(LAMP, FLOOR),
-    "TRIANGLE_LIGHTS": made_of(LAMP, TRIANGLE), "ELLIPSOID_LIGHTS": made_of(LAMP, ball("m", **ODD)),
-    "LIGHTS": lit(), "MANY_LIGHTS": lit(lights=[{"type": "point", "position": [0, 2, 0], "intensity": 4}]),
-    "LIGHT_TREE": lit(lights=[{"type": "point", "position": [i, 2, 0], "intensity": 4} for i in range(9)]),
-    "POINT_LIGHTS": lit(lights=[{"type": "point", "position": [0, 2, 0], "intensity": 4}]),
-    "SPOT_LIGHTS": lit(lights=[{"type": "spot", "position": [0, 2, 0], "direction": [0, -1, 0], "intensity": 4,
-                                "inner_angle": 20, "outer_angle": 30}]),
-    "DIRECTIONAL_LIGHTS": lit(lights=[SUN]), "SUN_DISKS": lit(lights=[{**SUN, "angular_diameter": 1}]),
-    "ENVIRONMENT": lit(),
-    "SUN": document([FLOOR], environment={"type": "sky", "sun_elevation": 30, "sun_azimuth": 0}),
-    "ENVIRONMENT_IMAGE": document([FLOOR], environment={"type": "image", "asset": "floats"}),
-    "ENVIRONMENT_CUBE": document([FLOOR], environment={"type": "cubemap", "assets": {
-        f"{sign}{axis}": "face" for axis in "xyz" for sign in "pn"}}),
-    "APERTURE": lit(camera={"position": [0, 0, 4], "target": [0, 0, 0], "aperture_radius": 0.1}),
-    "DISNEY": made_of({"type": "disney"}), "SUBSURFACE": made_of({"type": "disney", "subsurface": 1}),
-    "SHEEN": made_of({"type": "disney", "sheen": 1}), "ANISOTROPIC": made_of({"type": "disney", "anisotropic": 1}),
-    "TANGENTS": made_of({"type": "disney", "anisotropic": 1}, icosphere("m", 1)),
-    "CLEARCOAT": made_of({"type": "disney", "clearcoat": 1}), "METAL_ROUGH": made_of(GLTF),
-    "BLINN_PHONG": made_of(PHONG), "PHONG": made_of({**PHONG, "type": "phong"}),
-    "AMBIENT": made_of({**PHONG, "ambient": 0.1}),
-    "MICROFACET": made_of(MICROFACET), "MICROFACET_TABLES": made_of({**MICROFACET, "distribution": "abc"}),
-    **{f"MICROFACET_{kind}_{e.name}".upper(): made_of({**MICROFACET, kind: e.name.lower()})
-       for kind, terms in TERMS.items() for e in terms if PLAIN.get(kind) != e},
-    "PRINCIPLED": made_of({"type": "principled"}), "PRINCIPLED_LOBES": made_of({"type": "principled"}),
-    "TRANSMISSION": made_of(GLASS), "MIRRORS": made_of({**GLASS, "roughness": 0}),
-    "ATTENUATION": made_of({**GLASS, "attenuation_color": [0.5, 0.8, 0.9], "attenuation_distance": 1}),
-}  # fmt: skip
 ELSEWHERE = {"UVS_1", "TEXTURED_LIGHTS", "INSTANCES"}  # raised in the tests of glTF files, textured lights, instances
 
 

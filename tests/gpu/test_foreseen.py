@@ -16,11 +16,8 @@ from service.scene import parse_scene
 from service.worker.device.loaded_scene import begin_key, slider_keys
 from service.worker.helpers.compile_client import records
 from tests.documents import Shelf
-from tests.gpu.test_precompile import SIZE, Ears, arrays, arrays_of, cold
 from tests.serving import PATIENCE_S, SCENE
-from tests.supervisors import with_supervisor
-
-__all__ = ["arrays", "cold"]  # fixtures
+from tests.supervisors import SIZE, Ears, arrays_of, with_supervisor
 
 
 def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arrays: Any, cold: Path) -> None:
@@ -30,14 +27,14 @@ def test_a_foreseen_scene_begins_with_a_kernel_that_is_there(gpu: Renderer, arra
         ears = Ears()
         unforeseen = supervisor.open(ears)  # alone, so that its kernel is compiled while it is loaded
         await supervisor.send_scene(Update(unforeseen, 1, arrays_of("rich"), SIZE, StopRule(4)))
-        cold_ms = (await ears.next(unforeseen, Loaded)).compile_ms
+        cold_ms = (await ears.next_of(unforeseen, Loaded)).compile_ms
         supervisor.drop(unforeseen)
         task = supervisor.open(ears)
         supervisor.send(Foresee(task, arrays, SIZE))
         for key in [begin_key(Foresee(task, arrays, SIZE)), *slider_keys(Foresee(task, arrays, SIZE))]:
             await recorded(key)
         await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(4), interactive=True))
-        assert (await ears.next(task, Loaded)).compile_ms < cold_ms / 4  # from the disk cache
+        assert (await ears.next_of(task, Loaded)).compile_ms < cold_ms / 4  # from the disk cache
         for key in keys_after_edit(arrays, RenderSettings(**SIZE)):
             await recorded(key)
 
@@ -59,15 +56,15 @@ def test_a_lamp_is_seen_before_its_kernel_is_there(gpu: Renderer, arrays: Any, c
         ears = Ears()
         task = supervisor.open(ears)
         await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule(4), interactive=True))
-        await ears.next(task, Loaded)
+        await ears.next_of(task, Loaded)
         for key in keys:
             await until_recorded(gpu, key)
         await supervisor.send_scene(Update(task, 2, lit, SIZE, StopRule(4), interactive=True))
         supervisor.send(Want(task, 1, View()))
-        while (first := await ears.next(task, Frame, Loaded)).generation != 2:
+        while (first := await ears.next_of(task, Frame, Loaded)).generation != 2:
             supervisor.send(Want(task, 1, View()))
         assert isinstance(first, Frame) and first.provisional
-        assert (await ears.next(task, Loaded)).generation == 2
+        assert (await ears.next_of(task, Loaded)).generation == 2
 
     with_supervisor(test)
 

@@ -15,43 +15,16 @@ from service.pack import pack
 from service.pack.geometry import instances
 from service.scene import parse_scene
 from tests import documents
-from tests.extremes.scenes import LONG, icosphere, moved, quad, rows
-from tests.rendering import Images, document
-from tests.shaders.test_shapes import _trace
-
-Doc = dict[str, Any]
-SKY = {"type": "constant", "radiance": 0.6}
-SUN = {"type": "directional", "direction": [-1, -2, -1], "irradiance": 2, "angular_diameter": 3}
-FLOOR = quad("white", (-9, -1.4, 9), (18, 0, 0), (0, 0, -18))
-TURNED = {"translate": [-1.2, 0.1, 0], "rotate": [20, 30, 40]}
-MIRRORED = {"translate": [1.1, 0, 0.2], "rotate": [10, 0, 60], "scale": [-0.6, 1.2, 0.8]}
-RNG = np.random.default_rng(2)
-IMAGES = Images(t=RNG.integers(0, 256, (16, 16, 4)).astype(np.uint8))
+from tests.extremes.scenes import LONG, moved, rows
+from tests.gpu.instanced import IMAGES, MIRRORED, Doc, bumpy, two
+from tests.rays import trace
+from tests.rendering import document
 
 
 @pytest.fixture(autouse=True)
 def worth(monkeypatch: pytest.MonkeyPatch) -> None:
     """Whatever it spares."""
     monkeypatch.setattr(instances, "WORTH", 0)
-
-
-def bumpy(**more: Any) -> Doc:
-    """An icosphere that no symmetry maps onto itself, with texture coordinates and colours."""
-    ball = icosphere("m", 3)
-    v = np.array(ball["vertices"])
-    uvs = np.stack([v[:, 0], v[:, 1] + 0.3 * v[:, 2]], axis=1)
-    v *= 1 + 0.15 * np.sin(5 * v[:, :1]) * np.cos(4 * v[:, 1:2] + 1)
-    return {**ball, "vertices": v.tolist(), "uvs": uvs.tolist(), **more}
-
-
-def two(material: Doc, *more: Doc, **mesh: Any) -> Doc:
-    shapes = [bumpy(transform=TURNED, **mesh), bumpy(transform=MIRRORED, **mesh), FLOOR, *more]
-    materials = {"m": material, "white": {"type": "diffuse", "albedo": 0.6}}
-    texture = {"asset": "t", "scale": [2, 2]}
-    textures = {"t": texture, "n": {**texture, "color_space": "linear"}}
-    used = {name: value for name, value in textures.items() if f"'texture': '{name}'" in str(material)}
-    lit = {"environment": SKY, "lights": [SUN]}
-    return document(shapes, materials, textures=used, camera={"position": [0, 1, 5.5], "target": [0, 0, 0]}, **lit)
 
 
 T = {"texture": "t"}
@@ -156,10 +129,10 @@ def test_a_ray_meets_the_same_triangle_of_another_instance(gpu: Renderer, monkey
     rng = np.random.default_rng(3)
     o = np.concatenate([rng.uniform(-0.5, 0.5, (20_000, 2)), np.full((20_000, 1), -2.0)], axis=1)
     down, up = np.tile([0.0, 0, -1], (20_000, 1)), np.tile([0.0, 0, 1], (20_000, 1))
-    hits, _, leaves = _trace(gpu, scene, o, up, down)  # back to where it came from: nothing is there
+    hits, _, leaves = trace(gpu, scene, o, up, down)  # back to where it came from: nothing is there
     assert (hits[:, 3] > 0).all() and not leaves[:, 0].any()
     between = o * [1, 1, 0] + [0, 0, 5e-4] + np.outer(o[:, 1] * np.tan(np.radians(5)), [0, 0, 1])
-    hits, _, leaves = _trace(gpu, scene, between, up, down)
+    hits, _, leaves = trace(gpu, scene, between, up, down)
     assert (hits[:, 3] > 0).all() and leaves[:, 0].all()
     scene.release()
 

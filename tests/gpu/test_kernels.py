@@ -12,7 +12,7 @@ from gpu import Renderer, RenderSettings
 from gpu.kernels import cache
 from gpu.kernels.cache import KernelCache
 from service.worker.helpers import compile_client
-from tests.gpu.test_precompile import arrays_of
+from tests.supervisors import arrays_of
 
 TEXT = """
 layout(local_size_x = 8) in;

@@ -15,7 +15,7 @@ from service.pack import PackCache, pack, scene_delta
 from service.pack.edits import moved_meshes
 from service.pack.geometry import instances
 from service.scene import parse_scene
-from tests.gpu.test_instances import IMAGES, two
+from tests.gpu.instanced import IMAGES, two
 
 Doc = dict[str, Any]
 MATTE = {"type": "diffuse", "albedo": 0.7}

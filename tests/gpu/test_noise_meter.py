@@ -11,30 +11,8 @@ from gpu import Renderer
 from gpu.layout import METER_REPLICATES
 from gpu.layout.bindings import Slot
 from gpu.picture.noise_meter import FROM, around, draw, inclusion, squared_error
-from service import presets
+from tests.gpu.noisy_scenes import FLOOR, SCENES, SHAPES, luminance
 from tests.rendering import Images, document, picture
-
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
-SHAPES = [
-    {"type": "sphere", "center": [0, 0, 0], "radius": 0.8, "material": "ball"},
-    {"type": "quad", "origin": [-6, -0.8, 6], "u": [12, 0, 0], "v": [0, 0, -12], "material": "floor"},
-]
-FLOOR = {"type": "diffuse", "albedo": 0.5}
-
-
-def under_a_lamp(ball: dict[str, Any]) -> dict[str, Any]:
-    """A small lamp in sight, whose edges carry most of the error."""
-    lamp = {"type": "quad", "origin": [-0.4, 1.2, -0.4], "u": [0.8, 0, 0], "v": [0, 0, 0.8], "material": "lamp"}
-    materials = {"ball": ball, "floor": FLOOR, "lamp": {"type": "diffuse", "albedo": 0, "emission": 30}}
-    return document([*SHAPES, lamp], materials, environment={"type": "constant", "radiance": 0.3})
-
-
-SCENES = {
-    "cornell": presets.get("scenes", "cornell-boxes"),
-    "rough metal": under_a_lamp({"type": "principled", "metallic": 1, "roughness": 0.3}),
-    "rough glass": under_a_lamp({"type": "principled", "transmission": 1, "roughness": 0.4}),
-    "furnace": document(SHAPES[:1], {"ball": FLOOR}, environment={"type": "constant", "radiance": 1}),
-}
 
 
 @pytest.mark.parametrize("name", SCENES)
@@ -53,11 +31,6 @@ def test_it_tells_the_truth(gpu: Renderer, name: str) -> None:
                 squares.append(((luminance(one) - reference) ** 2).mean() - doubt)
             error = np.sqrt(np.mean(squares)) / reference.mean()
             assert np.mean([one.noise() or 0.0 for one in made]) == pytest.approx(error, rel=0.2), (sampler, samples)
-
-
-def luminance(made: Any) -> np.ndarray:
-    values: np.ndarray = made.read()[..., :3].astype(float) @ LUMINANCE
-    return values
 
 
 def test_nothing_black_and_tiny(gpu: Renderer) -> None:

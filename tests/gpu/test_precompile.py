@@ -17,26 +17,21 @@ from gpu import KernelKey, Renderer, RenderSettings
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
-from service.pack import pack
 from service.renderers.local.supervisor import Supervisor
-from service.scene import parse_scene
 from service.worker.device.loaded_scene import LoadedScene, kernel_request
 from service.worker.helpers.compile_client import CompileClient, Compiled, records
 from service.worker.helpers.compile_main import LOCKS
-from tests.documents import Shelf
-from tests.serving import PATIENCE_S, SCENE, wait_until
-from tests.supervisors import with_supervisor
+from tests.serving import PATIENCE_S, wait_until
+from tests.supervisors import LINEAR, SCENES, SIZE, Ears, compile_helpers, with_supervisor
 
-SIZE = {"width": 32, "height": 32}
 COLD = {**SIZE, "clamp": 5.0}  # compiled in
-LINEAR = View(encoding="linear")
 
 AHEAD = """
 import sys
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import ENTRY, GUIDES, common_keys, kernel_key
 from gpu.precompile.precompiler import Precompiler
-from tests.gpu.test_precompile import SETTINGS, arrays_of
+from tests.supervisors import SETTINGS, arrays_of
 a, settings = arrays_of(sys.argv[1]), SETTINGS[sys.argv[1]]
 precompiler = Precompiler()
 keys = [kernel_key(a, settings, features.flags(a), entry) for entry in (ENTRY, GUIDES)]
@@ -45,7 +40,7 @@ print(all([precompiler.compile(each)[1] for each in [*keys, *common_keys()]]))
 RENDERER = """
 import sys
 from gpu import Renderer
-from tests.gpu.test_precompile import SETTINGS, arrays_of
+from tests.supervisors import SETTINGS, arrays_of
 with Renderer() as renderer:
     picture = renderer.picture(renderer.load(arrays_of(sys.argv[1])), SETTINGS[sys.argv[1]])
     picture.trace(9.0, 10)
@@ -54,70 +49,6 @@ with Renderer() as renderer:
     picture.display()
     picture.display(tone_map="agx", dtype="f4")
 """
-SETTINGS = {name: RenderSettings(32, 32, max_bounces=2, adaptive=name == "rich") for name in ("plain", "rich")}
-SCENES: dict[str, Any] = {
-    "plain": SCENE,
-    "rich": {
-        **SCENE,
-        "environment": {"type": "sky", "sun_elevation": 30, "sun_azimuth": 0},
-        "textures": {"t": {"type": "checker", "a": 0.1, "b": 0.8}},
-        "materials": {
-            "ball": {"type": "principled"},
-            "floor": {"type": "diffuse", "albedo": {"texture": "t"}},
-        },
-    },
-}
-
-
-def arrays_of(name: str) -> Any:
-    return pack(parse_scene(SCENES[name]), Shelf()).arrays
-
-
-@pytest.fixture(scope="module")
-def arrays(gpu: Renderer) -> Any:
-    return arrays_of("plain")
-
-
-class Ears:
-    """Hears what becomes of several tasks, in order."""
-
-    def __init__(self) -> None:
-        self.messages: asyncio.Queue[Any] = asyncio.Queue()
-
-    def heard(self, message: Any) -> None:
-        self.messages.put_nowait(message)
-
-    def again(self) -> None:
-        self.messages.put_nowait("again")
-
-    def lost(self, detail: str) -> None:
-        self.messages.put_nowait(detail)
-
-    async def next(self, task: int, *kinds: type) -> Any:
-        while True:
-            message = await asyncio.wait_for(self.messages.get(), PATIENCE_S)
-            assert not isinstance(message, str), message
-            if message.task == task and isinstance(message, kinds):
-                return message
-
-
-def helpers(parent: int | None) -> list[int]:
-    found = []
-    for path in Path("/proc").glob("[0-9]*"):
-        try:
-            of = int((path / "stat").read_text().rsplit(")", 1)[1].split()[1])
-            command = (path / "cmdline").read_bytes()
-            if of == parent and b"compile_main" in command and b"--priority\0now" in command:
-                found.append(int(path.name))
-        except OSError:
-            continue
-    return found
-
-
-@pytest.fixture
-def cold(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
-    monkeypatch.setenv("MESA_SHADER_CACHE_DIR", str(tmp_path))
-    return tmp_path
 
 
 async def beside(
@@ -127,25 +58,25 @@ async def beside(
     ears, other = Ears(), Ears()
     busy, late = supervisor.open(other), supervisor.open(ears)
     await supervisor.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
-    await other.next(busy, Loaded)
+    await other.next_of(busy, Loaded)
     await supervisor.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
-    loaded = asyncio.create_task(ears.next(late, Loaded))
+    loaded = asyncio.create_task(ears.next_of(late, Loaded))
     seen: list[int] = []
     while not loaded.done():
         supervisor.send(Read(busy, len(seen), LINEAR))
-        seen.append((await other.next(busy, Image)).progress.samples)
+        seen.append((await other.next_of(busy, Image)).progress.samples)
         await asyncio.sleep(0)
         if newer and len(seen) == 3:
             supervisor.send(Update(late, 2, stop=StopRule(6), base=1))
         if kill:
-            for helper in helpers(supervisor.process_id):
+            for helper in compile_helpers(supervisor.process_id):
                 os.kill(helper, signal.SIGKILL)
                 kill = False
     assert not kill
     assert (await loaded).generation == 1 + newer and not supervisor.statistics.restarts
-    assert (await ears.next(late, Done)).reason == "max_samples"
+    assert (await ears.next_of(late, Done)).reason == "max_samples"
     supervisor.send(Read(late, 1, LINEAR))
-    pixels = np.array((await ears.next(late, Image)).pixels)
+    pixels = np.array((await ears.next_of(late, Image)).pixels)
     supervisor.drop(busy)
     supervisor.drop(late)
     return len(set(seen)), pixels
@@ -166,13 +97,13 @@ def test_others_are_traced_meanwhile(gpu: Renderer, arrays: Any, cold: Path) -> 
         grown, pixels = await beside(supervisor, arrays, newer=True)
         assert grown >= 5
         assert np.array_equal(pixels, in_the_loop(gpu, arrays, samples=6))
-        assert len(helpers(supervisor.process_id)) == 1
+        assert len(compile_helpers(supervisor.process_id)) == 1
 
     with_supervisor(test)
 
     async def again(supervisor: Supervisor) -> None:
         await beside(supervisor, arrays)
-        assert helpers(supervisor.process_id) == []  # what is in the disk cache needs none
+        assert compile_helpers(supervisor.process_id) == []  # what is in the disk cache needs none
 
     with_supervisor(again)
 
@@ -183,17 +114,17 @@ def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, a
         busy, late = supervisor.open(other), supervisor.open(ears)
         for task, hears, stop in ((busy, other, StopRule()), (late, ears, StopRule(2))):
             await supervisor.send_scene(Update(task, 1, arrays, SIZE, stop))
-            await hears.next(task, Loaded)
-        await ears.next(late, Done)
-        before = helpers(supervisor.process_id)
+            await hears.next_of(task, Loaded)
+        await ears.next_of(late, Done)
+        before = compile_helpers(supervisor.process_id)
         supervisor.send(Read(late, 1, View("normal", encoding="linear")))
-        normal = asyncio.create_task(ears.next(late, Image))
+        normal = asyncio.create_task(ears.next_of(late, Image))
         seen: list[int] = []
         while not normal.done():
             supervisor.send(Read(busy, len(seen), LINEAR))
-            seen.append((await other.next(busy, Image)).progress.samples)
+            seen.append((await other.next_of(busy, Image)).progress.samples)
             await asyncio.sleep(0)
-        assert seen[-1] > seen[0] and len(before) <= len(helpers(supervisor.process_id)) == 1
+        assert seen[-1] > seen[0] and len(before) <= len(compile_helpers(supervisor.process_id)) == 1
         pixels = (await normal).pixels
         scene = gpu.load(arrays)
         picture = gpu.picture(scene, RenderSettings(**SIZE))
@@ -242,7 +173,7 @@ def test_without_a_cache_nobody_is_asked(
 
     async def test(supervisor: Supervisor) -> None:
         _, pixels = await beside(supervisor, arrays)
-        assert helpers(supervisor.process_id) == [] and np.array_equal(pixels, in_the_loop(gpu, arrays))
+        assert compile_helpers(supervisor.process_id) == [] and np.array_equal(pixels, in_the_loop(gpu, arrays))
 
     with_supervisor(test)
 
@@ -362,9 +293,9 @@ async def compiled_for(supervisor: Supervisor, arrays: Any) -> tuple[int, int]:
     other = Ears()
     busy, late = supervisor.open(other), supervisor.open(Ears())
     await supervisor.send_scene(Update(busy, 1, arrays, SIZE, StopRule()))
-    await other.next(busy, Loaded)
+    await other.next_of(busy, Loaded)
     await supervisor.send_scene(Update(late, 1, arrays, COLD, StopRule(4)))
-    while not (begun := helpers(supervisor.process_id)):
+    while not (begun := compile_helpers(supervisor.process_id)):
         await asyncio.sleep(0.01)
     return late, begun[0]
 

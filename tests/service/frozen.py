@@ -26,8 +26,7 @@ from pathlib import Path
 from typing import Any
 
 from service.storage.database import FILE
-from tests.service.rendering.test_durable import kill
-from tests.serving import SCENE, Server
+from tests.serving import SCENE, Server, kill
 
 FOLDERS = Path(__file__).parent / "folders"
 MADE_BY = {

@@ -18,8 +18,8 @@ from service.storage.database import Database
 from service.storage.documents import BY_LINK, PRIVATE, SHARED, checked
 from service.storage.stores import Storage, storage
 from tests.asset_files import OBJ, glb, gltf, png
-from tests.service.test_quota import mesh_scene
-from tests.service.test_rest import is_problem
+from tests.calls import is_problem
+from tests.service.stored_assets import mesh_scene
 from tests.serving import ENDLESS, SCENE, SMALL, Client, Server
 
 ANNA, BERT = {"authorization": "Bearer anna"}, {"authorization": "Bearer bert"}

@@ -16,7 +16,7 @@ from service.storage.documents import checked
 from service.storage.stores import Storage, storage
 from service.system.disk_usage import Usage
 from tests.asset_files import OBJ, glb, gltf
-from tests.service.test_quota import ASSET, file, here, mesh_scene
+from tests.service.stored_assets import ASSET, file, here, mesh_scene
 
 
 @pytest.fixture

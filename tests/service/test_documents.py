@@ -30,7 +30,7 @@ from service.storage import database, documents, migrations
 from service.storage.database import DamagedFile
 from service.storage.documents import Documents, checked
 from tests.asset_files import OBJ
-from tests.service.test_rest import is_problem
+from tests.calls import is_problem
 from tests.serving import SCENE, Server
 
 MATERIAL = {"type": "diffuse", "albedo": [0.1, 0.2, 0.3]}

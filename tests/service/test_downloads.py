@@ -18,7 +18,7 @@ from starlette.types import Message, Receive, Scope, Send
 from service.http import downloads
 from service.http.downloads import PIECE, Downloads, FileAnswer, Pieces
 from service.problems import TooManyRequests, Unavailable
-from tests.service.test_operation import metrics
+from tests.calls import metrics
 from tests.serving import PATIENCE_S, SCENE, Server, wait_until
 
 SIZE = 768  # of a picture of 9 MiB in float32

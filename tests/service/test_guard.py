@@ -24,7 +24,8 @@ from service.http.guard import Guard, _Body
 from service.http.keys import Keys
 from service.problems import Unauthorized
 from service.routes.errors import respond
-from tests.service.test_rest import OBJ, is_problem
+from tests.asset_files import OBJ
+from tests.calls import is_problem
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Server
 
 ANNA, BERT = {"authorization": "Bearer anna-1"}, {"authorization": "bearer  bert-2"}

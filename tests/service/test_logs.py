@@ -17,7 +17,7 @@ import pytest
 
 from service.logs import output as log_output
 from service.logs import setup
-from tests.service.test_operation import metrics
+from tests.calls import metrics
 from tests.serving import PATIENCE_S, Client, Server, wait_until
 
 ROOT = Path(__file__).parents[2]

@@ -29,8 +29,7 @@ from service.streams.edit_session import EditSession
 from service.system import memory
 from service.system.memory import MemoryBudget, machine_memory
 from service.worker.device.memory import UNLIMITED, default_limit
-from tests.serving import PATIENCE_S, SCENE, Client, Server
-from tests.test_privileges import served
+from tests.serving import PATIENCE_S, SCENE, Client, Server, served
 
 
 class Work:

@@ -17,7 +17,7 @@ from service.app import create_app, server_settings
 from service.config import Config, ConfigError, load_config
 from service.http.guard import OPEN_OF_A_KEY, Guard
 from service.routes.errors import respond
-from tests.service.test_rest import is_problem
+from tests.calls import is_problem
 from tests.serving import Server
 
 

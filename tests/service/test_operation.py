@@ -24,15 +24,10 @@ from service.logs import setup
 from service.logs.setup import _fields
 from service.routes.metrics import scrape
 from service.state import AppState
+from tests.calls import metrics
 from tests.serving import ENDLESS, SCENE, SMALL, Server, client, wait_until
 
 ROOT = Path(__file__).parents[2]
-
-
-def metrics(server: Server) -> dict[str, float]:
-    """Values by name and labels, as they are written."""
-    lines = [line for line in server.http.get("/metrics").text.splitlines() if not line.startswith("#")]
-    return {name: float(value) for name, value in (line.rsplit(" ", 1) for line in lines)}
 
 
 def test_metrics_tell_what_happens(server: Server) -> None:

@@ -8,7 +8,6 @@ import subprocess
 import sys
 from collections.abc import Iterator
 from pathlib import Path
-from typing import Any
 
 import pytest
 
@@ -20,9 +19,9 @@ from service.storage.documents import checked
 from service.storage.stores import Storage, storage
 from service.system.disk_usage import BLOCK, Usage
 from tests.asset_files import OBJ, glb, gltf
+from tests.service.stored_assets import ASSET, file, here, mesh_scene
 from tests.serving import SCENE
 
-ASSET = 2 * BLOCK  # bytes that a small asset takes on the disk: its own and its record's block
 LIMIT = 20 * ASSET
 
 
@@ -33,24 +32,12 @@ def kept(tmp_path: Path) -> Iterator[Storage]:
     kept.assets.close()
 
 
-def file(folder: Path, id: str, suffix: str = "") -> Path:
-    return folder / "assets" / (id.removeprefix("sha256:") + suffix)
-
-
 def uploads(kept: Storage, folder: Path, count: int, size: int = 1000) -> list[str]:
     """Ids, the one that was used longest ago first."""
     ids = [kept.assets.add(OBJ + b"#" * (size - len(OBJ) + i)).id for i in range(count)]
     for i, id in enumerate(ids, 1):
         os.utime(file(folder, id), (i, i))
     return ids
-
-
-def mesh_scene(*assets: str) -> dict[str, Any]:
-    return {**SCENE, "shapes": [{"type": "mesh", "asset": asset, "material": "ball"} for asset in assets]}
-
-
-def here(kept: Storage, ids: list[str]) -> list[bool]:
-    return [kept.assets.holds(id) for id in ids]
 
 
 def used(kept: Storage) -> int:

@@ -20,10 +20,10 @@ from PIL import Image
 from websockets.exceptions import ConnectionClosed
 
 from service.images import read_metadata
+from tests.asset_files import OBJ
+from tests.calls import is_problem, pixels, start, status
 from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Server, wait_until
 from tests.serving import client as opened
-
-OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 
 
 @pytest.fixture
@@ -38,29 +38,6 @@ def running(http: httpx.Client) -> Iterator[str]:
     wait_until(lambda: status(http, id)["samples"] > 0)
     yield id
     http.delete(f"/v1/renders/{id}")
-
-
-def start(http: httpx.Client, settings: Any = SMALL, scene: Any = SCENE) -> Any:
-    answer = http.post("/v1/renders", json={"scene": scene, "settings": settings})
-    assert answer.status_code == 202, answer.text
-    return answer.json()
-
-
-def status(http: httpx.Client, id: str, wait: float = 0) -> Any:
-    return http.get(f"/v1/renders/{id}", params={"wait": wait}).json()
-
-
-def pixels(http: httpx.Client, id: str, aov: str = "color") -> np.ndarray:
-    answer = http.get(f"/v1/renders/{id}/image", params={"format": "npy", "aov": aov})
-    return np.load(io.BytesIO(answer.content))
-
-
-def is_problem(answer: httpx.Response, status: int, *pointers: str) -> bool:
-    body = answer.json()
-    assert answer.headers["content-type"] == "application/problem+json", answer.text
-    assert answer.status_code == body["status"] == status and {"type", "title", "detail"} <= body.keys(), body
-    assert [error["pointer"] for error in body.get("errors", [])] == list(pointers), body
-    return True
 
 
 def test_one_shot(http: httpx.Client) -> None:

@@ -16,8 +16,8 @@ import httpx
 import pytest
 
 from service.state import MOST_WAITS
-from tests.service.test_rest import pixels, start, wait_until
-from tests.serving import ENDLESS, SCENE, SMALL, Server
+from tests.calls import pixels, start
+from tests.serving import ENDLESS, SCENE, SMALL, Server, wait_until
 
 
 @pytest.fixture

@@ -11,7 +11,7 @@ from gpu import Renderer
 from gpu.kernels import source
 from tests.probing import prober_of
 from tests.rendering import Images, document, picture
-from tests.shaders.test_sampling import _draw
+from tests.shaders.numbers import draw
 
 SKY = Images(sky=np.random.default_rng(8).exponential(1, (8, 16, 3)).astype(np.float32) ** 3)
 ROOM = [
@@ -30,7 +30,7 @@ def room(ball: dict[str, Any], floor: dict[str, Any] = MATTE) -> dict[str, Any]:
 
 @pytest.mark.parametrize("doublings", [1, 2])
 def test_parts_are_a_sequence_of_as_many_more(gpu: Renderer, doublings: int) -> None:
-    assert np.array_equal(*(_draw(prober_of(gpu), 0, 64, doublings=parts) for parts in (doublings, 0)))
+    assert np.array_equal(*(draw(prober_of(gpu), 0, 64, doublings=parts) for parts in (doublings, 0)))
 
 
 @pytest.mark.parametrize("ball", [{**METAL, "roughness": 0.4}, GLASS], ids=["metal", "glass"])

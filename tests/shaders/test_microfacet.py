@@ -18,8 +18,8 @@ from service.pack import pack_materials, pack_microfacets
 from service.scene import parse_scene
 from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from tests import microfacets, stats
+from tests.lobes import Grid
 from tests.probing import Prober, prober_of
-from tests.shaders.test_lobes import Grid
 
 Doc = dict[str, Any]
 DEFAULTS: Doc = {"distribution": "ggx", "alpha": 0.25, "gamma": 2.0, "geometry": "smith", "fresnel": "schlick",

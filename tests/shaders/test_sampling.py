@@ -7,12 +7,11 @@ import pytest
 from scipy import stats as scipy_stats
 from scipy.stats import qmc
 
-from gpu import FILTERS, Renderer, layout
+from gpu import FILTERS, Renderer
 from gpu.picture import filters
 from tests import stats
 from tests.probing import Prober, prober_of
-
-N = 1 << 16
+from tests.shaders.numbers import N, draw
 
 
 @pytest.fixture(scope="module")
@@ -20,23 +19,11 @@ def prober(gpu: Renderer) -> Prober:
     return prober_of(gpu)
 
 
-def _draw(
-    prober: Prober, what: int, count: int = N, sampler: int = 0, pair: int = 2, seed: int = 0, replicate: int = 0,
-    pixel: tuple[int, int] = (3, 7), filter_name: str = "box", doublings: int = 0, adaptive: int = 0,
-) -> np.ndarray:  # fmt: skip
-    frame = np.zeros((), layout.Frame.dtype)
-    frame["seed"], frame["replicate"] = seed, replicate
-    defines = {"WHAT": what, "SAMPLER": sampler, "ADAPTIVE": adaptive}
-    out = prober.run("numbers.comp", count, {}, defines=defines, frame=frame, filter_name=filter_name,
-                     pixel=pixel, pair=pair, doublings=doublings)  # fmt: skip
-    return out[0].astype(float)
-
-
 @pytest.mark.parametrize("k", [4, 8, 10])
 @pytest.mark.parametrize("seed", [0, 1, 12345])
 def test_sobol_is_stratified_in_every_elementary_interval(prober: Prober, k: int, seed: int) -> None:
     for start in (0, 1 << k):  # every aligned block of 2^k samples, not the first one alone
-        u = _draw(prober, 0, start + (1 << k), seed=seed)[start:, :2]
+        u = draw(prober, 0, start + (1 << k), seed=seed)[start:, :2]
         for a in range(k + 1):
             cells = np.floor(u * [1 << a, 1 << (k - a)]).astype(int)
             assert len(np.unique(cells[:, 0] * (1 << (k - a)) + cells[:, 1])) == 1 << k
@@ -47,8 +34,8 @@ def test_sobol_beats_independent_and_matches_scipys_scramble(prober: Prober) -> 
         # An integrand with a slanted edge: mean of x + y < 0.8
         return float(np.sqrt(np.mean([((u.sum(1) < 0.8).mean() - 0.32) ** 2 for u in draw])))  # type: ignore[attr-defined]
 
-    ours = errors(_draw(prober, 0, 256, seed=s)[:, :2] for s in range(64))
-    plain = errors(_draw(prober, 0, 256, sampler=1, seed=s)[:, :2] for s in range(64))
+    ours = errors(draw(prober, 0, 256, seed=s)[:, :2] for s in range(64))
+    plain = errors(draw(prober, 0, 256, sampler=1, seed=s)[:, :2] for s in range(64))
     owen = errors(qmc.Sobol(2, scramble=True, rng=s).random(256) for s in range(64))
     assert ours < 0.35 * plain
     assert ours < 1.5 * owen
@@ -58,7 +45,7 @@ def test_sobol_beats_independent_and_matches_scipys_scramble(prober: Prober) -> 
 @pytest.mark.parametrize("corner", [(0, 0), (6, 4), (2, 130)])
 def test_four_neighbours_fill_each_others_gaps(prober: Prober, corner: tuple[int, int], pair: int) -> None:
     pixels = [(corner[0] + i % 2, corner[1] + i // 2) for i in range(4)]
-    drawn = np.stack([_draw(prober, 0, 64, pixel=pixel, pair=pair)[:, :2] for pixel in pixels])
+    drawn = np.stack([draw(prober, 0, 64, pixel=pixel, pair=pair)[:, :2] for pixel in pixels])
     for k in range(7):
         together = drawn[:, : 1 << k].reshape(-1, 2)
         for axis in (0, 1):
@@ -69,7 +56,7 @@ def _edge_errors(prober: Prober, samples: int, **more: int) -> np.ndarray:
     """(blocks, 16): of pixels in blocks of 4 x 4, in the share of x + y / 2 < 0.7."""
     corners = [(4 * i, 4 * (i % 5)) for i in range(30)]
     pixels = [[(x + i % 4, y + i // 4) for i in range(16)] for x, y in corners]
-    draw = lambda pixel: _draw(prober, 0, samples, pixel=pixel, **more)[:, :2]  # noqa: E731
+    draw = lambda pixel: draw(prober, 0, samples, pixel=pixel, **more)[:, :2]  # noqa: E731
     return np.array([[(draw(p) @ [1, 0.5] < 0.7).mean() - 0.45 for p in block] for block in pixels])
 
 
@@ -84,13 +71,13 @@ def test_neighbours_errors_cancel(prober: Prober, samples: int) -> None:
 
 @pytest.mark.parametrize("sampler", [0, 1])
 def test_pixels_pairs_and_replicates_are_independent(prober: Prober, sampler: int) -> None:
-    base = _draw(prober, 0, 4096, sampler)[:, :2]
+    base = draw(prober, 0, 4096, sampler)[:, :2]
     others = [
-        _draw(prober, 0, 4096, sampler, pixel=(4, 7)),
-        _draw(prober, 0, 4096, sampler, pixel=(7, 3)),
-        _draw(prober, 0, 4096, sampler, pair=3),
-        _draw(prober, 0, 4096, sampler, replicate=1),
-        _draw(prober, 0, 4096, sampler, seed=1),
+        draw(prober, 0, 4096, sampler, pixel=(4, 7)),
+        draw(prober, 0, 4096, sampler, pixel=(7, 3)),
+        draw(prober, 0, 4096, sampler, pair=3),
+        draw(prober, 0, 4096, sampler, replicate=1),
+        draw(prober, 0, 4096, sampler, seed=1),
     ]
     for other in others:
         for axis in (0, 1):
@@ -99,7 +86,7 @@ def test_pixels_pairs_and_replicates_are_independent(prober: Prober, sampler: in
 
 @pytest.mark.parametrize("sampler", [0, 1])
 def test_numbers_are_uniform_and_below_one(prober: Prober, sampler: int) -> None:
-    u = np.concatenate([_draw(prober, 0, 1024, sampler, seed=s)[:, :2] for s in range(32)])
+    u = np.concatenate([draw(prober, 0, 1024, sampler, seed=s)[:, :2] for s in range(32)])
     assert (u >= 0).all()
     assert (u < 1).all()
     counts = np.histogram2d(u[:, 0], u[:, 1], [32, 32], [[0, 1], [0, 1]])[0]
@@ -124,7 +111,7 @@ WARPS = {
 def test_warps_have_their_density(prober: Prober, name: str) -> None:
     """Each warp, mapped back to the unit square by its own distribution function, is uniform there."""
     what, inverse = WARPS[name]
-    x, y = inverse(_draw(prober, what, N, sampler=1))
+    x, y = inverse(draw(prober, what, N, sampler=1))
     counts = np.histogram2d(x, y, [24, 24], [[0, 1], [0, 1]])[0]
     assert counts.sum() == N
     assert stats.chi_square(counts, np.full_like(counts, N / counts.size)) > stats.sidak(1e-3, len(WARPS))
@@ -132,7 +119,7 @@ def test_warps_have_their_density(prober: Prober, name: str) -> None:
 
 @pytest.mark.parametrize("name", FILTERS)
 def test_filters_have_their_profile(prober: Prober, name: str) -> None:
-    a = _draw(prober, 6, N, sampler=1, filter_name=name)
+    a = draw(prober, 6, N, sampler=1, filter_name=name)
     radius = filters.RADIUS[name]
     edges = np.linspace(-radius, radius, 41)
     fine = np.linspace(-radius, radius, 40 * 200 + 1)

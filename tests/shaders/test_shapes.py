@@ -7,11 +7,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, Scene, layout
-from gpu.layout.bindings import Slot
+from gpu import Renderer
 from service.pack import pack
 from service.scene import parse_scene
-from tests.probing import prober_of
+from tests.rays import ball_mesh, to_world, trace
 from tests.rendering import Images, document
 
 TURNED = {"translate": [0.3, -0.2, 0.1], "rotate": [20, -35, 50], "scale": [0.5, 1.3, -0.8]}
@@ -29,21 +28,9 @@ ROWS: dict[str, dict[str, Any]] = {
 N = 20_000
 
 
-def _matrix(shape: dict[str, Any]) -> np.ndarray:
-    t = shape.get("transform", {})
-    rx, ry, rz = (np.radians(a) for a in t.get("rotate", (0, 0, 0)))
-    x = np.array([[1, 0, 0], [0, np.cos(rx), -np.sin(rx)], [0, np.sin(rx), np.cos(rx)]])
-    y = np.array([[np.cos(ry), 0, np.sin(ry)], [0, 1, 0], [-np.sin(ry), 0, np.cos(ry)]])
-    z = np.array([[np.cos(rz), -np.sin(rz), 0], [np.sin(rz), np.cos(rz), 0], [0, 0, 1]])
-    out = np.eye(4)
-    out[:3, :3] = z @ y @ x @ np.diag(np.broadcast_to(np.asarray(t.get("scale", 1), float), 3))
-    out[:3, 3] = t.get("translate", (0, 0, 0))
-    return out
-
-
 def expected(shape: dict[str, Any], o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Distance (nan: none) and outward unit normal, in float64, by way of the shape's own space."""
-    m = _matrix(shape)
+    m = to_world(shape)
     inverse = np.linalg.inv(m[:3, :3])
     o, d = (o - m[:3, 3]) @ inverse.T, d @ inverse.T
     with np.errstate(all="ignore"):
@@ -72,19 +59,6 @@ def expected(shape: dict[str, Any], o: np.ndarray, d: np.ndarray) -> tuple[np.nd
         return t, n / np.linalg.norm(n, axis=1, keepdims=True)
 
 
-def _trace(gpu: Renderer, scene: Scene, o: np.ndarray, d: np.ndarray, away: np.ndarray) -> list[np.ndarray]:
-    def wide(a: np.ndarray) -> np.ndarray:
-        return np.concatenate([a, np.zeros((len(a), 1))], 1).astype(np.float32)
-
-    scene.bind()
-    frame = np.zeros((), layout.Frame.dtype)
-    scene.write_frame(frame)
-    inputs = {Slot.SUM: wide(o), Slot.COMPENSATION: wide(d), Slot.MOMENTS: wide(away)}
-    outputs = (Slot.OUTPUT, Slot.ALBEDO, Slot.NORMAL)
-    known = scene.defines(RenderSettings(8, 8)) | {"HAS_ANISOTROPIC": 1}
-    return prober_of(gpu).run("rays.comp", len(o), inputs, outputs, known, frame=frame)
-
-
 def _rays(rng: np.random.Generator, n: int) -> tuple[np.ndarray, np.ndarray]:
     o = rng.normal(size=(n, 3))
     o *= rng.choice([0.1, 3.0], (n, 1)) / np.linalg.norm(o, axis=1, keepdims=True)  # from inside and outside
@@ -101,7 +75,7 @@ def test_hits_are_where_float64_says(gpu: Renderer, row: str) -> None:
     rng = np.random.default_rng(7)
     o, d = _rays(rng, N)
     scene = gpu.load(pack(parse_scene(document([shape])), Images()).arrays)
-    hits, _, _ = _trace(gpu, scene, o, d, rng.normal(size=(N, 3)))
+    hits, _, _ = trace(gpu, scene, o, d, rng.normal(size=(N, 3)))
     t, n = expected(shape, o, d)
     met = hits[:, 3] >= 0
     edge = np.isnan(t) != ~met
@@ -122,20 +96,13 @@ CLOSED = {
 }
 
 
-def _icosphere(divisions: int) -> dict[str, Any]:
-    import trimesh
-
-    mesh = trimesh.creation.icosphere(divisions)
-    return {"type": "mesh", "vertices": mesh.vertices.tolist(), "faces": mesh.faces.tolist(), "smooth": False}
-
-
 @pytest.mark.parametrize("scale", [1e-4, 1.0, 1e5])
 @pytest.mark.parametrize("offset", [0.0, 7.3])
 @pytest.mark.parametrize("row", [*CLOSED, "mesh"])
 def test_rays_that_leave_do_not_come_back(gpu: Renderer, row: str, scale: float, offset: float) -> None:
     """From outside, off a convex shape, towards any outward direction, grazing ones too: nothing may be met."""
-    shape = CLOSED[row] if row != "mesh" else _icosphere(3)
-    inner = _matrix(shape)
+    shape = CLOSED[row] if row != "mesh" else ball_mesh(3)
+    inner = to_world(shape)
     inner = np.diag([scale, scale, scale, 1.0]) @ inner
     inner[:3, 3] += np.array([offset, -2 * offset, offset]) * scale
     placed = {**shape, "material": "m", "transform": {"matrix": inner.ravel().tolist()}}
@@ -148,13 +115,13 @@ def test_rays_that_leave_do_not_come_back(gpu: Renderer, row: str, scale: float,
     shift = np.array([offset, -2 * offset, offset]) * scale - np.array(packed.origin)
     scene = gpu.load(packed)
     world = o * scale + shift
-    first, _, _ = _trace(gpu, scene, world, d, np.ones((N, 3)))
+    first, _, _ = trace(gpu, scene, world, d, np.ones((N, 3)))
     normal = first[:, :3].astype(float)
     away = rng.normal(size=(N, 3))
     graze = away - (away * normal).sum(1, keepdims=True) * normal
     graze /= np.linalg.norm(graze, axis=1, keepdims=True)
     towards = graze + normal * rng.choice([1e-4, 1e-2, 1.0], (N, 1))
-    hits, places, leaves = _trace(gpu, scene, world, d, towards)
+    hits, places, leaves = trace(gpu, scene, world, d, towards)
     met = hits[:, 3] >= 0
     assert met.mean() > 0.2
     assert np.isfinite(places[met]).all()

@@ -22,6 +22,7 @@ from service.streams.scene_diff import SceneDiff, scene_diff
 from tests.documents import Few
 from tests.probing import PROBES
 from tests.rendering import Images, document, render
+from tests.shaders.textured import BALL, BARE, BOX, QUAD, at, on_ball
 
 Doc = dict[str, Any]
 RNG = np.random.default_rng(6)
@@ -32,7 +33,6 @@ IMAGES = {
     "floats": RNG.random((6, 4, 3), np.float32) * 3,
     "one": np.array([[[200, 30, 90]]], np.uint8),
 }
-QUAD = {"type": "quad", "origin": [-1, -1, 0], "u": [2, 0, 0], "v": [0, 2, 0], "material": "m"}
 LOOK = {"position": [0, 0, 4], "target": [0, 0, 0], "vfov": 2 * np.degrees(np.arctan(0.25))}  # the quad fills it
 
 
@@ -143,19 +143,7 @@ RAMPED = {"t": {"asset": "ramp", "wrap": "clamp"}}
 ALBEDO = {"albedo": {"texture": "t"}}
 
 
-def at(point: list[float], away: list[float], up: tuple[float, ...] = (0, 1, 0)) -> dict[str, Any]:
-    """A camera that sees one place, from `away`."""
-    return {"position": (np.array(point) + away).tolist(), "target": point, "up": list(up), "vfov": 0.01}
-
-
-BOX = {"type": "box", "min": [-1, -2, -3], "max": [1, 2, 3], "material": "m"}
-BALL = {"type": "sphere", "center": [0, 0, 0], "radius": 2, "material": "m"}
 STRETCHED = {**BALL, "transform": {"scale": [1, 2, 0.5]}}
-
-
-def on_ball(x: float, y: float, z: float) -> tuple[list[float], list[float]]:
-    n = np.array([x, y, z]) / np.linalg.norm([x, y, z])
-    return (2 * n).tolist(), [0.5 + np.arctan2(x, z) / (2 * np.pi), 1 - np.arccos(n[1]) / np.pi]
 
 
 PLACES = [
@@ -269,9 +257,6 @@ def refused(scene: dict[str, Any]) -> list[str]:
     with pytest.raises(InvalidDocument) as caught:
         pack(parse_scene(scene), Shelf(**IMAGES))
     return [error.pointer for error in caught.value.errors]
-
-
-BARE = {"type": "mesh", "material": "m", "vertices": [[0, 0, 0], [1, 0, 0], [0, 1, 0]], "faces": [[0, 1, 2]]}
 
 
 def test_what_cannot_be_is_refused_at_its_place() -> None:

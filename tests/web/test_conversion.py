@@ -14,7 +14,7 @@ from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
 from tests import microfacets
 from tests.serving import Server
 from tests.web.conftest import Editor
-from tests.web.test_modules import call
+from tests.web.modules import call
 
 CONVERT = """async ([old, type]) => {
     const schema = await (await fetch("/v1/schema")).json();

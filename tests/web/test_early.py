@@ -8,8 +8,7 @@ from playwright.sync_api import BrowserContext, WebSocketRoute
 
 from tests.serving import Server
 from tests.web.conftest import Editor
-from tests.web.test_picture import click
-from tests.web.test_textures import halves
+from tests.web.editing import click, halves
 
 
 class Slow:

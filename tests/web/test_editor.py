@@ -13,7 +13,7 @@ from playwright.sync_api import Browser, BrowserContext
 
 from tests.serving import Server
 from tests.web.conftest import Editor, MortalServer
-from tests.web.test_picture import overlay
+from tests.web.editing import overlay
 
 STAGE = "#stage"
 

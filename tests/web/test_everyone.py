@@ -15,7 +15,7 @@ from websockets.typing import Subprotocol
 from gpu import Renderer
 from tests.serving import Server
 from tests.web.conftest import Editor
-from tests.web.test_picture import camera
+from tests.web.editing import camera
 
 SERIOUS = {"serious", "critical"}
 

@@ -20,7 +20,7 @@ from playwright.sync_api import Browser, Route
 
 from tests.serving import Server
 from tests.web.conftest import Editor
-from tests.web.test_textures import halves
+from tests.web.editing import halves
 
 PASTE = "(text) => { navigator.clipboard.readText = async () => text; }"
 IS_DONE = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'"

@@ -10,7 +10,7 @@ import pytest
 from playwright.sync_api import Browser, Page
 
 from tests.serving import Server
-from tests.web.test_modules import call
+from tests.web.modules import call
 
 
 @pytest.fixture(scope="module")

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 from tests.web.conftest import Editor
-from tests.web.test_saving import TRIANGLE
-from tests.web.test_things import document
+from tests.web.editing import TRIANGLE, document
 
 
 def test_what_is_new_shares_no_material(editor: Editor) -> None:

@@ -13,6 +13,7 @@ from playwright.sync_api import Browser, Page
 
 from service.scene.transform import Transform
 from tests.serving import Server
+from tests.web.modules import call
 
 
 @pytest.fixture(scope="module")
@@ -21,15 +22,6 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     opened.goto(server.url + "/icon.svg")  # any page of the same origin: the editor itself need not run
     yield opened
     opened.close()
-
-
-def call(page: Page, module: str, function: str, *arguments: Any) -> Any:
-    script = """async ([module, name, args]) => {
-        const all = await import(new URL(module, location));
-        const result = all[name](...args);
-        return result === undefined ? "undefined" : result;
-    }"""
-    return page.evaluate(script, [module, function, list(arguments)])
 
 
 def document(chance: random.Random, depth: int = 3) -> Any:

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 
 from tests.asset_files import png
-from tests.service.assets.test_obj_scene import GREY, TEXTURED, zipped
+from tests.obj_files import GREY, TEXTURED, zipped
 from tests.web.conftest import Editor
 
 TWO = TEXTURED + "usemtl shiny\nv 0 0 1\nf 1/1 2/2 5/3\n"

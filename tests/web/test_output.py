@@ -10,7 +10,7 @@ from PIL import Image
 
 from service.images import read_metadata
 from tests.web.conftest import Editor
-from tests.web.test_saving import finish
+from tests.web.editing import finish
 
 OUTPUT = "#output"
 

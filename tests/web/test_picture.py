@@ -2,48 +2,13 @@
 
 from __future__ import annotations
 
-import base64
 import re
-from typing import Any
 
 import numpy as np
 import pytest
 
 from tests.web.conftest import Editor
-
-
-def point(editor: Editor, x: float, y: float) -> tuple[float, float]:
-    """A place of the stage, 0..1, on the page."""
-    box = editor.page.locator("#stage").bounding_box()
-    assert box is not None
-    return box["x"] + x * box["width"], box["y"] + y * box["height"]
-
-
-def click(editor: Editor, x: float, y: float) -> None:
-    editor.page.mouse.click(*point(editor, x, y))
-
-
-def camera(editor: Editor) -> dict[str, Any]:
-    """The camera's numbers, as the panel shows them."""
-    editor.tab("scene")
-    editor.page.click("#outline-list [data-thing='/camera']")
-    script = """() => Object.fromEntries([...document.querySelectorAll("#thing-form [data-field]")].map((row) =>
-        [row.dataset.field, [...row.querySelectorAll("input.number")].map((each) => Number(each.value))]))"""
-    found: dict[str, Any] = editor.page.evaluate(script)
-    return found
-
-
-def overlay(editor: Editor, id: str) -> np.ndarray:
-    """(height, width, 4) of one of the canvases."""
-    script = """(id) => {
-        const { width, height } = document.getElementById(id);
-        const data = document.getElementById(id).getContext("2d").getImageData(0, 0, width, height).data;
-        let text = ""; // a list of numbers would take seconds
-        for (let i = 0; i < data.length; i += 8192) text += String.fromCharCode(...data.subarray(i, i + 8192));
-        return [width, height, btoa(text)];
-    }"""
-    width, height, values = editor.page.evaluate(script, id)
-    return np.frombuffer(base64.b64decode(values), np.uint8).reshape(height, width, 4)
+from tests.web.editing import camera, click, overlay, point
 
 
 def test_a_click_selects_the_thing_and_its_material(editor: Editor) -> None:

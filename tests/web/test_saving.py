@@ -16,20 +16,7 @@ from playwright.sync_api import BrowserContext
 from service.images import read_metadata
 from tests.serving import Server
 from tests.web.conftest import Editor
-from tests.web.test_picture import overlay
-
-TRIANGLE = b"v -1 0.2 1.2\nv 1 0.2 1.2\nv 0 1.9 1.2\nf 1 2 3\n"
-
-
-def finish(editor: Editor, samples: int) -> None:
-    """From the start, with another seed: by now the picture may have more samples than that."""
-    editor.tab("render")
-    editor.page.evaluate("document.querySelector('#more-form').closest('details').open = true")
-    for place, value in (("#settings-form [data-field=max_samples]", samples), ("#more-form [data-field=seed]", 7)):
-        entry = editor.page.locator(f"{place} input")
-        entry.fill(str(value))
-        entry.press("Enter")
-    editor.wait("the end", lambda: editor.text("#state") == "Done" and editor.samples() == samples)
+from tests.web.editing import TRIANGLE, finish, overlay
 
 
 def read_exr(path: Path) -> tuple[list[str], np.ndarray]:

@@ -2,23 +2,12 @@
 
 from __future__ import annotations
 
-import io
 import json
 
-from PIL import Image
-
 from tests.web.conftest import Editor
+from tests.web.editing import halves
 
 BENEATH = "#material-form [data-field=base_color] .beneath"
-
-
-def halves(left: tuple[int, int, int] = (0, 220, 0)) -> bytes:
-    """Green at the left unless told, dark blue at the right."""
-    image = Image.new("RGB", (16, 16), left)
-    image.paste((0, 0, 40), (8, 0, 16, 16))
-    file = io.BytesIO()
-    image.save(file, "PNG")
-    return file.getvalue()
 
 
 def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:

@@ -2,19 +2,11 @@
 
 from __future__ import annotations
 
-import json
-from typing import Any
-
 import numpy as np
 
 from tests import gltf_files
 from tests.web.conftest import Editor
-
-
-def document(editor: Editor) -> Any:
-    """The scene as the page would save it."""
-    editor.tab("save")
-    return json.loads(editor.shot("text=Scene as JSON"))
+from tests.web.editing import document
 
 
 def entries(editor: Editor, name: str) -> list[float]:

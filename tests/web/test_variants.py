@@ -11,8 +11,7 @@ import pytest
 from PIL import Image
 
 from tests.web.conftest import Editor
-from tests.web.test_picture import overlay, point
-from tests.web.test_saving import finish
+from tests.web.editing import finish, overlay, point
 
 
 def metric(editor: Editor) -> float:

@@ -14,7 +14,7 @@ from service.assets.types import AssetLimits
 from service.pack import pack
 from service.scene import parse_scene
 from tests import asset_files as make
-from tests.service.assets.test_obj_scene import zipped
+from tests.obj_files import zipped
 
 ROOF = "v 0 0 0\nv 1 0 0\nv 1 1 1\nv 0 1 1\nv 1 2 0\nv 0 2 0\n"  # two slopes that meet in a ridge
 SLOPES = ("f 1 2 3 4\n", "f 4 3 5 6\n")

@@ -14,7 +14,7 @@ from service.assets.scene_import import Imported
 from service.pack import pack
 from service.scene import parse_scene
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
-from tests.service.assets.test_gltf_scene import imported, noted
+from tests.service.assets.scenes import imported, noted
 
 PIXELS = np.arange(4 * 4 * 4, dtype=np.uint8).reshape(4, 4, 4) * 4
 

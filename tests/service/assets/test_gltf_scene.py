@@ -3,37 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
 
 from service.assets import AssetStore, MeshData, scene_import
-from service.assets.scene_import import Imported
 from service.pack import pack
 from service.pack.geometry import instances
 from service.problems import AssetError
 from service.scene import parse_scene
 from tests.gltf_files import QUAD, QUAD_FACES, QUAD_UVS, Gltf
+from tests.service.assets.scenes import imported, noted
 
 HALF = math.sqrt(0.5)
-
-
-@pytest.fixture(scope="module")
-def store(tmp_path_factory: pytest.TempPathFactory) -> Iterator[AssetStore]:
-    store = AssetStore(tmp_path_factory.mktemp("data"))
-    yield store
-    store.close()
-
-
-def imported(store: AssetStore, file: Gltf) -> Imported:
-    info = store.add(file.glb())
-    assert info.kind == "scene"
-    found = store.scene(info.id)
-    assert (info.warnings or []) == found.warnings
-    parse_scene(found.document)
-    return found
 
 
 def corners(store: AssetStore, shape: dict[str, Any]) -> np.ndarray:
@@ -41,10 +24,6 @@ def corners(store: AssetStore, shape: dict[str, Any]) -> np.ndarray:
     mesh = store.mesh(shape["asset"])
     matrix = np.reshape(shape.get("transform", {"matrix": np.eye(4)})["matrix"], (4, 4))
     return (mesh.vertices @ matrix[:3, :3].T + matrix[:3, 3])[mesh.faces]
-
-
-def noted(found: Imported) -> dict[str, str]:
-    return {warning["pointer"]: warning["detail"] for warning in found.warnings}
 
 
 @pytest.mark.parametrize("name", ["NORMAL", "TEXCOORD_0", "TANGENT", "COLOR_0"])

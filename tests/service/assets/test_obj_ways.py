@@ -12,7 +12,7 @@ from PIL import Image
 
 from service.cli import main
 from tests.asset_files import png
-from tests.service.assets.test_obj_scene import QUAD, zipped
+from tests.obj_files import QUAD, zipped
 from tests.serving import Server
 
 SMALL = ["--set", "width=24", "--set", "height=24", "--spp", "4", "--tone-map", "linear"]

@@ -16,7 +16,7 @@ from service.assets.scenes.rays import Placed
 from service.assets.scenes.room import stand_inside
 from service.assets.types import AssetLimits
 from tests import asset_files as make
-from tests.service.assets.test_obj_scene import zipped
+from tests.obj_files import zipped
 
 LOW, HIGH = np.array([10.0, 0.0, -2.0]), np.array([16.0, 2.5, 2.0])
 SIDES = {  # corners of a box by the sides that they make, counter-clockwise from outside

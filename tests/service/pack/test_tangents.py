@@ -19,9 +19,9 @@ from service.scene import parse_scene
 from service.streams.scene_diff import scene_diff
 from tests.documents import Shelf, matrix_of
 from tests.gltf_files import QUAD, QUAD_UVS, Gltf
+from tests.normal_maps import MAPS, TEXTURES
 from tests.probing import prober_of
 from tests.rendering import Images, document, picture, render
-from tests.shaders.test_normal_maps import MAPS, TEXTURES
 
 Doc = dict[str, Any]
 BRUSHED = {"type": "principled", "metallic": 1, "base_color": 0.9, "roughness": 0.35, "anisotropic": 0.9}

@@ -21,9 +21,8 @@ from service.renderers.bsdf_questions import LONG_AT_ONCE, MOST, BsdfQuestions
 from service.renderers.local.supervisor import Supervisor
 from service.scene import PrincipledMaterial, parse_scene
 from tests.documents import Shelf
-from tests.gpu.test_precompile import LINEAR, SIZE, Ears, helpers
 from tests.serving import SCENE
-from tests.supervisors import with_supervisor
+from tests.supervisors import LINEAR, SIZE, Ears, compile_helpers, with_supervisor
 
 GLASS = pack_material(PrincipledMaterial(type="principled", transmission=1.0, roughness=0.4))
 UP = np.array([[0.0, 0.0, 1.0]])
@@ -79,7 +78,7 @@ async def busy_picture(supervisor: Supervisor) -> tuple[int, Ears]:
     task = supervisor.open(ears)
     arrays = pack(parse_scene(SCENE), Shelf()).arrays
     await supervisor.send_scene(Update(task, 1, arrays, SIZE, StopRule()))
-    await ears.next(task, Loaded)
+    await ears.next_of(task, Loaded)
     return task, ears
 
 
@@ -91,8 +90,8 @@ def test_pictures_grow_while_its_kernel_is_compiled(gpu: Renderer, cold: Path) -
         helped = False
         while not answer.done():
             supervisor.send(Read(task, len(seen), LINEAR))
-            seen.append((await ears.next(task, Image)).progress.samples)
-            helped = helped or bool(helpers(supervisor.process_id))
+            seen.append((await ears.next_of(task, Image)).progress.samples)
+            helped = helped or bool(compile_helpers(supervisor.process_id))
         assert (await answer)["f"].any()
         assert helped and len(set(seen)) >= 5
 

@@ -34,9 +34,7 @@ from service.renderers.local.supervisor import Supervisor
 from service.renders.recorder import Recorder
 from service.renders.store.store import RenderStore
 from service.worker.device import checkpoints
-from tests.gpu.test_precompile import LINEAR, arrays_of
-from tests.service.rendering.test_worker import Ears, settings
-from tests.supervisors import with_supervisor
+from tests.supervisors import LINEAR, Ears, arrays_of, settings, with_supervisor
 
 ENDLESS = 1 << 24
 

@@ -15,7 +15,7 @@ from service.renders.store.pictures import PictureFiles
 from service.renders.store.record import Outcome, StoredRender
 from service.renders.store.rows import RenderRows
 from service.renders.store.store import RenderStore
-from tests.service.rendering.test_render_store import DOCUMENT, order, picture
+from tests.service.rendering.stored import DOCUMENT, order, picture
 
 HALF, WHOLE = Progress(8, 0.2, 1.0), Progress(64, 0.1, 4.0)
 ENDED = Outcome("done", "max_samples", WHOLE, ended_at=200.0)

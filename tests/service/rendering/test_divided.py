@@ -17,11 +17,7 @@ from service.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule,
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
-from tests.gpu.test_precompile import arrays_of
-from tests.service.rendering.test_pool import impatient
-from tests.service.rendering.test_worker import LINEAR, Ears, settings
-
-__all__ = ["impatient"]  # a fixture
+from tests.supervisors import LINEAR, Ears, arrays_of, settings
 
 SIDE, SAMPLES = 96, 500  # the last block ends before its border
 

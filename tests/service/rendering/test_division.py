@@ -24,7 +24,7 @@ from service.worker.division.ledger import MOST_BYTES, PIXEL_BYTES, Ledger
 from service.worker.helpers.denoise_client import DenoiseClient
 from service.worker.payloads import saved_bands, saved_picture, sent_picture
 from service.worker.task import Task
-from tests.gpu.test_precompile import arrays_of
+from tests.supervisors import arrays_of
 
 FIRST, SIZE = 8, 64  # samples: the first border, and the distance of the others
 WIDTH, HEIGHT = 512, 300

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import asyncio
 import json
-import os
 import signal
 import sqlite3
 import threading
 import time
 from collections.abc import Iterator
-from contextlib import closing, suppress
+from contextlib import closing
 from datetime import UTC, datetime
 from functools import partial
 from pathlib import Path
@@ -28,7 +27,7 @@ from service.renders.store.store import RenderStore
 from service.requests.request_parser import folded
 from service.scene import parse_settings
 from service.storage.database import FILE
-from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, wait_until
+from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, kill, wait_until
 from tests.serving import Server as AnyServer
 
 Server = partial(AnyServer, warms=False)
@@ -61,15 +60,6 @@ def until_samples(server: AnyServer, id: str, samples: int) -> dict[str, Any]:
 
 def until_checkpoint(folder: Path, id: str) -> None:
     wait_until((folder / "data" / "renders" / f"{id}.checkpoint").exists)
-
-
-def kill(server: AnyServer) -> None:
-    """The server and all its processes at once, which cannot know."""
-    for pid in [server.process.pid, *server.children()]:
-        with suppress(ProcessLookupError):
-            os.kill(pid, signal.SIGKILL)
-    server.process.wait()
-    server.http.close()
 
 
 @pytest.fixture(scope="module")

@@ -11,7 +11,6 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.config import Config
 from service.ipc.messages import (
     Checkpoint,
     Done,
@@ -25,54 +24,15 @@ from service.ipc.messages import (
     View,
 )
 from service.ipc.orders import Stop, TakeCheckpoint
-from service.pack import Packed, pack
-from service.problems import Conflict, Internal, Unavailable
-from service.quality import resolve
-from service.renderers.statistics import Statistics
+from service.pack import Packed
+from service.problems import Conflict, Internal
 from service.renders.job import Job
 from service.renders.recorder import MOST_STARTS, Recorder
 from service.renders.store.record import Order, Outcome
 from service.renders.store.store import RenderStore
-from service.scene import parse_scene, parse_settings
-from tests.documents import Shelf
-from tests.serving import SCENE
+from tests.service.rendering.fakes import SETTINGS, Renderers, load, until
 
-SETTINGS = resolve(parse_settings({"width": 4, "height": 4, "max_samples": 8}, "", Config()))
-PACKED = pack(parse_scene(SCENE), Shelf())
 SAVED = SavedPicture(4, (0, 0, 0), [np.arange(64, dtype=np.uint8)])
-
-
-class Renderers:
-    """Notes what it is told."""
-
-    def __init__(self) -> None:
-        self.statistics = Statistics()
-        self.hopeless = False
-        self.opened, self.sent = 0, list[Any]()
-        self.clients = list[str]()
-
-    def open(self, listener: Any, kind: str, client: str) -> int:
-        if self.hopeless:
-            raise Unavailable("nothing renders")
-        self.clients.append(client)
-        self.opened += 1
-        return self.opened
-
-    def drop(self, task: int) -> None:
-        self.sent.append(("drop", task))
-
-    def send(self, message: Any) -> None:
-        self.sent.append(message)
-
-    def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
-        self.sent.append(("stored", read()))
-
-    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
-        self.sent.append((update, restore))
-
-
-async def load(document: bytes, count: Callable[[int], None]) -> Packed:
-    return PACKED
 
 
 async def stored(renderers: Any, store: RenderStore, outcome: Outcome | None = None) -> Job:
@@ -93,12 +53,6 @@ async def in_line(job: Job) -> None:
         if job.reserve():
             await job.run()
         await asyncio.sleep(0.001)
-
-
-async def until(condition: Callable[[], object]) -> None:
-    async with asyncio.timeout(10):
-        while not condition():
-            await asyncio.sleep(0.005)
 
 
 def test_it_goes_on_from_its_checkpoint_when_something_renders_again(tmp_path: Path) -> None:

@@ -15,9 +15,7 @@ from service.problems import Unavailable
 from service.renderers.local import restarts
 from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
-from tests.gpu.test_precompile import arrays_of
-from tests.service.rendering.test_worker import LINEAR, Ears, settings
-from tests.supervisors import with_supervisor
+from tests.supervisors import LINEAR, Ears, arrays_of, settings, with_supervisor
 
 
 async def replaced(supervisor: Supervisor, number: int = signal.SIGKILL) -> None:

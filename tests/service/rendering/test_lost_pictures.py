@@ -20,7 +20,7 @@ from service.storage.database import FILE
 from service.storage.lost_pictures import KEEP
 from service.storage.stores import storage
 from service.system.disk_usage import Usage
-from tests.service.rendering.test_render_store import DOCUMENT, PROGRESS, order, picture
+from tests.service.rendering.stored import DOCUMENT, PROGRESS, order, picture
 
 DATABASE = [FILE, f"{FILE}-wal", f"{FILE}-shm"]
 

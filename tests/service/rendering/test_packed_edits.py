@@ -20,9 +20,8 @@ from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
 from service.worker.task import HOLD_S
 from tests.documents import Shelf
-from tests.service.rendering.test_worker import ENDLESS, LINEAR, Ears, settings
 from tests.serving import SCENE
-from tests.supervisors import with_supervisor
+from tests.supervisors import ENDLESS, LINEAR, Ears, settings, with_supervisor
 
 
 @pytest.fixture(scope="module")

@@ -10,63 +10,26 @@ from typing import Any
 import numpy as np
 import pytest
 
-from service.ipc import channel
 from service.ipc.messages import (
     Checkpoint,
     Done,
     Failed,
     Progress,
     Read,
-    Ready,
     Restore,
     SavedPicture,
     StopRule,
-    Unable,
     Update,
     View,
     Want,
 )
 from service.ipc.orders import Pause, Resume, Settle
 from service.problems import Unavailable
-from service.renderers.local import restarts
 from service.renderers.local.process import Waiting
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
-from tests.gpu.test_precompile import arrays_of
-from tests.service.rendering.test_worker import LINEAR, Ears, settings
-
-
-class Fake:
-    """A renderer's process that renders nothing: it notes what it is told, and says what a test has it say."""
-
-    def __init__(self, driver: str, received: Callable[[Any], None], lost: Callable[[], None], lifeline: Any) -> None:
-        self.began = self.lived_s = 0.0
-        self.ready = self.unable = False
-        self.task, self.id = 0, 4711
-        self.link, self.told = self, list[Any]()
-        self.say, self.lose = received, lost
-        able = driver != ""
-        word = Ready({"renderer": driver, "version": ""}) if able else Unable("There is no such device.")
-        asyncio.get_running_loop().call_soon(received, word)
-        if not able:
-            asyncio.get_running_loop().call_soon(lost)
-
-    def send(self, message: Any) -> None:
-        self.told.append(message)
-
-    def send_encoded(self, message: channel.Encoded) -> None:
-        self.told.append(channel.decode(*message))
-
-    def heard(self, kind: Any) -> list[int]:
-        """The tasks of the messages of that kind, in order."""
-        return [message.task for message in self.told if isinstance(message, kind)]
-
-    def close(self) -> None: ...
-
-    def watch(self, excused: bool = False) -> None: ...
-
-    async def end(self, patience_s: float) -> Any:
-        return "crashed"
+from tests.service.rendering.fakes import Fake
+from tests.supervisors import LINEAR, Ears, arrays_of, settings
 
 
 class Fakes:
@@ -102,12 +65,6 @@ def with_fakes(test: Callable[[Fakes], Awaitable[None]], *drivers: str) -> None:
             await fakes.pool.close()
 
     asyncio.run(run())
-
-
-@pytest.fixture
-def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(restarts, "BETWEEN_TRIES_S", 0.0)
-    monkeypatch.setattr(restarts, "HOPELESS_S", 0.05)
 
 
 def test_streams_go_where_the_fewest_are_attended() -> None:

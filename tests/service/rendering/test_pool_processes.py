@@ -28,11 +28,7 @@ from service.ipc.messages import (
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
-from tests.gpu.test_precompile import arrays_of
-from tests.service.rendering.test_pool import impatient
-from tests.service.rendering.test_worker import LINEAR, Ears, settings
-
-__all__ = ["impatient"]  # a fixture
+from tests.supervisors import LINEAR, Ears, arrays_of, settings
 
 ENDLESS = 1 << 24
 

@@ -6,7 +6,6 @@ import asyncio
 import errno
 import os
 import threading
-import zlib
 from collections.abc import Callable, Coroutine
 from dataclasses import replace
 from pathlib import Path
@@ -19,33 +18,20 @@ from service import cli
 from service.config import Config
 from service.ipc.messages import Progress, Restore, SavedPicture
 from service.problems import FieldError, Internal, InvalidDocument, Unavailable
-from service.quality import resolve
 from service.renders.store import rows
 from service.renders.store import store as store_module
 from service.renders.store.pictures import DamagedPicture, PictureFiles
-from service.renders.store.record import IdempotencyKey, Order, Outcome
+from service.renders.store.record import IdempotencyKey, Outcome
 from service.renders.store.store import RenderStore
-from service.scene import parse_settings
 from service.storage.database import Database
 from service.storage.stores import storage
+from tests.service.rendering.stored import DOCUMENT, PROGRESS, order, picture
 
-SETTINGS = resolve(parse_settings({"width": 4, "height": 4}, "", None))
-PROGRESS = Progress(8, 0.25, 1.5, None, {4: 0.125})
 OBJ = b"v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
-DOCUMENT = zlib.compress(b"{}")
-
-
-def picture(value: int = 1, reason: Any = None) -> Restore:
-    buffers = [np.full(size, value, np.uint8) for size in (1000, 0, 64)]
-    return Restore(7, 1, SavedPicture(8, (2, 1, 0), buffers), reason, PROGRESS)
 
 
 def run(test: Callable[[], Coroutine[Any, Any, None]]) -> None:
     asyncio.run(test())
-
-
-def order(id: str, owner: str = "") -> Order:
-    return Order(id, owner, SETTINGS, "label", 2, 100.0, len(DOCUMENT))
 
 
 def test_a_picture_comes_back_as_it_was(tmp_path: Path) -> None:

@@ -26,7 +26,7 @@ from service.storage.stores import Storage, storage
 from service.system.disk_usage import Usage
 from tests.asset_files import OBJ
 from tests.queues import LIMITS
-from tests.service.rendering.test_job import SETTINGS, Renderers, load
+from tests.service.rendering.fakes import SETTINGS, Renderers, load
 
 
 class Ended:

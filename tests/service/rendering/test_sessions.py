@@ -16,7 +16,7 @@ from service.renderers.local.supervisor import Supervisor
 from service.requests.request_reader import RequestReader
 from service.streams import sessions
 from service.streams.sessions import Sessions
-from tests.service.test_operation import metrics
+from tests.calls import metrics
 from tests.serving import ENDLESS, PATIENCE_S, SMALL, Client, Picture, Server, wait_until
 
 READER = RequestReader(Config(_env_file=None), cast(Assets, None))  # type: ignore[call-arg]

@@ -29,7 +29,7 @@ from service.renders.store.store import RenderStore
 from service.requests.request_reader import weight
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
-from tests.service.rendering.test_job import PACKED, SETTINGS, Renderers, until
+from tests.service.rendering.fakes import PACKED, SETTINGS, Renderers, until
 
 
 class Quick(Renderers):

@@ -17,7 +17,6 @@ from service.ipc.messages import (
     Done,
     Failed,
     Frame,
-    FromRenderer,
     Image,
     Loaded,
     Progressed,
@@ -39,9 +38,7 @@ from service.worker.progress.noise import NoiseReading
 from service.worker.progress.stop_rules import judged_after, judged_from, late, reached
 from tests.documents import Shelf
 from tests.serving import PATIENCE_S, SCENE
-
-ENDLESS = StopRule()
-LINEAR = View(encoding="linear")
+from tests.supervisors import ENDLESS, LINEAR, Ears, settings
 
 
 @pytest.mark.parametrize(
@@ -157,28 +154,6 @@ def test_coalescing_keeps_order_where_it_matters() -> None:
     assert list(coalesced(iter([camera, Stop(1), material]))) == [camera, Stop(1), material]
 
 
-class Ears:
-    """Hears what becomes of a task."""
-
-    def again(self) -> None:
-        self.messages.put_nowait("again")
-
-    def __init__(self) -> None:
-        self.messages: asyncio.Queue[FromRenderer | str] = asyncio.Queue()
-
-    def heard(self, message: FromRenderer) -> None:
-        self.messages.put_nowait(message)
-
-    def lost(self, detail: str) -> None:
-        self.messages.put_nowait(detail)
-
-    async def next(self, kind: Any) -> Any:
-        while True:
-            message = await asyncio.wait_for(self.messages.get(), PATIENCE_S)
-            if isinstance(message, kind):
-                return message
-
-
 @pytest.fixture(scope="module")
 def arrays(gpu: Renderer) -> Any:
     return pack(parse_scene(SCENE), Shelf()).arrays
@@ -197,10 +172,6 @@ def rendering(gpu: Renderer) -> Iterator[Callable[[Callable[[Supervisor], Awaita
         runner.run(start())
         yield lambda test: runner.run(test(supervisor))  # type: ignore[arg-type]
         runner.run(supervisor.close())
-
-
-def settings(side: int = 32, **others: Any) -> dict[str, Any]:
-    return {"width": side, "height": side, **others}
 
 
 def test_load_trace_done_read(rendering: Any, arrays: Any) -> None:

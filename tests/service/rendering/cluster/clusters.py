@@ -12,10 +12,13 @@ from collections.abc import Awaitable, Callable, Iterator
 from contextlib import suppress
 from pathlib import Path
 
+from service.ipc.messages import StopRule, Update
 from service.renderers.local.process import Options
+from service.renderers.local.supervisor import Supervisor
 from service.renderers.pool.pool import Pool, Seat
 from service.renderers.protocol import Place
 from service.renderers.ray.cluster import Cluster
+from tests.supervisors import Ears, arrays_of, settings
 
 LIST_NODES = """
 import sys, ray
@@ -26,7 +29,16 @@ for node in ray.nodes():
 """
 # How soon a head gives up a node that does not answer: by default after half a minute.
 QUICK = {"RAY_health_check_period_ms": "500", "RAY_health_check_failure_threshold": "2"}
+SAMPLES = 400
+ENDLESS = 1 << 24
 OPTIONS = {"patience_s": 10.0, "checkpoint_s": 0.05}
+
+
+async def begun(renderers: Pool | Supervisor, samples: int = SAMPLES) -> tuple[int, Ears]:
+    ears = Ears()
+    task = renderers.open(ears, "render")
+    await renderers.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4), StopRule(samples)))
+    return task, ears
 
 
 def seats(cluster: Cluster) -> list[Seat]:

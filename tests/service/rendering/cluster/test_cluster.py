@@ -18,15 +18,20 @@ from service.renderers.local.supervisor import Supervisor
 from service.renderers.pool.pool import Pool
 from service.renderers.ray import cluster as clusters
 from service.renderers.ray.cluster import RESTS, Cluster
-from tests.gpu.test_precompile import LINEAR, arrays_of
-from tests.service.rendering.cluster.clusters import OPTIONS, descendants, kill, until, with_pool
-from tests.service.rendering.test_worker import Ears, settings
-from tests.supervisors import with_supervisor
+from tests.service.rendering.cluster.clusters import (
+    ENDLESS,
+    OPTIONS,
+    SAMPLES,
+    begun,
+    descendants,
+    kill,
+    until,
+    with_pool,
+)
+from tests.supervisors import LINEAR, Ears, with_supervisor
 
 pytest.importorskip("ray", reason="Ray is not installed: pip install 'sunbox[ray]'")
 
-SAMPLES = 400
-ENDLESS = 1 << 24
 SECRET = "a key of callers"
 
 Run = Callable[[Callable[[Pool], Awaitable[None]]], None]
@@ -62,13 +67,6 @@ def expected(gpu: Renderer) -> np.ndarray:
 
     with_supervisor(test)
     return found[0]
-
-
-async def begun(renderers: Pool | Supervisor, samples: int = SAMPLES) -> tuple[int, Ears]:
-    ears = Ears()
-    task = renderers.open(ears, "render")
-    await renderers.send_scene(Update(task, 1, arrays_of("plain"), settings(96, seed=4), StopRule(samples)))
-    return task, ears
 
 
 async def picture(renderers: Pool | Supervisor, task: int, ears: Ears) -> np.ndarray:

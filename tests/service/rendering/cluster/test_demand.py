@@ -12,8 +12,8 @@ from service.renderers.local.process import Start
 from service.renderers.ray.control import Joined
 from service.renderers.ray.pool import IDLE_S, LONG_S, ClusterPool
 from service.renderers.ray.renderers import room
-from tests.service.rendering.test_pool import Fake
-from tests.service.rendering.test_worker import Ears
+from tests.service.rendering.fakes import Fake
+from tests.supervisors import Ears
 
 
 class Counted:

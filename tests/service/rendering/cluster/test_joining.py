@@ -27,9 +27,9 @@ from service.renderers.ray.joining import CannotJoin, close_token_file
 from service.renderers.ray.lane import Lane
 from service.renderers.ray.renderers import described, plan
 from service.state import AppState
-from tests.gpu.test_precompile import arrays_of
 from tests.service.rendering.cluster.clusters import OPTIONS, until
 from tests.serving import PATIENCE_S
+from tests.supervisors import arrays_of
 
 HAS_RAY = importlib.util.find_spec("ray") is not None
 needs_ray = pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'sunbox[ray]'")

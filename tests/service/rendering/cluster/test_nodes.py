@@ -12,8 +12,7 @@ from service.ipc.messages import Checkpoint, Progressed
 from service.problems import Unavailable
 from service.renderers.pool.pool import Pool
 from service.renderers.ray.cluster import Cluster
-from tests.service.rendering.cluster.clusters import OPTIONS, Nodes, seats, until
-from tests.service.rendering.cluster.test_cluster import ENDLESS, begun
+from tests.service.rendering.cluster.clusters import ENDLESS, OPTIONS, Nodes, begun, seats, until
 
 pytest.importorskip("ray", reason="Ray is not installed: pip install 'sunbox[ray]'")
 

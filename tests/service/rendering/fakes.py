@@ -1,0 +1,93 @@
+"""Renderers that render nothing: they note what they are sent, and report what a test has them report."""
+
+from __future__ import annotations
+
+import asyncio
+from collections.abc import Callable
+from typing import Any
+
+from service.config import Config
+from service.ipc import channel
+from service.ipc.messages import Ready, Restore, SavedPicture, Unable, Update
+from service.pack import Packed, pack
+from service.problems import Unavailable
+from service.quality import resolve
+from service.renderers.statistics import Statistics
+from service.scene import parse_scene, parse_settings
+from tests.documents import Shelf
+from tests.serving import SCENE
+
+SETTINGS = resolve(parse_settings({"width": 4, "height": 4, "max_samples": 8}, "", Config()))
+PACKED = pack(parse_scene(SCENE), Shelf())
+
+
+class Renderers:
+    """Takes tasks, and notes what is sent to them."""
+
+    def __init__(self) -> None:
+        self.statistics = Statistics()
+        self.hopeless = False
+        self.opened, self.sent = 0, list[Any]()
+        self.clients = list[str]()
+
+    def open(self, listener: Any, kind: str, client: str) -> int:
+        if self.hopeless:
+            raise Unavailable("nothing renders")
+        self.clients.append(client)
+        self.opened += 1
+        return self.opened
+
+    def drop(self, task: int) -> None:
+        self.sent.append(("drop", task))
+
+    def send(self, message: Any) -> None:
+        self.sent.append(message)
+
+    def stored(self, task: int, picture: SavedPicture, read: Callable[[], Restore]) -> None:
+        self.sent.append(("stored", read()))
+
+    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
+        self.sent.append((update, restore))
+
+
+async def load(document: bytes, count: Callable[[int], None]) -> Packed:
+    return PACKED
+
+
+async def until(condition: Callable[[], object]) -> None:
+    async with asyncio.timeout(10):
+        while not condition():
+            await asyncio.sleep(0.005)
+
+
+class Fake:
+    """A renderer's process: `told` is what it was sent, and a test has it report by `say(message)` and `lose()`."""
+
+    def __init__(self, driver: str, received: Callable[[Any], None], lost: Callable[[], None], lifeline: Any) -> None:
+        self.began = self.lived_s = 0.0
+        self.ready = self.unable = False
+        self.task, self.id = 0, 4711
+        self.link, self.told = self, list[Any]()
+        self.say, self.lose = received, lost
+        able = driver != ""
+        word = Ready({"renderer": driver, "version": ""}) if able else Unable("There is no such device.")
+        asyncio.get_running_loop().call_soon(received, word)
+        if not able:
+            asyncio.get_running_loop().call_soon(lost)
+
+    def send(self, message: Any) -> None:
+        self.told.append(message)
+
+    def send_encoded(self, message: channel.Encoded) -> None:
+        self.told.append(channel.decode(*message))
+
+    def heard(self, kind: Any) -> list[int]:
+        """The tasks of the messages of that kind, in order."""
+        return [message.task for message in self.told if isinstance(message, kind)]
+
+    def close(self) -> None: ...
+
+    def watch(self, excused: bool = False) -> None: ...
+
+    async def end(self, patience_s: float) -> Any:
+        return "crashed"

@@ -1,0 +1,26 @@
+"""Small renders and pictures for a store."""
+
+from __future__ import annotations
+
+import zlib
+from typing import Any
+
+import numpy as np
+
+from service.ipc.messages import Progress, Restore, SavedPicture
+from service.quality import resolve
+from service.renders.store.record import Order
+from service.scene import parse_settings
+
+SETTINGS = resolve(parse_settings({"width": 4, "height": 4}, "", None))
+PROGRESS = Progress(8, 0.25, 1.5, None, {4: 0.125})
+DOCUMENT = zlib.compress(b"{}")
+
+
+def picture(value: int = 1, reason: Any = None) -> Restore:
+    buffers = [np.full(size, value, np.uint8) for size in (1000, 0, 64)]
+    return Restore(7, 1, SavedPicture(8, (2, 1, 0), buffers), reason, PROGRESS)
+
+
+def order(id: str, owner: str = "") -> Order:
+    return Order(id, owner, SETTINGS, "label", 2, 100.0, len(DOCUMENT))
