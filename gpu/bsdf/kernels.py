@@ -18,7 +18,7 @@ from gpu.layout import MaterialModel
 from gpu.layout.microfacet_records import Microfacet
 
 VALUES, ALBEDO, TERMS = "bsdf_values.comp", "bsdf_albedo.comp", "bsdf_terms.comp"
-ENTRIES = (VALUES, ALBEDO, TERMS)
+ENTRIES = {"values": VALUES, "albedo": ALBEDO, "terms": TERMS}  # the kernel for each question about a material
 
 NOWHERE: np.void = np.zeros(1, layout.Camera.dtype)[0]  # a camera where there is no scene to look at
 # Every term of `microfacet`. They would cost a picture time, but not a curve, and one kernel serves them all.

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from hashlib import sha256
-from typing import Literal, get_args
 
 import numpy as np
 
@@ -19,8 +18,6 @@ from gpu.layout import ShapeKind, bindings
 from gpu.picture import accumulators, noise_meter, resolve
 from gpu.settings import TONE_MAPS, RenderSettings
 
-BsdfQuestion = Literal["values", "albedo", "terms"]
-QUESTIONS = get_args(BsdfQuestion)  # in the order of gpu.bsdf.kernels.ENTRIES
 ENTRY, GUIDES = "pathtrace.comp", "guides.comp"  # those that depend on the scene; the others: `common_keys`
 
 
@@ -112,16 +109,17 @@ def common_keys() -> list[KernelKey]:
     return [KernelKey(tuple(defines.items()), (), entry) for entry, defines in entries]
 
 
-def bsdf_key(material: SceneArrays, question: BsdfQuestion) -> KernelKey:
-    """The key of the kernel by which a `BsdfEvaluator` answers the question for a scene of one material."""
-    bare, entry = bsdf.bare(material), bsdf.ENTRIES[QUESTIONS.index(question)]
+def bsdf_key(material: SceneArrays, question: str) -> KernelKey:
+    """The key of the kernel by which a `BsdfEvaluator` answers the question, one of `gpu.bsdf.kernels.ENTRIES`, for a
+    scene of one material."""
+    bare, entry = bsdf.bare(material), bsdf.ENTRIES[question]
     return KernelKey(tuple(bsdf.defines(bare, entry).items()), _textures(bare, bsdf.flags(bare)), entry)
 
 
 def bsdf_keys() -> Iterator[KernelKey]:
     """The keys of all kernels that a `BsdfEvaluator` needs for any material."""
     found = set[KernelKey]()
-    for question in QUESTIONS:
+    for question in bsdf.ENTRIES:
         for material in bsdf.samples():
             key = bsdf_key(material, question)
             if key not in found:

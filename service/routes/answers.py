@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import math
 from datetime import datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 from fastapi import Path
 from pydantic import BaseModel, Field
 
 from service import presets
+from service.assets.types import Kind
+from service.ipc.messages import Reason
 from service.problems import ANSWERS
+from service.renders.store.record import State
 from service.requests.bsdf_request import MOST_SAMPLES
 from service.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
 from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE, TERMS
@@ -95,13 +98,13 @@ class Forecast(BaseModel):
 
 class Render(BaseModel):
     id: str
-    state: Literal["queued", "running", "done", "cancelled", "failed"]
+    state: State
     label: str | None
     priority: int
     created: datetime | None = Field(description="When it was sent, by the server's clock; UTC.")
     started: datetime | None = Field(description="When it first left the line; null while it waits for that.")
     ended: datetime | None = Field(description="When it was done, cancelled or failed; null before.")
-    reason: Literal["max_samples", "time_limit", "target_noise", "stopped"] | None
+    reason: Reason | None
     samples: int = Field(description="Complete ones per pixel; with `adaptive` their mean over the pixels.")
     noise: float | None = Field(description="Estimated RMSE of the luminance over its mean; null before 2 samples.")
     elapsed_s: float = Field(description="From the first dispatch to the end of the last sample.")
@@ -125,7 +128,7 @@ class AssetWarning(BaseModel):
 
 class Asset(BaseModel):
     id: str
-    kind: Literal["mesh", "image", "scene"]
+    kind: Kind
     format: str
     bytes: int
     width: int | None = Field(None, description="Of an image, texels.")

@@ -282,7 +282,7 @@ def test_microfacet_and_its_terms(gpu: Renderer, given: dict[str, Any]) -> None:
     f = Steps(gpu.bsdf.values(packed, head_on[None], w)).finish().f[0]
     np.testing.assert_allclose(f, microfacets.bsdf(m, head_on, w), rtol=1.2e-2, atol=1e-6)
     keys = list(kernel_keys.bsdf_keys())
-    assert all(kernel_keys.bsdf_key(packed, question) in keys for question in kernel_keys.QUESTIONS)
+    assert all(kernel_keys.bsdf_key(packed, question) in keys for question in kernels.ENTRIES)
 
 
 def test_pairs_are_those_of_the_grid(gpu: Renderer) -> None:
@@ -357,7 +357,7 @@ def test_no_slider_asks_for_a_kernel_that_was_not_foreseen() -> None:
     for material in [*map(lone, ALL.values()), lab]:
         glowing = material.materials.copy()
         glowing["emission"], glowing["opacity"], glowing["attenuation_distance"] = 3.0, 0.5, 1.0
-        for question in kernel_keys.QUESTIONS:
+        for question in kernels.ENTRIES:
             key = kernel_keys.bsdf_key(material, question)
             assert kernel_keys.bsdf_key(replace(material, materials=glowing), question) == key
             used.add(foreseen.index(key))
