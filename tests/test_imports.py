@@ -22,6 +22,20 @@ KINDS = ("bsdf/lobes/**", "lights", "shapes", "tonemap")
 LEAVES = sorted(p for kind in KINDS for p in ROOT.glob(f"shaders/{kind}/*.glsl") if p.stem not in COMPOSERS)
 SOURCES = sorted((*MODULES, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROOT.glob("web/**/*.js")))
 MOST_LINES = 400
+MOST_METHODS, MOST_ATTRIBUTES = 30, 18  # of a class, its bases included
+# Classes whose fields are a format, a document or a row, and not state that methods share.
+DATA = {"BaseModel", "BaseSettings", "Model", "Record", "IntEnum", "Enum", "Protocol"}
+# Classes that are larger, each with the reason why it is one all the same.
+LARGE_CLASSES = {
+    "gpu.arrays.SceneArrays": "one field for each array of a scene",
+    "gpu.picture.picture.Picture": "not parted yet: the picture, and a block of it that others trace",
+    "service.bench.scale_model._Simulation": "not parted yet",
+    "service.bench.soak_tally.Tally": "one field for each number of its report",
+    "service.renders.job.Job": "not parted yet: the render, and what shows it",
+    "service.state.AppState": "not parted yet",
+    "service.worker.loop.Loop": "not parted yet",
+    "service.worker.task.Task": "not parted yet: the picture, and whose turn it is",
+}
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.
 LAYERS = [
@@ -239,6 +253,59 @@ def test_folder_has_a_table_of_contents(folder: Path) -> None:
     modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
     folders = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert listed == modules | folders
+
+
+@cache
+def classes() -> dict[str, ast.ClassDef]:
+    """By module and name."""
+    found: dict[str, ast.ClassDef] = {}
+    for path in MODULES:
+        for node in ast.walk(ast.parse(path.read_text())):
+            if isinstance(node, ast.ClassDef):
+                found[f"{name_of(path)}.{node.name}"] = node
+    return found
+
+
+def bases(name: str) -> Iterator[str]:
+    """The class and those of ours that it is made from."""
+    yield name
+    for base in classes()[name].bases:
+        called = ast.unparse(base).partition("[")[0].rpartition(".")[2]
+        module = name.rpartition(".")[0]
+        known = [each for each in classes() if each.rpartition(".")[2] == called]
+        imported = {each for path in MODULES if name_of(path) == module for each in imports_of(path)}
+        for each in known:
+            if each in imported or each.rpartition(".")[0] == module:
+                yield from bases(each)
+
+
+def is_data(node: ast.ClassDef) -> bool:
+    frozen = any("frozen=True" in ast.unparse(each) for each in node.decorator_list)
+    return frozen or any(ast.unparse(base).partition("[")[0].rpartition(".")[2] in DATA for base in node.bases)
+
+
+def members(node: ast.ClassDef) -> tuple[set[str], set[str]]:
+    """The methods of a class, and the attributes that they or the class set."""
+    methods = {each.name: each for each in node.body if isinstance(each, ast.FunctionDef | ast.AsyncFunctionDef)}
+    fields = {ast.unparse(each.target) for each in node.body if isinstance(each, ast.AnnAssign)}
+    for method in methods.values():
+        fields |= {
+            each.attr
+            for each in ast.walk(method)
+            if isinstance(each, ast.Attribute)
+            and isinstance(each.ctx, ast.Store)
+            and ast.unparse(each.value) == "self"
+        }
+    return set(methods), fields
+
+
+@pytest.mark.parametrize("name", classes())
+def test_class_has_one_subject(name: str) -> None:
+    family = [classes()[each] for each in bases(name)]
+    methods, fields = (set[str]().union(*parts) for parts in zip(*map(members, family), strict=True))
+    large = len(methods) > MOST_METHODS or (len(fields) > MOST_ATTRIBUTES and not any(map(is_data, family)))
+    said = f"{len(methods)} methods, {len(fields)} attributes: ask what its second subject is"
+    assert large is (name in LARGE_CLASSES), said
 
 
 def test_shaders_are_text() -> None:

@@ -6,8 +6,7 @@ import asyncio
 import logging
 import os
 import time
-from collections.abc import Callable
-from typing import Any
+from typing import Any, Protocol
 
 from service.ipc import channel
 from service.ipc.messages import FromRenderer, Heard, Ready, ToRenderer, Unable
@@ -26,24 +25,38 @@ CLOSING = "The server is shutting down."
 log = logging.getLogger(__name__)
 
 
-class Keeper:
-    """For the event loop. `heard` is called with the process's messages; `began` when another process has been begun;
-    `lost` with one that was lost, and why; `hopeless` after that, when the next attempt is some time away; `changed`
-    whenever the process is ready or lost, or has to wait, or there is no hope for it.
-    """
+class ProcessEvents(Protocol):
+    """What a keeper says of its process, on the event loop."""
 
-    def __init__(self, id: str, start: Start, patience_s: float, statistics: Statistics) -> None:
+    def received(self, message: Heard) -> None:
+        """The process has sent this."""
+
+    def began(self) -> None:
+        """Another process has been started; messages reach it from now on."""
+
+    def lost(self, process: RendererProcess, cause: Cause) -> None:
+        """This process has ended, for this reason."""
+
+    def given_up(self) -> None:
+        """It was lost once more while it started, and the next attempt is some time away."""
+
+    def changed(self) -> None:
+        """The process is ready or lost, has to wait, or was given up."""
+
+
+class Keeper:
+    """For the event loop."""
+
+    def __init__(
+        self, id: str, start: Start, patience_s: float, statistics: Statistics, events: ProcessEvents
+    ) -> None:
         """`id` names the renderer in the log; `patience_s` is how long it may be without progress."""
-        self.heard: Callable[[Heard], None] = lambda message: None
-        self.began: Callable[[], None] = lambda: None
-        self.lost: Callable[[RendererProcess, Cause], None] = lambda process, cause: None
-        self.hopeless: Callable[[], None] = lambda: None
-        self.changed: Callable[[], None] = lambda: None
         self.detail = "The renderer has not been started."  # why there is none, where there is none
         self.waiting = ""  # what it waits for, where there is no place for the process
         self.driver: str | None = None  # of the process that was ready last; None: there was none
         self.process: RendererProcess | None = None
         self.restarts = Restarts()
+        self._events = events
         self._id, self._begin_process, self._patience_s, self._statistics = id, start, patience_s, statistics
         self._ready: asyncio.Future[dict[str, Any]] | None = None
         self._lost_at: float | None = None
@@ -126,7 +139,7 @@ class Keeper:
         lifeline = None if self._lifeline is None else self._lifeline[0]
         process: RendererProcess = self._begin_process(self._received, lambda: self._lose(process), lifeline)
         self.process = process
-        self.began()
+        self._events.began()
 
     def _received(self, message: FromRenderer | Waiting) -> None:
         if isinstance(message, Ready):
@@ -139,14 +152,14 @@ class Keeper:
                 self.process.unable = True
             log.error("could not start a renderer renderer=%s error=%s", self._id, message.detail)
         else:
-            self.heard(message)
+            self._events.received(message)
 
     def _waits(self, message: Waiting) -> None:
         if message.detail != self.waiting:
             level = logging.WARNING if message.needed else logging.INFO
             log.log(level, "a renderer waits renderer=%s reason=%s", self._id, message.detail)
         self.waiting = message.detail
-        self.changed()
+        self._events.changed()
 
     def _is_ready(self, message: Ready) -> None:
         assert self.process is not None
@@ -159,7 +172,7 @@ class Keeper:
         if self._lost_at is not None:
             self._statistics.recovery_s.add(time.monotonic() - self._lost_at)
             self._lost_at = None
-        self.changed()
+        self._events.changed()
 
     async def _watch(self) -> None:
         loop, pause_s = asyncio.get_running_loop(), min(WATCH_S, self._patience_s / 4)
@@ -180,7 +193,7 @@ class Keeper:
             if not self._draining:
                 self.detail = "The renderer was lost."
             self._ready = asyncio.get_running_loop().create_future()
-        self.changed()
+        self._events.changed()
         self.do(self._replace(process))
 
     async def _replace(self, process: RendererProcess) -> None:
@@ -190,10 +203,10 @@ class Keeper:
         line = "renderer lost renderer=%s cause=%s lived_s=%.1f failures=%d"
         level = logging.INFO if cause == "released" else logging.ERROR
         log.log(level, line, self._id, cause, process.lived_s, self.restarts.failures)
-        self.lost(process, cause)
+        self._events.lost(process, cause)
         if self.restarts.hopeless:
-            self.hopeless()
-            self.changed()
+            self._events.given_up()
+            self._events.changed()
             if self._ready is not None and not self._ready.done():
                 self._ready.set_exception(Unavailable(self.detail))
                 self._ready.exception()  # looked at: perhaps nobody waits, and asyncio would complain

@@ -8,15 +8,16 @@ import logging
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 from service.ipc.channel import Encoded
-from service.ipc.messages import Restore, SavedPicture, ToRenderer, Update
+from service.ipc.leases import Lease, LeaseDone, LeaseFailed, LeaseRefuted
+from service.ipc.messages import Heard, Restore, SavedPicture, ToRenderer, Update
 from service.problems import Unavailable
 from service.renderers.local.keeper import STARTING
 from service.renderers.local.process import Options, Start
 from service.renderers.local.supervisor import Supervisor
+from service.renderers.local.tasks import Events
 from service.renderers.pool.division import Division
 from service.renderers.protocol import Listener, Member, Place
 from service.renderers.statistics import ClientStatistics, Kind
@@ -47,16 +48,13 @@ class Pool:
     def __init__(self, seats: Sequence[Seat]) -> None:
         self.statistics = ClientStatistics()
         numbers = itertools.count(1)
-        self._supervisors = [Supervisor(seat.options, seat.start, seat.place, numbers) for seat in seats]
+        self._supervisors = [
+            Supervisor(seat.options, seat.start, seat.place, numbers, _Seated(self, number))
+            for number, seat in enumerate(seats)
+        ]
         self._homes: dict[int, Supervisor] = {}  # by task
         self._stirred = asyncio.Event()  # set, and replaced, when a renderer is ready or lost
         self._division = Division([_Peer(supervisor) for supervisor in self._supervisors])
-        for number, supervisor in enumerate(self._supervisors):
-            supervisor.changed, supervisor.ended = self._changed, self._forget
-            supervisor.lost = partial(self._take_over_from, supervisor)
-            supervisor.handed = partial(self._division.handed, sender=number)
-            supervisor.noticed, supervisor.told = self._division.heard, self._division.told
-            supervisor.kind_of = self._kind_of
 
     def start(self) -> None:
         for supervisor in self._supervisors:
@@ -238,6 +236,34 @@ class Pool:
         home = self._homes.get(task)
         held = None if home is None else home.tasks.get(task)
         return "server" if held is None else held.kind
+
+
+class _Seated(Events):
+    """What the pool makes of the events of one of its renderers."""
+
+    def __init__(self, pool: Pool, number: int) -> None:
+        self._pool, self._number = pool, number
+
+    def changed(self) -> None:
+        self._pool._changed()
+
+    def lost(self) -> None:
+        self._pool._take_over_from(self._pool._supervisors[self._number])
+
+    def ended(self, task: int) -> None:
+        self._pool._forget(task)
+
+    def heard(self, message: Heard) -> None:
+        self._pool._division.heard(message)
+
+    def leased(self, message: Lease | LeaseDone | LeaseFailed | LeaseRefuted) -> None:
+        self._pool._division.handed(message, self._number)
+
+    def replayed(self, task: int) -> None:
+        self._pool._division.told(task)
+
+    def kind_of(self, task: int) -> Kind:
+        return self._pool._kind_of(task)
 
 
 class _Peer:
