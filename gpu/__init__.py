@@ -21,7 +21,6 @@ precompile  kernels that are compiled before they are needed; public
 analysis    measurements of a scene and of the device at hand; public
 """
 
-from gpu.analysis.path_truncation import bounced_paths, missing_light
 from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, TextureArrays, apply_edit
 from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfTerms, BsdfValues
 from gpu.context import devices, software_device
@@ -76,9 +75,7 @@ __all__ = [
     "WrongThread",
     "apply_edit",
     "border_after",
-    "bounced_paths",
     "devices",
-    "missing_light",
     "picture_bytes",
     "scene_bytes",
     "software_device",

@@ -114,13 +114,10 @@ def short(seconds: float) -> str:
     return f"{seconds:.1f}" if seconds < 10 else f"{seconds:.0f}"
 
 
-def forecast(
-    samples: int, noise: float | None, elapsed_s: float, missing: dict[int, float] | None = None
-) -> dict[str, Any] | None:
+def forecast(samples: int, noise: float | None, elapsed_s: float) -> dict[str, Any] | None:
     """Of each preset's number of samples the seconds from the start and the noise, for the scene at hand with its own
     bounces, from what it has taken so far; None before that can be told. Noise is taken to fall with the root of the
-    samples: what a low-discrepancy sampler gains beyond that comes on top. `missing`: by bounces, the share of its
-    light that comes later, once measured."""
+    samples: what a low-discrepancy sampler gains beyond that comes on top."""
     if samples < TRUSTED_SAMPLES or noise is None or elapsed_s <= 0:
         return None
     return {
@@ -128,7 +125,6 @@ def forecast(
             "samples": knobs["max_samples"],
             "seconds": elapsed_s * knobs["max_samples"] / samples,
             "noise": noise * (samples / knobs["max_samples"]) ** 0.5,
-            "missing_light": missing[knobs["max_bounces"]] if missing else None,
         }
         for name, knobs in PRESETS.items()
     }

@@ -119,7 +119,7 @@ class Tracing:
             "setup_s": setup_s,
             "kernel": self._kernel,
             "eta_s": now.eta_s,
-            "forecast": forecast(now.samples, now.noise, now.elapsed_s, now.missing),
+            "forecast": forecast(now.samples, now.noise, now.elapsed_s),
             "warnings": self.warnings,
             "settings": self.settings.document(),
         }

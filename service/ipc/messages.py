@@ -55,7 +55,6 @@ class Progress:
     noise: float | None = None
     elapsed_s: float = 0.0
     eta_s: float | None = None
-    missing: dict[int, float] | None = None  # by bounces, the share of the scene's light that comes later
 
 
 @dataclass(frozen=True)

@@ -30,7 +30,7 @@ def status(order: Order, outcome: Outcome, renderers: int, kernel: bool = False)
         "elapsed_s": progress.elapsed_s,
         "setup_s": outcome.setup_s,
         "eta_s": None if outcome.state in ("cancelled", "failed") else progress.eta_s,
-        "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s, progress.missing),
+        "forecast": forecast(progress.samples, progress.noise, progress.elapsed_s),
         "warnings": outcome.warnings,
         "renderers": renderers,
         "not_divided": undivided(order.settings.adaptive, order.settings.time_limit),

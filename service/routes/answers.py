@@ -91,9 +91,6 @@ class Forecast(BaseModel):
     samples: int
     seconds: float = Field(description="From the render's start, as this scene goes on this machine.")
     noise: float
-    missing_light: float | None = Field(
-        description="Share of this scene's light that comes after the preset's bounces; null until measured."
-    )
 
 
 class Render(BaseModel):

@@ -110,7 +110,5 @@ def frame_bytes(frame: messages.Frame, view: View, seq: int) -> bytes:
     }
     if frame.denoised:
         header["denoised"] = True
-    if progress.missing is not None:
-        header["missing_light"] = progress.missing
     text = json.dumps(header, separators=(",", ":")).encode()
     return b"".join((struct.pack("<I", len(text)), text, body))

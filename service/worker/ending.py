@@ -88,7 +88,6 @@ class Ending:
         residency.wake()
         tracker.clock.pause()
         tracker.reason = reason
-        tracker.truncated.cancel()
         residency.rests()
         if residency.loaded is not None:
             noise = tracker.meter.read(residency.full, fresh=True)

@@ -49,7 +49,7 @@ class Task:
         self._renderer = renderer = context.renderer
         self._send, self._forget = context.send, context.forget
         self._residency = Residency(renderer, context.memory, self, self._part)
-        self._tracker = ProgressTracker(renderer)
+        self._tracker = ProgressTracker()
         denoising = DenoisePolicy(context.denoiser, yields=bool(renderer.info["software"]))
         self._frames = FrameSource(context, number, client, self._residency, self._tracker, denoising, self._finish)
         self.home = Home(number, context.send)
@@ -168,7 +168,7 @@ class Task:
             return
         if self._tracker.reason is not None:
             return
-        if not (self._ending.end_if_reached() or self._tracker.truncated.step(residency.full)):
+        if not self._ending.end_if_reached():
             self._trace()
         residency.rests()
 
@@ -364,7 +364,6 @@ class Task:
     def _part(self) -> None:
         """Have all helpers of the task let go of resources that are about to leave the device."""
         self._frames.part()
-        self._tracker.truncated.restart()
 
     def _restart(self) -> None:
         self._frames.restart()

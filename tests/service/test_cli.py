@@ -8,7 +8,6 @@ import os
 import signal
 import subprocess
 import sys
-from collections.abc import Iterator
 from importlib.metadata import version
 from pathlib import Path
 from types import SimpleNamespace
@@ -25,7 +24,7 @@ from service.commands.progress import ProgressLine, describe
 from service.config import load_config
 from service.images import read_metadata
 from service.ipc.messages import Progress
-from service.worker.progress import stop_rules, truncated_light
+from service.worker.progress import stop_rules
 
 SCENE: dict[str, Any] = {
     "version": 1,
@@ -214,28 +213,6 @@ def test_time_limit_is_kept_and_ends_between_samples(
     # A picture may end up to a sample before the limit; the contract allows a tenth of it and 0.1 s after it.
     assert 0.9 * limit_s <= told["elapsed_s"] <= 1.1 * limit_s + 0.1 and told["samples"] > 1
     assert rendered("by-samples", f"max_samples={told['samples']}")[1] == picture
-
-
-def test_an_ended_render_leaves_no_measurement_under_way(
-    gpu: Any, scene: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    """Its small picture would outlive the context, and be freed in one that is gone."""
-    told: list[str] = []
-
-    def endless() -> Iterator[None]:
-        told.append("begun")
-        try:
-            while True:
-                yield
-        finally:
-            told.append("ended")
-
-    measurement = endless()  # kept here, so that nothing but the task's end can end it
-    monkeypatch.setattr(truncated_light, "missing_light", lambda *_: measurement)
-    monkeypatch.setattr(truncated_light, "WORTH", 1e-9)  # due after the first sample
-    limits = ["--set", "width=16", "--set", "height=16", "--set", "time_limit=0.3"]
-    assert main(["render", str(scene), "-o", str(tmp_path / "out.png"), *limits]) == 0
-    assert told == ["begun", "ended"]
 
 
 def test_target_noise_ends_a_render(gpu: Any, scene: Path, tmp_path: Path) -> None:

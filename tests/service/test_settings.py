@@ -12,7 +12,6 @@ from service.config import ConfigError, load_config, unknown_variables
 from service.problems import InvalidDocument
 from service.quality import PRESETS, ResolvedSettings, resolve
 from service.scene import Settings, parse_settings
-from service.worker.progress import truncated_light
 
 NAN, INF = float("nan"), float("inf")
 
@@ -183,7 +182,3 @@ def test_misspelt_variables_are_found(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SUNBOX_APIKEY", "secret")
     monkeypatch.setenv("SUNBOX_PORT", "1")
     assert "SUNBOX_APIKEY" in unknown_variables() and "SUNBOX_PORT" not in unknown_variables()
-
-
-def test_light_beyond_the_bounces_is_measured_for_each_preset() -> None:
-    assert set(truncated_light.LIMITS) == {preset["max_bounces"] for preset in PRESETS.values()}

@@ -27,11 +27,9 @@ export function price(preset, live) {
 
 const share = (light) => (light < UNSEEN ? `under ${percent(UNSEEN)}` : percent(light));
 
-// What a preset takes, and what light lies beyond its bounces: of this scene once that is measured.
-export function taken({ max_samples, max_bounces, cost }, live) {
+// What a preset takes, and what light lies beyond its bounces.
+export function taken({ max_samples, max_bounces, cost }) {
   const text = `${count(max_samples)} samples, ${max_bounces} bounces`;
-  const here = isKnown(live) ? live.missing_light?.[max_bounces] : undefined;
-  if (typeof here === "number") return `${text}; beyond them ${share(here)} of this scene's light is missing`;
   if (!cost) return text;
   const { missing_light: usual, worst_missing_light: worst } = cost;
   const listed =
@@ -60,7 +58,7 @@ export function qualityChoice(root, pick) {
       );
     }
     for (const [name, place] of places) {
-      const texts = { price: price(presets[name], live), taken: taken(presets[name], live) };
+      const texts = { price: price(presets[name], live), taken: taken(presets[name]) };
       for (const [part, text] of Object.entries(texts))
         if (place[part].textContent !== text) place[part].textContent = text;
     }

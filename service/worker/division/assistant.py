@@ -34,7 +34,7 @@ class Assistant:
         self.traced = 0  # samples of pixels
         self._send = context.send
         self._residency = Residency(context.renderer, context.memory, self, lambda: None)
-        self._tracker = ProgressTracker(context.renderer)
+        self._tracker = ProgressTracker()
         self._updates = Updates(context, number, client, self._residency, self._tracker)
         self._leases: deque[Lease] = deque()
 

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 from service.ipc.messages import Progress, Reason, StopRule
 from service.worker.device.residency import Residency
 from service.worker.progress.eta import EtaEstimate
@@ -16,25 +14,19 @@ from service.worker.progress.stop_rules import (
     late,
     reached,
 )
-from service.worker.progress.truncated_light import TruncatedLight
-
-if TYPE_CHECKING:
-    from gpu import Renderer
 
 
 class ProgressTracker:
-    def __init__(self, renderer: Renderer) -> None:
+    def __init__(self) -> None:
         self.generation = 0  # the generation that is rendered
         self.interactive = False  # a person looks on, and may edit at any moment
         self.stop = StopRule()
         self.reason: Reason | None = None  # why it ended
         self.pixel_s: float | None = None  # what a sample of a pixel took lately
-        self.truncated = TruncatedLight(renderer)
         self.restart()
 
     def restart(self) -> None:
         """Start again at zero samples; the measured cost of a sample stays."""
-        self.truncated.restart()
         self.clock, self.meter, self.eta = Clock(), NoiseReading(), EtaEstimate()
         self.even = True  # as many samples in every pixel, as far as is known
 
@@ -46,7 +38,7 @@ class ProgressTracker:
         stopped = self.reason == "stopped"
         done = self.reason is not None and not stopped
         eta = 0.0 if done else self.eta.eta_s(self.stop, elapsed_s)
-        return Progress(samples, noise, elapsed_s, None if stopped else eta, self.truncated.shares)
+        return Progress(samples, noise, elapsed_s, None if stopped else eta)
 
     def noise(self, residency: Residency, fresh: bool = False) -> float | None:
         """The noise of the picture at full size, as last measured."""

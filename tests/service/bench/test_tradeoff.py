@@ -15,8 +15,6 @@ from service.bench.tradeoff_scenes import TradeoffAssets, bumps, cases, planks
 from service.cli import main
 from service.pack import pack
 from service.scene import parse_scene
-from service.worker.progress.truncated_light import LIMITS
-from tests.serving import PATIENCE_S, SCENE, Server
 
 
 @pytest.mark.parametrize("case", cases(), ids=lambda case: case.name)
@@ -89,24 +87,4 @@ def test_forecast_measures_the_scene_at_hand() -> None:
     found = quality.forecast(64, 0.1, 2.0)
     assert found is not None and set(found) == set(quality.PRESETS)
     high = {"samples": 1024, "seconds": pytest.approx(32), "noise": pytest.approx(0.025)}
-    assert found["high"] == high | {"missing_light": None}
-    told = quality.forecast(64, 0.1, 2.0, {3: 0.2, 5: 0.1, 8: 0.04, 16: 0.01, 64: 0.0})
-    assert told is not None and told["high"]["missing_light"] == 0.01 and told["draft"]["missing_light"] == 0.2
-
-
-def test_the_light_that_a_preset_misses_is_measured_on_the_scene(server: Server) -> None:
-    """Inside a glowing sphere of albedo a, a share a^(n + 1) of the light comes after n bounces."""
-    material = {"type": "diffuse", "albedo": 0.7, "emission": 1, "emission_sides": "both"}
-    sphere = {"type": "sphere", "center": [0, 0, 0], "radius": 9, "material": "m"}
-    scene = {**SCENE, "materials": {"m": material}, "shapes": [sphere], "lights": []}
-    settings = {"width": 64, "height": 64, "max_samples": 5200, "estimator": "bsdf", "max_bounces": 1}
-    id = server.http.post("/v1/renders", json={"scene": scene, "settings": settings}).json()["id"]
-    status = server.http.get(f"/v1/renders/{id}", params={"wait": PATIENCE_S}).json()
-    assert status["state"] == "done", status
-    for name, preset in quality.PRESETS.items():
-        share = status["forecast"][name]["missing_light"]
-        assert share == pytest.approx(0.7 ** (preset["max_bounces"] + 1), rel=0.05, abs=1e-3), name
-
-
-def test_limits_are_those_of_the_presets() -> None:
-    assert set(LIMITS) == {preset["max_bounces"] for preset in quality.PRESETS.values()}
+    assert found["high"] == high
