@@ -14,6 +14,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from typing import Any
 
+LONGEST_STEP = 200  # characters of a name in a pointer: a hundred pointers through a name of 20 MB would be 2 GB
+
 
 @dataclass(frozen=True)
 class FieldError:
@@ -24,6 +26,11 @@ class FieldError:
 
     def __str__(self) -> str:
         return f"{self.pointer or '/'}: {self.detail}"
+
+
+def escaped(step: object) -> str:
+    """One step of a JSON pointer (RFC 6901); a very long name is cut off."""
+    return str(step)[:LONGEST_STEP].replace("~", "~0").replace("/", "~1")
 
 
 class ServiceError(Exception):

@@ -41,7 +41,7 @@ LARGE_CLASSES = {
 LAYERS = [
     {"service.problems"},
     {"service.config"},
-    {"service.views"},
+    {"service.views", "service.colorimetry"},
     {"service.system"},
     {"service.logs", "service.ipc"},
     {"service.scene"},

@@ -5,8 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from gpu import RenderSettings, footprint
+from gpu import RenderSettings, footprint, layout
 from gpu.layout import ShapeKind
+from gpu.picture import display
+from service import colorimetry
 from service.assets.gltf import json_view
 from service.pack.lights import light_bounds
 from service.renders import memory
@@ -22,6 +24,15 @@ def test_the_server_counts_a_picture_s_bytes_as_the_renderer_takes_them() -> Non
     assert taken + 2 * 16 == memory.PICTURE_BYTES
     assert footprint.picture_bytes(RenderSettings(1920, 1080, adaptive=True)) < footprint.picture_bytes(settings)
     assert memory.SAVED_BYTES == footprint.TOTAL_BYTES + footprint.BLOCK_BYTES
+
+
+def test_luminance_has_the_same_weights_in_the_renderer() -> None:
+    assert tuple(colorimetry.LUMINANCE) == layout.LUMINANCE
+
+
+def test_the_renderer_encodes_srgb_as_the_service() -> None:
+    values = np.linspace(0, 1, 10_001)
+    np.testing.assert_array_equal(display.srgb(values), colorimetry.encode_srgb(values))
 
 
 def test_gltf_files_have_the_ranges_of_scenes() -> None:

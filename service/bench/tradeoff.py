@@ -20,6 +20,7 @@ from gpu import Renderer, RenderSettings, denoise
 from gpu.analysis.metering import noise_meter_off
 from service.bench import machine, pareto
 from service.bench.tradeoff_scenes import Case, TradeoffAssets, cases
+from service.colorimetry import LUMINANCE
 from service.pack import pack
 from service.quality import PRESETS
 from service.scene import parse_scene
@@ -28,7 +29,6 @@ FULL = 512  # pixels a side of the pictures whose seconds are reported
 EQUAL_SAMPLES = 64  # of the plain render: errors at equal time are at the time that it takes
 SEEDS = (1, 2)  # two pictures of each: half their squared difference is noise, what else they err is bias
 PPD = 67.0  # pixels per degree, for FLIP
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 REFERENCE = PRESETS["reference"]
 
 

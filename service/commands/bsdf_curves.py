@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, TypeVar
 import numpy as np
 
 from gpu import SceneArrays, Steps
+from service.colorimetry import LUMINANCE
 from service.pack import pack_material
 
 if TYPE_CHECKING:
@@ -20,7 +21,6 @@ ALBEDO_STEP = 1.0  # ... of the albedo, which is smooth and is sampled
 ALBEDO_SAMPLES = 1 << 16
 SLICE_STEP = 1.0  # ... of a slice, along both of its axes
 CHANNELS = ("r", "g", "b")
-LUMINANCE = (0.2126, 0.7152, 0.0722)  # of linear Rec.709
 
 T = TypeVar("T")
 

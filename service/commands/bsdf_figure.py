@@ -11,7 +11,8 @@ import numpy as np
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
-from service.commands.bsdf_curves import LUMINANCE, Curves
+from service.colorimetry import LUMINANCE
+from service.commands.bsdf_curves import Curves
 
 AXES = {  # what is on the two axes
     "distribution": ("angle of the facet's normal (degrees)", "D (1/sr)"),

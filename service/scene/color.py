@@ -8,6 +8,7 @@ from typing import Annotated, Any
 
 from pydantic import PlainValidator, WithJsonSchema
 
+from service.colorimetry import decode_srgb
 from service.scene.base import refusal
 from service.scene.numbers import BRIGHTEST, check_number, described, is_number, vector_schema
 
@@ -16,12 +17,7 @@ HEX = "^#[0-9a-fA-F]{6}$"
 FORMS = 'a colour is [r, g, b] (linear), one number (grey) or "#rrggbb" (sRGB)'
 
 
-def _decoded(encoded: float) -> float:
-    """The sRGB transfer function inverted [IEC 61966-2-1]."""
-    return encoded / 12.92 if encoded <= 0.04045 else float(((encoded + 0.055) / 1.055) ** 2.4)
-
-
-LINEAR_OF_BYTE = [_decoded(byte / 255) for byte in range(256)]
+LINEAR_OF_BYTE = [float(decode_srgb(byte / 255)) for byte in range(256)]
 
 
 def color(high: float) -> Callable[[Any], Color]:

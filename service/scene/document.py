@@ -9,7 +9,7 @@ from typing import Annotated, Any, Literal, Protocol
 
 from pydantic import BeforeValidator, Field, TypeAdapter, ValidationError
 
-from service.problems import FieldError, InvalidDocument
+from service.problems import FieldError, InvalidDocument, escaped
 from service.scene.base import MOST_MISTAKES, OMITTABLE, Model, hint, refusal
 from service.scene.camera import Camera
 from service.scene.environment import Environment
@@ -18,7 +18,7 @@ from service.scene.material import Material
 from service.scene.numbers import described
 from service.scene.shape import Shape
 from service.scene.texture import Texture
-from service.scene.validation import among, escaped, mistakes, validated_entries
+from service.scene.validation import among, mistakes, validated_entries
 
 
 def _version(value: Any) -> Any:

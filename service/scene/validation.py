@@ -9,14 +9,13 @@ from typing import Any, TypeVar
 
 from pydantic import BaseModel, TypeAdapter, ValidationError
 
-from service.problems import FieldError, InvalidDocument
+from service.problems import FieldError, InvalidDocument, escaped
 from service.scene.base import MOST_MISTAKES, REFUSAL, field_names
 from service.scene.error_location import ErrorLocation, locate
 from service.scene.numbers import described
 
 T = TypeVar("T")
 
-LONGEST_STEP = 200  # characters of a name in a pointer: a hundred pointers through a name of 20 MB would be 2 GB
 
 _WRONG_KIND = ("union_tag_invalid", "union_tag_not_found", "literal_error", "missing")
 
@@ -77,11 +76,6 @@ def among(names: Iterable[str]) -> str:
     """The names as a list for an error message, cut off where it gets too long."""
     known = [repr(name[:40]) for name in islice(names, 21)]
     return ", ".join(known[:20]) + (", ..." if len(known) > 20 else "") if known else "none"
-
-
-def escaped(step: object) -> str:
-    """One step of a JSON pointer (RFC 6901); a very long name is cut off."""
-    return str(step)[:LONGEST_STEP].replace("~", "~0").replace("/", "~1")
 
 
 def _is_below(pointer: str, holders: set[str]) -> bool:

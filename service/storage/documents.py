@@ -25,12 +25,13 @@ from service.problems import (
     PreconditionFailed,
     TooLarge,
     Unavailable,
+    escaped,
 )
 from service.scene import Material, parse_scene, references
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Limits
 from service.scene.text import dump_json
-from service.scene.validation import escaped, validated
+from service.scene.validation import validated
 from service.storage.asset_access import AssetAccess
 from service.storage.database import Database
 from service.storage.quota import Quota

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from service.assets.errors import ParseError
 from service.assets.gltf.extensions import check_required, remedy
-from service.assets.gltf.json_view import JsonView, escaped, shown, whole
+from service.assets.gltf.json_view import JsonView, shown, whole
 from service.assets.types import AssetLimits
+from service.problems import escaped
 
 JSON_CHUNK, BINARY_CHUNK = 0x4E4F534A, 0x004E4942
 MOST_ITEMS = 1 << 20  # items of one kind, which bounds the time to read an untrusted file

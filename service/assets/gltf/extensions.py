@@ -6,8 +6,9 @@ from collections.abc import Iterator
 from typing import Any
 
 from service.assets.errors import ParseError
-from service.assets.gltf.json_view import JsonView, escaped, shown
+from service.assets.gltf.json_view import JsonView, shown
 from service.assets.scenes.warnings import Warnings
+from service.problems import escaped
 
 READ = {
     "KHR_draco_mesh_compression", "KHR_lights_punctual", "KHR_materials_anisotropy", "KHR_materials_clearcoat",

@@ -7,6 +7,7 @@ from collections.abc import Iterator
 from typing import Any
 
 from service.assets.errors import ParseError
+from service.problems import escaped
 
 LARGEST_WHOLE = 1 << 53  # JSON's whole numbers are exact up to this one
 NUMBERS = {int, float}  # the types of numbers; bool is not among them
@@ -100,11 +101,6 @@ class JsonView:
         if not isinstance(found, str):
             raise self.error(name, f"must be a string, not {shown(found)}")
         return found
-
-
-def escaped(name: str | int) -> str:
-    """A name as a part of a pointer [RFC 6901]."""
-    return str(name).replace("~", "~0").replace("/", "~1")
 
 
 def whole(value: Any, pointer: str, low: int = 0) -> int:

@@ -17,6 +17,7 @@ import numpy as np
 
 from service.assets.scenes.rays import Hit, Placed, Scene
 from service.assets.types import Doubles
+from service.colorimetry import LUMINANCE
 
 GRID = 12  # rays along each side of the picture
 MIDDLE_GREY = 0.18
@@ -24,7 +25,6 @@ FAR = 4.0  # stops from middle grey up to which a picture stays as its author li
 FEWEST = 6  # rays that must hit something lit: fewer say nothing about the picture
 SHADOWED = 4  # lights, the brightest ones at a place, for which shadow rays are traced
 TEXTURE = 0.3  # the assumed mean of an image
-LUMINANCE = np.array([0.2126, 0.7152, 0.0722])  # weights of linear Rec.709
 BLACKEST, WHITEST = 0.04, 0.9  # reflectances: black plastic shines, and nothing reflects everything
 
 

@@ -13,8 +13,8 @@ import numpy as np
 from service.assets.gltf.json_view import JsonView
 from service.assets.gltf.texture_bake import pixels, png
 from service.assets.gltf.textures import factor
-from service.assets.readers.raw_mesh import linear
 from service.assets.types import Floats
+from service.colorimetry import decode_srgb, encode_srgb
 
 if TYPE_CHECKING:
     from service.assets.gltf.material_reader import MaterialReader
@@ -100,15 +100,14 @@ def _bake(read: MaterialReader, place: JsonView, factors: tuple[Any, Any, float]
     first, second = (np.asarray((image or white).resize((width, height))).reshape(-1, 4) for image in found)
     made = np.empty((2, width * height, 4), np.uint8)
     diffuse, specular, glossiness = factors
-    decode = linear(np.arange(256) / 255)
+    decode = decode_srgb(np.arange(256) / 255).astype(np.float32)
     for at in range(0, width * height, CHUNK):
         a, b = first[at : at + CHUNK], second[at : at + CHUNK]
         base, metallic = metallic_roughness(
             decode[a[:, :3]] * np.float32(diffuse[:3]), decode[b[:, :3]] * np.float32(specular)
         )
         rough = 1 - b[:, 3] / 255 * glossiness
-        encoded = np.where(base <= 0.0031308, base * 12.92, 1.055 * base ** (1 / 2.4) - 0.055)
-        made[0, at : at + CHUNK, :3] = (encoded * 255).round()
+        made[0, at : at + CHUNK, :3] = (encode_srgb(base) * 255).round()
         made[0, at : at + CHUNK, 3] = a[:, 3]
         made[1, at : at + CHUNK] = (np.stack([0 * rough, rough, metallic, 0 * rough], axis=1) * 255).round()
     shaped = made.reshape(2, height, width, 4)

@@ -15,8 +15,9 @@ import numpy.typing as npt
 
 from service.assets.errors import ParseError
 from service.assets.readers.polygons import Longs, triangulate
-from service.assets.readers.raw_mesh import RawMesh, linear
+from service.assets.readers.raw_mesh import RawMesh
 from service.assets.types import Doubles, Floats
+from service.colorimetry import decode_srgb
 
 TYPES = {
     **{"char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4"},
@@ -160,7 +161,7 @@ def _colors(columns: Columns, declared: dict[str, str]) -> Floats | None:
     found = _stack(columns, names)
     kind = declared[names[0]]
     most = 255 if kind[0] == "f" or found.max(initial=0) <= 255 else np.iinfo(kind).max
-    colors = found.astype(np.float32) if kind[0] == "f" else linear(found / most)
+    colors = found.astype(np.float32) if kind[0] == "f" else decode_srgb(found / most).astype(np.float32)
     return np.column_stack([colors, columns[ALPHA].astype(np.float32)]) if ALPHA in columns else colors
 
 

@@ -81,14 +81,6 @@ def unit_colors(colors: Numbers, warnings: list[str]) -> Floats:
     return np.ascontiguousarray(np.clip(colors, 0, 1), np.float32)
 
 
-def linear(encoded: Numbers) -> Floats:
-    """Of sRGB [IEC 61966-2-1]."""
-    low = encoded <= 0.04045
-    curved = ((np.maximum(encoded, 0) + 0.055) / 1.055) ** 2.4
-    decoded: Floats = np.where(low, encoded / 12.92, curved).astype(np.float32)
-    return decoded
-
-
 def _area_weighted(vertices: Doubles, faces: Indices) -> Doubles:
     a, b, c = (vertices[faces[:, k]] for k in range(3))
     weighted = np.cross(b - a, c - a)

@@ -10,15 +10,14 @@ from typing import Protocol
 import numpy as np
 
 from service.assets import Assets, ImageData
-from service.assets.readers.raw_mesh import linear
+from service.colorimetry import decode_srgb
 from service.pack.edits.cache import PackCache, lasting
 from service.pack.textures.uses import DECODED
-from service.problems import AssetError, FieldError, InvalidDocument
+from service.problems import AssetError, FieldError, InvalidDocument, escaped
 from service.scene import Scene
 from service.scene.texture import (
     ImageTexture,
 )
-from service.scene.validation import escaped
 
 MAX_TEXELS = 2**27  # the texels of a texture of 16384 rows on the device
 AT_ONCE = 2  # images that are read at a time, as `AssetLimits` has as many parsers
@@ -96,5 +95,5 @@ def _laid(images: dict[str, ImageData]) -> PackedTexels:
 def _decoded(image: ImageData) -> ImageData:
     """Linear floats from sRGB ones, such as those of a PNG of 16 bits; alpha stays as it is."""
     pixels = np.array(image.pixels, np.float32)
-    pixels[..., :3] = linear(pixels[..., :3])
+    pixels[..., :3] = decode_srgb(pixels[..., :3])
     return ImageData(pixels)

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from gpu.layout import texture_records
 from service.assets import ImageData
 from service.pack.parameters import member_of
-from service.problems import FieldError, InvalidDocument
+from service.problems import FieldError, InvalidDocument, escaped
 from service.scene import Scene
 from service.scene.material import Material, MicrofacetMaterial, stretches
 from service.scene.texture import (
@@ -19,7 +19,6 @@ from service.scene.texture import (
     Reference,
     references,
 )
-from service.scene.validation import escaped
 
 DECODED = " decoded"  # appended to the reference of an asset whose sRGB floats were made linear
 

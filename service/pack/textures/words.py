@@ -14,6 +14,7 @@ from service.pack.edits.cache import PackCache, lasting
 from service.pack.parameters import member_of
 from service.pack.textures.images import PackedTexels, TexelLimits, images_of, lay_out
 from service.pack.textures.uses import TextureReference, check_channels, uses_of
+from service.problems import escaped
 from service.scene import Scene
 from service.scene.color import LINEAR_OF_BYTE
 from service.scene.texture import (
@@ -25,7 +26,6 @@ from service.scene.texture import (
     ScalarTexture,
     references,
 )
-from service.scene.validation import escaped
 
 LINEAR = np.array(LINEAR_OF_BYTE, np.float32)
 

@@ -9,12 +9,11 @@ from typing import Any
 import pytest
 
 from service.config import Config
-from service.problems import InvalidDocument
+from service.problems import LONGEST_STEP, InvalidDocument
 from service.scene import merge_patch, parse_scene
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Parsed
 from service.scene.shape import SphereShape
-from service.scene.validation import LONGEST_STEP
 from service.streams import protocol
 
 MANY = 100_000
