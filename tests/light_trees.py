@@ -9,7 +9,7 @@ import numpy as np
 
 from gpu import Renderer, SceneArrays, layout
 from gpu.device.textures import linear_texture
-from gpu.kernels.features import FLAGS
+from gpu.kernels.flag_table import FLAGS
 from gpu.layout import LightCluster, LightKind, LightNode, LightTreeHead, bindings
 from gpu.layout.bindings import Slot
 from tests.probing import prober_of

@@ -14,15 +14,23 @@ from gpu.device.scene import upload_tables
 from gpu.device.textures import linear_texture
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
+from gpu.kernels.flag_table import FLAGS
 from gpu.kernels.source import SHADERS
 from gpu.layout import bindings
 from gpu.layout.bindings import Slot
 from gpu.picture import filters
 
 PROBES = Path(__file__).parent / "shaders" / "probes"
+
+
+def with_sliders(model: str) -> frozenset[str]:
+    """The flag of a material model, and those that its sliders can raise."""
+    return frozenset(n for n, flag in FLAGS.items() if model in (n, *flag.raised_with, *flag.compiled_with))
+
+
+DISNEY_FLAGS = with_sliders("HAS_DISNEY")
 # All flags of the production model.
-PRINCIPLED_FLAGS = frozenset({"HAS_PRINCIPLED", *features.EDITED["HAS_PRINCIPLED"], "HAS_ANISOTROPIC",
-                              "HAS_TRANSMISSION", "HAS_ATTENUATION"})  # fmt: skip
+PRINCIPLED_FLAGS = with_sliders("HAS_PRINCIPLED") | {"HAS_ATTENUATION"}
 
 
 def materials(**members: Any) -> np.ndarray:

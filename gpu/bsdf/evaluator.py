@@ -20,6 +20,7 @@ from gpu.bsdf import kernels as own
 from gpu.bsdf import lobes as single
 from gpu.device.scene import upload_tables
 from gpu.device.textures import KINDS, bound_textures, linear_texture
+from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout import BSDF_GROUP, MaterialModel, bindings
 from gpu.layout.bindings import Slot
@@ -177,10 +178,10 @@ class BsdfEvaluator:
     def _dispatch(self, material: SceneArrays, entry: str, uniforms: dict[str, int]) -> _Dispatch:
         contexts.use(self._context)
         bare = own.bare(material)
-        flags, defines = own.flags(bare), own.defines(bare, entry)
+        flags = features.evaluating(bare)
         if "HAS_PRINCIPLED" in flags and not self._tables:
             self._tables = upload_tables(self._context)
-        kernel = self._kernels.get(entry, defines)
+        kernel = self._kernels.get(entry, own.defines(bare, flags, entry))
         work = _Dispatch(self._context, self._kernels, kernel, self._tables, uniforms)
         try:
             work.upload(bare, flags)

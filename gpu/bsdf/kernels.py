@@ -21,8 +21,6 @@ VALUES, ALBEDO, TERMS = "bsdf_values.comp", "bsdf_albedo.comp", "bsdf_terms.comp
 ENTRIES = {"values": VALUES, "albedo": ALBEDO, "terms": TERMS}  # the kernel for each question about a material
 
 NOWHERE: np.void = np.zeros(1, layout.Camera.dtype)[0]  # a camera where there is no scene to look at
-# Every term of `microfacet`. They would cost a picture time, but not a curve, and one kernel serves them all.
-_MENUS = frozenset(name for name in features.FLAGS if name.startswith("HAS_MICROFACET"))
 # What a material has besides its BSDF.
 _REST = {"emission": 0.0, "ambient": 0.0, "opacity": 1.0, "attenuation_distance": layout.ABSENT}
 
@@ -35,28 +33,21 @@ def bare(arrays: SceneArrays) -> SceneArrays:
     return replace(arrays, materials=materials)
 
 
-def flags(arrays: SceneArrays) -> frozenset[str]:
-    """The flags that a bare material raises, with those that its sliders and menus could raise."""
-    raised = features.grown(frozenset(), arrays)
-    return raised | _MENUS if "HAS_MICROFACET" in raised else raised
-
-
-def defines(arrays: SceneArrays, entry: str) -> dict[str, object]:
+def defines(arrays: SceneArrays, raised: frozenset[str], entry: str) -> dict[str, object]:
     """What the kernel `entry` is compiled with for a bare material; many materials have it in common.
 
     `bsdf_albedo.comp` takes the independent sampler, so that the scatter of its samples gives their error.
     """
     own: dict[str, dict[str, object]] = {ALBEDO: {"SAMPLER": 1}, VALUES: lobes.defines(), TERMS: {}}
-    return features.defines(flags(arrays), shapes=features.counts(arrays)) | own[entry]
+    return features.defines(raised, shapes=features.counts(arrays)) | own[entry]
 
 
-def samples() -> Iterator[SceneArrays]:
-    """A bare material of each model; of a model that can transmit or be anisotropic, one for each combination."""
+def samples() -> Iterator[tuple[SceneArrays, frozenset[str]]]:
+    """A bare material of each model with the flags of each kernel that evaluates one of that model."""
     for model in MaterialModel:
-        for transmission in (0.0, 1.0):
-            for anisotropic in (0.0, 1.0):
-                material = np.zeros(1, layout.Material.dtype)
-                material["model"] = model
-                material["transmission"], material["anisotropic"] = transmission, anisotropic
-                terms = Microfacet.words // 4 if model == MaterialModel.MICROFACET else 0
-                yield bare(SceneArrays(NOWHERE, material, microfacets=np.zeros((terms, 4), np.uint32)))
+        material = np.zeros(1, layout.Material.dtype)
+        material["model"] = model
+        terms = Microfacet.words // 4 if model == MaterialModel.MICROFACET else 0
+        arrays = bare(SceneArrays(NOWHERE, material, microfacets=np.zeros((terms, 4), np.uint32)))
+        raised = features.evaluating(arrays)
+        yield from ((arrays, flags) for flags in (raised, *features.touched(raised, anywhere=False)))

@@ -179,7 +179,7 @@ class Scene:
     @property
     def spared(self) -> tuple[str, ...]:
         """The features that they are not compiled for."""
-        return _words(frozenset(features.FLAGS) - self._raised)
+        return _words(features.everything() - self._raised)
 
     def edit(
         self,

@@ -1,6 +1,7 @@
 """From a scene to compiled kernels: the flags of the code that it needs, the shader text, the compiled result.
 
-features        the table of flags: which code a scene needs
+flag_table      a row for each flag: what needs it, and which sliders raise it
+features        what kernels are compiled with: a scene's flags before and after edits, its numbers of records
 layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and constants
 textures_glsl   how materials read textures, as GLSL
 instances_glsl  records of instances as GLSL

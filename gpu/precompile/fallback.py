@@ -20,49 +20,23 @@ from gpu.arrays import SceneArrays
 from gpu.device.scene import Scene
 from gpu.device.textures import TextureCache
 from gpu.kernels import features
-from gpu.layout import ShapeKind
+from gpu.kernels.flag_table import FLAGS, beside
 from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
 
-# Features that it does not support: textures are laid out anew for each scene; instances and the terms of
-# `microfacet` are rare and would cost all other scenes time.
-UNKNOWN = frozenset({
-    "HAS_TEXTURES", "HAS_BYTE_TEXELS", "HAS_FLOAT_TEXELS", "HAS_SRGB_TEXELS", "HAS_CHECKERS", "HAS_UVS", "HAS_UVS_1",
-    "HAS_VERTEX_COLORS", "HAS_NORMAL_MAPS", "HAS_COAT_NORMALS", "HAS_TEXTURED_LIGHTS", "HAS_INSTANCES",
-    *(name for name in features.everything() if name.startswith("HAS_MICROFACET")),
-})  # fmt: skip
-# Flags that sliders raise in any scene, and those that they raise where another one is on.
-_ANYWHERE = ("HAS_OPACITY", "HAS_EMISSION", "HAS_LIGHTS", "HAS_MANY_LIGHTS", "HAS_LIGHT_TREE")
-_BESIDE = {
-    "HAS_PRINCIPLED": ("HAS_TRANSMISSION", "HAS_ATTENUATION", "HAS_ANISOTROPIC"),
-    "HAS_SMOOTH_NORMALS": ("HAS_TANGENTS",),  # of a mesh whose highlight is stretched
-    "HAS_NORMAL_MAPS": ("HAS_COAT_NORMALS",),
-    "HAS_DIRECTIONAL_LIGHTS": ("HAS_SUN_DISKS",),
-    "HAS_TEXTURES": ("HAS_TEXTURED_LIGHTS",),
-}
-_SHINING = {
-    ShapeKind.SPHERE: ("spheres", "HAS_SPHERE_LIGHTS"),
-    ShapeKind.QUAD: ("quads", "HAS_QUAD_LIGHTS"),
-    ShapeKind.ELLIPSOID: ("ellipsoids", "HAS_ELLIPSOID_LIGHTS"),
-    ShapeKind.TRIANGLE: ("triangles", "HAS_TRIANGLE_LIGHTS"),
-}
 _FACES = 6  # quads that a box becomes when it shines
 _EDITED = {"camera", "materials", "environment"}  # what `Scene.edit` can change, as far as `edits` goes
 
 
 def flags() -> frozenset[str]:
     """The flags of the kernel for many scenes."""
-    return features.everything() - UNKNOWN
+    return frozenset(flag.name for flag in FLAGS.values() if flag.in_general)
 
 
 def superset(arrays: SceneArrays) -> frozenset[str]:
     """The flags of the scene's superset kernel: its own, and those that its sliders could raise."""
     raised = features.flags(arrays, True)
-    lamps = {lamp for records, lamp in _SHINING.values() if len(getattr(arrays, records))}
-    faces = {"HAS_QUADS", "HAS_QUAD_LIGHTS"} if len(arrays.boxes) else set[str]()
-    both = {"HAS_EMISSION_BOTH"} if (arrays.materials["emission_sides"] == 2).any() else set[str]()
-    beside = {more for flag in raised & set(_BESIDE) for more in _BESIDE[flag]}
-    return raised | lamps | faces | both | beside | set(_ANYWHERE)
+    return raised | {f.name for f in FLAGS.values() if beside(f.compiled_with, raised) or f.previewed(arrays)}
 
 
 def defines(raised: frozenset[str] | None = None, arrays: SceneArrays | None = None) -> dict[str, object]:
@@ -86,10 +60,10 @@ def kernel_key(
 ) -> kernel_keys.KernelKey | None:
     """The key of the superset kernel with these flags, or of the kernel for many scenes; None where that cannot show
     such a scene."""
-    needs = features.flags(arrays) - features.SPARING
-    if settings_for(settings) is None or (needs & UNKNOWN if raised is None else needs - raised):
+    compiled = flags() if raised is None else raised
+    if settings_for(settings) is None or features.needed(features.flags(arrays)) - compiled:
         return None
-    bound = kernel_keys.kernel_key(arrays, settings, flags() if raised is None else raised).textures
+    bound = kernel_keys.kernel_key(arrays, settings, compiled).textures
     return kernel_keys.KernelKey(tuple(defines(raised, arrays).items()), bound)
 
 

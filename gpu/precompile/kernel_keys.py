@@ -54,9 +54,9 @@ def flags(arrays: SceneArrays, editing: bool = False) -> frozenset[str]:
     return features.flags(arrays, editing)
 
 
-def camera_flags(camera: np.void) -> frozenset[str]:
-    """The flags that a `layout.Camera` raises by itself: two cameras that raise the same share a scene's kernel."""
-    return frozenset(name for name, asks in features.CAMERA_FLAGS.items() if asks(camera))
+def camera_flags(arrays: SceneArrays) -> frozenset[str]:
+    """The flags that the camera alone raises: two cameras that raise the same share a scene's kernel."""
+    return features.camera_flags(arrays)
 
 
 def flags_after_edit(raised: frozenset[str], arrays: SceneArrays, editing: bool) -> frozenset[str]:
@@ -83,20 +83,9 @@ def key_after_move(arrays: SceneArrays, settings: RenderSettings) -> KernelKey |
 
 
 def keys_after_edit(arrays: SceneArrays, settings: RenderSettings) -> list[KernelKey]:
-    """The keys that a stream will need when it first moves a slider that is not compiled in with the others: the
-    opacity of any material, and two of `principled`. They are a guess for meshes, of which only those with the
-    anisotropic material get tangents.
-    """
-    has = features.flags(arrays, True)
-    asked = set[frozenset[str]]()
-    if "HAS_PRINCIPLED" in has:
-        along = {"HAS_TANGENTS"} if "HAS_SMOOTH_NORMALS" in has else set()
-        clear, stretched = {"HAS_TRANSMISSION"}, {"HAS_ANISOTROPIC", *along}
-        asked |= {has | clear, has | stretched, has | clear | stretched}
-    asked |= {has | {"HAS_OPACITY"}}
-    return [
-        kernel_key(arrays, settings, raised) for raised in sorted(asked - {has}, key=lambda f: (len(f), sorted(f)))
-    ]
+    """The keys that a stream will need when it first moves a slider whose code is compiled ahead. They are a guess
+    for meshes, of which only those with the anisotropic material get tangents."""
+    return [kernel_key(arrays, settings, raised) for raised in features.touched(features.flags(arrays, True))]
 
 
 def common_keys() -> list[KernelKey]:
@@ -112,16 +101,21 @@ def common_keys() -> list[KernelKey]:
 def bsdf_key(material: SceneArrays, question: str) -> KernelKey:
     """The key of the kernel by which a `BsdfEvaluator` answers the question, one of `gpu.bsdf.kernels.ENTRIES`, for a
     scene of one material."""
-    bare, entry = bsdf.bare(material), bsdf.ENTRIES[question]
-    return KernelKey(tuple(bsdf.defines(bare, entry).items()), _textures(bare, bsdf.flags(bare)), entry)
+    bare = bsdf.bare(material)
+    return _bsdf_key(bare, features.evaluating(bare), question)
+
+
+def _bsdf_key(bare: SceneArrays, raised: frozenset[str], question: str) -> KernelKey:
+    entry = bsdf.ENTRIES[question]
+    return KernelKey(tuple(bsdf.defines(bare, raised, entry).items()), _textures(bare, raised), entry)
 
 
 def bsdf_keys() -> Iterator[KernelKey]:
-    """The keys of all kernels that a `BsdfEvaluator` needs for any material."""
+    """The keys of all kernels that a `BsdfEvaluator` needs for any material, each once."""
     found = set[KernelKey]()
     for question in bsdf.ENTRIES:
-        for material in bsdf.samples():
-            key = bsdf_key(material, question)
+        for bare, raised in bsdf.samples():
+            key = _bsdf_key(bare, raised, question)
             if key not in found:
                 found.add(key)
                 yield key

@@ -8,11 +8,10 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.kernels.features import EDITED
 from gpu.layout import MaterialModel
 from gpu.layout.bindings import Slot
 from tests import baseline, disney
-from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
+from tests.probing import DISNEY_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of
 
 D, P, G, B = MaterialModel.DISNEY, MaterialModel.PRINCIPLED, MaterialModel.METAL_ROUGH, MaterialModel.BLINN_PHONG
 GLASS = {"model": P, "transmission": 1, "base_color": 1}
@@ -48,7 +47,7 @@ ROWS = {
     "nearly clear": materials(model=P, transmission=1e-7, base_color=1, roughness=0.5),
 }  # fmt: skip
 ELEVATIONS = (90.0, 45.0, 1.0, 0.1, 0.01)  # degrees above the surface
-OLD = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG"})
+OLD = DISNEY_FLAGS | {"HAS_METAL_ROUGH", "HAS_BLINN_PHONG"}
 SIDES = {row: (0, 1) if m["transmission"][0] > 0 and m["metallic"][0] < 1 else (0,) for row, m in ROWS.items()}
 CASES = [(row, inside) for row in ROWS for inside in SIDES[row]]
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,8 @@ import pytest
 from gpu import Renderer, RenderSettings
 from gpu.analysis.kernel_cost import kernel_cost
 from gpu.arrays import SceneArrays
-from gpu.kernels.features import FLAGS, flags, grown
+from gpu.kernels.features import flags, grown
+from gpu.kernels.flag_table import FLAGS
 from gpu.precompile.kernel_keys import kernel_key, keys_after_edit
 from service.pack import Packed, pack
 from service.scene import parse_scene
@@ -87,8 +89,8 @@ def test_paths_go_through_mirrors_as_they_are_scattered(
     assert "HAS_MIRRORS" in flags(scene) and "HAS_PRINCIPLED_LOBES" not in flags(scene)
     settings = RenderSettings(48, 32, 8, estimator=estimator, roulette_depth=2)
     images = [_seen(gpu, settings, scene)]
-    monkeypatch.setitem(FLAGS, "HAS_MIRRORS", lambda _: False)
-    monkeypatch.setitem(FLAGS, "HAS_PRINCIPLED_LOBES", lambda _: True)
+    monkeypatch.setitem(FLAGS, "HAS_MIRRORS", replace(FLAGS["HAS_MIRRORS"], asks=lambda _: False))
+    monkeypatch.setitem(FLAGS, "HAS_PRINCIPLED_LOBES", replace(FLAGS["HAS_PRINCIPLED_LOBES"], asks=lambda _: True))
     images.append(_seen(gpu, settings, scene))
     assert np.isclose(*images, rtol=1e-3, atol=1e-5).all(2).mean() > 0.985
     assert images[0].mean() == pytest.approx(images[1].mean(), rel=2e-3)

@@ -29,7 +29,7 @@ def test_includes_happen_once(tmp_path: Path) -> None:
 
 def test_files_are_read_once(monkeypatch: pytest.MonkeyPatch) -> None:
     """A kernel's key is its text: a scene's first frame would wait 6 ms for each that is looked up."""
-    defines = features.defines(frozenset(features.FLAGS))
+    defines = features.defines(features.everything())
     first = KernelSource("pathtrace.comp", defines)
     monkeypatch.setattr(source, "_read", None)
     again = KernelSource("pathtrace.comp", defines | {"HAS_BVH": 0})
@@ -66,8 +66,8 @@ def test_the_drivers_errors_name_file_and_line(gpu: Renderer, tmp_path: Path) ->
 
 def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
     text = "\n".join(p.read_text() for p in SHADERS.rglob("*") if p.suffix in (".glsl", ".comp"))
-    assert [flag for flag in features.FLAGS if flag not in text] == []
-    everything = features.defines(frozenset(features.FLAGS))
+    assert [flag for flag in features.everything() if flag not in text] == []
+    everything = features.defines(features.everything())
     for entry in ("pathtrace.comp", "guides.comp"):
         KernelSource(entry, everything)  # raises where a name in #if is not defined
     KernelSource("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0, "LINE": 1024})

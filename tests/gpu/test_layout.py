@@ -8,7 +8,7 @@ import pytest
 from gpu import Renderer, layout
 from gpu.device.textures import linear_texture
 from gpu.kernels import layout_glsl
-from gpu.kernels.features import COUNTS, FEW, FLAGS, defines
+from gpu.kernels.features import COUNTS, FEW, defines, everything
 from gpu.layout import BUFFERS, bindings
 from gpu.layout.bindings import COUNTED
 from gpu.layout.record import LayoutError, Record, f32, vec3
@@ -102,5 +102,5 @@ def test_a_hole_is_refused() -> None:
 
 def test_every_flag_and_count_is_defined() -> None:
     known = defines(frozenset())
-    assert set(FLAGS) <= set(known)
+    assert everything() <= set(known)
     assert {*COUNTS, *FEW} == {f"{name.upper()}_COUNT" for name in COUNTED}

@@ -200,7 +200,7 @@ def test_flags_change_no_pixel_beyond_rounding(gpu: Renderer, monkeypatch: pytes
     from gpu.kernels import features
 
     exact = render(gpu, _showcase(), 16, max_bounces=3, roulette_depth=99)
-    everything = frozenset(features.FLAGS)
+    everything = features.everything()
     monkeypatch.setattr(features, "flags", lambda scene, editing=False: everything)
     full = render(gpu, _showcase(), 16, max_bounces=3, roulette_depth=99)
     # A rounding may turn a path at an edge: all but a few pixels agree to rounding, and their mean does.

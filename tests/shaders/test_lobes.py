@@ -8,15 +8,14 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.kernels.features import EDITED
 from gpu.layout.bindings import Slot
 from tests import baseline, disney, stats
 from tests.lobes import BLINN_PHONG, METAL_ROUGH, PHONG, PRINCIPLED, ROWS, D, Grid
-from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
+from tests.probing import DISNEY_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of
 
 RECIPROCAL = [name for name, row in ROWS.items() if row["model"][0] not in (BLINN_PHONG, PHONG)]
 ANGLES = (0.0, 35.0, 70.0, 87.0)
-FLAGS = frozenset({"HAS_DISNEY", *EDITED["HAS_DISNEY"], "HAS_METAL_ROUGH", "HAS_BLINN_PHONG", "HAS_PHONG"})
+FLAGS = DISNEY_FLAGS | {"HAS_METAL_ROUGH", "HAS_BLINN_PHONG", "HAS_PHONG"}
 TANGENT = np.array([0.8, 0.6])
 CASES = [(name, angle) for name in ROWS for angle in ANGLES]
 

@@ -10,7 +10,7 @@ import pytest
 from scipy import integrate
 
 from gpu import Renderer
-from gpu.kernels.features import FLAGS
+from gpu.kernels.flag_table import FLAGS
 from gpu.layout.bindings import Slot
 from gpu.layout.microfacet_records import PLAIN, Distribution
 from gpu.tables import microfacet as tables

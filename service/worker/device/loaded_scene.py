@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 from gpu import RenderSettings, Steps, apply_edit, picture_bytes, scene_bytes
@@ -126,9 +126,8 @@ def kernel_request(
         raised = kernel_keys.flags(arrays, editing)
     elif loaded is not None:
         arrays, editing, raised = loaded.scene.arrays, loaded.editing, loaded.scene.flags
-        same_flags = update.camera is None or kernel_keys.camera_flags(update.camera) == kernel_keys.camera_flags(
-            arrays.camera
-        )
+        moved = arrays if update.camera is None else replace(arrays, camera=update.camera)
+        same_flags = kernel_keys.camera_flags(moved) == kernel_keys.camera_flags(arrays)
         compiled = {"materials", "texture_words", "microfacets", "environment_map", "moved"}
         if update.settings is None and same_flags and not edits.keys() & compiled:
             return None

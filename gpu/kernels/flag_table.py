@@ -1,0 +1,292 @@
+"""The flags, which say what code a scene needs: a row for each.
+
+A flag only removes code that the scene cannot reach; choices that change pixels are settings (`features.defines`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from gpu import layout
+from gpu.arrays import SceneArrays
+from gpu.kernels import textures_glsl
+from gpu.layout import LightKind, MaterialModel, ShapeKind, microfacet_records, texture_records
+
+Asks = Callable[[SceneArrays], bool]
+ANYWHERE = ("any scene",)  # in place of the names of flags
+# The records of each kind of shape that may stand in a kernel's loop; instances never do.
+SHAPES = {
+    ShapeKind.SPHERE: "spheres",
+    ShapeKind.QUAD: "quads",
+    ShapeKind.BOX: "boxes",
+    ShapeKind.ELLIPSOID: "ellipsoids",
+    ShapeKind.TRIANGLE: "triangles",
+}
+
+
+@dataclass(frozen=True)
+class Flag:
+    """A flag, and what is known of the sliders and menus that raise it while a scene is edited.
+
+    `asks` says whether a scene needs the flag's code. The members called `..._with` name the flags beside which a
+    slider can raise this one, or are ANYWHERE. They differ in how the kernels come to have its code by then.
+    """
+
+    name: str
+    asks: Asks
+    # The code is cheap: the kernels of an edited scene have it from the start.
+    raised_with: tuple[str, ...] = ()
+    # The code is expensive: a kernel with it is compiled in idle time as soon as the scene is shown. Where several
+    # flags are compiled with the same one, there is a kernel for each combination.
+    compiled_with: tuple[str, ...] = ()
+    # The flag comes with one that is compiled so, where all of these are raised by then.
+    follows: tuple[str, ...] = ()
+    # Whether a slider can raise it in another way: until its kernel is compiled, the scene's superset kernel has it.
+    previewed: Asks = lambda scene: False
+    # Kernels that evaluate a material alone have it, as it costs a curve no time that anybody would notice.
+    evaluated_with: tuple[str, ...] = ()
+    in_general: bool = True  # the kernel for many scenes supports it
+    spares: bool = False  # it saves work and changes no picture, so that no edit waits for the compiler to raise it
+    of_camera: bool = False  # the camera alone decides
+
+
+def beside(names: tuple[str, ...], raised: frozenset[str]) -> bool:
+    """Whether one of these flags is raised, or they stand for any scene."""
+    return names == ANYWHERE or not raised.isdisjoint(names)
+
+
+def looped_count(scene: SceneArrays, kind: ShapeKind) -> int:
+    """The number of shapes of a kind that stand in the kernel's loop; they come first among their records."""
+    return scene.large.get(kind, 0) if kind in scene.bvh_kinds else len(getattr(scene, SHAPES[kind]))
+
+
+def _linear(kind: ShapeKind) -> Asks:
+    return lambda s: looped_count(s, kind) > 0
+
+
+def _tree(kind: ShapeKind) -> Asks:
+    return lambda s: kind in s.bvh_kinds
+
+
+def _light(kind: LightKind) -> Asks:
+    return lambda s: bool((s.lights["kind"] == kind).any())
+
+
+def _sun_disks(s: SceneArrays) -> bool:
+    return bool(((s.lights["kind"] == LightKind.DIRECTIONAL) & (s.lights["spread"] > 0)).any())
+
+
+def _hidden(s: SceneArrays) -> bool:
+    records = (getattr(s, name)["shape"] for name in (*SHAPES.values(), "instances"))
+    return any(bool((shapes & np.uint32(layout.HIDDEN)).any()) for shapes in records)
+
+
+def _model(model: MaterialModel) -> Asks:
+    return lambda s: bool((s.materials["model"] == model).any())
+
+
+def _disney(member: str) -> Asks:
+    models = (MaterialModel.DISNEY, MaterialModel.PRINCIPLED)
+    return lambda s: bool((np.isin(s.materials["model"], models) & (s.materials[member] > 0)).any())
+
+
+def _microfacets(s: SceneArrays) -> np.ndarray:
+    """The records of the materials of that model."""
+    words = s.microfacets.reshape(-1)[: len(s.materials) * microfacet_records.Microfacet.words]
+    records: np.ndarray = np.ascontiguousarray(words).view(microfacet_records.Microfacet.dtype)
+    found: np.ndarray = records[s.materials["model"][: len(records)] == MaterialModel.MICROFACET]
+    return found
+
+
+def _term(kind: str, value: int) -> Asks:
+    return lambda s: bool((_microfacets(s)[kind] == value).any())
+
+
+def _transmits(materials: np.ndarray) -> np.ndarray:
+    m = materials
+    out: np.ndarray = (m["model"] == MaterialModel.PRINCIPLED) & (m["transmission"] > 0) & (m["metallic"] < 1)
+    return out
+
+
+def _mirrors(materials: np.ndarray) -> np.ndarray:
+    """Materials that only mirror or refract, by their own numbers; textures may add others, or take some away."""
+    m = materials
+    whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
+    bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
+    out: np.ndarray = (
+        (m["model"] == MaterialModel.PRINCIPLED) & (m["roughness"] < layout.LEAST_ROUGHNESS) & whole & bare
+    )
+    return out
+
+
+def _spreads(s: SceneArrays) -> bool:
+    """Whether kernels need the lobes of `principled`: not where all such materials only mirror or refract, and among
+    them is clear glass, whose paths then take the short loop of path/delta_chain.glsl."""
+    m = s.materials
+    given = m["model"] == MaterialModel.PRINCIPLED
+    sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
+    spared = (sure & _transmits(m)).any() and not _normal_mapped(s)
+    return bool(given.any() and (not spared or (given & ~sure).any()))
+
+
+def _attenuates(s: SceneArrays) -> bool:
+    return bool((_transmits(s.materials) & (s.materials["attenuation_distance"] > 0)).any())
+
+
+def _slot_flags(scene: SceneArrays) -> np.ndarray:
+    """The flags of all slots in use."""
+    if scene.textures is None:
+        return np.zeros(0, np.uint32)
+    slots, _ = textures_glsl.records(scene.textures)
+    flags: np.ndarray = slots["flags"][slots["width"] > 0]
+    return flags
+
+
+def _slot(flag: int, kind: int = 0) -> Asks:
+    return lambda s: bool((_slot_flags(s) & (flag | kind) == flag).any())
+
+
+def _normal_mapped(s: SceneArrays) -> bool:
+    return s.textures is not None and any(name in s.textures.slots for name in ("normal", "coat_normal"))
+
+
+def _coat_apart(s: SceneArrays) -> bool:
+    """Whether the normal of some coat differs from that of the layer below."""
+    if s.textures is None or not _normal_mapped(s):
+        return False
+    names = list(s.textures.slots)
+    _, uses = textures_glsl.records(s.textures)
+    mapped = [
+        uses["channel"][:, names.index(n)] != texture_records.CHANNEL_NONE
+        for n in texture_records.NORMALS
+        if n in names
+    ]
+    coated = (s.materials["model"] == MaterialModel.PRINCIPLED) & (s.materials["clearcoat"] > 0)
+    return bool((np.any(mapped, axis=0) & coated).any())
+
+
+def _thin(s: SceneArrays) -> bool:
+    return bool((s.triangle_colors[..., 3] < 1).any())
+
+
+def _shines_both(s: SceneArrays) -> bool:
+    return bool(((s.materials["emission"] > 0).any(axis=1) & (s.materials["emission_sides"] == 2)).any())
+
+
+def _veiled(s: SceneArrays) -> bool:
+    """Whether the emission or the opacity of an emitting shape varies over its surface."""
+    shines = (s.materials["emission"] > 0).any(axis=1)
+    given = s.materials[shines]
+    textured = (given[name] == np.float32(layout.TEXTURED) for name in ("emission", "opacity"))
+    return any(bool(values.any()) for values in textured) or (len(given) > 0 and _thin(s))
+
+
+def _where(flag: str) -> Asks:
+    return lambda s: FLAGS[flag].asks(s)
+
+
+def _always(_: SceneArrays) -> bool:
+    return True
+
+
+def _term_flags() -> Iterator[Flag]:
+    """A flag for each term of `microfacet` that has code of its own: HAS_MICROFACET_DISTRIBUTION_GTR."""
+    plain = microfacet_records.PLAIN
+    for kind, terms in microfacet_records.TERMS.items():
+        for term in terms:
+            if plain.get(kind) != term:
+                yield _of_microfacet(f"HAS_MICROFACET_{kind.upper()}_{term.name}", _term(kind, term))
+
+
+def _of_microfacet(name: str, asks: Asks) -> Flag:
+    """A flag of the model `microfacet`, whose terms are rare and would cost the pictures of all other scenes time."""
+    return Flag(name, asks, evaluated_with=("HAS_MICROFACET",), in_general=False)
+
+
+def _of_textures(name: str, asks: Asks, previewed: Asks = Flag.previewed) -> Flag:
+    """A flag of textures, which are laid out anew for each scene."""
+    return Flag(name, asks, previewed=previewed, in_general=False)
+
+
+_OPAQUE = ("HAS_DISNEY", "HAS_PRINCIPLED")
+_PHONG = ("HAS_BLINN_PHONG", "HAS_PHONG")
+_ROWS = (
+    Flag("HAS_SPHERES", _linear(ShapeKind.SPHERE)),
+    Flag("HAS_VAST_SPHERES", lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any())),
+    Flag("HAS_QUADS", _linear(ShapeKind.QUAD), previewed=lambda s: len(s.boxes) > 0),  # of one that shines
+    Flag("HAS_BOXES", _linear(ShapeKind.BOX)),
+    Flag("HAS_ELLIPSOIDS", _linear(ShapeKind.ELLIPSOID)),
+    Flag("HAS_TRIANGLES", _linear(ShapeKind.TRIANGLE)),
+    Flag("HAS_BVH", lambda s: bool(s.bvh_kinds)),
+    Flag("HAS_BVH_SPHERES", _tree(ShapeKind.SPHERE)),
+    Flag("HAS_BVH_QUADS", _tree(ShapeKind.QUAD)),
+    Flag("HAS_BVH_BOXES", _tree(ShapeKind.BOX)),
+    Flag("HAS_BVH_ELLIPSOIDS", _tree(ShapeKind.ELLIPSOID)),
+    Flag("HAS_BVH_TRIANGLES", _tree(ShapeKind.TRIANGLE)),
+    Flag("HAS_INSTANCES", lambda s: len(s.instances) > 0, in_general=False),  # rare, and a cost for all other scenes
+    Flag("HAS_SINGLE_SIDED", lambda s: bool((s.triangles["shape"] & np.uint32(layout.SINGLE_SIDED)).any())),
+    Flag("HAS_SMOOTH_NORMALS", lambda s: len(s.triangle_normals) > 0),
+    # Of meshes whose highlight is stretched, and which have smooth normals.
+    Flag(
+        "HAS_TANGENTS",
+        lambda s: s.tangents,
+        follows=("HAS_ANISOTROPIC", "HAS_SMOOTH_NORMALS"),
+        previewed=_where("HAS_SMOOTH_NORMALS"),
+    ),
+    Flag("HAS_HIDDEN_SHAPES", _hidden),
+    Flag("HAS_OPACITY", lambda s: bool((s.materials["opacity"] < 1).any()) or _thin(s), compiled_with=ANYWHERE),
+    _of_textures("HAS_TEXTURES", lambda s: s.textures is not None or len(s.triangle_colors) > 0),
+    _of_textures("HAS_BYTE_TEXELS", _slot(0, texture_records.SLOT_FLOATS | texture_records.SLOT_CHECKER)),
+    _of_textures("HAS_FLOAT_TEXELS", _slot(texture_records.SLOT_FLOATS, texture_records.SLOT_CHECKER)),
+    _of_textures("HAS_SRGB_TEXELS", _slot(texture_records.SLOT_SRGB)),
+    _of_textures("HAS_CHECKERS", _slot(texture_records.SLOT_CHECKER)),
+    _of_textures("HAS_UVS", lambda s: len(s.triangle_uvs) > 0),
+    _of_textures("HAS_UVS_1", lambda s: len(s.triangle_uvs_1) > 0),
+    _of_textures("HAS_VERTEX_COLORS", lambda s: len(s.triangle_colors) > 0),
+    _of_textures("HAS_NORMAL_MAPS", _normal_mapped),
+    _of_textures("HAS_COAT_NORMALS", _coat_apart, previewed=_normal_mapped),
+    _of_textures("HAS_TEXTURED_LIGHTS", _veiled, previewed=_where("HAS_TEXTURES")),
+    Flag("HAS_EMISSION", lambda s: bool((s.materials["emission"] > 0).any()), previewed=_always),
+    Flag("HAS_EMISSION_BOTH", _shines_both, previewed=lambda s: bool((s.materials["emission_sides"] == 2).any())),
+    Flag("HAS_LIGHTS", lambda s: len(s.lights) > 0, previewed=_always),
+    Flag("HAS_MANY_LIGHTS", lambda s: len(s.lights) > 1, previewed=_always),
+    Flag("HAS_LIGHT_TREE", lambda s: len(s.light_tree) > 0, previewed=_always),
+    Flag("HAS_POINT_LIGHTS", _light(LightKind.POINT)),
+    Flag("HAS_SPOT_LIGHTS", _light(LightKind.SPOT)),
+    Flag("HAS_DIRECTIONAL_LIGHTS", _light(LightKind.DIRECTIONAL)),
+    Flag("HAS_SUN_DISKS", _sun_disks, previewed=_light(LightKind.DIRECTIONAL)),
+    Flag("HAS_SPHERE_LIGHTS", _light(LightKind.SPHERE), previewed=lambda s: len(s.spheres) > 0),
+    Flag("HAS_QUAD_LIGHTS", _light(LightKind.QUAD), previewed=lambda s: len(s.quads) + len(s.boxes) > 0),
+    Flag("HAS_TRIANGLE_LIGHTS", _light(LightKind.TRIANGLE), previewed=lambda s: len(s.triangles) > 0),
+    Flag("HAS_ELLIPSOID_LIGHTS", _light(LightKind.ELLIPSOID), previewed=lambda s: len(s.ellipsoids) > 0),
+    Flag("HAS_ENVIRONMENT", lambda s: s.environment is not None),
+    Flag("HAS_ENVIRONMENT_IMAGE", lambda s: (e := s.environment) is not None and e.texels.size > 3 and not e.cube),
+    Flag("HAS_ENVIRONMENT_CUBE", lambda s: s.environment is not None and s.environment.cube),
+    Flag("HAS_SUN", lambda s: s.environment is not None and s.environment.sun is not None),
+    # Without an aperture its code costs less than 2 % of a sample's time (cornell-boxes, sphere-on-floor,
+    # point-lights).
+    Flag("HAS_APERTURE", lambda s: bool(s.camera["aperture_radius"] > 0), raised_with=ANYWHERE, of_camera=True),
+    Flag("HAS_DISNEY", _model(MaterialModel.DISNEY)),
+    Flag("HAS_SUBSURFACE", _disney("subsurface"), raised_with=_OPAQUE),
+    Flag("HAS_SHEEN", _disney("sheen"), raised_with=_OPAQUE),
+    # It doubles the time of a sample of `principled`.
+    Flag("HAS_ANISOTROPIC", _disney("anisotropic"), raised_with=("HAS_DISNEY",), compiled_with=("HAS_PRINCIPLED",)),
+    Flag("HAS_CLEARCOAT", _disney("clearcoat"), raised_with=_OPAQUE),
+    Flag("HAS_METAL_ROUGH", _model(MaterialModel.METAL_ROUGH)),
+    Flag("HAS_BLINN_PHONG", _model(MaterialModel.BLINN_PHONG)),
+    Flag("HAS_PHONG", _model(MaterialModel.PHONG)),
+    Flag("HAS_AMBIENT", lambda s: bool((s.materials["ambient"] > 0).any()), raised_with=_PHONG),
+    _of_microfacet("HAS_MICROFACET", _model(MaterialModel.MICROFACET)),
+    *_term_flags(),
+    _of_microfacet("HAS_MICROFACET_TABLES", lambda s: bool((_microfacets(s)["rows"] > 0).any())),
+    Flag("HAS_PRINCIPLED", _model(MaterialModel.PRINCIPLED)),
+    Flag("HAS_PRINCIPLED_LOBES", _spreads, raised_with=("HAS_PRINCIPLED",)),
+    # It adds a fifth to the time of a sample of `principled`.
+    Flag("HAS_TRANSMISSION", lambda s: bool(_transmits(s.materials).any()), compiled_with=("HAS_PRINCIPLED",)),
+    Flag("HAS_MIRRORS", lambda s: bool((_transmits(s.materials) & _mirrors(s.materials)).any()), spares=True),
+    Flag("HAS_ATTENUATION", _attenuates, previewed=_where("HAS_PRINCIPLED")),
+)
+FLAGS = {flag.name: flag for flag in _ROWS}
