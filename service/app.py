@@ -248,7 +248,7 @@ class _Server(uvicorn.Server):
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     own: AppState = app.state.sunbox
     own.renderers.start()
-    own.assets.warm()
+    own.assets.start()
     asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
     await own.resume_renders()
     own.warming = asyncio.create_task(_warm(app))

@@ -187,9 +187,9 @@ class AssetStore:
         """An image by its reference. Raises AssetError."""
         return as_image(self._load(ref), ref)
 
-    def warm(self) -> None:
-        """Start a parsing process with its libraries, without waiting, so that a first file is parsed at once."""
-        self.loader.sandbox.warm()
+    def start(self) -> None:
+        """Start a parsing process, without waiting, so that a first file is parsed at once."""
+        self.loader.sandbox.start()
 
     def rights(self) -> Rights:
         """Which rights the processes that parse uploads have given up. Waits for the first of them."""

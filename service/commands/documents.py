@@ -152,7 +152,7 @@ def source_assets(source: Source, roots: Sequence[str], config: Config) -> Itera
 
     uploaded = source.store or storage(config).assets
     if references.references(source.document):
-        uploaded.loader.sandbox.start()
+        uploaded.start()
     with closing(uploaded), FileAssets(source.path.parent, asset_folders(roots), uploaded) as assets:
         yield SourceAssets(assets, uploaded, source.assets)
 

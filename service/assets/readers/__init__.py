@@ -3,7 +3,7 @@
 obj          OBJ: vertices and faces
 obj_lines    the lines of an OBJ text by keyword, in blocks
 ply          PLY, text and binary
-stl          STL, through trimesh
+stl          STL, binary and text
 polygons     polygons -> triangles
 raw_mesh     the result of a reader, and the checks that every mesh has to pass
 mesh_checks  oddities of a mesh: repeated triangles, edges of too many, inside out

@@ -28,7 +28,6 @@ from service.system.shared_memory import trim
 NICENESS = 5
 LARGE = 1 << 20  # bytes of a file after which memory is given back to the system
 EARLY = ("PIL.Image", "PIL.PngImagePlugin", "PIL.JpegImagePlugin", "PIL.WebPImagePlugin", "OpenImageIO", "DracoPy")
-LATE = ("trimesh.exchange.stl",)  # 0.4 s, for one format
 
 
 def main() -> None:
@@ -42,10 +41,6 @@ def main() -> None:
             request, source = receive(link)
         except (EOFError, OSError):
             return
-        if source < 0:
-            for name in LATE:
-                importlib.import_module(name)
-            continue
         if not is_capped:
             cap(**request["caps"])
             is_capped = True

@@ -71,12 +71,6 @@ class Sandbox:
         with self.children.one() as child:
             child.given = 0
 
-    def warm(self) -> None:
-        """Starts a child and has it load every library, without waiting: the first file then finds it ready."""
-        with self.children.one() as child:
-            child.given = 0
-            send(child.link, {}, -1)
-
     def rights(self) -> Rights:
         """Which rights a child gives up before it reads a file. Waits for the first child, and logs it once."""
         with self._asking:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import struct
 from collections.abc import Iterator
 from typing import Any
@@ -178,6 +179,29 @@ def test_ply_agrees_with_trimesh(store: AssetStore) -> None:
         assert read.normals is not None and np.array_equal(read.faces, ball.faces)
         assert np.allclose(read.vertices, ball.vertices, atol=1e-6)
         assert np.allclose(read.normals, ball.vertex_normals, atol=1e-5)
+
+
+@pytest.mark.parametrize("encoding", ["stl", "stl_ascii"])
+def test_stl_agrees_with_trimesh(store: AssetStore, encoding: str) -> None:
+    import trimesh
+
+    ball = trimesh.creation.icosphere(subdivisions=2)
+    exported = ball.export(file_type=encoding)
+    data = exported.encode() if isinstance(exported, str) else exported
+    again = trimesh.load(io.BytesIO(data), "stl", process=False)
+    assert np.array_equal(triangles(mesh(store, data, "m.stl")), again.triangles)
+
+
+def test_stl_texts_are_read_by_words_and_not_by_lines(store: AssetStore) -> None:
+    soup = RNG.random((3, 3, 3)).astype(np.float32)
+    text = make.stl_text(soup)
+    for data in (
+        text.replace(b"outer loop\n", b"outer loop "),
+        text.replace(b"\nvertex", b" vertex"),
+        text.replace(b"endloop", b"end loop").upper(),
+        text.replace(b"solid thing", b"solid vertex of a facet", 1),
+    ):
+        assert np.array_equal(triangles(mesh(store, data, "m.stl")), soup)
 
 
 def test_oddities_come_along_and_are_no_warning(store: AssetStore) -> None:

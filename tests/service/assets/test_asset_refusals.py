@@ -105,11 +105,20 @@ REFUSED: dict[str, tuple[str, bytes, str]] = {
     "PLY without faces": ("m.ply", make.ply(QUAD, []), "no faces"),
     "STL cut": ("m.stl", make.stl(np.zeros((4, 3, 3)))[:-7], "not an STL file: 277 bytes; its header promises 284"),
     "STL text cut": ("m.stl", make.stl_text(np.ones((2, 3, 3)))[:-20], "cut off: it does not end with `endsolid`"),
-    "STL text with a bad number": ("m.stl", make.stl_text(np.ones((2, 3, 3))).replace(b"1.0", b"one", 1), "STL"),
+    "STL text with a bad number": (
+        "m.stl",
+        make.stl_text(np.ones((2, 3, 3))).replace(b"1.0", b"one", 1),
+        "not a number",
+    ),
     "STL text lacking a vertex": (
         "m.stl",
         make.stl_text(np.ones((4, 3, 3))).replace(b"vertex 1.0 1.0 1.0\n", b"", 3),
         "4 facets were begun, 3 triangles",
+    ),
+    "STL text with a quad": (
+        "m.stl",
+        make.stl_text(np.ones((2, 3, 3))).replace(b"endloop", b"vertex 1 1 1\nendloop", 1),
+        "2 facets were begun, 1 triangles",
     ),
     "text as STL": ("m.stl", b"hello", "not an STL file"),
     "GLB cut": ("m.glb", GLB[:-50], "cut off: its header promises"),

@@ -82,16 +82,6 @@ def test_one_child_serves_many_files(box: Sandbox, monkeypatch: pytest.MonkeyPat
     assert not running(third) and pid_of(box) != third
 
 
-def test_warming_loads_the_libraries(box: Sandbox) -> None:
-    def pages(pid: int) -> int:
-        return int(Path(f"/proc/{pid}/statm").read_text().split()[1])
-
-    plain = pages(pid_of(box))
-    with Sandbox(AssetLimits()) as other:
-        other.warm()
-        assert pages(pid_of(other)) > plain + 1000
-
-
 def test_a_child_starts_without_what_only_the_service_needs() -> None:
     script = "import sys, service.assets.sandbox.child; print(*sys.modules)"
     loaded = subprocess.run([sys.executable, "-c", script], capture_output=True, text=True, check=True).stdout.split()
