@@ -26,6 +26,7 @@ from starlette.responses import FileResponse, Response
 
 from service import presets
 from service.config import Config, cores, unknown_variables
+from service.http.compression import Compressed
 from service.http.connection_limits import Watch
 from service.http.connections import connection_class, listen
 from service.http.downloads import Pieces
@@ -111,6 +112,7 @@ def create_app(config: Config) -> FastAPI:
     app.mount("/", Files(directory=WEB, html=True))
     tell_errors(app)
     describe(app, keyed=bool(config.api_key))
+    app.add_middleware(Compressed)
     app.add_middleware(Guard, config=config, refuse=respond)
     app.add_middleware(Pieces)
     app.add_middleware(Requests, refuse=respond, heard=own.traffic.heard)

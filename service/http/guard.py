@@ -97,7 +97,7 @@ class Guard:
                 scope["owner"] = self._owner(scope, headers)
                 scope["caller"] = scope["owner"] or network_of((scope.get("client") or ("",))[0])
                 CALLER.set(scope["caller"])
-                if _route_path(scope) != HEALTH:
+                if route_path(scope) != HEALTH:
                     shares = self._of_keys if scope["owner"] else self._of_addresses
                     stack.enter_context(shares.taken(scope["caller"]))
             except ServiceError as error:
@@ -114,7 +114,7 @@ class Guard:
 
     def _owner(self, scope: Scope, headers: Headers) -> str:
         """The name of the key's owner; "" where no key is needed. Raises Unauthorized."""
-        path = _route_path(scope)
+        path = route_path(scope)
         if not self._keys.asked_for or not (path == "/v1" or path.startswith("/v1/")):
             return ""
         offered = scope.get("subprotocols", []) if scope["type"] == "websocket" else []
@@ -247,7 +247,7 @@ def open_for_health(app: ASGIApp, refusing: ASGIApp) -> ASGIApp:
     """An application that answers the health check by `app`, and everything else by `refusing`."""
 
     async def answering(scope: Scope, receive: Receive, send: Send) -> None:
-        await (app if _route_path(scope) == HEALTH else refusing)(scope, receive, send)
+        await (app if route_path(scope) == HEALTH else refusing)(scope, receive, send)
 
     return answering
 
@@ -268,7 +268,7 @@ async def _close(scope: Scope, receive: Receive, send: Send, code: int, reason: 
     await send({"type": "websocket.close", "code": code, "reason": reason[:REASON_CHARACTERS]})
 
 
-def _route_path(scope: Scope) -> str:
+def route_path(scope: Scope) -> str:
     """The path as the routes see it, relative to the one that the application is mounted at."""
     path: str = scope["path"]
     below = path.removeprefix(scope.get("root_path", ""))

@@ -1,0 +1,31 @@
+"""What everybody may read goes out compressed: the editor's files, the API's description, schemas and presets.
+
+All else goes out as it is. Pictures do not get smaller, and the length of a compressed answer that holds a secret
+beside text of a stranger's choice would tell of the secret (the attack is known as BREACH); these answers hold
+neither.
+"""
+
+from __future__ import annotations
+
+from starlette.middleware.gzip import GZipMiddleware
+from starlette.types import ASGIApp, Receive, Scope, Send
+
+from service.http.guard import route_path
+
+PUBLIC_API = ("/v1/schema", "/v1/presets/")
+LEVEL = 6  # 9 takes twice as long for 1 % less
+
+
+class Compressed:
+    """ASGI middleware: gzip for clients that accept it."""
+
+    def __init__(self, app: ASGIApp) -> None:
+        self._app, self._gzip = app, GZipMiddleware(app, compresslevel=LEVEL)
+
+    async def __call__(self, scope: Scope, receive: Receive, send: Send) -> None:
+        app = self._gzip if scope["type"] == "http" and _is_public(route_path(scope)) else self._app
+        await app(scope, receive, send)
+
+
+def _is_public(path: str) -> bool:
+    return path.startswith(PUBLIC_API) if path.startswith("/v1/") else path != "/metrics"

@@ -1,0 +1,41 @@
+"""Which answers go out compressed."""
+
+from __future__ import annotations
+
+import pytest
+
+from tests.serving import SCENE, SMALL, Server
+
+GZIP = {"accept-encoding": "gzip"}
+PUBLIC = ["/", "/main.js", "/style.css", "/openapi.json", "/v1/schema", "/v1/presets/scenes/cornell-boxes"]
+
+
+@pytest.mark.parametrize("path", PUBLIC)
+def test_public_text_is_compressed(server: Server, path: str) -> None:
+    plain = server.http.get(path, headers={"accept-encoding": "identity"})
+    packed = server.http.get(path, headers=GZIP)
+    assert packed.headers["content-encoding"] == "gzip" and "Accept-Encoding" in packed.headers["vary"]
+    assert packed.content == plain.content and "content-encoding" not in plain.headers
+    assert int(packed.headers["content-length"]) < 0.5 * len(plain.content)
+
+
+def test_what_is_somebodys_is_not(server: Server) -> None:
+    made = server.http.post("/v1/renders?wait=60", json={"scene": SCENE, "settings": SMALL}, headers=GZIP)
+    path = f"/v1/renders/{made.json()['id']}"
+    for own in (
+        path,
+        f"{path}/image?format=png",
+        f"{path}/image?format=npy",
+        f"{path}/scene",
+        "/v1/info",
+        "/metrics",
+    ):
+        answer = server.http.get(own, headers=GZIP)
+        assert answer.status_code == 200 and "content-encoding" not in answer.headers, own
+    assert "content-encoding" not in made.headers
+
+
+def test_unchanged_files_are_not_sent_again(server: Server) -> None:
+    first = server.http.get("/main.js", headers=GZIP)
+    again = server.http.get("/main.js", headers={**GZIP, "if-none-match": first.headers["etag"]})
+    assert again.status_code == 304 and not again.content
