@@ -31,7 +31,6 @@ LARGE_CLASSES = {
     "gpu.picture.picture.Picture": "not parted yet: the picture, and a block of it that others trace",
     "service.bench.scale_model._Simulation": "not parted yet",
     "service.bench.soak_tally.Tally": "one field for each number of its report",
-    "service.renders.job.Job": "not parted yet: the render, and what shows it",
     "service.state.AppState": "not parted yet",
     "service.worker.loop.Loop": "not parted yet",
     "service.worker.task.Task": "not parted yet: the picture, and whose turn it is",

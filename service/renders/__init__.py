@@ -1,12 +1,14 @@
 """Renders asked for over REST.
 
-job         one render: its progress, its image, its end
+job         one render, as the queue and its callers see it
 queue       all renders, with bounds on how many wait, run and are kept
 slots       which renders run, which wait, and which give way to others
 turns       whose render starts next
 preemption  which renders give way to one that waits
-ordered     what was asked for, what became of it, and what it needs to begin
-resident    what the renderer has of a render
+ordered     what was asked for, where it stands, its scene, and where it is stored
+life        the states of a render, and the places where its picture may be
+rendering   its task with a renderer: opened, ended, lost, or given up for another render
+viewer      shows its picture, from that task or from the disk
 scene       its scene: as a document while it waits, packed when it begins
 memory      what a render takes in memory
 documents   what the documents of renders that wait take on the disk, by owner

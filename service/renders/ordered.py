@@ -1,12 +1,14 @@
-"""What was asked for with a render, what became of it so far, and what it needs to begin."""
+"""What a render is: what was asked for, where it stands, its scene, and where it is stored."""
 
 from __future__ import annotations
 
 import logging
+from typing import Any
 
 from service.problems import ServiceError, Unavailable
-from service.quality import ResolvedSettings
 from service.renderers.protocol import Renderers
+from service.renders.followers import Changes
+from service.renders.life import Life
 from service.renders.recorder import Recorder
 from service.renders.scene import RenderScene
 from service.renders.store.record import Order, Outcome, State
@@ -15,53 +17,48 @@ log = logging.getLogger(__name__)
 
 
 class Ordered:
-    """The order of a render, which never changes, its outcome, and how it waits in line."""
+    """A render as it stands in line. What a renderer has of it is for Rendering and PictureViewer."""
 
     recorder: Recorder | None = None
     number = 0  # rises in the order of arrival
     place = 0  # among those of its owner that wait
     waits = False  # for memory, the disk or a renderer, which was logged
+    task: int | None = None  # which renders it, and shows it when it has ended; None: no renderer has it
 
-    def __init__(
-        self, renderers: Renderers, order: Order, outcome: Outcome, scene: RenderScene, document: bytes | None
-    ) -> None:
-        self.renderers = renderers
-        self.order = order
-        self.outcome = outcome
-        self.began = outcome.state == "running"  # when the server ended before, or it gave way to another one
-        self._scene = scene
-        self._memory = scene.memory
-        self._document = document
-
-    @property
-    def id(self) -> str:
-        return self.order.id
-
-    @property
-    def owner(self) -> str:
-        return self.order.owner
-
-    @property
-    def client(self) -> str:
-        """Who shares the slots with others: the owner; without keys each render is its own client."""
-        return self.order.owner or self.order.id
-
-    @property
-    def priority(self) -> int:
-        return self.order.priority
+    def __init__(self, renderers: Renderers, order: Order, life: Life, scene: RenderScene) -> None:
+        self.renderers, self.order, self.life, self.scene = renderers, order, life, scene
+        self.id, self.owner, self.priority = order.id, order.owner, order.priority
+        self.client = order.owner or order.id  # who shares the slots with others: without keys each is its own client
+        self.finished = life.finished
+        self.changes = Changes[Any]()
 
     @property
     def state(self) -> State:
+        """As callers see it."""
         return self.outcome.state
+
+    @property
+    def outcome(self) -> Outcome:
+        return self.life.outcome
+
+    @outcome.setter
+    def outcome(self, outcome: Outcome) -> None:
+        self.life.outcome = outcome
+
+    @property
+    def began(self) -> bool:
+        """Whether it was running when the server ended, or gave way: it goes on before its owner's others begin."""
+        return self.life.began
+
+    @property
+    def ended_at(self) -> float:
+        """By the monotonic clock, once it has ended."""
+        return self.life.ended_at
 
     @property
     def elapsed_s(self) -> float:
         """For how long it has been rendered."""
         return self.outcome.progress.elapsed_s
-
-    @property
-    def settings(self) -> ResolvedSettings:
-        return self.order.settings
 
     @property
     def lasting(self) -> bool:
@@ -71,25 +68,21 @@ class Ordered:
     @property
     def memory_share(self) -> float:
         """The part of SUNBOX_MEMORY that it takes while it runs."""
-        return self._memory.share
+        return self.scene.memory.share
 
     @property
     def lacks(self) -> int:
         """The bytes of memory that are missing for it to begin."""
-        return self._scene.lacks
+        return self.scene.lacks
 
     def set_aside(self) -> None:
         """Forget the packed scene, which is packed again when its turn comes."""
-        self._scene.set_aside()
-
-    def forget_document(self) -> None:
-        """The store has it from now on."""
-        self._document = None
+        self.scene.set_aside()
 
     async def document(self) -> bytes:
         """The folded document. Raises Unavailable, Internal."""
-        if self._document is not None:
-            return self._document
+        if self.scene.document is not None:
+            return self.scene.document
         assert self.recorder is not None
         return await self.recorder.store.document(self.recorder.number)
 
@@ -99,7 +92,7 @@ class Ordered:
         try:
             if self.renderers.hopeless:
                 raise Unavailable("There is no renderer.")
-            self._scene.reserve()
+            self.scene.reserve()
         except Unavailable as error:
             if self.recorder is not None:
                 self.wait(error)
@@ -111,3 +104,7 @@ class Ordered:
         if not self.waits:
             log.warning("a render has to wait id=%s reason=%s", self.id[:6], reason)
         self.waits = True
+
+    def wake(self) -> None:
+        """Its status has changed."""
+        self.changes.tell(self)

@@ -19,6 +19,7 @@ from service.problems import FieldError, Gone, InvalidDocument, NotFound, Servic
 from service.renders.documents import WaitingDocuments
 from service.renders.followers import Follower, Followers
 from service.renders.job import Job
+from service.renders.life import PictureAt
 from service.renders.recorder import Recorder
 from service.renders.retention import KeptRenders, Retention
 from service.renders.slots import Slots
@@ -122,7 +123,7 @@ class RenderQueue:
         if listed and self.store is not None:
             job.number = await self._stored(job, uses, key)
             job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
-            job.forget_document()
+            job.scene.document = None
         if listed:
             self._number = job.number = max(job.number, self._number + 1)
             self._jobs[job.id] = job
@@ -216,7 +217,7 @@ class RenderQueue:
         try:
             yield
         finally:
-            if job.finished.is_set() or job.shown:
+            if job.finished.is_set() or job.picture_at is PictureAt.BOTH:
                 self._rest(job)
 
     async def close(self) -> None:
@@ -329,8 +330,9 @@ class RenderQueue:
         """Keep an ended render with the renderer, and let others go that have not been looked at for longer."""
         self._resting.pop(job.id, None)
         self._resting[job.id] = job
-        for each in [each for each in self._resting.values() if not (each.finished.is_set() or each.shown)]:
-            del self._resting[each.id]  # it waited, and runs by now
+        for each in list(self._resting.values()):
+            if not each.finished.is_set() and each.picture_at is not PictureAt.BOTH:
+                del self._resting[each.id]  # it waited, and runs by now
         total = sum(each.resident_bytes for each in self._resting.values())
         for each in list(self._resting.values())[:-1]:
             if total <= RESTING_BYTES:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Awaitable, Callable
 
+from service.ipc.messages import Update
 from service.pack import Packed
 from service.problems import TooLarge
 from service.quality import ResolvedSettings
 from service.renders.memory import RenderMemory
+from service.requests.request_reader import stop_rule
 from service.system.memory import MemoryBudget
 
 # Packs the scene of a folded document; it calls its second argument with the bytes of memory that parsing takes.
@@ -18,11 +20,17 @@ class RenderScene:
     """For the event loop."""
 
     def __init__(
-        self, settings: ResolvedSettings, load: Load, packed: Packed | None, budget: MemoryBudget | None
+        self,
+        settings: ResolvedSettings,
+        load: Load,
+        document: bytes | None,
+        packed: Packed | None,
+        budget: MemoryBudget | None,
     ) -> None:
-        """Raises TooLarge for a render that never fits into the `budget`."""
+        """`document` is folded; None: it is stored. Raises TooLarge for a render that never fits into `budget`."""
+        self.document = document
         self.memory = RenderMemory(settings, budget)
-        self._load = load
+        self._settings, self._load = settings, load
         self._packed = packed
         if packed is not None:
             self.memory.packed(packed)
@@ -52,3 +60,8 @@ class RenderScene:
             packed = await self._load(await document(), self.memory.read)
         self.memory.packed(packed)
         return packed
+
+    def update(self, task: int, packed: Packed) -> Update:
+        """The message that begins a task with it."""
+        settings = self._settings
+        return Update(task, 1, packed.arrays, settings.for_gpu(), stop_rule(settings), denoise=settings.denoise)

@@ -124,7 +124,7 @@ async def start(request: Request, wait: Wait = 0, idempotency_key: IdempotencyHe
     with waiting.place(request) if wait else contextlib.nullcontext():
         found = await submission.submitted(request, idempotency_key)
         if isinstance(found, Job) and wait:
-            if not await waiting.until(request, found.settled(), wait):
+            if not await waiting.until(request, found.life.over.wait(), wait):
                 return Response(status_code=GONE)
             if found.finished.is_set():
                 code = 200
@@ -173,7 +173,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel:
     renders = app_state(request).renders
     job = renders.get(id, owner(request))
     with waiting.place(request) if wait else contextlib.nullcontext(), renders.looking(job):
-        if wait and not await waiting.until(request, job.settled(), wait):
+        if wait and not await waiting.until(request, job.life.over.wait(), wait):
             return Response(status_code=GONE)
     return JSONResponse(job.status(kernel=kernel))
 
@@ -202,7 +202,7 @@ async def scene(request: Request, id: answers.RenderId) -> Response:
     own = app_state(request)
     job = own.renders.get(id, owner(request))
     document = await job.document()
-    settings = json.dumps({name: value for name, value in job.settings.document().items() if value is not None})
+    settings = json.dumps({name: value for name, value in job.order.settings.document().items() if value is not None})
     body = await writing(lambda: f'{{"scene":{unfolded(document)},"settings":{settings}}}'.encode())
     return await own.downloads.answer(caller(request), body, "application/json")
 
@@ -279,7 +279,7 @@ def _most_bytes(job: Job, query: ImageQuery) -> int:
 
 def _texels(job: Job, query: ImageQuery) -> int:
     """The numbers in the layers of an image."""
-    return job.settings.width * job.settings.height * sum(len(images.LAYERS[aov]) for aov in _aovs(query))
+    return job.order.settings.width * job.order.settings.height * sum(len(images.LAYERS[aov]) for aov in _aovs(query))
 
 
 def _write(
@@ -289,7 +289,7 @@ def _write(
     made_from = None
     if images.FORMATS[query.format].has_metadata:
         view = recipe.PictureView(aov=query.aov, exposure=query.exposure, tone_map=query.tone_map, bits=bits)
-        made_from = recipe.write_text(unfolded(document), job.settings, samples, view)
+        made_from = recipe.write_text(unfolded(document), job.order.settings, samples, view)
     if query.aov == "all":
         images.write_layers(file, layers, made_from)
     else:

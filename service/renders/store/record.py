@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterable
 from dataclasses import asdict, dataclass, field, replace
-from typing import Any, Literal
+from typing import Any, Literal, get_args
 
 from service.ipc.messages import Loaded, Progress, Reason
 from service.problems import ANSWERS, FieldError, Internal, InvalidDocument, ServiceError, problem
@@ -13,8 +13,9 @@ from service.quality import ResolvedSettings, resolve
 from service.renders.store.fitting import Unfit, fit, read, stored, unknown
 from service.scene.settings import Settings
 
-State = Literal["queued", "running", "done", "cancelled", "failed"]
-ENDED: tuple[State, ...] = ("done", "cancelled", "failed")
+End = Literal["done", "cancelled", "failed"]
+State = Literal["queued", "running"] | End
+ENDED: tuple[End, ...] = get_args(End)
 
 
 @dataclass(frozen=True)

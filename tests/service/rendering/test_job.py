@@ -148,7 +148,7 @@ def test_an_unexpected_error_fails_the_one_render(tmp_path: Path) -> None:
 
     async def test(renderers: Any, store: RenderStore) -> None:
         job = await stored(renderers, store)
-        job._scene._load = broken
+        job.scene._load = broken
         await asyncio.wait_for(job.run(), 10)
         assert job.state == "failed"
 
