@@ -30,7 +30,7 @@ from tests.service.rendering.cluster.clusters import (
 )
 from tests.supervisors import LINEAR, Ears, with_supervisor
 
-pytest.importorskip("ray", reason="Ray is not installed: pip install 'sunbox[ray]'")
+pytestmark = pytest.mark.ray
 
 SECRET = "a key of callers"
 

@@ -31,9 +31,6 @@ from tests.service.rendering.cluster.clusters import OPTIONS, until
 from tests.serving import PATIENCE_S
 from tests.supervisors import arrays_of
 
-HAS_RAY = importlib.util.find_spec("ray") is not None
-needs_ray = pytest.mark.skipif(not HAS_RAY, reason="Ray is not installed: pip install 'sunbox[ray]'")
-
 
 @pytest.mark.parametrize(
     ("nodes", "wanted", "expected"),
@@ -83,7 +80,7 @@ def closed_port() -> int:
         return int(server.getsockname()[1])
 
 
-@needs_ray
+@pytest.mark.ray
 @pytest.mark.parametrize("variable", ["SUNBOX_RAY", "RAY_ADDRESS"])
 def test_a_server_does_not_start_without_its_cluster(tmp_path: Path, variable: str) -> None:
     address = f"127.0.0.1:{closed_port()}"
@@ -109,7 +106,7 @@ def test_a_token_in_the_home_folder_is_left_to_its_owner(
     assert path.stat().st_mode & 0o777 == 0o600 and path.read_text() == "token"
 
 
-@needs_ray
+@pytest.mark.ray
 @pytest.mark.parametrize(("mode", "expected"), [("token", "True"), ("disabled", "False")])
 def test_a_cluster_without_a_token_is_known(mode: str, expected: str) -> None:
     program = "from service.renderers.ray.joining import has_token; print(has_token())"
@@ -118,7 +115,7 @@ def test_a_cluster_without_a_token_is_known(mode: str, expected: str) -> None:
     assert told.stdout.strip() == expected, told.stderr
 
 
-@needs_ray
+@pytest.mark.ray
 def test_a_head_that_does_not_answer() -> None:
     with socket.create_server(("127.0.0.1", 0)) as silent:
         address = f"127.0.0.1:{silent.getsockname()[1]}"
@@ -173,7 +170,7 @@ async def told(actors: Actors, count: int) -> list[Any]:
     return heard
 
 
-@needs_ray
+@pytest.mark.ray
 def test_a_node_with_other_code_is_told_apart() -> None:
     unable, ended = asyncio.run(told(Actors({"host": "far", "version": "0.0.9+abc"}), 2))
     assert isinstance(unable, Unable) and ended == Ended("crashed")
@@ -181,7 +178,7 @@ def test_a_node_with_other_code_is_told_apart() -> None:
         assert word in unable.detail
 
 
-@needs_ray
+@pytest.mark.ray
 def test_a_node_without_sunbox() -> None:
     from ray.exceptions import RayActorError
 
@@ -204,7 +201,7 @@ def test_the_version_is_of_the_code(monkeypatch: pytest.MonkeyPatch, tmp_path: P
     assert len(versions | {here}) == 3
 
 
-@needs_ray
+@pytest.mark.ray
 def test_it_says_that_there_is_no_room(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(lane, "PLACING_S", 0.01)
     assert set(asyncio.run(told(Actors(None), 2))) == {Waiting("There is no room.")}

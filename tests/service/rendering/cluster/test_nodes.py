@@ -14,7 +14,7 @@ from service.renderers.pool.pool import Pool
 from service.renderers.ray.cluster import Cluster
 from tests.service.rendering.cluster.clusters import ENDLESS, OPTIONS, Nodes, begun, seats, until
 
-pytest.importorskip("ray", reason="Ray is not installed: pip install 'sunbox[ray]'")
+pytestmark = pytest.mark.ray
 
 
 @pytest.fixture(scope="module")
