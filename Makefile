@@ -41,20 +41,20 @@ image-test: setup
 
 soak:
 	@.ci/setup test
-	.venv/bin/python -m service.bench.soak --minutes $(or $(MINUTES),60) $(RENDERERS)
-	.venv/bin/python -m service.bench.soak_restarts $(RENDERERS)
+	.venv/bin/python -m tests.bench soak --minutes $(or $(MINUTES),60) $(RENDERERS)
+	.venv/bin/python -m tests.bench restarts $(RENDERERS)
 
 bench: setup
 	.venv/bin/sunbox bench speed -o out/bench.json
 
 bench-compare: setup
-	.venv/bin/sunbox bench compare --revision $(or $(REV),HEAD) -o out/compare.json
+	.venv/bin/python -m tests.bench compare --revision $(or $(REV),HEAD) -o out/compare.json
 
 tradeoff: setup
 	.venv/bin/sunbox bench tradeoff --publish
 
 gallery: setup
-	.venv/bin/python -m service.bench.gallery "$(or $(DATA),$(error name the folder with the models: make gallery DATA=...))"
+	.venv/bin/python -m tests.bench gallery "$(or $(DATA),$(error name the folder with the models: make gallery DATA=...))"
 
 # JavaScript's formatter has no package for pip: it is run where it is there (npm install --global @biomejs/biome@2).
 lint: setup

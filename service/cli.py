@@ -15,19 +15,7 @@ from importlib import import_module, metadata
 from service.commands import CommandError
 from service.views import AOVS, BSDF_KINDS, DEFAULT_TONE_MAP, LOSSLESS_FORMATS, TONE_MAPS
 
-BENCHES = (
-    "speed",
-    "gpu",
-    "frames",
-    "compare",
-    "peers",
-    "hemisphere",
-    "hand",
-    "tradeoff",
-    "seeds",
-    "scale",
-    "profile",
-)
+BENCHES = ("speed", "gpu", "tradeoff", "seeds", "scale")
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -36,8 +24,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     # Nothing here multiplies large matrices, and a pool of threads for that costs 60 ms at every start.
     os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
     run = import_module(f"service.commands.{parsed.command.replace('-', '_')}").run
+    return exit_code(lambda: run(parsed))
+
+
+def exit_code(run: Callable[[], int]) -> int:
+    """The exit code of a command, whose errors are printed."""
     try:
-        return int(run(parsed))
+        return int(run())
     except CommandError as error:
         for line in error.lines:
             print(f"error: {line}", file=sys.stderr)
@@ -183,45 +176,22 @@ def _bench(command: argparse.ArgumentParser) -> None:
         default="speed",
         help="speed (default): paths per second, compile times, growth with triangles, latencies; "
         "gpu: what a device can do, from its limits to first frames, in about ten minutes; "
-        "frames: the first frame after every slider's move and every change of scene, caches empty, in half an hour; "
-        "compare: this checkout beside an earlier revision; "
-        "peers: error at equal time beside Mitsuba and Cycles; "
-        "hemisphere: error of uniform directions beside Sunbox's, over samples and time; "
-        "hand: from a slider to other pixels, in a browser; "
         "tradeoff: the price list, what every knob that buys speed costs in error; "
         "seeds: the experiments of the programs that Sunbox grew out of, repeated; "
-        "scale: what several renderers gain; "
-        "profile: where the time of a path goes on llvmpipe, scene by scene, in about ten minutes",
+        "scale: what several renderers gain",
     )
     add("-o", "--output", metavar="FILE", help="also write the figures as JSON")
     text = "tradeoff: write docs/tradeoff.* and the price list that is served; seeds: write docs/experiments*; "
-    text += "scale: write docs/scaling.*; profile: write docs/profile.*"
+    text += "scale: write docs/scaling.*"
     add("--publish", action="store_true", help=text)
-    text_quick = "tradeoff, seeds, scale, profile: try it out on little; its figures mean nothing"
-    add("--quick", action="store_true", help=text_quick)
-    add(
-        "--simulate", type=int, metavar="N", help="scale: also simulate 1, 2, 4 ... N renderers on hosts of their own"
-    )
-    text = "profile: this scene or model instead of the built-in ones; may be given again"
-    add("--file", action="append", default=[], metavar="FILE", help=text)
-    text = "profile: also compare the system's Mesa with the one unpacked in this folder (dpkg -x)"
-    add("--mesa", metavar="DIR", help=text)
-    add(
-        "--runs",
-        type=int,
-        default=5,
-        metavar="N",
-        help="runs a scene, of which the median counts; frames: moves of a slider (default: 5)",
-    )
+    text = "tradeoff, seeds, scale: try it out on little; its figures mean nothing"
+    add("--quick", action="store_true", help=text)
+    text = "scale: also simulate 1, 2, 4 ... N renderers on hosts of their own"
+    add("--simulate", type=int, metavar="N", help=text)
+    add("--runs", type=int, default=5, metavar="N", help="runs a scene, of which the median counts (default: 5)")
     add("--seconds", type=float, default=600.0, metavar="S", help="gpu: about how long it may take (default: 600)")
-    add("--scenes", metavar="NAMES", help="frames: only these built-in scenes, separated by commas")
     add("--device", type=int, metavar="N", help="gpu: the number of the EGL device (default: EGL's own choice)")
-    add("--most", type=int, default=4096, metavar="N", help="hemisphere: samples 1, 4, 16 ... N (default: 4096)")
-    add("--figure", metavar="FILE", help="hemisphere: also draw the curves, as .png or .svg")
-    add("--revision", default="HEAD", metavar="REV", help="compare: with this one (default: HEAD)")
     add("--mesh", metavar="FILE", help="measure this mesh instead of the generated one")
-    add("--mitsuba", metavar="PYTHON", help="peers: beside Mitsuba; an interpreter that can import mitsuba")
-    add("--cycles", metavar="PYTHON", help="peers: beside Cycles; an interpreter that can import bpy")
     add("--environment", metavar="FILE", help="light the scenes with this HDR image instead of the generated one")
 
 

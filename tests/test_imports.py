@@ -14,7 +14,7 @@ from tests.conftest import LONG_FILES, TESTS
 
 ROOT = Path(__file__).parents[1]
 MODULES = sorted((*ROOT.glob("gpu/**/*.py"), *ROOT.glob("service/**/*.py")))
-FOLDERS = sorted({path.parent for path in MODULES})
+FOLDERS = sorted({path.parent for path in (*MODULES, *ROOT.glob("tests/bench/**/*.py"))})
 SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {".glsl", ".comp"})
 # Shader files of which each is one kind of a thing; the named ones put the kinds of their folder together.
 COMPOSERS = {"lights", "light_tree", "shapes", "traverse", "transparency", "transparency_walk", "budget"}
@@ -179,6 +179,7 @@ def test_module_keeps_to_its_room(path: Path) -> None:
     for imported in imports_of(path):
         top = imported.split(".")[0]
         said = f"{module} imports {imported}"
+        assert top != "tests", f"{said}: tests are not installed"
         if within(module, "gpu"):
             assert top != "service" and top not in WEB_FRAMEWORK, said
             assert top != "moderngl" or not within(module, *WITHOUT_GL), said
@@ -249,7 +250,7 @@ def test_folder_has_a_table_of_contents(folder: Path) -> None:
     contents = ast.get_docstring(ast.parse((folder / "__init__.py").read_text())) or ""
     lines = re.findall(r"^(\w+(?:, \w+)*) {2,}\S", contents, re.MULTILINE)
     listed = {name for line in lines for name in line.split(", ")}
-    modules = {path.stem for path in folder.glob("*.py")} - {"__init__"}
+    modules = {path.stem for path in folder.glob("*.py") if not path.stem.startswith("test_")} - {"__init__"}
     folders = {path.parent.name for path in folder.glob("*/__init__.py")}
     assert listed == modules | folders
 

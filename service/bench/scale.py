@@ -21,7 +21,7 @@ from typing import Any
 from gpu import Renderer
 from service import presets
 from service.bench import machine, scale_costs, scale_model
-from service.bench.soak_server import Server
+from service.bench.server import Server
 from service.worker.division.ledger import MOST_BYTES
 
 PLACES = (  # what runs, renderers, cores

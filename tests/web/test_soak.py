@@ -11,9 +11,9 @@ from pathlib import Path
 import pytest
 
 from gpu import Renderer
-from service.bench import soak_page
-from service.bench.soak_server import Server, resident
-from service.bench.soak_tally import Tally
+from tests.bench import soak_page
+from tests.bench.soak_server import SoakServer, resident
+from tests.bench.soak_tally import Tally
 
 SECONDS = 4.0
 
@@ -26,7 +26,7 @@ def test_a_drag_session_survives_a_renderer_and_keeps_its_memory(
         (pytest.fail if os.environ.get("CI") else pytest.skip)(f"no {lacking}")
     monkeypatch.setattr(soak_page, "WEIGH_S", 0.5)
     monkeypatch.setattr(soak_page, "SETTLED_S", 1.0)
-    server, tally, over = Server(tmp_path), Tally(), threading.Event()
+    server, tally, over = SoakServer(tmp_path), Tally(), threading.Event()
     try:
         session = threading.Thread(target=soak_page.drag, args=(server, tally, over, random.Random(1)))
         session.start()

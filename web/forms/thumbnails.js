@@ -7,7 +7,7 @@ import { recall, remember } from "../lib/browser-storage.js";
 const SIDE = 96;
 const SETTINGS = { width: SIDE, height: SIDE, max_samples: 32, max_bounces: 6, seed: 1 };
 
-// The stage that every material stands on: the one that `service/bench/thumbnails.py` takes the presets in.
+// The stage that every material stands on: the one that `tests/bench/thumbnails.py` takes the presets in.
 export async function studio() {
   const [set, environment] = await Promise.all([
     fetch(beside("studio.json")).then((answer) => answer.json()),

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
@@ -11,12 +10,10 @@ import numpy as np
 import pytest
 import trimesh
 
-from service import presets
-from service.bench import compare, first_frames, growth, latency, machine, scenes, speed, timing
-from service.bench.sliders import Slider, sliders
+from service.bench import growth, latency, machine, scenes, speed, timing
 from service.cli import main
 from service.pack import pack
-from service.scene import merge_patch, parse_scene
+from service.scene import parse_scene
 
 
 @pytest.mark.parametrize("case", scenes.cases(), ids=lambda case: f"{case.name}-{case.max_bounces}")
@@ -77,44 +74,6 @@ def test_latencies_in_rooms_are_measured(gpu: Any, filled: None, monkeypatch: py
         assert room[f"{hand}_p95_ms"] >= room[f"{hand}_p50_ms"] > 0
 
 
-@pytest.mark.parametrize("name", [entry["name"] for entry in presets.names("scenes")])
-def test_every_slider_changes_its_number_and_gives_it_back(name: str) -> None:
-    document = presets.get("scenes", name)
-    found = sliders(document)
-    assert {"camera/vfov", "camera/aperture_radius"} <= {slider.name for slider in found}
-    for slider in found:
-        low, high = (merge_patch(document, slider.patch(document, share)) for share in (0.0, 1.0))
-        assert parse_scene(low) != parse_scene(high), slider.name
-        assert merge_patch(high, slider.restore(document)) == document, slider.name
-
-
-def test_sliders_are_of_the_first_material_of_each_kind() -> None:
-    names = {slider.name for slider in sliders(presets.get("scenes", "cornell-spheres"))}
-    assert {"materials/subject/roughness", "materials/lamp/emission", "materials/white/albedo"} <= names
-    assert not any(name.startswith(("materials/red", "materials/steel")) for name in names)
-    assert "lights/1/intensity" in {slider.name for slider in sliders(presets.get("scenes", "point-lights"))}
-
-
-def test_first_frames_are_measured_at_a_real_server(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
-    found = [Slider(("camera", "vfov"), 20, 60, "number"), Slider(("materials", "subject", "albedo"), 0, 1, "color")]
-    monkeypatch.setattr(first_frames, "sliders", lambda document: found)
-    monkeypatch.setattr(first_frames, "QUIET_S", 2.0)
-    monkeypatch.setattr(first_frames.presets, "names", lambda kind: [{"name": "matte-clay"}])
-    document = first_frames.measure(["cornell-empty"], lambda line: None, moves=2)
-    row = document["scenes"][0]
-    assert row["sliders"].keys() == {"camera/vfov", "materials/subject/albedo"}
-    assert all(len(times) == 2 and min(times) > 0 for times in row["sliders"].values())
-    assert row["start_ms"] > row["change_again_ms"] > 0 and row["change_ms"] > 0 and row["change_foreseen_ms"] > 0
-    assert [each["name"] for each in document["thumbnails"]] == ["matte-clay"]
-    assert all(document["thumbnails"][0][f"{which}_ms"] > 0 for which in ("first", "again", "left_alone"))
-    assert len(first_frames.table(document).splitlines()) == 7
-
-
-def test_first_frames_refuse_a_scene_that_is_not_built_in(capsys: pytest.CaptureFixture[str]) -> None:
-    assert main(["bench", "frames", "--scenes", "cornell-empty,nowhere"]) == 2
-    assert "nowhere" in capsys.readouterr().err
-
-
 def test_command_prints_a_table_and_keeps_the_figures(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -136,38 +95,3 @@ def test_command_prints_a_table_and_keeps_the_figures(
     assert "12.35" in said and "+30.0" in said and "slider p95" in said and "64.2 ms" in said and "a driver" in said
     assert json.loads(output.read_text()) == document
     assert main(["bench", "--runs", "0"]) == main(["bench", "--mesh", "missing.obj"]) == 2
-
-
-def test_a_revision_is_the_same_as_itself(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
-    """And not as one without what the scene needs. Where this is no checkout, that is said."""
-    monkeypatch.setattr(compare, "cases", lambda: scenes.cases()[2:3])
-    options = compare.Options("HEAD", 1, 32, 2, 16, 4, 2, 64)
-    try:
-        commit = compare.unpack("HEAD", tmp_path)
-    except compare.NoRevision:
-        assert main(["bench", "compare"]) == 2
-        return
-    assert (tmp_path / "pyproject.toml").exists()
-    document = compare.measure(options, lambda what: None)
-    (row,) = document["scenes"]
-    assert document["machine"]["before"] == commit and row["rel_mse"]["before"] > 0
-    if str(document["machine"]["after"]) == commit:  # nothing has been changed since
-        assert row["same_bits"] and row["rel_mse"]["ratio"] == 1
-    assert scenes.cases()[2].name in compare.table(document) and "ratio" in compare.table(document)
-    assert main(["bench", "compare", "--revision", "no-such-thing"]) == 2
-
-
-def test_uniform_directions_fall_with_the_root_of_samples(tmp_path: Path) -> None:
-    """The founding experiment, short: theory's slope, and Sunbox below it at equal samples and at equal time."""
-    out, drawn = tmp_path / "hemisphere.json", tmp_path / "hemisphere.svg"
-    given = ["--figure", str(drawn)] if find_spec("matplotlib") else []
-    assert main(["bench", "hemisphere", "--most", "64", "-o", str(out), *given]) == 0
-    curves = {(c["material"], c["way"]): c for c in json.loads(out.read_text())["curves"]}
-    assert len(curves) == 4
-    for material in ("diffuse", "metal r=.1"):
-        uniform, ours = curves[material, "uniform"], curves[material, "sunbox"]
-        assert uniform["samples"] == [1, 4, 16, 64] and all(s > 0 for s in ours["seconds"])
-        assert -0.7 < uniform["slope"] < (-0.4 if material == "diffuse" else -0.2)
-        assert ours["slope"] < -0.45
-        assert all(a > b for a, b in zip(uniform["error"], ours["error"], strict=True))
-    assert not given or "equal time" in drawn.read_text() or drawn.stat().st_size > 10_000

@@ -12,7 +12,6 @@ from gpu import KernelKey, RenderSettings, SceneArrays, apply_edit
 from gpu.precompile import fallback, kernel_keys
 from service import presets
 from service.bench.scenes import BenchAssets
-from service.bench.sliders import Slider, sliders
 from service.config import Config
 from service.ipc.messages import Update
 from service.requests.request_reader import RequestReader
@@ -20,6 +19,7 @@ from service.streams import protocol
 from service.streams.edit_session import EditSession
 from service.worker.device.loaded_scene import KernelRequest, LoadedScene, kernel_request
 from service.worker.payloads import updated_scene
+from tests.bench.sliders import Slider, sliders
 
 SETTINGS = {"width": 256, "height": 256}
 SHARES = (0.0, 0.618, 1.0)  # of a slider's range: it is dragged to its ends, too

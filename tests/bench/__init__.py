@@ -1,0 +1,25 @@
+"""Benchmarks that developers run, besides those of the product: `python -m tests.bench NAME`.
+
+__main__        the command line
+compare         this checkout beside an earlier revision
+compare_run     one side of `compare`
+first_frames    `frames`: every slider of every built-in scene, changes of scene, thumbnails
+sliders         the sliders of a scene's document
+hand            from a slider to other pixels, in a real browser
+hemisphere      how error falls with samples of the hemisphere, and with time
+peers           Sunbox beside Mitsuba 3 and Cycles
+peer_scenes     the scenes of `peers`
+peer_sunbox     Sunbox's side
+peer_mitsuba    Mitsuba's side
+peer_cycles     Cycles' side
+peer_blender    the scenes for Cycles
+profile         where the time of a path goes on llvmpipe
+soak            mixed clients for a long time
+soak_clients    the clients of `soak`
+soak_page       a user of the editor in a browser, for `soak`
+soak_restarts   `restarts`: a thousand renders while the server is restarted, its disk fills up and its clock jumps
+soak_server     the server under test of `soak` and `restarts`
+soak_tally      the results of `soak`, counted
+gallery         the README's pictures
+thumbnails      the editor's pictures of the material presets
+"""
