@@ -79,7 +79,7 @@ RUNS_KERNELS = ("gpu", "gpu.errors", "gpu.denoise", "gpu.precompile", "gpu.analy
 LOOKS_INTO_GPU = {
     "service.pack": ("gpu", "gpu.arrays", "gpu.layout", "gpu.accel", "gpu.tables"),
     "service.worker": RUNS_KERNELS,
-    "service.commands": RUNS_KERNELS,
+    "service.commands": ("gpu", "gpu.errors", "gpu.denoise"),
     "service.bench": (*RUNS_KERNELS, "gpu.layout", "gpu.accel"),
 }
 WITHOUT_GL = (
@@ -92,6 +92,19 @@ WITHOUT_GL = (
     "gpu.jit",
     "gpu.denoise",
 )
+GL_SIDE = (
+    "gpu.context",
+    "gpu.kernels",
+    "gpu.device",
+    "gpu.picture",
+    "gpu.bsdf",
+    "gpu.precompile",
+    "gpu.analysis",
+    "gpu.renderer",
+)
+# The renderer's process; and the benchmarks, which measure the GPU side itself: the seconds of a sample, a tree's
+# order, a merge. A door for them in the worker would only pass everything on.
+TOUCHES_GL = ("service.worker", "service.bench")
 OFFLINE = "gpu.tables.build"
 SHARED_BY_PROCESSES = ("service.ipc", "service.system", "service.logs", "service.quality", "service.views")
 ERRORS = ("gpu.errors", "service.problems")
@@ -208,6 +221,16 @@ def test_only_public_rooms_of_gpu_are_looked_into() -> None:
             rooms = [room for package, room in LOOKS_INTO_GPU.items() if within(module, package)]
             assert rooms, f"{said}: nobody there speaks to gpu"
             assert other == "gpu" or within(other, *rooms[0][1:]), f"{said}: that room is private"
+
+
+def test_only_the_renderers_process_and_the_benchmarks_touch_gl() -> None:
+    """Others get arrays, settings and errors from `gpu`; a name of gpu/__init__.py counts as the module it is from."""
+    origin = {f"gpu.{name.rpartition('.')[2]}": name for name in imports_of(ROOT / "gpu" / "__init__.py")}
+    for path in MODULES:
+        module = name_of(path)
+        if within(module, "service") and not within(module, *TOUCHES_GL):
+            touched = [name for name in imports_of(path) if within(origin.get(name, name), *GL_SIDE)]
+            assert touched == [], f"{module} imports {touched}: ask service/worker to do it"
 
 
 def test_the_renderers_process_shares_only_its_channel() -> None:

@@ -39,14 +39,15 @@ def run(arguments: argparse.Namespace) -> int:
     config = configuration()
     given = [Path(name) for name in (arguments.material, arguments.other) if name is not None]
     materials = [_material(each, arguments.kind) for each in given]
-    from gpu import GpuError, Renderer
+    from gpu import GpuError
     from service.commands.bsdf_curves import curves_of
+    from service.worker.in_process import InProcessRenderer
 
     names = [each.stem for each in given]
     if len(set(names)) < len(names):
         names = [str(each) for each in given]
     try:
-        with Renderer(config.device) as renderer:
+        with InProcessRenderer(config.device) as renderer:
             curves = [
                 curves_of(renderer, material, arguments.kind, angles, arguments.lobes) for material in materials
             ]

@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING, TypeVar
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from gpu import SceneArrays, Steps
+from gpu import SceneArrays
 from service.colorimetry import LUMINANCE
 from service.pack import pack_material
 
 if TYPE_CHECKING:
-    from gpu import BsdfEvaluator, Renderer
     from service.scene import Material
+    from service.worker.in_process import InProcessRenderer
 
 STEP = 0.1  # degrees between two values of a curve
 ALBEDO_STEP = 1.0  # ... of the albedo, which is smooth and is sampled
 ALBEDO_SAMPLES = 1 << 16
 SLICE_STEP = 1.0  # ... of a slice, along both of its axes
 CHANNELS = ("r", "g", "b")
-
-T = TypeVar("T")
 
 
 @dataclass(frozen=True)
@@ -64,10 +62,12 @@ class Curves:
         ]
 
 
-def curves_of(renderer: Renderer, material: Material, kind: str, angles: list[float], lobes: bool = False) -> Curves:
+def curves_of(
+    renderer: InProcessRenderer, material: Material, kind: str, angles: list[float], lobes: bool = False
+) -> Curves:
     """The curves of one kind; `lobes` is for "polar". Raises GpuError."""
     packed = pack_material(material)
-    return _polar(renderer.bsdf, packed, angles, lobes) if lobes else KINDS[kind](renderer.bsdf, packed, angles)
+    return _polar(renderer, packed, angles, lobes) if lobes else KINDS[kind](renderer, packed, angles)
 
 
 def table(materials: Mapping[str, Curves]) -> str:
@@ -91,10 +91,6 @@ def _plain(name: str) -> str:
     return "".join("_" if c in ',"\r\n' else c for c in name)
 
 
-def _done(work: Generator[None, None, T]) -> T:
-    return Steps(work).finish()
-
-
 def _directions(theta: np.ndarray | float) -> np.ndarray:
     """Directions (n, 3) in the plane of normal and tangent, at these degrees from the normal towards the tangent."""
     t = np.radians(np.atleast_1d(theta))
@@ -109,12 +105,12 @@ def _channels(name: str, values: np.ndarray) -> dict[str, np.ndarray]:
     return {f"{name}_{channel}": values[:, i] for i, channel in enumerate(CHANNELS)}
 
 
-def _polar(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float], lobes: bool = False) -> Curves:
+def _polar(renderer: InProcessRenderer, material: SceneArrays, angles: list[float], lobes: bool = False) -> Curves:
     """f in the plane of incidence; wo is at -angle, so that a mirror reflects it to +angle. Light beyond 90 degrees
     is transmitted."""
     theta = np.round(np.arange(-1800, 1801) * STEP, 1)
     wo = _directions(-np.array(angles))
-    found = _done(bsdf.values(material, wo, _directions(theta), lobes=lobes))
+    found = renderer.bsdf_values(material, wo, _directions(theta), lobes=lobes)
     above = np.abs(theta) < 90
     clear = bool(found.f[:, ~above].any()) or bool((found.delta_wi[found.delta_probability > 0][:, 2] < 0).any())
     shown = np.ones_like(above) if clear else above
@@ -133,13 +129,13 @@ def _polar(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float], lobe
     return Curves("polar", theta[shown], columns, specular, lobes=parts)
 
 
-def _albedo(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+def _albedo(renderer: InProcessRenderer, material: SceneArrays, angles: list[float]) -> Curves:
     theta = np.append(np.arange(0, 90, ALBEDO_STEP), 90 - STEP)
-    found = _done(bsdf.albedo(material, _directions(theta), ALBEDO_SAMPLES))
+    found = renderer.bsdf_albedo(material, _directions(theta), ALBEDO_SAMPLES)
     return Curves("albedo", theta, _channels("albedo", found.albedo))
 
 
-def _slice(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+def _slice(renderer: InProcessRenderer, material: SceneArrays, angles: list[float]) -> Curves:
     """f over the angle of the half vector to the normal, theta_h, and that of both directions to it, theta_d, in
     planes at right angles [Rusinkiewicz 1998; Burley 2012, figure 1]. Luminance in the columns, one for each theta_d.
     """
@@ -149,39 +145,39 @@ def _slice(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> C
     across = np.zeros_like(half)
     across[:, 1] = np.sin(theta_d)
     along = half * np.cos(theta_d)[:, None]
-    found = _done(bsdf.values(material, along + across, along - across, paired=True))
+    found = renderer.bsdf_values(material, along + across, along - across, paired=True)
     image = found.f[:, 0].reshape(len(grid), len(grid), 3)
     luminance = image.astype(np.float64) @ LUMINANCE
     columns = {f"theta_d_{angle:g}": values for angle, values in zip(grid, luminance, strict=True)}
     return Curves("slice", grid, columns, image=image)
 
 
-def _distribution(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+def _distribution(renderer: InProcessRenderer, material: SceneArrays, angles: list[float]) -> Curves:
     theta = np.round(np.arange(900) * STEP, 1)
-    found = _done(bsdf.terms(material, _directions(0.0), _directions(theta)))
+    found = renderer.bsdf_terms(material, _directions(0.0), _directions(theta))
     missing = "" if found.has_facets.all() else "a perfect mirror has no distribution: it must be at least 0.01"
     return Curves("distribution", theta, {"D": found.distribution}, missing=missing)
 
 
-def _geometry(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+def _geometry(renderer: InProcessRenderer, material: SceneArrays, angles: list[float]) -> Curves:
     """G between a direction at -angle and one at theta on the other side of the normal."""
     theta = np.round(np.arange(900) * STEP, 1)
     columns, missing = dict[str, np.ndarray](), ""
     for angle in angles:
-        found = _done(bsdf.terms(material, _directions(angle), _directions(theta)))
+        found = renderer.bsdf_terms(material, _directions(angle), _directions(theta))
         columns[f"G_{angle:g}"] = found.geometry
         if not found.has_facets.all():
             missing = "a perfect mirror has no geometry term: it must be at least 0.01"
     return Curves("geometry", theta, columns, missing=missing)
 
 
-def _fresnel(bsdf: BsdfEvaluator, material: SceneArrays, angles: list[float]) -> Curves:
+def _fresnel(renderer: InProcessRenderer, material: SceneArrays, angles: list[float]) -> Curves:
     theta = np.round(np.arange(900) * STEP, 1)
-    found = _done(bsdf.terms(material, _directions(0.0), _directions(theta)))
+    found = renderer.bsdf_terms(material, _directions(0.0), _directions(theta))
     return Curves("fresnel", theta, _channels("F", found.fresnel))
 
 
-KINDS: dict[str, Callable[[BsdfEvaluator, SceneArrays, list[float]], Curves]] = {
+KINDS: dict[str, Callable[[InProcessRenderer, SceneArrays, list[float]], Curves]] = {
     "polar": _polar,
     "distribution": _distribution,
     "geometry": _geometry,

@@ -15,9 +15,9 @@ from service.commands.configuration import configuration
 from service.commands.documents import pack_scene, read_source, source_assets
 
 if TYPE_CHECKING:
-    from gpu import Renderer
     from service.pack import Packed
     from service.scene import Scene
+    from service.worker.in_process import InProcessRenderer
 
 WIDTH = len("most triangles")  # of the names of rows
 
@@ -32,10 +32,11 @@ def run(arguments: argparse.Namespace) -> int:
         with source_assets(source, arguments.asset_root, config) as assets:
             packed = pack_scene(source, assets, config)
         _print([("scene", str(source.path)), *contents(source.scene, packed)])
-    from gpu import GpuError, Renderer
+    from gpu import GpuError
+    from service.worker.in_process import InProcessRenderer
 
     try:
-        with Renderer(config.device) as renderer:
+        with InProcessRenderer(config.device) as renderer:
             if packed is not None:
                 _print(kernel(renderer, packed))
             if packed is not None and arguments.measure:
@@ -65,21 +66,15 @@ def _triangles(packed: Packed) -> str:
     return f"{held}, shared by {shown} instances" if shown else str(held)
 
 
-def kernel(renderer: Renderer, packed: Packed) -> list[tuple[str, str]]:
+def kernel(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]:
     """The features that the scene's kernel is compiled for; nothing is compiled."""
-    scene = renderer.load(packed.arrays)
-    try:
-        return [("features", " ".join(scene.features) or "none")]
-    finally:
-        scene.release()
+    return [("features", " ".join(renderer.features(packed.arrays)) or "none")]
 
 
-def measured(renderer: Renderer, packed: Packed) -> list[tuple[str, str]]:
+def measured(renderer: InProcessRenderer, packed: Packed) -> list[tuple[str, str]]:
     """What the scene's kernel saves beside one with every feature; both are compiled, and measured here and now."""
-    from gpu.analysis.kernel_cost import kernel_cost
-
     print("compiling and measuring; the kernel with every feature may take minutes", file=sys.stderr)
-    price = kernel_cost(renderer, packed.arrays)
+    price = renderer.kernel_cost(packed.arrays)
     own, full = (f"{1e6 * s:.3g} us a sample and pixel" for s in (price.sample_s, price.full_sample_s))
     return [
         ("not needed", " ".join(price.spared)),

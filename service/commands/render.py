@@ -67,13 +67,14 @@ def run(arguments: argparse.Namespace) -> int:
         packed = pack_scene(source, assets, config)
         with refusals():
             document, names = assets.by_id(source.document) if output.is_repeatable else (None, {})
-        from gpu import GpuError, Renderer
+        from gpu import GpuError
         from service.commands.tracing import Interrupt, Tracing
         from service.quality import resolve
+        from service.worker.in_process import InProcessRenderer
 
         interrupt = Interrupt()
         try:
-            with interrupt.watch(), Renderer(config.device) as renderer:
+            with interrupt.watch(), InProcessRenderer(config.device) as renderer:
                 tracing = Tracing(renderer, packed, resolve(chosen))
                 setup_s = time.perf_counter() - began
                 tracing.run(interrupt)

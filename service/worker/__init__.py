@@ -12,6 +12,7 @@ updates       the update that waits to be applied, perhaps for its kernel
 ending        how a render ends, and how its picture comes to the server
 context       what all tasks of a process share
 payloads      the payloads of messages by their types in gpu
+in_process    a renderer without a process of its own, as the command line uses it
 division      one picture on several renderers
 device        what a task has on the device
 progress      how far a picture is, and when it is finished
