@@ -20,9 +20,10 @@ TESTS = Path(__file__).parent
 # The files that take longest, in this order: begun last, one of them would leave a core without work.
 LONG_FILES = (
     "web/test_editor.py", "web/test_saving.py", "web/test_everyone.py", "web/test_lobe.py", "web/test_picture.py",
-    "web/test_variants.py", "service/bench/test_bench.py", "shaders/test_furnace.py",
+    "web/test_variants.py", "bench/test_first_frames.py", "bench/test_hemisphere.py", "shaders/test_furnace.py",
     "gpu/test_fallback.py", "service/test_one_client.py",
-    "service/rendering/test_durable.py", "service/bench/test_scale.py", "service/test_hostile.py",
+    "service/rendering/test_durable.py", "service/bench/test_scale.py", "bench/test_soak.py", "service/test_hostile.py",
+    "service/bench/test_bench.py", "bench/test_profile.py",
     "service/rendering/cluster/test_cluster.py", "service/rendering/test_survival.py", "shaders/test_light.py",
     "service/rendering/cluster/test_nodes.py", "gpu/test_precompile.py", "service/rendering/test_divided.py",
     "service/rendering/test_fairness.py", "shaders/test_microfacet.py", "service/test_rest.py",
