@@ -85,7 +85,7 @@ def create_app(config: Config) -> FastAPI:
     kept = storage(config, lambda: store.pictures)
     store = RenderStore(config.data_dir, kept.quota.room, partial(kept.quota.room, reserved=True))
     memory = MemoryBudget(config.memory)
-    own = AppState(
+    state = AppState(
         config,
         kept.assets,
         RequestReader(config, kept.assets, memory, kept.access),
@@ -104,7 +104,7 @@ def create_app(config: Config) -> FastAPI:
         docs_url=None,
         redoc_url=None,
     )
-    app.state.sunbox = own
+    app.state.sunbox = state
     api = (info, preset_routes, assets, documents, renders, bsdf, stream)
     for router in (each.router for each in api):
         app.include_router(router)
@@ -115,7 +115,7 @@ def create_app(config: Config) -> FastAPI:
     app.add_middleware(Compressed)
     app.add_middleware(Guard, config=config, refuse=respond)
     app.add_middleware(Pieces)
-    app.add_middleware(Requests, refuse=respond, heard=own.traffic.heard)
+    app.add_middleware(Requests, refuse=respond, heard=state.traffic.heard)
     return app
 
 
@@ -152,12 +152,12 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
     """With at most that many connections. Raises DamagedFile, CannotJoin."""
     host, port = listener.getsockname()[:2]
     app = create_app(config)
-    own: AppState = app.state.sunbox
-    own.documents.prepare()
-    own.quota.clear()
-    own.shares.clear()
-    own.address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
-    server = _Server(server_settings(app, config, most), own)
+    state: AppState = app.state.sunbox
+    state.documents.prepare()
+    state.quota.clear()
+    state.shares.clear()
+    state.address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
+    server = _Server(server_settings(app, config, most), state)
     server.run([listener])
     return 1 if server.refused else 0
 
@@ -248,30 +248,30 @@ class _Server(uvicorn.Server):
 
 @asynccontextmanager
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
-    own: AppState = app.state.sunbox
-    own.renderers.start()
-    own.assets.start()
-    asking = asyncio.create_task(asyncio.to_thread(own.assets.rights))  # which logs them
-    await own.resume_renders()
-    own.warming = asyncio.create_task(_warm(app))
+    state: AppState = app.state.sunbox
+    state.renderers.start()
+    state.assets.start()
+    asking = asyncio.create_task(asyncio.to_thread(state.assets.rights))  # which logs them
+    await state.resume_renders()
+    state.warming = asyncio.create_task(_warm(app))
     yield
     asking.cancel()
-    await own.farewell()
-    await own.renderers.close()
-    await asyncio.to_thread(own.assets.close)
-    own.bodies.close()
-    if own.renders.store is not None:
-        await own.renders.store.close()
+    await state.farewell()
+    await state.renderers.close()
+    await asyncio.to_thread(state.assets.close)
+    state.bodies.close()
+    if state.render_queue.store is not None:
+        await state.render_queue.store.close()
 
 
 async def _warm(app: FastAPI) -> None:
     """Render a first frame, repeat the address below what was logged meanwhile, and prepare for changes of scene."""
-    own: AppState = app.state.sunbox
-    if not await warm_up(own.renderers, own.reader, presets.get("scenes", presets.DEFAULT_SCENE)):
+    state: AppState = app.state.sunbox
+    if not await warm_up(state.renderers, state.reader, presets.get("scenes", presets.DEFAULT_SCENE)):
         return
-    _announce(own.address)
+    _announce(state.address)
     scenes = (presets.get("scenes", each["name"]) for each in presets.names("scenes"))
-    await foresee(own.renderers, own.reader, scenes)
+    await foresee(state.renderers, state.reader, scenes)
 
 
 def _announce(address: str) -> None:

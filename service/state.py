@@ -57,7 +57,7 @@ class AppState:
     quota: Quota
     shares: AssetShares
     access: AssetAccess
-    renders: RenderQueue
+    render_queue: RenderQueue
     traffic: Traffic = field(default_factory=Traffic)
     warming: asyncio.Task[None] | None = None  # renders a first frame, and prepares for changes of scene
     address: str = ""  # of the server; "" where there is none, as under a test's client
@@ -73,7 +73,7 @@ class AppState:
     def __post_init__(self) -> None:
         self.memory = self.reader.budget
         self.memory.cache("assets", lambda: self.assets.loader.bytes, self.assets.loader.shrink)
-        self.memory.cache("pictures", lambda: 0, self.renders.shrink)  # renders count themselves
+        self.memory.cache("pictures", lambda: 0, self.render_queue.shrink)  # renders count themselves
         self.bodies = Bodies(self.config, self.memory)
         most = max(self.config.max_bodies, 4 * self.config.max_body)
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
@@ -101,16 +101,16 @@ class AppState:
 
     async def resume_renders(self) -> None:
         """Take up the renders that an earlier server left. Without a data folder renders end with the server."""
-        store = self.renders.store
+        store = self.render_queue.store
         if store is None:
             return
         if not await asyncio.to_thread(store.usable):
             log.warning("renders will not outlive this server: the data folder cannot be written to")
-            self.renders.store = None
+            self.render_queue.store = None
             return
         stored = await asyncio.to_thread(store.load)
         await store.open()
-        self.renders.resume(stored, self._resumed)
+        self.render_queue.resume(stored, self._resumed)
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
         """A render that is asked for now. Raises TooLarge for one that never fits into the memory."""
@@ -148,7 +148,7 @@ class AppState:
         self.renderers.drain()
         self.sessions.close("The server is shutting down.")
         until = time.monotonic() + FAREWELL_S
-        await self.renders.close()
+        await self.render_queue.close()
         while self.sessions.attended and time.monotonic() < until:
             await asyncio.sleep(0.01)
 
@@ -162,13 +162,13 @@ def app_state(connection: HTTPConnection) -> AppState:
     return found
 
 
-def caller(connection: HTTPConnection) -> str:
+def caller_of(connection: HTTPConnection) -> str:
     """The client whose limits count, as the guard named it: the owner of the key, or else the address's network."""
     found: str = connection.scope.get("caller", "")
     return found
 
 
-def owner(connection: HTTPConnection) -> str:
+def owner_of(connection: HTTPConnection) -> str:
     """The name that the guard gave the key's owner; "" where no keys are needed."""
     found: str = connection.scope.get("owner", "")
     return found

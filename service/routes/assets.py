@@ -21,7 +21,7 @@ from service.problems import UnsupportedMedia
 from service.requests.bodies import SMALL
 from service.routes import answers
 from service.scene.text import dump_json
-from service.state import app_state, caller, owner
+from service.state import app_state, caller_of, owner_of
 from service.system.executors import opening, storing, storing_small
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
@@ -46,23 +46,23 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
         async for _ in request.stream():  # to its end, so that its sender reads the answer
             pass
         raise UnsupportedMedia("Send the file's bytes as the body, not as a form: curl --data-binary @FILE, not -F")
-    own, whose, client = app_state(request), owner(request), caller(request)
-    file = await asyncio.to_thread(own.assets.incoming)
+    state, owner, caller = app_state(request), owner_of(request), caller_of(request)
+    file = await asyncio.to_thread(state.assets.incoming)
 
     def add() -> AssetInfo:
         with file:  # here: a request that is cancelled does not wait for this thread
-            info = own.assets.add(file, kind, filename, partial(own.shares.room, whose))
-        own.shares.uploaded(whose, own.assets.parts(info))
+            info = state.assets.add(file, kind, filename, partial(state.shares.room, owner))
+        state.shares.uploaded(owner, state.assets.parts(info))
         return info
 
     received = 0
-    with own.uploads.growing(client) as have:
+    with state.uploads.growing(caller) as have:
         async for chunk in request.stream():
             received += len(chunk)
             if received > SMALL:
                 have(received)
-            await asyncio.to_thread(own.assets.receive, file, chunk)
-        info = await (storing_small if received <= SMALL_ASSET else storing)(add, client)
+            await asyncio.to_thread(state.assets.receive, file, chunk)
+        info = await (storing_small if received <= SMALL_ASSET else storing)(add, caller)
     return {"warnings": []} | {name: value for name, value in asdict(info).items() if value is not None}
 
 
@@ -77,15 +77,15 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
     here they are in headers: `Sunbox-Warnings` (as much of the list as has room, as JSON), `Sunbox-Exposure` and
     `Sunbox-Aspect-Ratio`, each only where there is something to say."""
 
-    own, whose = app_state(request), owner(request)
+    state, owner = app_state(request), owner_of(request)
 
     def read() -> tuple[Imported, str]:
-        own.access.check(whose, id)
-        imported = own.assets.scene(id)
-        own.shares.imported(whose, id, imported.references())
+        state.access.check(owner, id)
+        imported = state.assets.scene(id)
+        state.shares.imported(owner, id, imported.references())
         return imported, dump_json(imported.scene(presets.default_environment()))
 
-    imported, text = await storing(read, caller(request))
+    imported, text = await storing(read, caller_of(request))
     headers = {"sunbox-warnings": _fitting(imported.warnings)} if imported.warnings else {}
     for name in ("exposure", "aspect_ratio"):
         if (value := getattr(imported, name)) is not None:
@@ -106,16 +106,16 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     responses=answers.files("application/octet-stream") | answers.problems(404),
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
-    own, whose = app_state(request), owner(request)
+    state, owner = app_state(request), owner_of(request)
 
     def find(stack: ExitStack) -> bytes | BinaryIO:
-        own.access.check(whose, id)
-        return stack.enter_context(own.assets.opened(id))
+        state.access.check(owner, id)
+        return stack.enter_context(state.assets.opened(id))
 
     with ExitStack() as stack:
-        source = await opening(partial(find, stack), caller(request))
+        source = await opening(partial(find, stack), caller_of(request))
         # A cache that many share would answer other keys.
-        cached = FOREVER.format("private" if whose else "public")
+        cached = FOREVER.format("private" if owner else "public")
         headers = {"content-disposition": "attachment", "cache-control": cached}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)

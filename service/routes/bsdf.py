@@ -18,7 +18,7 @@ from service.requests.request_parser import Kind
 from service.routes import answers
 from service.routes.errors import GONE
 from service.routes.waiting import until
-from service.state import STARTING_S, app_state, caller, owner
+from service.state import STARTING_S, app_state, caller_of, owner_of
 from service.system.executors import packing
 
 router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
@@ -73,15 +73,15 @@ async def terms(request: Request) -> Response:
 
 
 async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]) -> Response:
-    own = app_state(request)
-    async with own.bodies.taken(request, caller(request)) as body:
-        await own.renderers.able(STARTING_S)
-        asked: BsdfRequest = await own.bodies.parsed(kind, body, caller(request))
+    state = app_state(request)
+    async with state.bodies.taken(request, caller_of(request)) as body:
+        await state.renderers.able(STARTING_S)
+        asked: BsdfRequest = await state.bodies.parsed(kind, body, caller_of(request))
     material = pack_material(asked.material)
     question = EvaluateBsdf(
-        0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner(request)
+        0, asked.question, material, asked.wo, asked.wi, asked.samples, asked.lobes, owner_of(request)
     )
-    answer = asyncio.ensure_future(own.bsdf.ask(question, caller(request)))
+    answer = asyncio.ensure_future(state.bsdf.ask(question, caller_of(request)))
     if not await until(request, answer):
         return Response(status_code=GONE)
     arrays = answer.result()

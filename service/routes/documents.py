@@ -9,7 +9,7 @@ from urllib.parse import urlencode
 from fastapi import APIRouter, Header, Path, Query, Request, Response
 
 from service.routes import answers
-from service.state import app_state, caller, owner
+from service.state import app_state, caller_of, owner_of
 from service.storage.documents import (
     BY_LINK,
     LINK_DAYS,
@@ -66,7 +66,7 @@ async def names(
 ) -> list[answers.Named]:
     """Of one's own documents and of those that others share, in the order of the titles; without keys of all. Those
     that were saved `by_link` are left out. `Link` with `rel=next` leads to the next page while there is one."""
-    found, more = await saving(partial(app_state(request).documents.names, kind, owner(request), limit, after))
+    found, more = await saving(partial(app_state(request).documents.names, kind, owner_of(request), limit, after))
     if more:
         following = urlencode({"limit": limit, "after": max(each["name"] for each in found)})
         response.headers["link"] = f'<{kind}?{following}>; rel="next"'
@@ -78,17 +78,17 @@ async def document(
     request: Request, kind: answers.DocumentKind, name: Name, if_none_match: IfNoneMatch = None
 ) -> Response:
     """One's own, or else one that another key shares. Its `ETag` serves for a later `If-Match`."""
-    own = app_state(request)
+    state = app_state(request)
 
     def read() -> tuple[bytes, str]:
-        data = own.documents.get(kind, name, owner(request))
+        data = state.documents.get(kind, name, owner_of(request))
         return data, etag(data)
 
     data, tag = await saving(read)
     headers = {"etag": tag, "cache-control": "private, no-cache"}
     if if_none_match is not None and {"*", tag} & set(_tags(if_none_match) or ()):
         return Response(status_code=304, headers=headers)
-    return await own.downloads.answer(caller(request), data, JSON, headers)
+    return await state.downloads.answer(caller_of(request), data, JSON, headers)
 
 
 @router.put(
@@ -110,17 +110,17 @@ async def put(
     if_match: IfMatch = None,
     if_none_match: IfNoneMatch = None,
 ) -> answers.Named:
-    own = app_state(request)
-    async with own.bodies.taken(request, caller(request)) as body:
-        checked: CheckedDocument = await own.bodies.parsed(check_kind(kind), body, caller(request))
+    state = app_state(request)
+    async with state.bodies.taken(request, caller_of(request)) as body:
+        checked: CheckedDocument = await state.bodies.parsed(check_kind(kind), body, caller_of(request))
     condition = Condition(_tags(if_match), _tags(if_none_match))
     wanted = BY_LINK if by_link else shared
 
     def save() -> tuple[str, bool, str]:
-        kept, new = own.documents.put(kind, name, checked, title, owner(request), wanted, condition)
+        kept, new = state.documents.put(kind, name, checked, title, owner_of(request), wanted, condition)
         return kept, new, etag(checked.body.encode())
 
-    kept, new, response.headers["etag"] = await saving(save, caller(request))
+    kept, new, response.headers["etag"] = await saving(save, caller_of(request))
     if new:
         response.status_code = 201
     return answers.Named(name=name, title=kept)
@@ -134,7 +134,7 @@ async def put(
 )
 async def delete(request: Request, kind: answers.DocumentKind, name: Name, if_match: IfMatch = None) -> None:
     condition = Condition(_tags(if_match))
-    await saving(partial(app_state(request).documents.delete, kind, name, owner(request), condition))
+    await saving(partial(app_state(request).documents.delete, kind, name, owner_of(request), condition))
 
 
 def _tags(header: str | None) -> tuple[str, ...] | None:

@@ -18,7 +18,7 @@ from starlette.types import Receive, Scope, Send
 from service.renders.job import Job
 from service.renders.queue import RenderQueue
 from service.routes.waiting import place
-from service.state import app_state, bodiless, caller
+from service.state import app_state, bodiless, caller_of
 
 MIME = "text/event-stream"
 BETWEEN_S = 0.1  # two events of one render: of the contract, ten a second at most
@@ -56,7 +56,7 @@ def _answer(request: Request, events: AsyncIterator[bytes]) -> Response:
     """At once where the request asks for the head only. Raises TooManyRequests, Unavailable."""
     if bodiless(request):
         return Response(media_type=MIME, headers=HEADERS)
-    app_state(request).waits.check(caller(request))
+    app_state(request).waits.check(caller_of(request))
     return _Counted(request, events)
 
 

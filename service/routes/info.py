@@ -42,8 +42,8 @@ async def readyz(request: Request) -> dict[str, str]:
     responses={200: {"content": {"text/plain": {"schema": {"type": "string"}}}}},
 )
 async def metrics(request: Request) -> Response:
-    own = app_state(request)
-    return Response(await scrape(own, own.traffic), media_type=MIME)
+    state = app_state(request)
+    return Response(await scrape(state, state.traffic), media_type=MIME)
 
 
 @router.get(

@@ -129,7 +129,7 @@ def _failures(clients: ClientStatistics, members: Sequence[Member]) -> Iterator[
 
 
 def _clients(state: AppState) -> Iterator[Metric]:
-    renders = state.renders
+    renders = state.render_queue
     states = {"queued": renders.queued, "running": renders.running, "kept": renders.kept}
     yield _gauges("renders", "Renders requested over REST.", "state", states)
     if renders.store is not None:

@@ -25,7 +25,7 @@ from service.renders.store.record import State
 from service.requests.request_parser import LONGEST_LABEL, unfolded
 from service.routes import answers, events, submission, waiting
 from service.routes.errors import GONE
-from service.state import MOST_WAITS, app_state, caller, owner
+from service.state import MOST_WAITS, app_state, caller_of, owner_of
 from service.system.executors import writing
 from service.views import AOVS, DEFAULT_TONE_MAP, LEAST_EXPOSURE, MOST_EXPOSURE, Aov, AovOrAll, FileFormat, ToneMap
 
@@ -102,7 +102,7 @@ async def render(request: Request, query: Annotated[ImageQuery, Query()]) -> Res
             raise Unavailable("The server is shutting down.")
         return await _image(request, job, query, view)
     finally:
-        app_state(request).renders.cancel(job)
+        app_state(request).render_queue.cancel(job)
         job.release()
 
 
@@ -140,7 +140,7 @@ async def start(request: Request, wait: Wait = 0, idempotency_key: IdempotencyHe
     responses=answers.shaped(list[answers.Render]) | answers.problems(422),
 )
 async def renders(request: Request, query: Annotated[ListQuery, Query()]) -> Response:
-    page = app_state(request).renders.page(owner(request), query.label, query.state, query.limit, query.after)
+    page = app_state(request).render_queue.page(owner_of(request), query.label, query.state, query.limit, query.after)
     headers = dict[str, str]()
     if page.more:
         following = query.model_copy(update={"after": page.renders[-1].id})
@@ -159,7 +159,7 @@ async def renders(request: Request, query: Annotated[ListQuery, Query()]) -> Res
     responses=answers.EVENTS | answers.problems(422, 429),
 )
 async def all_progress(request: Request, label: Label = None) -> Response:
-    return events.of_all(request, app_state(request).renders, owner(request), label)
+    return events.of_all(request, app_state(request).render_queue, owner_of(request), label)
 
 
 @router.get(
@@ -170,8 +170,8 @@ async def all_progress(request: Request, label: Label = None) -> Response:
     responses=answers.shaped(answers.Render) | answers.problems(404, 410, 422, 429),
 )
 async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel: Kernel = False) -> Response:
-    renders = app_state(request).renders
-    job = renders.get(id, owner(request))
+    renders = app_state(request).render_queue
+    job = renders.get(id, owner_of(request))
     with waiting.place(request) if wait else contextlib.nullcontext(), renders.looking(job):
         if wait and not await waiting.until(request, job.life.over.wait(), wait):
             return Response(status_code=GONE)
@@ -187,7 +187,7 @@ async def status(request: Request, id: answers.RenderId, wait: Wait = 0, kernel:
     responses=answers.EVENTS | answers.problems(404, 410, 429),
 )
 async def progress(request: Request, id: answers.RenderId) -> Response:
-    return events.of_one(request, app_state(request).renders.get(id, owner(request)))
+    return events.of_one(request, app_state(request).render_queue.get(id, owner_of(request)))
 
 
 @router.get(
@@ -199,12 +199,12 @@ async def progress(request: Request, id: answers.RenderId) -> Response:
     responses=answers.RENDER_AGAIN | answers.problems(404, 410, 503),
 )
 async def scene(request: Request, id: answers.RenderId) -> Response:
-    own = app_state(request)
-    job = own.renders.get(id, owner(request))
+    state = app_state(request)
+    job = state.render_queue.get(id, owner_of(request))
     document = await job.document()
     settings = json.dumps({name: value for name, value in job.order.settings.document().items() if value is not None})
     body = await writing(lambda: f'{{"scene":{unfolded(document)},"settings":{settings}}}'.encode())
-    return await own.downloads.answer(caller(request), body, "application/json")
+    return await state.downloads.answer(caller_of(request), body, "application/json")
 
 
 @router.get(
@@ -214,8 +214,8 @@ async def scene(request: Request, id: answers.RenderId) -> Response:
     responses=FILES | answers.problems(404, 409, 410, 422, 429, 503),
 )
 async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQuery, Query()]) -> Response:
-    renders = app_state(request).renders
-    job = renders.get(id, owner(request))
+    renders = app_state(request).render_queue
+    job = renders.get(id, owner_of(request))
     with renders.looking(job):
         return await _image(request, job, query, query.view())
 
@@ -229,8 +229,8 @@ async def image(request: Request, id: answers.RenderId, query: Annotated[ImageQu
     responses=answers.problems(404, 410, 503),
 )
 async def delete(request: Request, id: answers.RenderId) -> None:
-    renders = app_state(request).renders
-    job = renders.get(id, owner(request))
+    renders = app_state(request).render_queue
+    job = renders.get(id, owner_of(request))
     if job.finished.is_set():
         await renders.delete(job)
     else:
@@ -239,8 +239,8 @@ async def delete(request: Request, id: answers.RenderId) -> None:
 
 
 async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> Response:
-    own, downloads = app_state(request), app_state(request).downloads
-    client = caller(request)
+    state, downloads = app_state(request), app_state(request).downloads
+    client = caller_of(request)
     key = (job.id, query.model_dump_json()) if job.state == "done" else None  # else it changes
     async with present(request.receive) as gone, downloads.turn(client):
         if gone():
@@ -248,7 +248,7 @@ async def _image(request: Request, job: Job, query: ImageQuery, view: View) -> R
         written = downloads.find(key)
         if written is None:
             downloads.admit(client, _most_bytes(job, query))
-            with own.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
+            with state.memory.held("pictures", _texels(job, query) * FLOAT_BYTES):
                 written = await _written(downloads, job, query, view)
             downloads.keep(client, key, written)
     return FileAnswer(written.file, images.FORMATS[query.format].mime, {"cache-control": "no-store"}, held=written)

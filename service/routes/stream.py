@@ -9,7 +9,7 @@ from fastapi import APIRouter, WebSocket, WebSocketDisconnect
 from starlette.websockets import WebSocketState
 
 from service.problems import NotFound, ServiceError, TooManyRequests
-from service.state import app_state, owner
+from service.state import app_state, owner_of
 from service.streams.stream import LOST, Attendance, Stream
 
 router = APIRouter()
@@ -21,13 +21,13 @@ REASON_CHARACTERS = 100  # a close frame holds 123 bytes of it
 
 @router.websocket("/v1/stream")
 async def stream(socket: WebSocket) -> None:
-    own = app_state(socket)
+    state = app_state(socket)
     await socket.accept(SUBPROTOCOL if SUBPROTOCOL in socket.scope["subprotocols"] else None)
     try:
-        info = await own.info()
+        info = await state.info()
         try:
             query = socket.query_params
-            session = own.sessions.enter(query.get("session"), query.get("beside"), owner(socket))
+            session = state.sessions.enter(query.get("session"), query.get("beside"), owner_of(socket))
         except ServiceError as error:
             code = CLOSE_CODES.get(type(error), LOST)
             return await socket.close(code, error.detail[:REASON_CHARACTERS])
@@ -35,7 +35,7 @@ async def stream(socket: WebSocket) -> None:
             await socket.send_text(json.dumps({"type": "hello", "session": session.id, **info}))
             await _until_closed(socket, session.stream)
         finally:
-            own.sessions.leave(session)
+            state.sessions.leave(session)
     except WebSocketDisconnect:
         return
     except RuntimeError:  # of Starlette, for what was to be sent when the connection had just been closed

@@ -19,7 +19,7 @@ from service.renders.job import Job
 from service.renders.status import status
 from service.renders.store.record import IdempotencyKey, Order, StoredRender
 from service.requests.request_parser import ParsedRequest
-from service.state import STARTING_S, AppState, app_state, caller, owner
+from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.storage.quota import Quota
 from service.system.executors import opening, packing
 
@@ -31,74 +31,74 @@ _turns: weakref.WeakValueDictionary[tuple[int, str, str], asyncio.Lock] = weakre
 
 async def one_shot(request: Request) -> Job:
     """A render that waits for its turn, and is not listed."""
-    began, own = time.monotonic(), app_state(request)
+    began, state = time.monotonic(), app_state(request)
     parsed = await _parsed(request, "request")
-    job = await _packed(own, parsed, owner(request), began)
-    await own.renders.submit(job, listed=False)
+    job = await _packed(state, parsed, owner_of(request), began)
+    await state.render_queue.submit(job, listed=False)
     return job
 
 
 async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
     """A render that waits for its turn, or the one of before with this key: a status where it is gone."""
-    began, own, name = time.monotonic(), app_state(request), owner(request)
+    began, state, owner = time.monotonic(), app_state(request), owner_of(request)
     if key is None:
-        return await _submitted(own, await _parsed(request, "render"), name, began)
+        return await _submitted(state, await _parsed(request, "render"), owner, began)
     if not 1 <= len(key) <= LONGEST_KEY:
         raise InvalidDocument([FieldError("/idempotency-key", f"must have 1 to {LONGEST_KEY} characters")])
-    store = own.renders.store
+    store = state.render_queue.store
     if store is None:
         raise Unavailable("Idempotency-Key needs the data folder, which cannot be written to.", 60)
     parsed = await _parsed(request, "keyed_render", key)
-    async with _turn(own, name, key):
-        known = await store.keyed(name, key)
+    async with _turn(state, owner, key):
+        known = await store.keyed(owner, key)
         if known is None:
-            return await _submitted(own, parsed, name, began, IdempotencyKey(key, parsed.digest))
+            return await _submitted(state, parsed, owner, began, IdempotencyKey(key, parsed.digest))
     digest, stored = known
     if digest != parsed.digest:
         raise Conflict("This Idempotency-Key was used for another request.")
-    return _known(own, stored, parsed)
+    return _known(state, stored, parsed)
 
 
 async def _parsed(request: Request, kind: Any, key: str | None = None) -> ParsedRequest:
-    own, name = app_state(request), owner(request)
-    async with own.bodies.taken(request, caller(request)) as body:
-        store = own.renders.store
-        if key is None or store is None or await store.keyed(name, key) is None:  # a repetition needs no room
-            own.renders.admit(name)
-        await own.renderers.able(STARTING_S)
-        parsed: ParsedRequest = await own.bodies.parsed(kind, body, caller(request))
+    state, owner = app_state(request), owner_of(request)
+    async with state.bodies.taken(request, caller_of(request)) as body:
+        store = state.render_queue.store
+        if key is None or store is None or await store.keyed(owner, key) is None:  # a repetition needs no room
+            state.render_queue.admit(owner)
+        await state.renderers.able(STARTING_S)
+        parsed: ParsedRequest = await state.bodies.parsed(kind, body, caller_of(request))
     return parsed
 
 
 async def _submitted(
-    own: AppState, parsed: ParsedRequest, name: str, began: float, key: IdempotencyKey | None = None
+    state: AppState, parsed: ParsedRequest, owner: str, began: float, key: IdempotencyKey | None = None
 ) -> Job:
-    own.renders.admit(name)
-    async with _pinned(own.quota, parsed.assets):  # until the store says that they are in use
-        job = await _packed(own, parsed, name, began)
-        await own.renders.submit(job, parsed.assets, key)
+    state.render_queue.admit(owner)
+    async with _pinned(state.quota, parsed.assets):  # until the store says that they are in use
+        job = await _packed(state, parsed, owner, began)
+        await state.render_queue.submit(job, parsed.assets, key)
     return job
 
 
-async def _packed(own: AppState, parsed: ParsedRequest, name: str, began: float) -> Job:
+async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: float) -> Job:
     """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
-    packed = await packing(partial(own.reader.pack, parsed.scene, owner=name))
+    packed = await packing(partial(state.reader.pack, parsed.scene, owner=owner))
     id, document = secrets.token_hex(ID_BYTES), parsed.document
-    order = Order(id, name, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
-    return own.job(order, document, packed, time.monotonic() - began)
+    order = Order(id, owner, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
+    return state.job(order, document, packed, time.monotonic() - began)
 
 
-def _known(own: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job | dict[str, Any]:
+def _known(state: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job | dict[str, Any]:
     """A render that the same request gave before. Where it is gone, only its state is stored."""
     try:
-        return own.renders.get(stored.order.id, stored.order.owner)
+        return state.render_queue.get(stored.order.id, stored.order.owner)
     except ServiceError:
         return status(replace(stored.order, settings=parsed.settings), stored.outcome, renderers=0)
 
 
-def _turn(own: AppState, name: str, key: str) -> asyncio.Lock:
+def _turn(state: AppState, owner: str, key: str) -> asyncio.Lock:
     """A lock that lets in one request at a time of a key: another one waits until it is accepted or refused."""
-    return _turns.setdefault((id(own), name, key), asyncio.Lock())
+    return _turns.setdefault((id(state), owner, key), asyncio.Lock())
 
 
 @asynccontextmanager

@@ -10,7 +10,7 @@ from typing import Any
 from starlette.requests import Request
 
 from service.http.downloads import disconnected
-from service.state import app_state, caller
+from service.state import app_state, caller_of
 
 
 async def until(request: Request, ending: Awaitable[Any], seconds: float | None = None) -> bool:
@@ -32,4 +32,4 @@ async def until(request: Request, ending: Awaitable[Any], seconds: float | None 
 
 def place(request: Request) -> AbstractContextManager[None]:
     """A place among the caller's long-polls and event streams. Raises TooManyRequests, Unavailable."""
-    return app_state(request).waits.taken(caller(request))
+    return app_state(request).waits.taken(caller_of(request))

@@ -67,14 +67,14 @@ def calling(folder: Path, test: Callable[[Any], Awaitable[None]], **limits: Any)
 
     async def run() -> None:
         app = create_app(Config(data_dir=folder, api_key=["a", "b"], **limits))
-        own: AppState = app.state.sunbox
-        own.documents.prepare()
+        state: AppState = app.state.sunbox
+        state.documents.prepare()
         try:
             await test(app)
-            assert own.uploads.total == 0 and own.memory.used()["bodies"] == 0, "something still counts"
+            assert state.uploads.total == 0 and state.memory.used()["bodies"] == 0, "something still counts"
         finally:
-            own.assets.close()
-            own.bodies.close()
+            state.assets.close()
+            state.bodies.close()
 
     asyncio.run(run())
 
@@ -130,7 +130,7 @@ def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
     """While one caller's are parsed for minutes: another's files are stored, found and pinned."""
 
     async def test(app: Any) -> None:
-        own: AppState = app.state.sunbox
+        state: AppState = app.state.sunbox
         go_on = threading.Event()
         large = [asyncio.ensure_future(storing(lambda: go_on.wait(60), name)) for name in ("a", "a", "a", "c")]
         try:
@@ -139,7 +139,7 @@ def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
                 assert await small.answered() == 201
                 id = json.loads(small.body)["id"]
                 assert await Call(app, "b", "GET", f"/v1/assets/{id}", b"").answered() == 200
-                async with _pinned(own.quota, [id]):
+                async with _pinned(state.quota, [id]):
                     pass
             assert not any(each.done() for each in large)
         finally:
