@@ -223,7 +223,7 @@ def test_only_public_rooms_of_gpu_are_looked_into() -> None:
 
 
 def test_only_the_renderers_process_and_the_benchmarks_touch_gl() -> None:
-    """Others get arrays, settings and errors from `gpu`; a name of gpu/__init__.py counts as the module it is from."""
+    """Others get arrays, settings and errors from `gpu`, whose names count as the modules that they come from."""
     origin = {f"gpu.{name.rpartition('.')[2]}": name for name in imports_of(ROOT / "gpu" / "__init__.py")}
     for path in MODULES:
         module = name_of(path)
