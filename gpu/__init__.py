@@ -35,6 +35,7 @@ from gpu.errors import (
     WrongThread,
 )
 from gpu.footprint import picture_bytes, scene_bytes
+from gpu.layout.pixel_layers import ACCUMULATOR_BYTES
 from gpu.picture.blocks import Band, border_after, stop_after
 from gpu.picture.picture import Picture
 from gpu.picture.saved import Saved
@@ -44,6 +45,7 @@ from gpu.settings import AOVS, ESTIMATORS, FILTERS, FIRST_HIT_AOVS, SAMPLERS, TO
 from gpu.steps import Steps
 
 __all__ = [
+    "ACCUMULATOR_BYTES",
     "AOVS",
     "ESTIMATORS",
     "FILTERS",

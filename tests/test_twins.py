@@ -8,10 +8,9 @@ import pytest
 from gpu import RenderSettings, footprint, layout
 from gpu.layout import ShapeKind
 from gpu.picture import display
-from service import colorimetry
+from service import colorimetry, pack
 from service.assets.gltf import json_view
 from service.pack.lights import light_bounds
-from service.renders import memory
 from service.scene import numbers
 from tests.documents import packed
 
@@ -20,10 +19,11 @@ def test_the_server_counts_a_picture_s_bytes_as_the_renderer_takes_them() -> Non
     """The server counts the denoised picture as well, and a copy of it that is on its way: a vec4 a pixel each."""
     settings = RenderSettings(1920, 1080)
     pixels = settings.width * settings.height
-    taken = (footprint.picture_bytes(settings, guided=True) - footprint.PICTURE_BYTES) / pixels
-    assert taken + 2 * 16 == memory.PICTURE_BYTES
+    taken = (footprint.picture_bytes(settings, guided=True) - footprint.FIXED_BYTES) / pixels
+    assert taken + 2 * 16 == pack.RENDERED_PIXEL_BYTES == 176
     assert footprint.picture_bytes(RenderSettings(1920, 1080, adaptive=True)) < footprint.picture_bytes(settings)
-    assert memory.SAVED_BYTES == footprint.TOTAL_BYTES + footprint.BLOCK_BYTES
+    without = (footprint.picture_bytes(settings) - footprint.FIXED_BYTES) / pixels
+    assert without == pack.SAVED_PIXEL_BYTES == 96
 
 
 def test_luminance_has_the_same_weights_in_the_renderer() -> None:

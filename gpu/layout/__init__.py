@@ -6,6 +6,7 @@ texture_records  how materials use textures, and which numbers of a material a t
 microfacet_records  the terms of the model `microfacet`, their parameters and tables
 links            the bits of links between a tree's nodes, and of what a ray has hit
 bindings         binding points of buffers and blocks, and texture units
+pixel_layers     what a picture stores of every pixel
 """
 
 from gpu.layout.links import (

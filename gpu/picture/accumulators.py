@@ -10,12 +10,11 @@ from gpu import context as contexts
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout.bindings import BlockSlot, Slot
+from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
 from gpu.picture.blocks import Sums, merged, merged_moments
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.schedule import work_groups
 
-SLOTS = (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS)
-PIXEL_BYTES = 16  # of each accumulator
 _LINE = 1024  # pixels in a row of merge.comp's invocations
 
 
@@ -43,8 +42,8 @@ class Accumulators:
 
     def _take(self, buffers: dict[Slot, Any]) -> None:
         try:
-            for slot in SLOTS:
-                buffers[slot] = contexts.allocate(self._context, PIXEL_BYTES * self._size[0] * self._size[1])
+            for slot in ACCUMULATORS:
+                buffers[slot] = contexts.allocate(self._context, VECTOR_BYTES * self._size[0] * self._size[1])
         except Exception:
             self._release(buffers)
             raise
@@ -82,7 +81,7 @@ class Accumulators:
             self.open = True
 
     def restore_block(self, contents: list[np.ndarray]) -> None:
-        """Have this block, in the order of SLOTS; without contents, none. Raises OutOfMemory."""
+        """Have this block, in the order of ACCUMULATORS; without contents, none. Raises OutOfMemory."""
         if contents:
             self.allocate_block()
             for buffer, data in zip(self.block.values(), contents, strict=True):
@@ -153,26 +152,26 @@ class Accumulators:
         return merged_moments(total, block, self.moment_scale)
 
     def _vectors(self, buffer: Any, first: int, count: int) -> np.ndarray:
-        data = buffer.read(PIXEL_BYTES * count, offset=PIXEL_BYTES * first)
+        data = buffer.read(VECTOR_BYTES * count, offset=VECTOR_BYTES * first)
         return np.frombuffer(data, np.float32).reshape(count, 4)
 
     def clear_rows(self, top: int, rows: int) -> None:
         """Clear rows of the block."""
         width = self._size[0]
         for buffer in self.block.values():
-            buffer.clear(PIXEL_BYTES * width * rows, offset=PIXEL_BYTES * width * top)
+            buffer.clear(VECTOR_BYTES * width * rows, offset=VECTOR_BYTES * width * top)
 
     def read_rows(self, top: int, rows: int) -> np.ndarray:
-        """Rows of the block: (rows, width, 12) float32, one accumulator after the other."""
+        """Rows of the block: (rows, width, 4 * accumulators) float32."""
         width = self._size[0]
         parts = [self._vectors(buffer, width * top, width * rows) for buffer in self.block.values()]
-        return np.concatenate(parts, axis=-1).reshape(rows, width, 4 * len(SLOTS))
+        return np.concatenate(parts, axis=-1).reshape(rows, width, 4 * len(ACCUMULATORS))
 
     def write_rows(self, top: int, values: np.ndarray) -> None:
         """Write what `read_rows` gave."""
         for k, buffer in enumerate(self.block.values()):
             part = np.ascontiguousarray(values[..., 4 * k : 4 * k + 4], np.float32)
-            buffer.write(part, offset=PIXEL_BYTES * self._size[0] * top)
+            buffer.write(part, offset=VECTOR_BYTES * self._size[0] * top)
 
     def release(self) -> None:
         self._release(self.total)
@@ -193,20 +192,20 @@ def bind(
 ) -> None:  # fmt: skip
     """Bind pixels [first, first + count) for a kernel that includes `accumulate/accumulators.glsl`; `zero` where
     there is no buffer."""
-    for slot in SLOTS:
+    for slot in ACCUMULATORS:
         places = (int(slot), total.get(slot)), (int(_BESIDE[slot]), None if block is None else block[slot])
         for place, buffer in places:
             if buffer is None:
                 zero.bind_to_storage_buffer(place)
             else:
-                buffer.bind_to_storage_buffer(place, offset=PIXEL_BYTES * first, size=PIXEL_BYTES * count)
+                buffer.bind_to_storage_buffer(place, offset=VECTOR_BYTES * first, size=VECTOR_BYTES * count)
     for name, value in (("block_stride", int(block is not None)), ("moment_scale", moment_scale)):
         uniform = kernel.get(name, None)  # a kernel that needs no moments has no scale of them
         if uniform is not None:
             uniform.value = value
 
 
-_BESIDE = dict(zip(SLOTS, BlockSlot, strict=True))
+_BESIDE = dict(zip(ACCUMULATORS, BlockSlot, strict=True))
 
 
 def _beside(block: dict[Slot, Any]) -> dict[Any, Any]:

@@ -12,11 +12,11 @@ from gpu.device.scene import Scene
 from gpu.kernels import features
 from gpu.layout import Frame, bindings
 from gpu.layout.bindings import Slot
+from gpu.layout.pixel_layers import VECTOR_BYTES
 from gpu.picture import filters
 from gpu.picture.schedule import Tile, group_stride
 from gpu.settings import RenderSettings
 
-_PIXEL_BYTES = 16  # of every accumulator
 _ALIGNED = 32  # pixels; with any driver a binding may begin at a multiple of this
 
 
@@ -27,7 +27,7 @@ class Dispatcher:
         self.context, self._frame_buffer = context, frame
         self.scene, self.settings = scene, settings
         # As drivers bind no more than 128 MiB at once, to be sure of.
-        self.most_pixels = contexts.storage_block_bytes(context) // 16 // _ALIGNED * _ALIGNED - _ALIGNED
+        self.most_pixels = contexts.storage_block_bytes(context) // VECTOR_BYTES // _ALIGNED * _ALIGNED - _ALIGNED
         self.counters = context.buffer(reserve=16)  # paths that were ended, and cut
         self._spreads = bool(contexts.describe(context)["software"])
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
@@ -52,7 +52,7 @@ class Dispatcher:
         first = (y * width + x) // _ALIGNED * _ALIGNED
         count = (y + rows - 1) * width + x + columns - first
         for slot, buffer in buffers.items():
-            buffer.bind_to_storage_buffer(int(slot), offset=first * _PIXEL_BYTES, size=count * _PIXEL_BYTES)
+            buffer.bind_to_storage_buffer(int(slot), offset=first * VECTOR_BYTES, size=count * VECTOR_BYTES)
         return first
 
     def frame(self, origin: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:

@@ -10,6 +10,7 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu.layout.bindings import Slot
+from gpu.layout.pixel_layers import FIRST_HIT, VECTOR_BYTES
 from gpu.picture.schedule import Tile
 from gpu.picture.tiles import SLICE_S, Tiles
 from gpu.settings import ID_AOVS
@@ -42,8 +43,8 @@ class FirstHit:
 
     def allocate(self) -> None:
         width, height = self._size
-        for slot in (Slot.ALBEDO, Slot.NORMAL, Slot.OUTPUT):
-            self.buffers[slot] = contexts.allocate(self._context, 16 * width * height)
+        for slot in FIRST_HIT:
+            self.buffers[slot] = contexts.allocate(self._context, VECTOR_BYTES * width * height)
             self.buffers[slot].clear()
 
     def limit(self, samples: int) -> None:

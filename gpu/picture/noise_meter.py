@@ -24,6 +24,7 @@ from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
 from gpu.layout import LUMINANCE, METER_REPLICATES
 from gpu.layout.bindings import Slot
+from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
 from gpu.picture import blocks
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.schedule import work_groups
@@ -58,8 +59,8 @@ class NoiseMeter:
     def allocate(self) -> None:
         """Make accumulators like the picture's. In place of second moments they begin with x, whose fraction is the
         estimate's number, y, and 1 / probability of the pixel."""
-        for slot in (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS):
-            self.buffers[slot] = contexts.allocate(self._context, 16 * LINE * self.lines)
+        for slot in ACCUMULATORS:
+            self.buffers[slot] = contexts.allocate(self._context, VECTOR_BYTES * LINE * self.lines)
 
     def place(self, main: dict[Slot, Any], seed: int) -> None:
         """Draw the pixels by the picture's second moments so far."""
@@ -112,7 +113,7 @@ class NoiseMeter:
         """Luminance and, with `variance`, its variance, summed over the picture; that of each metered pixel."""
         width, height = self._size
         kernel = self._kernels.get("meter.comp", defines(variance=int(variance)))
-        output = contexts.allocate(self._context, 16 * LINE * self.lines)
+        output = contexts.allocate(self._context, VECTOR_BYTES * LINE * self.lines)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
         self.buffers[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.NORMAL))
         kernel["width"].value, kernel["lines"].value = width, self.lines

@@ -13,7 +13,8 @@ from gpu import context as contexts
 from gpu.device.scene import Scene
 from gpu.errors import NothingRendered
 from gpu.kernels.cache import KernelCache
-from gpu.picture import accumulators, blocks, display, first_hit
+from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
+from gpu.picture import blocks, display, first_hit
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.bands import BandTracer, Sharing
 from gpu.picture.blocks import Band
@@ -169,7 +170,7 @@ class Picture:
         even = [buffer.size for buffer in (*self._sums.total.values(), *self._beside)]
         if sizes == even:
             return self.settings.adaptive or not goes_on or saved.samples + saved.under_way[0] <= blocks.FIRST
-        parted = [NO_BLOCK.nbytes], [accumulators.PIXEL_BYTES * pixels] * len(accumulators.SLOTS)
+        parted = [NO_BLOCK.nbytes], [VECTOR_BYTES * pixels] * len(ACCUMULATORS)
         return not self.settings.adaptive and sizes in [even + more for more in parted]
 
     def restore(self, saved: Saved) -> None:
@@ -260,8 +261,9 @@ class Picture:
         return self._lent.complete
 
     def read_band(self, band: Band) -> np.ndarray:
-        """The accumulators of a complete band: (rows, width, 12) float32, sum, compensation and moments, whose last
-        number is the count of the samples. Raises ValueError where it is not complete."""
+        """The accumulators of a complete band: (rows, width, 4 * accumulators) float32. They are the sum, the
+        compensation, and the moments, whose last number is the count of the samples. Raises ValueError where the
+        band is not complete."""
         contexts.use(self.context)
         if self._lent is None or self._lent.band != band or not self._lent.complete:
             raise ValueError(f"{band} is not complete")
@@ -287,7 +289,7 @@ class Picture:
         if self._sharing is None:
             raise ValueError("no block is shared")
         self._check(band)
-        if values.shape != (band.rows, self.settings.width, 4 * len(accumulators.SLOTS)):
+        if values.shape != (band.rows, self.settings.width, 4 * len(ACCUMULATORS)):
             raise ValueError(f"values of shape {values.shape} are not those of {band}")
         lent = None if self._lent is None else self._lent.band
         if lent is not None and lent.top < band.top + band.rows and band.top < lent.top + lent.rows:

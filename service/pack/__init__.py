@@ -7,6 +7,7 @@ geometry            shapes in world space, as records, triangles and the tree ov
 lights              lights with how often each is picked, and environments with the tables that draw from them
 textures            images -> texels, and which number of which material reads which of them
 textured_emission   the mean emission of textured shapes that shine
+picture_bytes       the bytes that a picture takes
 edits               parts that are reused after an edit, and the arrays that differ
 """
 
@@ -17,11 +18,14 @@ from service.pack.lights.environment_blur import CUBE_FACES
 from service.pack.lights.light_bounds import warm_light_tree
 from service.pack.microfacets import pack_microfacets
 from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.picture_bytes import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES
 from service.pack.scene import Packed, pack, pack_material
 from service.pack.textures.words import repacked
 
 __all__ = [
     "CUBE_FACES",
+    "RENDERED_PIXEL_BYTES",
+    "SAVED_PIXEL_BYTES",
     "CacheBudget",
     "PackCache",
     "Packed",

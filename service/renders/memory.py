@@ -2,21 +2,17 @@
 
 from __future__ import annotations
 
-from service.pack import Packed
+from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
 from service.quality import ResolvedSettings
 from service.requests.request_reader import weight
 from service.system.memory import MemoryBudget
 
-# Bytes of a pixel in the renderer: three vec4 of the samples and three of a block of them, three of the AOVs, the
-# denoised picture, and a copy of it on its way.
-PICTURE_BYTES = 176
-SAVED_BYTES = 96  # of a pixel in the server: six vec4 of the last checkpoint; a finished picture may have only three
 COPIES = 2  # of a packed scene: the server's, with which another renderer could go on, and the renderer's
 
 
 def picture_bytes(settings: ResolvedSettings) -> int:
     """The bytes of a picture in the renderer."""
-    return settings.render_width * settings.render_height * PICTURE_BYTES
+    return settings.render_width * settings.render_height * RENDERED_PIXEL_BYTES
 
 
 class RenderMemory:
@@ -37,7 +33,7 @@ class RenderMemory:
     @property
     def _pictures(self) -> int:
         settings = self._settings
-        return picture_bytes(settings) + settings.render_width * settings.render_height * SAVED_BYTES
+        return picture_bytes(settings) + settings.render_width * settings.render_height * SAVED_PIXEL_BYTES
 
     def packed(self, packed: Packed) -> None:
         """Note how large the scene is."""

@@ -19,9 +19,8 @@ from service.assets import AssetStore, ImageData
 from service.assets.cache import ParsedCache
 from service.assets.types import AssetLimits
 from service.config import MIB, Config
-from service.pack import CacheBudget, PackCache
+from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, CacheBudget, PackCache
 from service.problems import TooLarge, Unavailable
-from service.renders.memory import PICTURE_BYTES, SAVED_BYTES
 from service.requests.bodies import Bodies
 from service.requests.request_reader import RequestReader
 from service.streams import protocol
@@ -172,12 +171,12 @@ def edit(session: EditSession, message: protocol.Start) -> None:
 
 
 def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:
-    budget = MemoryBudget(200 * 100 * PICTURE_BYTES)
+    budget = MemoryBudget(200 * 100 * RENDERED_PIXEL_BYTES)
     reader = RequestReader(Config(), assets, budget)
     session, other = EditSession(reader, 1), EditSession(reader, 2)
     edit(session, start(100, 1))
     used = budget.used()
-    assert used["pictures"] == 100 * 100 * PICTURE_BYTES and used["scenes"] and used["documents"]
+    assert used["pictures"] == 100 * 100 * RENDERED_PIXEL_BYTES and used["scenes"] and used["documents"]
     with pytest.raises(TooLarge, match="SUNBOX_MEMORY"):
         edit(session, start(300, 2))
     with pytest.raises(Unavailable, match="SUNBOX_MEMORY"):
@@ -185,7 +184,7 @@ def test_a_stream_s_picture_and_scene_count(assets: AssetStore) -> None:
     assert budget.used()["pictures"] == used["pictures"]
     edit(session, start(50, 3))
     edit(other, start(120, 2))
-    assert budget.used()["pictures"] == 170 * 100 * PICTURE_BYTES
+    assert budget.used()["pictures"] == 170 * 100 * RENDERED_PIXEL_BYTES
     session.close()
     other.close()
     assert sum(budget.used().values()) - reader.caches.bytes == 0
@@ -220,10 +219,10 @@ def test_a_server_says_what_it_holds(tmp_path: Path) -> None:
         client.finished()
         info = server.http.get("/v1/info").json()
         assert info["memory"]["limit"] == info["renderer"]["memory_limit"] == 64 * MIB
-        assert info["memory"]["used"]["pictures"] == 128 * 64 * PICTURE_BYTES
+        assert info["memory"]["used"]["pictures"] == 128 * 64 * RENDERED_PIXEL_BYTES
         lines = (line.rpartition(" ") for line in server.http.get("/metrics").text.splitlines())
         metrics = {name: value for name, _, value in lines}
-        assert float(metrics['sunbox_memory_bytes{owner="pictures"}']) == 128 * 64 * PICTURE_BYTES
+        assert float(metrics['sunbox_memory_bytes{owner="pictures"}']) == 128 * 64 * RENDERED_PIXEL_BYTES
         assert float(metrics["sunbox_memory_limit_bytes"]) == 64 * MIB
         client.start(2, settings={"width": 1024, "height": 1024, "max_samples": 1})
         told = client.until("error")[0]
@@ -245,7 +244,7 @@ def test_renders_wait_for_memory(tmp_path: Path) -> None:
     def pictures() -> int:
         return int(server.http.get("/v1/info").json()["memory"]["used"]["pictures"])
 
-    each = 500 * 500 * (PICTURE_BYTES + SAVED_BYTES)
+    each = 500 * 500 * (RENDERED_PIXEL_BYTES + SAVED_PIXEL_BYTES)
     with served(tmp_path, SUNBOX_MEMORY=str(96 * MIB)) as server:
         for route in ("/v1/renders", "/v1/render"):
             refused = server.http.post(route, json=body(1024, 1))

@@ -7,9 +7,9 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from gpu import Band, border_after
+from gpu import ACCUMULATOR_BYTES, Band, border_after
 
-PIXEL_BYTES = 48  # of a result
+PIXEL_BYTES = ACCUMULATOR_BYTES  # of a result
 MOST_BYTES = 3_000_000  # of one: it is copied a few times on its way, and a lost one is traced again
 AHEAD_BYTES = 256 << 20  # of results and leases of blocks whose turn has not come
 LEASE_S = 0.5  # of tracing at most: what a lost renderer costs, and how long the last one is waited for

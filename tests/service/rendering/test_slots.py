@@ -14,13 +14,12 @@ import pytest
 
 from gpu import Renderer
 from service.ipc.messages import Done, Progress, Restore, SavedPicture, Update, View
-from service.pack import Packed
+from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
 from service.quality import ResolvedSettings
 from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
 from service.renders import preemption, slots
 from service.renders.job import Job
-from service.renders.memory import PICTURE_BYTES, SAVED_BYTES
 from service.renders.preemption import giving_way
 from service.renders.queue import RenderQueue
 from service.renders.slots import Slots
@@ -56,7 +55,7 @@ def impatient(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 PIXELS = SETTINGS.width * SETTINGS.height
-PICTURE = PIXELS * (PICTURE_BYTES + SAVED_BYTES)
+PICTURE = PIXELS * (RENDERED_PIXEL_BYTES + SAVED_PIXEL_BYTES)
 SCENE = 2 * weight(PACKED)
 
 

@@ -1,0 +1,14 @@
+"""What a picture stores of every pixel on the device. A layer has a vector of 16 bytes, in a buffer of its own."""
+
+from __future__ import annotations
+
+from gpu.layout.bindings import Slot
+
+VECTOR_BYTES = 16  # of a vec4 or a uvec4
+ACCUMULATORS = (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS)  # of all samples, and again of a block of them
+FIRST_HIT = (Slot.ALBEDO, Slot.NORMAL, Slot.OUTPUT)  # AOVs, once one of them was asked for
+
+# Bytes of a pixel.
+ACCUMULATOR_BYTES = VECTOR_BYTES * len(ACCUMULATORS)
+FIRST_HIT_BYTES = VECTOR_BYTES * len(FIRST_HIT)
+PLAN_BYTES = 1  # of the plan of `adaptive`, about: it has words of areas, not of pixels
