@@ -7,6 +7,7 @@ ray             renderers on the hosts of a Ray cluster, behind the same supervi
 task            one task as the server has it
 replay_log      the messages of one task, so that another renderer can go on with it
 statistics      counters and distributions, for /metrics
+ask             one question to them and its one answer
 first_frame     the first frame of a scene that no client asked for: for readiness, and to warm up
 bsdf_questions  questions about the BSDF of one material
 """

@@ -4,12 +4,11 @@ from __future__ import annotations
 
 import asyncio
 import weakref
-from dataclasses import replace
 
 import numpy as np
 
-from service.ipc.messages import EvaluateBsdf, Evaluated, Failed, FromRenderer
-from service.problems import Internal, Unavailable
+from service.ipc.messages import EvaluateBsdf, Evaluated
+from service.renderers.ask import ask
 from service.renderers.protocol import Renderers
 from service.system.shares import Shares
 
@@ -44,32 +43,5 @@ class BsdfQuestions:
                 return await self._answer(question)
 
     async def _answer(self, question: EvaluateBsdf) -> dict[str, np.ndarray]:
-        waiting = _Waiting(asyncio.get_running_loop().create_future())
-        task = self._renderers.open(waiting, "bsdf", question.client)
-        try:
-            self._renderers.send(replace(question, task=task, client=question.client or str(task)))
-            return await waiting.answer
-        finally:
-            self._renderers.drop(task)
-
-
-class _Waiting:
-    """A Listener for one answer."""
-
-    def __init__(self, answer: asyncio.Future[dict[str, np.ndarray]]) -> None:
-        self.answer = answer
-
-    def heard(self, message: FromRenderer) -> None:
-        if self.answer.done():
-            return
-        if isinstance(message, Evaluated):
-            self.answer.set_result(message.arrays)
-        elif isinstance(message, Failed):
-            self.answer.set_exception(Internal(message.detail))
-
-    def again(self) -> None:
-        """Another renderer gets the same question."""
-
-    def lost(self, detail: str) -> None:
-        if not self.answer.done():
-            self.answer.set_exception(Unavailable(detail))
+        evaluated = await ask(self._renderers, question, answer=Evaluated, kind="bsdf", client=question.client)
+        return evaluated.arrays

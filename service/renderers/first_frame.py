@@ -9,9 +9,10 @@ from collections.abc import Iterable
 from functools import partial
 from typing import Any
 
-from service.ipc.messages import Failed, Foresee, Frame, FromRenderer, StopRule, Update, View, Want
+from service.ipc.messages import Foresee, Frame, FromRenderer, StopRule, Update, View, Want
 from service.pack import Packed, warm_builder, warm_light_tree
-from service.problems import ServiceError, Unavailable
+from service.problems import Internal, ServiceError, Unavailable
+from service.renderers.ask import ask
 from service.renderers.protocol import Renderers
 from service.requests.request_reader import RequestReader
 from service.system.executors import packing
@@ -29,18 +30,13 @@ async def first_frame(
     `settings` are the arguments of gpu.RenderSettings. Raises Unavailable where there is no renderer, where it fails,
     and where it gives no frame within `patience_s`.
     """
-    listener = _Listener()
-    task = renderers.open(listener, "server")
+    update = Update(0, 1, packed.arrays, settings, StopRule(max_samples=1), interactive=True)
     try:
-        stop = StopRule(max_samples=1)
-        await renderers.send_scene(Update(task, 1, packed.arrays, settings, stop, interactive=True))
-        renderers.send(Want(task, 1, View()))
-        return await asyncio.wait_for(listener.frame, patience_s)
+        return await ask(renderers, update, Want(0, 1, View()), answer=Frame, kind="server", patience_s=patience_s)
     except TimeoutError:
         raise Unavailable(f"The renderer has not rendered anything for {patience_s:g} s.") from None
-    finally:
-        renderers.drop(task)
-        listener.frame.cancel()
+    except Internal as error:
+        raise Unavailable(f"The renderer failed: {error.detail}") from None
 
 
 async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) -> bool:
@@ -73,7 +69,7 @@ async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterab
     await packing(warm_builder)
     await packing(warm_light_tree)
     log.debug("loaded the builders")
-    task = renderers.open(_Listener(), "server")
+    task = renderers.open(_Deaf(), "server")
     try:
         settings = (await packing(partial(reader.settings, WARM_UP_SETTINGS))).for_gpu()
         for document in documents:
@@ -89,21 +85,11 @@ def _packed(reader: RequestReader, document: Any) -> Packed:
     return reader.pack(reader.scene(document))
 
 
-class _Listener:
-    """`frame` is the task's first frame, or Unavailable."""
+class _Deaf:
+    """A Listener where nothing is answered."""
 
-    def __init__(self) -> None:
-        self.frame: asyncio.Future[Frame] = asyncio.get_running_loop().create_future()
+    def heard(self, message: FromRenderer) -> None: ...
 
-    def heard(self, message: FromRenderer) -> None:
-        if isinstance(message, Failed):
-            self.lost(f"The renderer failed: {message.detail}")
-        elif isinstance(message, Frame) and not self.frame.done():
-            self.frame.set_result(message)
+    def again(self) -> None: ...
 
-    def again(self) -> None:
-        """Another renderer begins the task again: the frame comes from that one."""
-
-    def lost(self, detail: str) -> None:
-        if not self.frame.done():
-            self.frame.set_exception(Unavailable(detail))
+    def lost(self, detail: str) -> None: ...

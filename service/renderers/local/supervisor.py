@@ -9,7 +9,7 @@ from functools import partial
 from typing import Any
 
 from service.ipc import channel
-from service.ipc.messages import Read, Restore, SavedPicture, ToRenderer, Update
+from service.ipc.messages import EvaluateBsdf, Read, Restore, SavedPicture, ToRenderer, Update
 from service.ipc.orders import Drop
 from service.problems import Unavailable
 from service.renderers.local.keeper import CLOSING
@@ -156,6 +156,8 @@ class Supervisor:
         task = self.tasks.get(message.task)
         if task is None:
             return
+        if isinstance(message, EvaluateBsdf):
+            message = replace(message, client=task.client)
         task.record.told(message)
         if task.resident:
             self._keeper.send(message)
