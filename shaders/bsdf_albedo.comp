@@ -5,7 +5,6 @@ layout(local_size_x = BSDF_GROUP) in;
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
-#include "material/surface.glsl"
 #include "bsdf/bsdf.glsl"
 #include "bsdf/bsdf_alone.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer direction_buffer { vec4 directions[]; };

@@ -5,10 +5,8 @@ layout(local_size_x = BSDF_GROUP) in;
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
-#include "material/surface.glsl"
 #include "bsdf/bsdf.glsl"
 #include "bsdf/bsdf_alone.glsl"
-#include "bsdf/bsdf_deltas.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer direction_buffer { vec4 directions[]; }; // every wo, then every wi
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer value_buffer { vec4 values[]; };     // f and its density
 layout(std430, binding = SLOT_MOMENTS) writeonly buffer delta_buffer { vec4 deltas[]; };    // wi and chance; weight

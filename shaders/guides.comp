@@ -46,7 +46,7 @@ void main() {
 #endif
             vec3 seen = m.base_color;
 #if HAS_TRANSMISSION
-            if (m.model == MODEL_PRINCIPLED) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));
+            if (model_transmits(m.model)) seen = mix(seen, vec3(1.0), m.transmission * (1.0 - m.metallic));
 #endif
             albedo += vec4(seen, 1.0);
             vec3 n = dot(at.ng, d) > 0.0 ? -at.ns : at.ns;

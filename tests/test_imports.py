@@ -18,7 +18,7 @@ FOLDERS = sorted({path.parent for path in (*MODULES, *ROOT.glob("tests/bench/**/
 SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {".glsl", ".comp"})
 # Shader files of which each is one kind of a thing; the named ones put the kinds of their folder together.
 COMPOSERS = {"lights", "light_tree", "shapes", "traverse", "transparency", "transparency_walk", "budget"}
-KINDS = ("bsdf/lobes/**", "lights", "shapes", "tonemap")
+KINDS = ("bsdf/lobes/**", "bsdf/models", "lights", "shapes", "tonemap")
 LEAVES = sorted(p for kind in KINDS for p in ROOT.glob(f"shaders/{kind}/*.glsl") if p.stem not in COMPOSERS)
 SOURCES = sorted((*MODULES, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROOT.glob("web/**/*.js")))
 MOST_LINES = 400

@@ -1,6 +1,6 @@
 """One material's BSDF as numbers, from the functions that render.
 
-lobes      the lobes of each model, of which a kernel can show one alone
+lobes      defines of the kernel that can show one lobe alone
 kernels    which kernels answer for a material
 evaluator  values, densities and albedos, in slices of bounded time
 """

@@ -22,10 +22,10 @@ from gpu.device.scene import upload_tables
 from gpu.device.textures import KINDS, bound_textures, linear_texture
 from gpu.kernels import features
 from gpu.kernels.cache import KernelCache
-from gpu.layout import BSDF_GROUP, MaterialModel, bindings
+from gpu.layout import BSDF_GROUP, bindings, models
 from gpu.layout.bindings import Slot
 
-DELTAS = 3  # as in shaders/bsdf/bsdf_deltas.glsl
+DELTAS = 3  # as in shaders/bsdf/bsdf.glsl
 BATCH = 64  # samples of one invocation: their sums in single precision are right to 4e-6
 SLICE_S = 0.01  # seconds of a slice
 _FIRST = 1024  # invocations of the first slice; the time that a slice takes decides the size of the next one
@@ -94,7 +94,7 @@ class BsdfEvaluator:
         Raises CompileError, OutOfMemory.
         """
         n, m = len(wo), 1 if paired else len(wi)
-        alone = single.OF_MODEL[MaterialModel(int(material.materials["model"][0]))] if lobes else ()
+        alone = models.BY_NUMBER[int(material.materials["model"][0])].lobes if lobes else ()
         found = []
         work = self._dispatch(material, own.VALUES, {"wo_count": n, "wi_count": m, "wi_step": int(paired)})
         try:

@@ -6,6 +6,7 @@ layout_glsl     the records of `gpu.layout` as GLSL: structs, loaders and consta
 textures_glsl   how materials read textures, as GLSL
 instances_glsl  records of instances as GLSL
 microfacets_glsl  parameters and tables of the model `microfacet` as GLSL
+models_glsl     the functions that pick those of a material's model, as GLSL
 source          shader text with its includes and flags; errors by file and line
 cache           compiled kernels, with a bound on how many are in memory
 """

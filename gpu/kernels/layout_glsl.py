@@ -4,9 +4,10 @@ read no scene include the constants alone, `layout_constants.glsl`: drivers coun
 from __future__ import annotations
 
 from gpu import layout
-from gpu.kernels import instances_glsl, microfacets_glsl, textures_glsl
-from gpu.layout import Frame, LightKind, MaterialModel, ShapeKind, bindings
+from gpu.kernels import instances_glsl, microfacets_glsl, models_glsl, textures_glsl
+from gpu.layout import Frame, LightKind, ShapeKind, bindings
 from gpu.layout.bindings import BlockSlot, Slot
+from gpu.layout.models import MODELS
 from gpu.layout.record import Record
 from gpu.tables import energy
 
@@ -100,8 +101,9 @@ def _picker(name: str, record: type[Record]) -> str:
 def constants() -> str:
     """The text of `layout_constants.glsl`, with which that of `layout.glsl` begins."""
     out = []
-    for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind), ("MODEL", MaterialModel)):
+    for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
+    out += [f"const uint MODEL_{model.name.upper()} = {model.number}u;" for model in MODELS]
     out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
     out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
@@ -147,8 +149,8 @@ def text() -> str:
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
     parts = [constants(), *structs, *loaders, nodes, _frame(), instances_glsl.text(), textures_glsl.text()]
-    parts.append(microfacets_glsl.text())
-    return "\n".join(parts) + "\n"
+    parts += [models_glsl.predicates(), microfacets_glsl.text()]
+    return "\n".join(parts)
 
 
 def _frame() -> str:

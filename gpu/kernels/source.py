@@ -9,9 +9,16 @@ from functools import cache
 from pathlib import Path
 
 from gpu.errors import CompileError
-from gpu.kernels import layout_glsl
+from gpu.kernels import layout_glsl, models_glsl
 
 SHADERS = Path(__file__).resolve().parents[2] / "shaders"
+# Files that exist only in memory.
+_GENERATED = {
+    "layout.glsl": layout_glsl.text,
+    "layout_constants.glsl": layout_glsl.constants,
+    "models.glsl": models_glsl.text,
+    "model_members.glsl": models_glsl.members,
+}
 _INCLUDE = re.compile(r'^\s*#include\s+"([^"]+)"\s*$')
 _CONDITION = re.compile(r"^\s*#\s*(?:el)?if\b(.*)")
 _WORD = re.compile(r"[A-Za-z_]\w*")
@@ -19,10 +26,8 @@ _WHERE = re.compile(r"(\d+)[:(](\d+)")
 
 
 def _read(name: str, folders: Sequence[Path]) -> str:
-    if name == "layout.glsl":
-        return layout_glsl.text()
-    if name == "layout_constants.glsl":
-        return layout_glsl.constants() + "\n"
+    if name in _GENERATED:
+        return _GENERATED[name]() + "\n"
     for folder in folders:
         if (folder / name).is_file():
             return (folder / name).read_text()

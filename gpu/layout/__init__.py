@@ -3,6 +3,7 @@
 record           what a declared record is: its members and their offsets, as a numpy dtype
 records          the records of materials, shapes, lights, the tree and the frame, with their enumerations
 texture_records  how materials use textures, and which numbers of a material a texture may give
+models           a row for each material model: its number, its lobes, what it can do
 microfacet_records  the terms of the model `microfacet`, their parameters and tables
 links            the bits of links between a tree's nodes, and of what a ray has hit
 bindings         binding points of buffers and blocks, and texture units

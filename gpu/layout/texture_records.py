@@ -25,7 +25,7 @@ SURFACE_RANGES: dict[str, tuple[float, float]] = {
     "attenuation_distance": (1e-45, 1e9),
     "anisotropic_rotation": (-1e9, 1e9),
     "ior": (1.0, 4.0),
-    "alpha": LARGE,  # what the distribution allows comes later, in material/surface.glsl
+    "alpha": LARGE,  # what the distribution allows comes later, in bsdf/models/microfacet.glsl
 }  # fmt: skip
 NORMALS = ("normal", "coat_normal")
 OTHER_RANGES = {"emission": LARGE, "opacity": UNIT, "cutoff": UNIT, "ambient": LARGE}

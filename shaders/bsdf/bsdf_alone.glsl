@@ -21,8 +21,6 @@ Lone lone_make(vec3 wo) {
     m.anisotropic_rotation *= lone.side; // it turns from u towards v on both sides, as in interaction_tangent
 #endif
     lone.s = surface_make(m, vec2(1.0, 0.0));
-#if HAS_PRINCIPLED_LOBES
-    principled_face(lone_turn(lone, wo), behind, lone.s);
-#endif
+    models_face(lone_turn(lone, wo), behind, lone.s);
     return lone;
 }

@@ -1,5 +1,5 @@
 // LOBE(name, f) stands around each lobe that a model adds up, and is f. Only in the kernel that tabulates values
-// (bsdf_values.comp) it lets every lobe, or a single one of them, through; names and numbers are in gpu/bsdf/lobes.py.
+// (bsdf_values.comp) it lets every lobe, or a single one of them, through; names and numbers are in gpu/layout/models.py.
 #if LOBE_CHOICE
 uniform uint lobe_shown; // LOBE_EVERY, or the lobe of which alone the values are
 

@@ -3,7 +3,7 @@
 // Whether light passes through its surfaces.
 bool material_transmits(Material m) {
 #if HAS_TRANSMISSION
-    return m.model == MODEL_PRINCIPLED && m.transmission > 0.0 && m.metallic < 1.0;
+    return model_transmits(m.model) && m.transmission > 0.0 && m.metallic < 1.0;
 #else
     return false;
 #endif
@@ -15,6 +15,6 @@ bool material_is_delta(Material m) {
 #if HAS_TRANSMISSION
     whole = whole || m.transmission >= 1.0;
 #endif
-    return whole && m.model == MODEL_PRINCIPLED && m.roughness < LEAST_ROUGHNESS && m.clearcoat <= 0.0
+    return whole && model_may_be_delta(m.model) && m.roughness < LEAST_ROUGHNESS && m.clearcoat <= 0.0
         && m.sheen <= 0.0;
 }

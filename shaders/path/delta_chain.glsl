@@ -2,22 +2,17 @@
 // runs both sides of every `if`, a loop of their own saves such paths the work that only other surfaces need.
 
 #if HAS_MIRRORS
-// Scatters as principled_sample does where there is no other lobe to pick.
+// Scatters as bsdf_sample does where there is no other lobe to pick.
 void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path) {
     Surface s = surface_make(m, here.tangent);
-    principled_side(here.behind, s);
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_CHOICE).y;
-    float chance = microfacet_reflect_chance(s, here.wo.z);
-    vec3 wi = microfacet_sample(s, here.wo, u, vec2(0.0));
+    LobeSample lobe = models_sample_delta(here.wo, here.behind, u, s);
     BsdfSample next;
-    next.d = frame_to_world(here.basis, wi);
-    next.scatter = Scatter(microfacet_fresnel(s, here.wo.z), chance);
-#if HAS_TRANSMISSION
-    if (u >= chance) next.scatter = Scatter(microfacet_transmittance(s, here.wo.z), 1.0 - chance);
-#endif
-    next.side = wi.z;
+    next.d = frame_to_world(here.basis, lobe.wi);
+    next.scatter = lobe.scatter;
+    next.side = lobe.wi.z;
     next.is_delta = true;
-    next.valid = next.scatter.pdf > 0.0 && facing_agrees(wi.z, dot(next.d, here.front));
+    next.valid = next.scatter.pdf > 0.0 && facing_agrees(lobe.wi.z, dot(next.d, here.front));
     path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
     path_extend(next, 1.0, s, rng, path);
 }

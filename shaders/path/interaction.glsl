@@ -79,9 +79,7 @@ Surface interaction_surface(Interaction here, Material m) {
 #if HAS_COAT_NORMALS
     s.coat = frame_basis(frame_to_local(here.basis, here.coat));
 #endif
-#if HAS_PRINCIPLED_LOBES
-    principled_face(here.wo, here.behind, s);
-#endif
+    models_face(here.wo, here.behind, s);
     return s;
 }
 

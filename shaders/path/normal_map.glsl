@@ -19,7 +19,7 @@ Scatter normal_map_eval(Surface s, Interaction here, vec3 v) {
         w = v - 2.0 * side * here.front;
         more = k == 0u && here.mapped && dot(w, here.basis.z) * side > 0.0;
 #if HAS_COAT_NORMALS
-        Scatter c = principled_coat_eval(s, here.wo, wi);
+        Scatter c = models_coat_eval(s, here.wo, wi);
         if (side > 0.0) sum = Scatter(sum.f + c.f, sum.pdf + c.pdf);
         float coat_side = dot(frame_to_local(here.basis, w), s.coat.z);
         more = more || (k == 0u && here.mapped && side > 0.0 && coat_side > 0.0);

@@ -1,7 +1,6 @@
 // The estimator: the light that reaches the camera along one path. path/path_trace.glsl follows a ray to what it meets and
 // adds what shines there, path/interaction.glsl says what that is, path/direct.glsl adds what the lights send there,
 // path/bsdf_world.glsl picks the next direction and path/path_extend.glsl turns the path there.
-#include "material/surface.glsl"
 #include "bsdf/bsdf.glsl"
 #include "lights/lights.glsl"
 #include "shapes/transparency.glsl"

@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from gpu import BsdfAlbedo, BsdfTerms, BsdfValues, Renderer, SceneArrays, Steps
-from gpu.bsdf import kernels, lobes
-from gpu.layout import MaterialModel
+from gpu.bsdf import kernels
+from gpu.layout import MaterialModel, models
 from gpu.precompile import kernel_keys
 from service.pack import pack_material
 from service.scene.material.microfacet import MicrofacetMaterial
@@ -114,12 +114,12 @@ def test_lobes_add_up_to_the_values(gpu: Renderer, row: str) -> None:
         packed = pack_material(MicrofacetMaterial(type="microfacet", alpha=0.3, **LAB_PLASTIC))
     else:
         packed = lone(ALL[row])
-    model = MaterialModel(int(packed.materials["model"][0]))
+    model = models.BY_NUMBER[int(packed.materials["model"][0])]
     rng = np.random.default_rng(11)
     wo, wi = sphere(rng, 20), sphere(rng, 300)
     plain = Steps(gpu.bsdf.values(packed, wo, wi)).finish()
     found = Steps(gpu.bsdf.values(packed, wo, wi, lobes=True)).finish()
-    assert found.lobe_names.tolist() == [lobe.name.lower() for lobe in lobes.OF_MODEL[model]]
+    assert found.lobe_names.tolist() == [lobe.name.lower() for lobe in model.lobes]
     assert len(plain.lobes) == len(plain.lobe_names) == 0
     np.testing.assert_array_equal(found.f, plain.f)
     np.testing.assert_array_equal(found.pdf, plain.pdf)

@@ -5,7 +5,6 @@ layout(local_size_x = 64) in;
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
-#include "material/surface.glsl"
 #include "bsdf/bsdf.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
@@ -19,7 +18,7 @@ void main() {
     Surface s = surface_make(material_load(i), normalize(vec2(0.8, 0.6)));
     float r = sqrt(max(0.0, 1.0 - ask.x * ask.x));
     vec3 wo = vec3(r * cos(ask.y), r * sin(ask.y), ask.x);
-    principled_face(wo, ask.z > 0.5, s);
+    models_face(wo, ask.z > 0.5, s);
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     bool finite = true;
     uint k = 0u;

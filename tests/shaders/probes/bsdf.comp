@@ -6,7 +6,6 @@ layout(local_size_x = 64) in;
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
-#include "material/surface.glsl"
 #include "bsdf/bsdf.glsl"
 layout(std430, binding = SLOT_SUM) readonly buffer ask_buffer { vec4 asks[]; };
 layout(std430, binding = SLOT_MOMENTS) writeonly buffer answer_buffer { vec4 answers[]; };
@@ -21,9 +20,7 @@ void main() {
     vec4 ask = asks[i];
     vec3 wo = asks[count + min(i, last_wo)].xyz;
     float specular = 0.0;
-#if HAS_PRINCIPLED
-    principled_face(wo, INSIDE == 1, s);
-#endif
+    models_face(wo, INSIDE == 1, s);
 #if SAMPLE
     LobeSample lobe = bsdf_sample(s, wo, ask.x, ask.yz);
     vec3 wi = lobe.wi;

@@ -5,7 +5,7 @@ layout(local_size_x = 64) in;
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
-#include "material/surface.glsl"
+#include "bsdf/bsdf.glsl"
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer answer_buffer { vec4 answers[]; };
 uniform uint count;
 

@@ -23,3 +23,9 @@ vec3 disney_specular_sample(Surface s, vec3 wo, vec2 u) {
 }
 
 float disney_specular_pdf(Surface s, vec3 wo, vec3 wm) { return ggx_visible_pdf(wo, wm, s.alpha); }
+
+// The highlight's own terms; wm is the normal of a facet.
+Terms disney_specular_terms(Surface s, vec3 wo, vec3 wi, vec3 wm) {
+    return Terms(disney_specular_fresnel(s, wm.z), ggx_d(bsdf_turn(s, wm), s.alpha),
+                 disney_specular_visibility(s, wo, wi), true);
+}

@@ -4,45 +4,45 @@
 #if HAS_PRINCIPLED
 
 // The tinted reflectance of the dielectric: the colour multiplies F0, 1 stays 1, and none is above the untinted one.
-vec3 microfacet_tinted(Surface s, float f) {
+vec3 principled_specular_tinted(Surface s, float f) {
     float f0 = fresnel_normal(s.eta_outside);
     return max(vec3(0.0), f - (1.0 - s.specular_color) * (f0 / (1.0 - f0) * (1.0 - f)));
 }
 
-vec3 microfacet_fresnel(Surface s, float c) {
-    vec3 clear = microfacet_tinted(s, fresnel_dielectric(c, s.eta_outside));
+vec3 principled_specular_fresnel(Surface s, float c) {
+    vec3 clear = principled_specular_tinted(s, fresnel_dielectric(c, s.eta_outside));
 #if HAS_TRANSMISSION
-    clear = mix(clear, microfacet_tinted(s, fresnel_dielectric(c, s.eta)), s.transmission);
+    clear = mix(clear, principled_specular_tinted(s, fresnel_dielectric(c, s.eta)), s.transmission);
 #endif
     return mix(clear, mix(s.base_color, vec3(1.0), fresnel_schlick(c)), s.metallic);
 }
 
-vec3 microfacet_transmittance(Surface s, float c) {
+vec3 principled_specular_transmittance(Surface s, float c) {
     return (1.0 - s.metallic) * s.transmission * (1.0 - fresnel_dielectric(c, s.eta)) * s.base_color;
 }
 
 // The chance of reflecting rather than refracting at a facet that light hits at cosine c.
-float microfacet_reflect_chance(Surface s, float c) {
+float principled_specular_reflect_chance(Surface s, float c) {
 #if HAS_TRANSMISSION
     if (s.index_matched) c = 1.0; // the chance of a perfectly specular event must not depend on the facet
-    float r = luminance(microfacet_fresnel(s, c)), t = luminance(microfacet_transmittance(s, c));
+    float r = luminance(principled_specular_fresnel(s, c)), t = luminance(principled_specular_transmittance(s, c));
     return t > 0.0 ? r / (r + t) : 1.0;
 #else
     return 1.0;
 #endif
 }
 
-vec3 microfacet_reflect(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
-    return microfacet_fresnel(s, cos_d) * (ggx_d(wm, s.alpha) * ggx_visibility(wo, wi, s.alpha));
+vec3 principled_specular_reflect(Surface s, vec3 wo, vec3 wi, vec3 wm, float cos_d) {
+    return principled_specular_fresnel(s, cos_d) * (ggx_d(wm, s.alpha) * ggx_visibility(wo, wi, s.alpha));
 }
 
-float microfacet_reflect_pdf(Surface s, vec3 wo, vec3 wm, float cos_d) {
-    return ggx_visible_pdf(wo, wm, s.alpha) * microfacet_reflect_chance(s, cos_d);
+float principled_specular_reflect_pdf(Surface s, vec3 wo, vec3 wm, float cos_d) {
+    return ggx_visible_pdf(wo, wm, s.alpha) * principled_specular_reflect_chance(s, cos_d);
 }
 
 #if HAS_TRANSMISSION
 // The normal of the facet that refracts wo into wi; its z is 0 where there is none.
-vec3 microfacet_half_vector(Surface s, vec3 wo, vec3 wi) {
+vec3 principled_specular_half_vector(Surface s, vec3 wo, vec3 wi) {
     vec3 h = wo + s.eta * wi;
     float l = dot(h, h);
     if (l == 0.0) return vec3(0.0);
@@ -51,49 +51,49 @@ vec3 microfacet_half_vector(Surface s, vec3 wo, vec3 wi) {
 }
 
 // The solid angle of facet normals per solid angle of wi, times 4 cos of wo at the facet [Walter et al. 2007, eq. 17].
-float microfacet_jacobian(Surface s, vec3 wo, vec3 wi, vec3 wm) {
+float principled_specular_jacobian(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     float c = dot(wo, wm), e = s.eta * dot(wi, wm);
     return 4.0 * c * abs(e) * s.eta / sqr(c + e);
 }
 
 // [Walter et al. 2007, eq. 21] without the cosine of wi; the masking of the two sides is multiplied.
-vec3 microfacet_transmit(Surface s, vec3 wo, vec3 wi, vec3 wm) {
+vec3 principled_specular_transmit(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     float g = 1.0 / ((abs(wo.z) + ggx_stretch(wo, s.alpha)) * (abs(wi.z) + ggx_stretch(wi, s.alpha)));
-    return microfacet_transmittance(s, dot(wo, wm)) * (g * ggx_d(wm, s.alpha) * microfacet_jacobian(s, wo, wi, wm));
+    return principled_specular_transmittance(s, dot(wo, wm)) * (g * ggx_d(wm, s.alpha) * principled_specular_jacobian(s, wo, wi, wm));
 }
 
-float microfacet_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
+float principled_specular_transmit_pdf(Surface s, vec3 wo, vec3 wi, vec3 wm) {
     float c = dot(wo, wm);
-    return ggx_visible_pdf(wo, wm, s.alpha) * microfacet_jacobian(s, wo, wi, wm)
-         * (1.0 - microfacet_reflect_chance(s, c));
+    return ggx_visible_pdf(wo, wm, s.alpha) * principled_specular_jacobian(s, wo, wi, wm)
+         * (1.0 - principled_specular_reflect_chance(s, c));
 }
 
-vec3 microfacet_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
+vec3 principled_specular_image(vec3 wi) { return vec3(wi.xy, -wi.z); }
 
-bool microfacet_folds(Surface s) { return s.transmission > 0.0 && s.metallic < 1.0; }
+bool principled_specular_folds(Surface s) { return s.transmission > 0.0 && s.metallic < 1.0; }
 
 // The density of wi as the image of a direction on the wrong side of the surface.
-float microfacet_reflect_folded(Surface s, vec3 wo, vec3 wi) {
-    vec3 wm = wo + microfacet_image(wi);
-    if (wm.z <= 0.0 || !microfacet_folds(s)) return 0.0;
+float principled_specular_reflect_folded(Surface s, vec3 wo, vec3 wi) {
+    vec3 wm = wo + principled_specular_image(wi);
+    if (wm.z <= 0.0 || !principled_specular_folds(s)) return 0.0;
     wm = normalize(wm);
-    return microfacet_reflect_pdf(s, wo, wm, dot(wo, wm));
+    return principled_specular_reflect_pdf(s, wo, wm, dot(wo, wm));
 }
 
-float microfacet_transmit_folded(Surface s, vec3 wo, vec3 wi) {
-    vec3 image = microfacet_image(wi), wm = microfacet_half_vector(s, wo, image);
-    return wm.z > 0.0 ? microfacet_transmit_pdf(s, wo, image, wm) : 0.0;
+float principled_specular_transmit_folded(Surface s, vec3 wo, vec3 wi) {
+    vec3 image = principled_specular_image(wi), wm = principled_specular_half_vector(s, wo, image);
+    return wm.z > 0.0 ? principled_specular_transmit_pdf(s, wo, image, wm) : 0.0;
 }
 #endif
 
 // A direction reflected or refracted at a visible facet; v decides which. Where the reflected one ends below the
 // surface, or the refracted one above it, light meets another facet. With glass, where many such losses would add up,
 // the image on the right side of the surface stands for that.
-vec3 microfacet_sample(Surface s, vec3 wo, float v, vec2 u) {
+vec3 principled_specular_sample(Surface s, vec3 wo, float v, vec2 u) {
     vec3 wm = s.is_delta ? vec3(0.0, 0.0, 1.0) : ggx_visible_normal(wo, s.alpha, u);
     float c = dot(wo, wm);
 #if HAS_TRANSMISSION
-    if (v >= microfacet_reflect_chance(s, c)) {
+    if (v >= principled_specular_reflect_chance(s, c)) {
         if (s.index_matched) return -wo;
         float k = 1.0 / s.eta;
         float cos_t = sqrt(max(0.0, 1.0 - k * k * (1.0 - c * c)));
@@ -103,7 +103,7 @@ vec3 microfacet_sample(Surface s, vec3 wo, float v, vec2 u) {
 #endif
     vec3 reflected = 2.0 * c * wm - wo;
 #if HAS_TRANSMISSION
-    if (microfacet_folds(s)) reflected.z = abs(reflected.z);
+    if (principled_specular_folds(s)) reflected.z = abs(reflected.z);
 #endif
     return reflected.z > 0.0 ? reflected : vec3(0.0);
 }

@@ -1,0 +1,94 @@
+"""The material models: one row each, from which the shaders' dispatchers, flags and lists of models follow.
+
+A model is a row here, its functions in `shaders/bsdf/models/NAME.glsl`, and a class in `service/scene/material`;
+`gpu/kernels/models_glsl.py` says which functions the shaders call. All other code asks what a model can do, and never
+for its name.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+
+
+class Lobe(IntEnum):
+    """Numbers of shaders/bsdf/lobe.glsl. `MULTISCATTER` is light that leaves the microfacets after several of them,
+    on either side; `TRANSMISSION` is refracted light."""
+
+    DIFFUSE = 0
+    SPECULAR = 1
+    MULTISCATTER = 2
+    SHEEN = 3
+    CLEARCOAT = 4
+    TRANSMISSION = 5
+
+
+@dataclass(frozen=True)
+class Model:
+    """What a model is and can do.
+
+    `name` is the document's `type`; `number` is that of `layout.Material.model`. `lobes` are those that it adds up.
+    """
+
+    name: str
+    number: int
+    lobes: tuple[Lobe, ...]
+    transmits: bool = False  # light passes where `transmission` is above 0 and `metallic` below 1
+    may_be_delta: bool = False  # it only mirrors or refracts where `roughness` is below LEAST_ROUGHNESS
+    depends_on_wo: bool = False  # its surface is completed by the direction that it is seen from
+    needs_tables: bool = False  # it looks up what its lobes lose, in the tables of gpu/tables/energy.py
+    has_terms: bool = False  # it has a distribution, a geometry and a Fresnel term
+    has_coat_normals: bool = False  # its coat may have a normal of its own
+    has_members: bool = False  # Surface has members for it alone, in shaders/bsdf/models/NAME_members.glsl
+
+    @property
+    def flag(self) -> str:
+        """The flag of kernels that know the model."""
+        return f"HAS_{self.name.upper()}"
+
+    @property
+    def lobes_flag(self) -> str:
+        """The flag of kernels that have its lobes: scenes in which all of its materials are perfectly specular can do
+        without."""
+        return self.flag + "_LOBES" if self.may_be_delta else self.flag
+
+
+_PLAIN = (Lobe.DIFFUSE, Lobe.SPECULAR)
+
+# The first has no flag: it is in every kernel. Kernels ask for the others in this order.
+MODELS = (
+    Model("diffuse", 0, (Lobe.DIFFUSE,)),
+    Model("disney", 1, (Lobe.DIFFUSE, Lobe.SPECULAR, Lobe.SHEEN, Lobe.CLEARCOAT), has_terms=True),
+    Model("metal_rough", 3, _PLAIN, has_terms=True),
+    Model("blinn_phong", 4, _PLAIN),
+    Model("phong", 6, _PLAIN),
+    Model("microfacet", 5, _PLAIN, has_terms=True, has_members=True),
+    Model(
+        "principled",
+        2,
+        tuple(Lobe),
+        transmits=True,
+        may_be_delta=True,
+        depends_on_wo=True,
+        needs_tables=True,
+        has_terms=True,
+        has_coat_normals=True,
+        has_members=True,
+    ),
+)
+FLAGGED = MODELS[1:]
+NUMBERS = {model.name: model.number for model in MODELS}
+BY_NUMBER = {model.number: model for model in MODELS}
+
+
+def numbers(trait: str) -> np.ndarray:
+    """The numbers of the models with a trait, by its name."""
+    return np.array([model.number for model in MODELS if getattr(model, trait)], np.uint32)
+
+
+def able(materials: np.ndarray, trait: str) -> np.ndarray:
+    """Whether the model of each `layout.Material` record has a trait, by its name."""
+    out: np.ndarray = np.isin(materials["model"], numbers(trait))
+    return out
