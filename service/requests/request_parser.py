@@ -15,6 +15,7 @@ from service.config import Config
 from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings, resolve
 from service.requests.bsdf_request import parse_albedo, parse_terms, parse_values
+from service.requests.conversion_request import parse_conversion
 from service.scene import Scene, load_json, parse_scene, parse_settings, references
 from service.scene.base import Model
 from service.scene.document import Parsed
@@ -127,7 +128,7 @@ def _plain(value: Any) -> Any:
     return value
 
 
-Kind = Literal["render", "keyed_render", "request", "scenes", "materials", "bsdf", "albedo", "terms"]
+Kind = Literal["render", "keyed_render", "request", "scenes", "materials", "bsdf", "albedo", "terms", "conversion"]
 # What can be asked of a process that parses large bodies, by name.
 PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "render": lambda config, body: RequestParser(config).render(body),
@@ -138,4 +139,5 @@ PARSERS: dict[Kind, Callable[[Config, bytearray | memoryview], Any]] = {
     "bsdf": lambda config, body: parse_values(body),
     "albedo": lambda config, body: parse_albedo(body),
     "terms": lambda config, body: parse_terms(body),
+    "conversion": lambda config, body: parse_conversion(body),
 }

@@ -5,6 +5,7 @@ submission   how a request for a render becomes one that waits
 events       the progress of renders as server-sent events
 waiting      waiting as long as whoever asks is there
 stream       the stream's WebSocket
+materials    a material turned into another model
 bsdf         a material's BSDF as numbers
 assets       uploads
 documents    saved scenes and materials

@@ -16,7 +16,8 @@ from service.problems import ANSWERS
 from service.renders.store.record import State
 from service.requests.bsdf_request import MOST_SAMPLES
 from service.requests.request_parser import HIGHEST_PRIORITY, LONGEST_LABEL
-from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, MATERIAL, RENDER, SCENE, TERMS
+from service.routes.examples import ALBEDO, ANY_DOCUMENT, ASSET, BSDF, CONVERSION, MATERIAL, RENDER, SCENE, TERMS
+from service.scene.material import MODELS
 from service.storage import documents
 
 PROBLEM = {"$ref": "#/components/schemas/Problem"}
@@ -146,6 +147,11 @@ class Asset(BaseModel):
     aspect_ratio: float | None = Field(
         None, description="Of a scene whose camera says it: the width of its picture over the height."
     )
+
+
+class ConvertedMaterial(BaseModel):
+    material: dict[str, Any]
+    lost: list[str] = Field(description="Names of the given parameters that have no part in it.")
 
 
 class SpecularLobe(BaseModel):
@@ -298,6 +304,25 @@ ALBEDO_BODY = body(
         },
     },
     metal=ALBEDO,
+)
+CONVERSION_BODY = body(
+    {
+        "type": "object",
+        "required": ["material", "to"],
+        "additionalProperties": False,
+        "properties": {
+            "material": reference("Material"),
+            "to": {"type": "string", "enum": list(MODELS), "description": "The `type` of the model."},
+            "choose": {
+                "type": "object",
+                "additionalProperties": {"type": "string"},
+                "default": {},
+                "description": "Values of menus of that model. Numbers that depend on one follow it: facets of "
+                "another `distribution` have a peak as wide.",
+            },
+        },
+    },
+    metal=CONVERSION,
 )
 ASSET_BODY = {
     "requestBody": {

@@ -39,6 +39,7 @@ NAMES = {
     "GET /v1/renders/{id}/events": "followRender",
     "GET /v1/renders/{id}/scene": "getRenderScene",
     "GET /v1/renders/{id}/image": "getRenderImage",
+    "POST /v1/materials/convert": "convertMaterial",
     "POST /v1/bsdf": "evaluateBsdf",
     "POST /v1/bsdf/albedo": "getBsdfAlbedo",
     "POST /v1/bsdf/terms": "getBsdfTerms",

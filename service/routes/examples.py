@@ -20,6 +20,7 @@ RENDER: dict[str, Any] = {"scene": SCENE, "settings": {"width": 256, "height": 2
 ASSET = "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n"
 ANY_DOCUMENT: dict[str, Any] = {"type": "object"}
 METAL: dict[str, Any] = {"type": "metal_rough", "base_color": [1, 0.78, 0.34], "metallic": 1, "roughness": 0.3}
+CONVERSION: dict[str, Any] = {"material": METAL, "to": "microfacet", "choose": {"distribution": "beckmann"}}
 BSDF: dict[str, Any] = {"material": METAL, "wo": [[0.6, 0, 0.8]], "wi": [[0, 0, 1], [-0.6, 0, 0.8]]}
 ALBEDO: dict[str, Any] = {"material": METAL, "cosines": [0.1, 0.5, 1], "samples": 1024}
 TERMS: dict[str, Any] = {"material": METAL, "cosines": [0.1, 0.5, 1]}

@@ -13,6 +13,9 @@ from pydantic_core import CoreSchema, PydanticCustomError
 
 # The parts of a material, under which the editor shows its parameters.
 Group = Literal["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface", "Film", "Emission", "Geometry"]
+# What can be the width of a highlight: a perceptual roughness, the alpha of a distribution of facets, or the exponent
+# of a cosine, that of half vectors or that of mirrored directions.
+Width = Literal["roughness", "alpha", "exponent", "mirrored exponent"]
 
 REFUSAL = "refusal"  # the type of our own errors among pydantic's
 MOST_MISTAKES = 100  # that are searched for in one document: a list of ten thousand wrong spheres only repeats itself
@@ -62,6 +65,7 @@ def hint(
     ranges: tuple[str, Mapping[Any, tuple[float, float]]] | None = None,
     used: tuple[str, Sequence[str]] | None = None,
     example: list[float] | None = None,
+    highlight: tuple[Width, str | None] | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
@@ -69,7 +73,8 @@ def hint(
     or both its ends; `default` is given where the model's is None. For a field that may be left out: `absent` is a
     word for what holds then; `follows` names the field, of the range 0 to 1, that sets it then, and how. `ranges`
     names a field with a choice, and the range for each of its values; `used` the choices with which the field has a
-    meaning, and `example` is what it begins with there.
+    meaning, and `example` is what it begins with there. `highlight` says in what sense the field is the width of the
+    highlight, and names the field of the highlight's colour, where it has its own.
     """
     extra: dict[str, Any] = {}
     if group is not None:
@@ -97,12 +102,15 @@ def hint(
         extra["x-used"] = {"field": name, "values": list(values)}
     if example is not None:
         extra["examples"] = [example]
+    if highlight is not None:
+        width, color = highlight
+        extra["x-highlight"] = {"as": width} | ({} if color is None else {"color": color})
     return Field(title=title, description=description, json_schema_extra=extra)
 
 
 def field_names(model: type[BaseModel]) -> list[str]:
     """A model's own fields before those that it shares with all of its kind: the order of a form."""
-    kind = next(c for c in reversed(model.__mro__) if issubclass(c, Model) and c is not Model)
+    kind = next(c for c in reversed(model.__mro__) if issubclass(c, Model) and c is not Model and c.__annotations__)
     return sorted(model.model_fields, key=lambda name: kind is not model and name in kind.__annotations__)
 
 

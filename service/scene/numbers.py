@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable
+from decimal import ROUND_HALF_UP, Context, Decimal
 from typing import Annotated, Any
 
 import numpy as np
@@ -47,6 +48,11 @@ def check_number(value: Any, low: float, high: float, name: str = "") -> float:
             raise refusal(f"{subject}must be finite, not {described(value)}")
         raise refusal(f"{subject}must be between {low:g} and {high:g}, not {described(value)}")
     return float(value)
+
+
+def rounded(value: float, digits: int) -> float:
+    """`value` to so many digits that count, halves upwards, as JavaScript's toPrecision has it."""
+    return float(Context(prec=digits, rounding=ROUND_HALF_UP).create_decimal(Decimal(value)))
 
 
 def described(value: object) -> str:

@@ -1,6 +1,8 @@
 """How surfaces scatter and emit: a module for each model.
 
 surface         what every material may carry: emission, opacity, a normal map
+conversion      a material turned into another model
+peaks           widths of the peaks of facets' distributions
 parameters      parameters that several models share
 diffuse         the Lambertian model
 disney          the "principled" BRDF of 2012
@@ -13,7 +15,7 @@ microfacet      the distributions, geometry and Fresnel terms of the literature
 
 from __future__ import annotations
 
-from typing import Annotated
+from typing import Annotated, get_args
 
 from pydantic import Field
 
@@ -24,6 +26,7 @@ from service.scene.material.metal_rough import MetalRoughMaterial
 from service.scene.material.microfacet import MicrofacetMaterial
 from service.scene.material.phong import PhongMaterial
 from service.scene.material.principled import PrincipledMaterial
+from service.scene.material.surface import AnySurface
 from service.scene.texture import ScalarTexture
 
 Material = Annotated[
@@ -37,6 +40,8 @@ Material = Annotated[
     Field(discriminator="type"),
 ]
 
+MODELS: dict[str, type[AnySurface]] = {model.name(): model for model in get_args(get_args(Material)[0])}
+
 
 def stretches(material: Material) -> bool:
     """Whether the highlight of `material` has a direction, for which a mesh then needs tangents at its vertices."""
@@ -45,6 +50,7 @@ def stretches(material: Material) -> bool:
 
 
 __all__ = [
+    "MODELS",
     "BlinnPhongMaterial",
     "DiffuseMaterial",
     "DisneyMaterial",

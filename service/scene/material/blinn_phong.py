@@ -2,11 +2,24 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from service.scene.base import hint
+from service.scene.base import Width, hint
 from service.scene.material.surface import Surface
 from service.scene.texture import AnyFactor, AnyRadiometric, AnyReflectance
+
+
+def shininess(width: Width) -> Any:
+    """The hint of an exponent."""
+    return hint(
+        "Shininess",
+        "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
+        group="Specular",
+        highlight=(width, "specular"),
+        unit="",
+        widget="slider",
+        soft=1000,
+    )
 
 
 class BlinnPhongMaterial(Surface):
@@ -33,17 +46,7 @@ class BlinnPhongMaterial(Surface):
             widget="color",
         ),
     ]
-    shininess: Annotated[
-        AnyFactor,
-        hint(
-            "Shininess",
-            "Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror.",
-            group="Specular",
-            unit="",
-            widget="slider",
-            soft=1000,
-        ),
-    ]
+    shininess: Annotated[AnyFactor, shininess("exponent")]
     ambient: Annotated[
         AnyRadiometric,
         hint(

@@ -3,14 +3,24 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, cast
 
 from pydantic import Discriminator, Field, PlainValidator, Tag, WithJsonSchema, model_validator
 
 from service.scene.base import OMITTABLE, hint, refusal
 from service.scene.color import Color
+from service.scene.material.peaks import same_width
 from service.scene.material.surface import SolidSurface
-from service.scene.numbers import LARGEST, Fraction, RefractiveIndex, check_number, is_number, vector, vector_schema
+from service.scene.numbers import (
+    LARGEST,
+    Fraction,
+    RefractiveIndex,
+    check_number,
+    is_number,
+    rounded,
+    vector,
+    vector_schema,
+)
 from service.scene.texture import REFERENCE_TAG, VALUE_TAG, AnyReflectance, ScalarTexture, form_of
 
 Distribution = Literal["phong", "beckmann", "ggx", "gtr", "abc", "sgd", "gaussian"]
@@ -62,6 +72,10 @@ ConductorIndex = Annotated[Color, PlainValidator(_per_channel(LEAST_INDEX)), _pe
 Extinction = Annotated[Color, PlainValidator(_per_channel(0.0)), _per_channel_schema(0.0)]
 
 
+def _inside(value: float, bounds: Range) -> float:
+    return min(max(value, bounds[0]), bounds[1])
+
+
 class MicrofacetMaterial(SolidSurface):
     """Microfacets by the terms of the literature, for comparison and teaching: may lose or gain energy."""
 
@@ -76,6 +90,7 @@ class MicrofacetMaterial(SolidSurface):
             "Alpha",
             "The distribution's parameter: a width; for phong an exponent, for abc an inverse width.",
             group="Specular",
+            highlight=("alpha", "f0"),
             unit="",
             widget="slider",
             soft=(0.01, 1.0),
@@ -200,6 +215,21 @@ class MicrofacetMaterial(SolidSurface):
         if isinstance(value, float) and not low <= value <= high:
             detail = f"must be between {low:g} and {high:g} where distribution is {self.distribution}, not {value!r}"
             raise refusal(detail, f"/{name}")
+
+    @classmethod
+    def chosen(cls, document: dict[str, Any], name: str, value: str) -> dict[str, Any]:
+        """Another distribution has a peak as wide."""
+        material = document | {name: value}
+        if name != "distribution":
+            return material
+        before = {each: document.get(each, cls.model_fields[each].default) for each in (name, "alpha", "gamma")}
+        gamma = _inside(before["gamma"], GAMMA_RANGES.get(cast(Distribution, value), ANY_GAMMA))
+        if "gamma" in document or gamma != before["gamma"]:
+            material["gamma"] = gamma
+        if not isinstance(before["alpha"], dict):
+            alpha = same_width(before[name], before["alpha"], before["gamma"], value, gamma)
+            material["alpha"] = rounded(_inside(alpha, ALPHA_RANGES[cast(Distribution, value)]), 3)
+        return material
 
     @property
     def alpha_range(self) -> Range:

@@ -33,6 +33,7 @@ Roughness = Annotated[
         "Roughness",
         "0 is polished, 1 is matte; its square is the width of the highlight.",
         group="Base",
+        highlight=("roughness", None),
         unit="",
         widget="slider",
     ),

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-from typing import Literal
+from typing import Annotated, Literal
 
-from service.scene.material.blinn_phong import BlinnPhongMaterial
+from service.scene.material.blinn_phong import BlinnPhongMaterial, shininess
+from service.scene.texture import AnyFactor
 
 
 class PhongMaterial(BlinnPhongMaterial):
     """The first highlight of all, about the mirrored direction; like `blinn_phong` it conserves no energy."""
 
     type: Literal["phong"]  # type: ignore[assignment]
+    shininess: Annotated[AnyFactor, shininess("mirrored exponent")]

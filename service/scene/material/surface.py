@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from service.scene.base import OMITTABLE, Model, hint
 from service.scene.texture import AnyFraction, AnyRadiometric, NormalTexture
@@ -33,7 +33,22 @@ NormalMap = Annotated[
 ]
 
 
-class SolidSurface(Model):
+class AnySurface(Model):
+    """The base of all models."""
+
+    @classmethod
+    def name(cls) -> str:
+        """The `type` of the model's documents."""
+        (name,) = get_args(cls.model_fields["type"].annotation)
+        return str(name)
+
+    @classmethod
+    def chosen(cls, document: dict[str, Any], name: str, value: str) -> dict[str, Any]:
+        """A document of the model with another value of a menu, and what follows from that."""
+        return document | {name: value}
+
+
+class SolidSurface(AnySurface):
     """The base of models that have no opacity."""
 
     emission: Emission = (0.0, 0.0, 0.0)
@@ -41,7 +56,9 @@ class SolidSurface(Model):
     normal_map: NormalMap = None
 
 
-class Surface(Model):
+class Surface(AnySurface):
+    """The base of models that have an opacity."""
+
     emission: Emission = (0.0, 0.0, 0.0)
     emission_sides: EmissionSides = "front"
     alpha: Annotated[
