@@ -18,7 +18,7 @@ from service.scene.texture import (
 
 
 def index_of_specular(specular: float) -> float:
-    """The index of refraction whose reflectance head-on is 0.08 `specular`, as `bsdf/models/principled.glsl` has it."""
+    """The index whose reflectance head-on is 0.08 `specular`, as `bsdf/models/principled.glsl` has it."""
     r = math.sqrt(0.08 * specular)
     return (1 + r) / (1 - r)
 
