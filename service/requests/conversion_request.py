@@ -4,12 +4,12 @@ from __future__ import annotations
 
 from pydantic import Field, TypeAdapter
 
-from service.problems import FieldError, InvalidDocument
+from service.problems import FieldError, InvalidDocument, escaped
 from service.scene import Material, load_json
 from service.scene.base import Model
 from service.scene.material import MODELS
 from service.scene.material.conversion import Converted, Document, converted, parameters
-from service.scene.validation import among, escaped, validated
+from service.scene.validation import among, validated
 
 
 class ConversionBody(Model):
