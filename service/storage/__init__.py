@@ -1,10 +1,10 @@
 """The data folder: what users saved, what renders left, and how much room there is.
 
-stores         what is kept in the data folder
+stores         the stores of the data folder, within one quota
 database       the SQLite file: its version, its connections
 migrations     its tables, as the ordered steps that made them
 data_lock      one server at a time on a data folder
-data_check     whether that is sound
+data_check     whether a data folder is sound
 quota          room on the disk
 documents      what users saved, in SQLite
 asset_shares   what the assets of one key take

@@ -1,4 +1,4 @@
-"""Which assets a key may use: those of others are answered as if they were not here."""
+"""Which assets a key may use: those of other keys seem not to exist."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from service.problems import AssetError
 from service.scene import Scene
 from service.storage.database import Database
 
-# Of the assets in a JSON array those that others uploaded and this owner did not, and that nothing it can read uses.
+# From a JSON array of assets, those that only other owners uploaded and that no document this owner can read uses.
 _FOREIGN = """
     SELECT wanted.value FROM json_each(:ids) AS wanted
     WHERE EXISTS (SELECT 1 FROM asset_owners WHERE asset = wanted.value)
@@ -44,7 +44,7 @@ class AssetAccess:
             raise unknown(id)
 
     def foreign(self, owner: str, ids: Collection[str]) -> set[str]:
-        """Those of these assets, which may not exist, that this owner may not use."""
+        """The ones among these assets, which need not exist, that this owner may not use."""
         asked = [id for id in set(ids) if ID.fullmatch(id) and not self._assets.is_builtin(id)] if owner else []
         if not asked or not self._database.exists():
             return set()

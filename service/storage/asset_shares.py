@@ -1,4 +1,4 @@
-"""What the assets of one key take: where that is too much, its own make room, those unused longest first."""
+"""Bounds on the assets of one key: where they take too much, its own longest unused ones are deleted."""
 
 from __future__ import annotations
 
@@ -29,31 +29,31 @@ class AssetShares:
         self._quota = quota
         self._each = each  # bytes; None: no bound
         self._lock = threading.Lock()
-        self._promised: Counter[str] = Counter()  # bytes that are being stored, by owner
+        self._pending: Counter[str] = Counter()  # bytes that are being stored, by owner
 
     @contextmanager
     def room(self, owner: str, size: Usage) -> Iterator[None]:
-        """Room for an owner's upload, which is to be stored while it lasts.
+        """A context in which an owner's upload can be stored.
 
-        Raises TooLarge for what could never be, Unavailable where too much must stay.
+        Raises TooLarge for an upload that never fits, Unavailable where too many assets are in use.
         """
         bounded = bool(owner) and self._each is not None
         if bounded:
             with self._lock:
                 self._make_room(owner, size.bytes)
-                self._promised[owner] += size.bytes
+                self._pending[owner] += size.bytes
         try:
             with self._quota.room(size):
                 yield
         finally:
             if bounded:
                 with self._lock:
-                    self._promised[owner] -= size.bytes
+                    self._pending[owner] -= size.bytes
 
     def uploaded(self, owner: str, ids: Collection[str]) -> None:
         """Note that an owner uploaded these assets, or a scene with these parts.
 
-        There must be room for those that others had uploaded before, too: else who has no room would learn of them.
+        Also assets that others uploaded earlier need room: else an owner without room would learn that they exist.
         Raises what `room` raises.
         """
         if not owner:
@@ -67,7 +67,7 @@ class AssetShares:
             self._note(owner, sizes)
 
     def imported(self, owner: str, scene: str, parts: Collection[str]) -> None:
-        """Note the parts of an owner's scene, of which some may be here again after they made room."""
+        """Note the parts of an owner's scene, some of which may have been deleted and made again."""
         if not owner or not self._database.exists():
             return
         known = self._owned_of(owner, [scene, *parts])
@@ -82,7 +82,7 @@ class AssetShares:
             return database.execute("SELECT owner, asset, bytes FROM asset_owners").fetchall()
 
     def clear(self) -> None:
-        """Forget the assets that are not there any more: to be called once, as they may have gone in any way."""
+        """Forget the assets that no longer exist. To be called once, as anything may have deleted them."""
         if self._database.exists():
             try:
                 with self._database.open() as database:
@@ -92,10 +92,10 @@ class AssetShares:
                 log.warning("could not look for uploads that are deleted error=%s", error)
 
     def forget(self, ids: Collection[str]) -> None:
-        """Delete what is noted of those of these assets that are deleted. Raises Unavailable."""
+        """Delete the rows of those of these assets that no longer exist. Raises Unavailable."""
         if self._database.exists():
             with self._database.open() as database, database:
-                database.execute("BEGIN IMMEDIATE")  # who uploads one again notes that afterwards
+                database.execute("BEGIN IMMEDIATE")  # an owner that uploads one again adds its row afterwards
                 gone = [(id,) for id in set(ids) - self._quota.sizes(ids).keys()]
                 database.executemany("DELETE FROM asset_owners WHERE asset = ?", gone)
 
@@ -131,8 +131,8 @@ class AssetShares:
             raise Unavailable(f"{detail} (SUNBOX_MAX_KEY_ASSETS).", RETRY_S)
 
     def _over(self, owner: str, size: int) -> int:
-        """The bytes that are too many with `size` more."""
+        """By how many bytes `size` more exceed the bound."""
         assert self._each is not None
         with self._database.open() as database:
             row = database.execute("SELECT total(bytes) FROM asset_owners WHERE owner = ?", (owner,)).fetchone()
-        return int(row[0]) + self._promised[owner] + size - self._each
+        return int(row[0]) + self._pending[owner] + size - self._each

@@ -1,7 +1,7 @@
-"""Whether a data folder is sound: the database, the documents and assets in it, and what a crash left.
+"""Whether a data folder is sound: the database, the documents and assets in it, and the leftovers of a crash.
 
-Nothing is written, so that a server may use the folder meanwhile: files that it writes or deletes just then are no
-faults.
+The check writes nothing, so that a server may use the folder meanwhile; files that it writes or deletes during the
+check are no faults.
 """
 
 from __future__ import annotations
@@ -33,7 +33,7 @@ PIECE = 1 << 20  # bytes that are hashed at a time
 
 @dataclass
 class Report:
-    """`faults` are what was lost or damaged; `notes` are what the next start puts right by itself."""
+    """`faults` are losses and damages; `notes` are leftovers that the next start removes by itself."""
 
     server: str | None = None  # which uses the folder, as `process PID on HOST`
     faults: list[str] = field(default_factory=list)
@@ -43,7 +43,7 @@ class Report:
 
 
 def check(folder: Path) -> Report:
-    """Takes as long as reading all of it does. Raises OSError where the folder cannot be read."""
+    """Check a folder, which takes as long as reading all of it. Raises OSError where it cannot be read."""
     os.scandir(folder).close()
     report = Report(holder(folder))
     _check_assets(AssetFolder(folder / "assets"), report)
@@ -79,7 +79,7 @@ def _check_assets(files: AssetFolder, report: Report) -> None:
             try:
                 report.faults += [f"assets/{name}: {fault}" for fault in _faults(files, hash)]
             except FileNotFoundError:
-                report.assets -= 1  # it has just made room
+                report.assets -= 1  # it was deleted just now
             except OSError as error:
                 report.faults.append(f"assets/{name}: it cannot be read: {error.strerror or error}")
 
@@ -153,13 +153,13 @@ def is_here(folder: Path, asset: str) -> bool:
 
 
 def reading(path: Path) -> sqlite3.Connection:
-    """A connection that writes nothing. Without a log beside the file nobody has it open, and no lock is needed."""
+    """A connection that writes nothing. Without a log beside the file no process has it open: no lock is needed."""
     alone = "" if path.with_name(path.name + "-wal").exists() else "&immutable=1"
     return sqlite3.connect(f"file:{quote(str(path.absolute()))}?mode=ro{alone}", uri=True, timeout=10)
 
 
 def _is_locked(path: Path) -> bool:
-    """Whether somebody is writing a file just now; also where it has gone meanwhile."""
+    """Whether a process is writing the file just now, or it is gone meanwhile."""
     try:
         with path.open("rb") as file:
             fcntl.flock(file, fcntl.LOCK_SH | fcntl.LOCK_NB)

@@ -1,6 +1,6 @@
-"""One server at a time on a data folder: each would count only its own bytes and renders, and go on with the other's.
+"""One server at a time on a data folder: two would miscount the quota, and both continue the same renders.
 
-The commands need no lock: what they share with a server (assets, and documents in SQLite) has locks of its own.
+Commands need no lock: assets, and documents in SQLite, which they share with a server, have their own locks.
 """
 
 from __future__ import annotations
@@ -16,7 +16,7 @@ from pathlib import Path
 
 log = logging.getLogger(__name__)
 
-FILE = "server.lock"  # in the data folder; it stays there, as only the lock on it matters
+FILE = "server.lock"  # in the data folder; the file stays, only the lock on it matters
 WAIT_S = 3.0  # for a server that is just ending
 STEP_S = 0.05
 IN_USE = (
@@ -26,12 +26,12 @@ IN_USE = (
 
 
 class FolderInUse(Exception):
-    """Another server has the folder; the text is for the person who started this one."""
+    """Another server uses the folder; the text is for the person who started this one."""
 
 
 @contextmanager
 def locked(folder: Path) -> Iterator[None]:
-    """The folder belongs to this process while it lasts, or until the process ends in any way. Raises FolderInUse.
+    """A context in which the folder belongs to this process; a process that ends loses it. Raises FolderInUse.
 
     A folder that cannot be written, or whose file system has no locks, is used without one.
     """
@@ -47,7 +47,7 @@ def locked(folder: Path) -> Iterator[None]:
 
 
 def holder(folder: Path) -> str | None:
-    """The server that uses a data folder, as `process PID on HOST`; None where none does, or nobody can tell."""
+    """The server that uses a data folder, as `process PID on HOST`; None where none does, or none is known."""
     try:
         fd = os.open(folder / FILE, os.O_RDONLY | os.O_CLOEXEC)
     except OSError:

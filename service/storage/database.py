@@ -1,4 +1,4 @@
-"""The data folder's SQLite file: its version, its connections, and what they raise."""
+"""The data folder's SQLite file: its version, its connections, and the errors that they raise."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ log = logging.getLogger(__name__)
 
 FILE = "documents.sqlite3"  # in the data folder
 BUSY_S = 10.0  # how long a writer waits for another one
-LOG_BYTES = 4 << 20  # to which the log is cut after a large document; by itself it keeps that size while others read
+LOG_BYTES = 4 << 20  # to which the log is cut after a large document; SQLite does not shrink it while others read
 
 
 class DamagedFile(Exception):
@@ -30,7 +30,7 @@ class Database:
         self.path = folder / FILE
 
     def prepare(self) -> None:
-        """Reads the file through and migrates what an earlier version wrote, which may take as long as copying it.
+        """Read all of the file, and migrate one of an earlier version, which may take as long as copying it.
 
         Raises DamagedFile.
         """
@@ -66,7 +66,7 @@ class Database:
     def open(self) -> Iterator[sqlite3.Connection]:
         """A connection to the tables of this version, closed at the end. Raises Unavailable where the disk fails.
 
-        What goes wrong in the caller's own work while it has the connection passes as it is.
+        Other exceptions of the caller's own code pass unchanged.
         """
         with ExitStack() as stack:
             with self._explained(OSError, sqlite3.Error):
@@ -76,14 +76,14 @@ class Database:
 
     @contextmanager
     def _explained(self, *of_the_disk: type[Exception]) -> Iterator[None]:
-        """Raises Unavailable for these."""
+        """Raise Unavailable for the errors of a failing disk."""
         try:
             yield
         except DamagedFile as error:
             log.error("could not use the database reason=%s", error)
             raise Unavailable("The server's database was written by a newer version of Sunbox.", 30) from None
         except (sqlite3.ProgrammingError, sqlite3.InterfaceError):
-            raise  # a mistake of ours, as a connection that another thread uses
+            raise  # a mistake in the code, such as a connection that another thread uses
         except of_the_disk as error:
             log.error("could not reach the database file=%s error=%s", self.path, error)
             if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_BUSY:
@@ -91,7 +91,7 @@ class Database:
             raise Unavailable("The database cannot be reached: the server's disk has a problem.", 30) from None
 
     def usage(self) -> Usage:
-        """Of the file's used pages, without the log beside it, which is deleted when the file is closed."""
+        """Bytes of the file's used pages, without the log beside it, which is deleted when the file is closed."""
         if not self.exists():
             return Usage()
         with self.open() as database:
@@ -106,9 +106,10 @@ class Database:
         self.path.parent.mkdir(parents=True, exist_ok=True)
         with closing(sqlite3.connect(self.path, timeout=BUSY_S)) as database:
             if database.execute("PRAGMA page_count").fetchone() == (0,):
-                # Pages that are free go back to the disk at every commit. It is chosen before anything is written.
+                # Free pages return to the disk at every commit. This must be chosen before anything is written.
                 database.execute("PRAGMA auto_vacuum = FULL")
-            # A write-ahead log, synced at every commit: what was answered is on the disk, and whole.
+            # A write-ahead log, synced at every commit: data of a request that was answered is on the disk, and
+            # whole.
             database.execute("PRAGMA journal_mode = WAL")
             database.execute("PRAGMA synchronous = FULL")
             database.execute(f"PRAGMA journal_size_limit = {LOG_BYTES}")
@@ -116,7 +117,7 @@ class Database:
             yield database
 
     def _migrate(self, database: sqlite3.Connection) -> None:
-        """Each migration is one transaction, so that one which is killed has done nothing."""
+        """Run each migration in one transaction, so that an interrupted one changes nothing."""
         while (version := _version(database)) < VERSION:
             with database:
                 database.execute("BEGIN IMMEDIATE")

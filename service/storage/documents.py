@@ -40,8 +40,8 @@ from service.system.disk_usage import Usage, expected
 log = logging.getLogger(__name__)
 
 Kind = Literal["scenes", "materials"]
-PRIVATE, SHARED, BY_LINK = range(3)  # whose a document is: its owner's, listed to all, or whose knows its name
-LINK_DAYS = 90  # after which a document that only a link leads to is deleted, if nobody has read it
+PRIVATE, SHARED, BY_LINK = range(3)  # who reads a document: its owner; all, who see it listed; all who know its name
+LINK_DAYS = 90  # a document by link that nobody has read for this long is deleted
 DAY_S = 86_400.0
 MOST_NAMES = 1000  # of one page
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -51,14 +51,14 @@ _MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
 
 @dataclass(frozen=True)
 class CheckedDocument:
-    """A valid document as it is stored, and its references to assets, which may be missing."""
+    """A valid document as it is stored, and its references to assets, which need not exist."""
 
     body: str
     uses: list[tuple[str, str]]  # JSON pointer, reference
 
 
 def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDocument:
-    """Raises InvalidDocument with pointers from the document's root. A large document takes seconds."""
+    """Validate a document. Raises InvalidDocument with pointers from its root. A large document takes seconds."""
     if kind == "materials":
         validated(_MATERIAL, document, "")
     else:
@@ -75,13 +75,13 @@ def etag(body: bytes) -> str:
 
 @dataclass(frozen=True)
 class Condition:
-    """What must be true of the document that there is, by the headers If-Match and If-None-Match of RFC 9110."""
+    """What the stored document must be, by the headers If-Match and If-None-Match of RFC 9110."""
 
     is_match: tuple[str, ...] | None = None  # one of these tags, or "*" for any document
     is_none: tuple[str, ...] | None = None  # none of these tags, or "*" for no document
 
     def check(self, body: bytes | None) -> None:
-        """`body`: the document, None where there is none. Raises PreconditionFailed."""
+        """Check the stored document, None where there is none. Raises PreconditionFailed."""
         if self.is_match is not None and not _matches(self.is_match, body):
             raise PreconditionFailed("Another document has this name by now, or none has: get it, and try again.")
         if self.is_none is not None and _matches(self.is_none, body):
@@ -99,7 +99,7 @@ def _matches(tags: tuple[str, ...], body: bytes | None) -> bool:
 class Documents:
     """For any number of threads and processes; not for an event loop. Raises Unavailable where the disk fails.
 
-    `quota` makes room for documents; without it there always is room. `each`: most bytes of one owner's documents. An
+    `quota` makes room for documents; without one there is no bound. `each`: most bytes of one owner's documents. An
     owner is a text; "" has no such bound, and what it saves is shared by default.
     """
 
@@ -111,7 +111,7 @@ class Documents:
         self._quota = quota
 
     def prepare(self) -> None:
-        """To be called once, before the server starts. Raises DamagedFile."""
+        """Migrate the database: to be called once, before the server starts. Raises DamagedFile."""
         self._database.prepare()
         if self._database.exists():
             with suppress(Unavailable), self._database.open() as database, database:
@@ -120,8 +120,8 @@ class Documents:
     def names(
         self, kind: str, owner: str = "", limit: int = MOST_NAMES, after: str | None = None
     ) -> tuple[list[dict[str, str]], bool]:
-        """`[{name, title}]` of what this owner may read but for documents by link, in the order of the titles: of the
-        first `limit` names behind `after`; and whether there are more. Raises NotFound for an unknown kind."""
+        """`[{name, title}]` of the documents that this owner may read, without those by link, in the order of titles:
+        the first `limit` names behind `after`; and whether there are more. Raises NotFound for an unknown kind."""
         check_kind(kind)
         with self._database.open() as database:
             rows = database.execute(
@@ -162,23 +162,23 @@ class Documents:
         shared: int | None = None,
         condition: Condition = ALWAYS,
     ) -> tuple[str, bool]:
-        """Save an owner's document under a name; its title, and whether the name is new.
+        """Save an owner's document under a name. Returns its title, and whether the name is new.
 
-        `shared`: PRIVATE, SHARED, or BY_LINK; None leaves that as it is, and a new one is its owner's alone. Raises
-        InvalidDocument, with pointers from the document's root, where there is no such asset for its owner, TooLarge
-        where it is too much for its owner, PreconditionFailed.
+        `shared`: PRIVATE, SHARED, or BY_LINK; None leaves it unchanged, and makes a new document private. Raises
+        InvalidDocument, with pointers from the document's root, for an asset that its owner may not use, TooLarge
+        where its owner's documents take too much, PreconditionFailed.
         """
         check_kind(kind)
         body, uses = document.body, list(dict.fromkeys(reference for _, reference in document.uses))
         key, size = (kind, name, owner), len(body.encode())
-        # These assets stay while others make room, so that a refused document costs no asset.
+        # Its assets are not deleted to make room for it.
         with self._quota.pinned(uses) if self._quota else nullcontext():
             foreign = self._access.foreign(owner, uses)
             self._find_assets(document, uses, foreign)
             room = self._quota.room(expected([size])) if self._quota else nullcontext()
             with room, self._database.open() as database, database:
                 database.execute("BEGIN IMMEDIATE")
-                self._find_assets(document, uses, foreign)  # again: another process may have made room
+                self._find_assets(document, uses, foreign)  # again: another process may have deleted one
                 old = database.execute(f"SELECT title, shared, bytes, body {_OWN}", key).fetchone()
                 condition.check(None if old is None else old[3].encode())
                 self._check_share(database, owner, size - (old[2] if old else 0))
@@ -197,7 +197,7 @@ class Documents:
         return kept, old is None
 
     def delete(self, kind: str, name: str, owner: str = "", condition: Condition = ALWAYS) -> None:
-        """Delete an owner's document, or else one that was saved before there were owners.
+        """Delete an owner's document, or else one of a version without owners.
 
         Raises NotFound, Forbidden for one that another owner shares, PreconditionFailed.
         """
@@ -221,7 +221,8 @@ class Documents:
 
     @contextmanager
     def assets_in_use(self) -> Iterator[set[str]]:
-        """The ids of all assets that saved documents and renders refer to; while it lasts none of these is stored."""
+        """A context with the ids of all assets that saved documents and renders use; none of these is stored
+        meanwhile."""
         if not self._database.exists():
             yield set()
             return
@@ -232,7 +233,7 @@ class Documents:
             }
 
     def usage(self) -> Usage:
-        """Of the database, whose unused pages don't count."""
+        """Bytes of the database, without its unused pages."""
         return self._database.usage()
 
     def _check_share(self, database: sqlite3.Connection, owner: str, more: int) -> None:
@@ -247,7 +248,7 @@ class Documents:
             )
 
     def _find_assets(self, document: CheckedDocument, uses: list[str], foreign: set[str]) -> None:
-        """Raises InvalidDocument where one of them is not here, or is foreign."""
+        """Raises InvalidDocument for an asset that does not exist, or that its owner may not use."""
 
         def why_not(ref: str) -> str | None:
             return unknown(ref).detail if ref in foreign else self._assets.missing(ref)
@@ -264,7 +265,7 @@ def _listed(titles: dict[str, str]) -> list[dict[str, str]]:
 
 
 def _note_read(database: sqlite3.Connection, kind: str, name: str, owner: str) -> None:
-    """Note that a document by link was read; once a day, and not where the disk takes nothing."""
+    """Note that a document by link was read: once a day, and not where the disk is full."""
     now = time.time()
     with suppress(sqlite3.OperationalError), database:
         database.execute(
@@ -274,7 +275,7 @@ def _note_read(database: sqlite3.Connection, kind: str, name: str, owner: str) -
 
 
 def _expire(database: sqlite3.Connection) -> None:
-    """Delete documents by link that nobody has read for long: their assets may make room from then on."""
+    """Delete documents by link that nobody has read for LINK_DAYS; their assets are no longer in use then."""
     last = time.time() - LINK_DAYS * DAY_S
     old = database.execute("SELECT kind, name, owner FROM document_links WHERE read_at < ?", (last,)).fetchall()
     for table in ("documents", "uses", "document_links"):

@@ -37,7 +37,7 @@ class LostPictures:
         self._counted: tuple[int, Usage] | None = None  # and when the folder was changed before
 
     def usage(self) -> Usage:
-        """Of all that is in the folder. It is counted again when a name came or went: files are not changed here."""
+        """Usage of the whole folder. It is counted again when a name came or went: files here do not change."""
         try:
             changed = self.path.stat().st_mtime_ns
         except FileNotFoundError:
@@ -47,7 +47,7 @@ class LostPictures:
         return self._counted[1]
 
     def spare(self) -> dict[str, Usage]:
-        """What may go where room is needed, the oldest first."""
+        """The files that may be deleted where room is needed, the oldest first."""
         if (self.path / KEEP).exists():
             return {}
         return {name: usage(found) for name, found in sorted(self._files(), key=lambda each: each[1].st_mtime_ns)}
@@ -61,11 +61,11 @@ class LostPictures:
         os.replace(self._renders / name, self.path / (name + DAMAGED if damaged else name))
 
     def keep(self) -> None:
-        """Have all of it stay, also where room is needed."""
+        """Let nothing here be deleted, even where room is needed."""
         (self.path / KEEP).write_text(WHY)
 
     def bring_back(self, names: Collection[str]) -> int:
-        """Move those of these files that are here to where they were, unless there are others by now; how many."""
+        """Move those of these files that are here back, unless others are in their places. Returns how many."""
         count = 0
         for name, _ in self._files():
             if name in names and not (self._renders / name).exists():
@@ -73,7 +73,7 @@ class LostPictures:
                 count += 1
         if count and [name for name, _ in self._files()] in ([], [KEEP]):
             self.delete(KEEP)
-            with suppress(OSError):  # somebody else put something there
+            with suppress(OSError):  # another process made a file of this name
                 self.path.rmdir()
         return count
 

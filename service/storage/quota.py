@@ -1,6 +1,6 @@
-"""Keeps the data folder within its quota: the assets unused for the longest time are deleted, never those in use.
+"""Bounds the data folder by its quota: the longest unused assets are deleted, never those in use.
 
-Before them go pictures whose renders nobody knows any more.
+Pictures of renders that the database does not know are deleted before them.
 """
 
 from __future__ import annotations
@@ -22,22 +22,22 @@ from service.system.disk_usage import Usage
 log = logging.getLogger(__name__)
 
 RETRY_S = 60
-RESERVE_BYTES = 64 << 20  # for small renders, where everything else is full
-RESERVE_PART = 16  # of a small quota, what is reserved
+RESERVE_BYTES = 64 << 20  # reserved for small renders, where the quota is full otherwise
+RESERVE_PART = 16  # the share of a small quota that is reserved: a sixteenth
 FRESH_S = 3600.0  # how long an upload may wait for the render or the document that refers to it
 
 
 class QuotaUsedUp(Unavailable):
-    """There is no room, and no asset that could make some."""
+    """There is no room, and no asset may be deleted."""
 
 
 def reserve_bytes(limit: int) -> int:
-    """What is reserved of a quota, in whole MiB."""
+    """The bytes of a quota that are reserved, in whole MiB."""
     return min(RESERVE_BYTES, limit // RESERVE_PART >> 20 << 20)
 
 
 class Quota:
-    """Bounds the assets in `folder` together with what `others` beside them take, `lost` among it.
+    """Bounds the assets in `folder` together with what `others` take, `lost` included.
 
     `in_use` is a context with the ids of the assets that must stay; no other asset comes into use while it lasts.
     """
@@ -53,8 +53,8 @@ class Quota:
         owned: Callable[[], Iterable[tuple[str, str, int]]] = tuple,
         reserve: int = 0,
     ) -> None:
-        """`gone` hears the ids of assets that were deleted, when nothing is locked any more that it could need.
-        `owned` gives who uploaded what: owner, id and bytes. `reserve`: bytes that `room` gives where told to."""
+        """`gone` is called with the ids of deleted assets, after all locks are released. `owned` lists uploads:
+        owner, id and bytes. `reserve`: bytes that only `room(reserved=True)` gives away."""
         self._files = AssetFolder(folder / "assets")
         self._limit = limit
         self._in_use = in_use
@@ -64,14 +64,15 @@ class Quota:
         self._owned = owned
         self._reserve = Usage(reserve)
         self._lock = threading.Lock()
-        self._promised = Usage()  # what is about to be stored
+        self._pending = Usage()  # what is about to be stored
         self._pinned: Counter[str] = Counter()  # how many contexts keep each id
 
     @contextmanager
     def room(self, size: Usage, reserved: bool = False) -> Iterator[None]:
-        """A context in which `size` more can be stored; assets are deleted for it. `reserved`: or the reserve used.
+        """A context in which `size` more can be stored; assets are deleted for it. With `reserved` the reserve
+        counts.
 
-        Raises TooLarge for what could never fit, QuotaUsedUp where too much must stay, Unavailable where the disk
+        Raises TooLarge for what never fits, QuotaUsedUp where too many assets are in use, Unavailable where the disk
         fails; nothing is deleted then.
         """
         if size.bytes > self._limit.bytes:
@@ -86,12 +87,12 @@ class Quota:
             except OSError as error:
                 log.error("could not make room error=%s", error)
                 raise Unavailable(f"room could not be made: {os.strerror(error.errno or 0)}", RETRY_S) from None
-            self._promised += size
+            self._pending += size
         try:
             yield
         finally:
             with self._lock:
-                self._promised -= size
+                self._pending -= size
 
     @contextmanager
     def pinned(self, ids: Collection[str]) -> Iterator[None]:
@@ -136,7 +137,7 @@ class Quota:
             log.warning("could not count the assets error=%s", error)
 
     def _make_room(self, size: Usage, reserve: Usage) -> None:
-        most = self._limit - reserve - self._promised - size
+        most = self._limit - reserve - self._pending - size
         if not self.used().exceeds(most):
             return
         self._files.clear()
@@ -175,7 +176,7 @@ class Quota:
         self._say_gone([f"sha256:{hash}" for hash in goes])
 
     def _within_share(self, owned: Collection[tuple[str, str, int]]) -> set[str]:
-        """The ids of what owners uploaded who have no more than their share of the quota."""
+        """The ids of the uploads of owners that take no more than their share of the quota."""
         sizes = Counter[str]()
         for owner, _, size in owned:
             sizes[owner] += size

@@ -1,4 +1,4 @@
-"""What is kept in the data folder: assets, documents and the pictures of renders, within one quota."""
+"""The stores of the data folder: assets, documents and the pictures of renders, within one quota."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ RENDERS = "renders"  # the folder of the renders' pictures, in the data folder
 
 
 def storage(config: Config, pictures: Callable[[], Usage] | None = None) -> Storage:
-    """`pictures`: what the pictures of renders take, for a server that counts them; else they are looked at."""
+    """`pictures` says what the renders' pictures take, where a server counts them; else the disk is read."""
     renders = config.data_dir / RENDERS
     beside, lost = pictures or (lambda: _pictures(renders)), LostPictures(renders)
     # They depend on each other: assets need room, the quota the documents' references, documents the assets.
