@@ -54,15 +54,15 @@ from service.system.confined import hide
 from service.system.memory import MemoryBudget
 
 WEB = Path(__file__).parents[1] / "web"
-PING_S = 15.0  # proxies cut connections that are idle for a minute
+PING_S = 15.0  # seconds between pings: proxies cut connections that are idle for a minute
 KEEP_ALIVE_S = 150  # longer than proxies keep idle connections (Caddy two minutes), or they meet a closed one
-TICKS = 10  # of uvicorn, ten a second, between two checks of the connections
+TICKS = 10  # of uvicorn, which ticks ten times a second, between two checks of the connections
 GRACE_S = 10  # for answers under way when the server ends
-AGAIN_S = 1.0  # from one signal to another that asks for more: `timeout` sends two in a row, and means one
-LAST_RESORT_S = 14.0  # the contract gives 15 from the signal to the end
+AGAIN_S = 1.0  # before it a second signal is ignored, as `timeout` sends two in a row; after it one ends at once
+LAST_RESORT_S = 14.0  # from the signal to a forced end; operators count on 15
 DESCRIPTORS = 65_536
-# How long a thread that computes may keep the event loop waiting whenever that comes back from a system call. With
-# Python's 5 ms an answer of ten calls takes 50 ms while somebody's scene is being validated.
+# Python's switch interval: how long a computing thread may delay the event loop after each of its system calls. With
+# the default, 5 ms, an answer of ten calls takes 50 ms while a scene is being validated.
 SWITCH_S = 0.001
 OPEN_TO_ALL = (
     "serving without a key: whoever reaches this address can render, and can read, replace and delete what is saved; "
@@ -82,18 +82,18 @@ log = logging.getLogger(__name__)
 
 def create_app(config: Config) -> FastAPI:
     """The service as an ASGI application. The renderer's process starts with its lifespan, and ends with it."""
-    kept = storage(config, lambda: store.pictures)
-    store = RenderStore(config.data_dir, kept.quota.room, partial(kept.quota.room, reserved=True))
+    stored = storage(config, lambda: store.pictures)
+    store = RenderStore(config.data_dir, stored.quota.room, partial(stored.quota.room, reserved=True))
     memory = MemoryBudget(config.memory)
     state = AppState(
         config,
-        kept.assets,
-        RequestReader(config, kept.assets, memory, kept.access),
+        stored.assets,
+        RequestReader(config, stored.assets, memory, stored.access),
         Pool(seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
-        kept.documents,
-        kept.quota,
-        kept.shares,
-        kept.access,
+        stored.documents,
+        stored.quota,
+        stored.shares,
+        stored.access,
         RenderQueue(_limits(config), store),
     )
     app = FastAPI(
@@ -120,7 +120,7 @@ def create_app(config: Config) -> FastAPI:
 
 
 def run(config: Config) -> int:
-    """Serves until SIGINT or SIGTERM; prints the address first. The exit code: 1 where it could not start."""
+    """Print the address and serve until SIGINT or SIGTERM. Returns the exit code: 1 where it could not start."""
     _give_memory_back()
     hide()
     sys.setswitchinterval(SWITCH_S)
@@ -149,7 +149,7 @@ def run(config: Config) -> int:
 
 
 def _serve(config: Config, listener: socket.socket, most: int) -> int:
-    """With at most that many connections. Raises DamagedFile, CannotJoin."""
+    """Serve with at most `most` connections; the exit code. Raises DamagedFile, CannotJoin."""
     host, port = listener.getsockname()[:2]
     app = create_app(config)
     state: AppState = app.state.sunbox
@@ -163,7 +163,7 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
 
 
 def server_settings(app: FastAPI, config: Config, most: int) -> uvicorn.Config:
-    """uvicorn's, with at most that many connections."""
+    """uvicorn's settings, for at most `most` connections."""
     heard = app.state.sunbox.traffic.heard
     full = Requests(turning_away(FULL, respond), refuse=respond, heard=heard)
     proxies = config.trusted_proxies
@@ -184,8 +184,8 @@ def server_settings(app: FastAPI, config: Config, most: int) -> uvicorn.Config:
 
 
 def _take_descriptors() -> int:
-    """Raise the limit of descriptors as far as the system allows; what it is then. Clients, scenes and assets
-    take some each, and what a shell gives its programs by default (1 024) is meant for such as wait with select().
+    """Raise the limit of descriptors as far as the system allows, and return it. Each client, scene and asset takes
+    some; a shell's default, 1 024, is made for programs that wait with select().
     """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     most = DESCRIPTORS if hard == resource.RLIM_INFINITY else min(hard, DESCRIPTORS)
@@ -235,7 +235,7 @@ class _Server(uvicorn.Server):
 
     def _end(self) -> None:
         if self._told_at is not None:
-            if time.monotonic() - self._told_at > AGAIN_S:  # nobody is waited for; other processes end with this one
+            if time.monotonic() - self._told_at > AGAIN_S:  # end at once; the other processes end with this one
                 os._exit(int(self.refused))
             return
         self._told_at = time.monotonic()
@@ -290,8 +290,8 @@ async def _docs() -> Response:
 
 
 def _give_memory_back() -> None:
-    """Make glibc return freed blocks of a megabyte at once. It learns to keep ones of up to 32 MiB for the next, and
-    here they are a scene's arrays: 95 MB stayed after a mesh of a million triangles was packed."""
+    """Make glibc return freed blocks of a megabyte or more at once. By default it learns to reuse blocks of up to
+    32 MiB, such as a scene's arrays: after packing a mesh of a million triangles it had 95 MB of them."""
     with contextlib.suppress(AttributeError):  # another C library
         libc = ctypes.CDLL(None)
         libc.mallopt(M_MMAP_THRESHOLD, 1 << 20)

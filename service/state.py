@@ -38,11 +38,11 @@ from service.system.executors import packing
 from service.system.memory import MemoryBudget
 from service.system.shares import Shares
 
-MESSAGE_BYTES = 1 << 20  # of the contract: bigger geometry goes through assets
+MESSAGE_BYTES = 1 << 20  # of one message on a stream: larger geometry is uploaded as an asset
 MOST_WAITS = 64  # long-polls and event streams of one caller: each takes some 40 KB, and all wake at a render's end
 STARTING_S = 15.0  # how long a caller waits for a renderer that is being started
-GPU_S = 60.0  # the same at start, where SUNBOX_REQUIRE_GPU is set
-FAREWELL_S = 4.0  # for the farewell to reach a client that reads slowly
+GPU_S = 60.0  # how long the start waits for one, where SUNBOX_REQUIRE_GPU is set
+FAREWELL_S = 4.0  # how long the end waits for slow clients to read the last messages
 
 log = logging.getLogger(__name__)
 
@@ -100,7 +100,7 @@ class AppState:
         }
 
     async def resume_renders(self) -> None:
-        """Take up the renders that an earlier server left. Without a data folder renders end with the server."""
+        """Continue the renders that an earlier server left. Without a data folder renders end with the server."""
         store = self.render_queue.store
         if store is None:
             return
@@ -113,7 +113,7 @@ class AppState:
         self.render_queue.resume(stored, self._resumed)
 
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
-        """A render that is asked for now. Raises TooLarge for one that never fits into the memory."""
+        """A new render. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
         return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory)
 
@@ -121,17 +121,17 @@ class AppState:
         return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)
 
     async def _pack(self, document: bytes, count: Callable[[int], None]) -> Packed:
-        """The scene of a folded document, which was valid when it was stored; that its owner may use its assets was
-        seen then, too. Raises what reading it raises.
+        """The packed scene of a folded document, which was valid, and whose owner was allowed to use its assets, when
+        it was stored. Raises what reading it raises.
 
-        `count` is called with the bytes of memory that parsing takes, before that is done."""
+        `count` is called with the bytes of memory that parsing takes, before parsing begins."""
         body = await packing(lambda: bytearray(f'{{"scene":{unfolded(document)}}}', "ascii"))
         count(await packing(partial(self.bodies.memory_for, body)))
         parsed: ParsedRequest = await self.bodies.parsed("request", body, counted=True)
         return await packing(partial(self.reader.pack, parsed.scene))
 
     async def gpu_missing(self) -> str | None:
-        """Why SUNBOX_REQUIRE_GPU forbids to start; None where nothing does. Waits for the renderer."""
+        """The reason why SUNBOX_REQUIRE_GPU forbids to start, or None. Waits for the renderer."""
         if not self.config.require_gpu or self.config.ray is not None:  # Ray has been asked for nodes with GPUs
             return None
         self.renderers.start()
@@ -142,7 +142,7 @@ class AppState:
         return SOFTWARE.format(renderer=renderer["renderer"]) if renderer.get("software") else None
 
     async def farewell(self) -> None:
-        """Tell all clients that the server ends, so that requests are answered; renders go on at the next start."""
+        """Tell all clients that the server ends, and answer open requests; renders go on at the next start."""
         if self.warming is not None:
             self.warming.cancel()
         self.renderers.drain()
@@ -163,13 +163,13 @@ def app_state(connection: HTTPConnection) -> AppState:
 
 
 def caller_of(connection: HTTPConnection) -> str:
-    """The client whose limits count, as the guard named it: the owner of the key, or else the address's network."""
+    """Whose limits a request counts towards: the owner of its key, or without keys the address's network."""
     found: str = connection.scope.get("caller", "")
     return found
 
 
 def owner_of(connection: HTTPConnection) -> str:
-    """The name that the guard gave the key's owner; "" where no keys are needed."""
+    """The owner of the request's key, as the guard named it; "" where no keys are needed."""
     found: str = connection.scope.get("owner", "")
     return found
 

@@ -1,7 +1,7 @@
-"""How many connections there are, and how long one may wait for the other side.
+"""Bounds on the number of connections, and on how long one may stand still.
 
-Slow clients are welcome, ones that stand still are not: a request's head, an answer's bytes and what is left of a
-body each have their time. `guard.py` does the same for bodies that are being received.
+Slow clients are welcome, stalled ones are not: a request's head, an answer's bytes and the rest of a body must each
+arrive in time. `guard.py` does the same for bodies that are being received.
 """
 
 from __future__ import annotations
@@ -19,15 +19,15 @@ from typing import Any, Literal
 
 import h11
 
-HEAD_S = 10.0  # for a request's head, from its first byte, or from the connection
-REST_S = 30.0  # for the rest of a body that was answered already
-UNREAD_S = 30.0  # in which an answer must go on by LEAST_RATE: a client that vanished or stalled takes nothing
+HEAD_S = 10.0  # within which a request's head must arrive, from its first byte or from the connection on
+REST_S = 30.0  # within which the rest of a body must arrive after its answer
+UNREAD_S = 30.0  # within which a client must take UNREAD_S * LEAST_RATE bytes of an answer
 LEAST_RATE = 1024  # bytes a second
 # The part of a WebSocket's unsent bytes that must be delivered within UNREAD_S. A frame is written as a whole, up to
 # 256 MiB, and a client that took it at LEAST_RATE would keep that in memory for days.
 LEAST_PART = 0.25
-SETTLED_S = 1.0  # a head that takes longer makes room for another connection where there is none
-REFUSALS = 64  # connections beyond the most that are answered why they are refused, or that the server lives
+SETTLED_S = 1.0  # a connection whose head takes longer is closed where room for another one is needed
+REFUSALS = 64  # connections beyond the limit that get an answer: the reason of the refusal, or the health check
 NETWORK_BITS = 64  # of an IPv6 address that one customer of a provider has
 
 Owed = Literal["head", "rest", "reading"]
@@ -39,7 +39,7 @@ log = logging.getLogger(__name__)
 class _Wait:
     owed: Owed
     since: float
-    enough: float  # bytes delivered in all with which it goes on
+    enough: float  # bytes delivered in all with which it counts as going on
 
 
 class Watch:
@@ -58,7 +58,7 @@ class Watch:
         self._waits = waits
 
     def _wait(self, connection: Any, now: float) -> _Wait | None:
-        """What a connection has been waiting for in vain, and since when."""
+        """What a connection waits for, and since when."""
         owed = _owed(connection)
         if owed is None:
             return None
@@ -82,9 +82,9 @@ class Room:
         self._is_proxy = lru_cache(4096)(self._within_proxies)
 
     def enter(self, connection: Any, connections: Collection[Any]) -> bool:
-        """Whether a new one may stay; `connections` has it already. One that rests makes room where there is none.
+        """Whether a new connection, already in `connections`, may stay. Where room is needed an idle one is closed.
 
-        False: it is to be refused. The one that was refused first is ended where too many of those are open.
+        False: refuse it. Where too many refused ones are open, the first of them is closed.
         """
         if len(connections) <= self._most // 2:
             return True
@@ -127,7 +127,7 @@ def _rest_order(connection: Any) -> tuple[int, float]:
 
 
 def _owed(connection: Any) -> Owed | None:
-    """What uvicorn's connection is waiting for from its client; None: for nothing, or for a next request."""
+    """What uvicorn's connection waits for from its client; None: for nothing, or for the next request."""
     if connection.transport.get_write_buffer_size():
         return "reading"
     if not _is_http(connection):  # a WebSocket has pings
@@ -145,7 +145,7 @@ def _least(connection: Any) -> float:
 
 
 def _is_http(connection: Any) -> bool:
-    """Whether it is no WebSocket's, as uvicorn has them."""
+    """Whether a connection of uvicorn's is HTTP and not a WebSocket."""
     return hasattr(connection, "cycle")
 
 
@@ -164,7 +164,7 @@ def _delivered(transport: Any) -> int:
 
 
 def _beside(connection: Any, connections: Collection[Any]) -> list[Any]:
-    """Those of the connections that come from the network of this one."""
+    """The connections that come from the same network as this one."""
     network = network_of(_address(connection))
     return [each for each in connections if network_of(_address(each)) == network]
 

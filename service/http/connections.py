@@ -18,12 +18,12 @@ from service.http.connection_limits import Room
 
 BACKLOG = 2048
 JOINED = 16 * 1024  # bytes; longer pieces are written as they are, as joining them would copy them
-# Bytes that may wait beside the largest piece. Answers and frames wait until what is before them was sent, but pongs
-# don't: uvicorn answers each ping at once, also those of a client that reads nothing.
+# Unsent bytes allowed besides the largest piece. Answers and frames wait for the bytes before them, but pongs do not:
+# uvicorn answers every ping at once, even for a client that reads nothing.
 MOST_BESIDE = 1 << 20
-# TCP's probes of a silent peer: one that vanished without a word is noticed after two minutes.
+# TCP keep-alive: a peer that vanished without closing is noticed after two minutes.
 PROBE_AFTER_S, PROBE_EVERY_S, PROBES = 60, 15, 4
-RESET = struct.pack("ii", 1, 0)  # SO_LINGER: closed at once, with a reset
+RESET = struct.pack("ii", 1, 0)  # SO_LINGER: close at once, with a reset
 
 log = logging.getLogger(__name__)
 
@@ -32,8 +32,8 @@ def listen(host: str, port: int) -> socket.socket:
     """A listening socket whose options each accepted connection inherits. Raises OSError."""
     family = socket.AF_INET6 if ":" in host else socket.AF_INET
     listener = socket.create_server((host, port), family=family, backlog=BACKLOG)
-    # asyncio does this only for sockets of a stated protocol. Without it an answer in two writes waits 40 ms for the
-    # client's delayed acknowledgement of the first.
+    # asyncio sets TCP_NODELAY only for sockets of a stated protocol. Without it an answer in two writes waits 40 ms
+    # for the client's delayed acknowledgement of the first.
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
     listener.setsockopt(socket.SOL_SOCKET, socket.SO_KEEPALIVE, 1)
     listener.setsockopt(socket.IPPROTO_TCP, socket.TCP_KEEPIDLE, PROBE_AFTER_S)
@@ -118,10 +118,10 @@ class JoinedWrites(asyncio.Transport):
 
 
 class Connection(H11Protocol):
-    """uvicorn's connection, with room for as many as there may be; head and body of an answer leave in one packet."""
+    """uvicorn's connection, bounded in number by `room`; head and body of an answer leave in one packet."""
 
     room: Room  # of all
-    refuse: ASGIApp  # answers those for which there is none
+    refuse: ASGIApp  # answers the connections for which there is no room
 
     def connection_made(self, transport: asyncio.Transport) -> None:  # type: ignore[override]
         self.began = time.monotonic()

@@ -1,7 +1,6 @@
-"""Large answers: sent in pieces, as the client takes them, from files that hold no memory.
+"""Large answers: sent in pieces, as the client takes them, from files and not from memory.
 
-Pictures are written one at a time for each client, so that a client that asks for many delays itself alone, and what
-one client does not fetch leaves room for others.
+Pictures are encoded one at a time for each client, so that a client that requests many delays only itself.
 """
 
 from __future__ import annotations
@@ -24,7 +23,7 @@ from service.problems import Unavailable
 from service.system.shares import Shares
 
 PIECE = 1 << 18  # bytes that are read and sent at a time
-AT_ONCE = 2  # pictures that are fetched from the renderer and written
+AT_ONCE = 2  # pictures that are fetched from the renderer and encoded at the same time
 ROOM = 4 << 30  # bytes on the disk of pictures that are being sent, of all clients
 RETRY_S = 10
 READ_ONLY = {errno.EACCES, errno.EPERM, errno.EROFS}
@@ -52,7 +51,7 @@ class Pieces:
 
 
 class FileAnswer(Response):
-    """The bytes of an open file, which need not have a name. `held` is kept until the answer's end."""
+    """The bytes of an open file, which need not have a name. A reference to `held` lasts until the answer's end."""
 
     def __init__(self, file: BinaryIO, media_type: str, headers: Mapping[str, str], held: object = None) -> None:
         self._file = file
@@ -77,7 +76,7 @@ class FileAnswer(Response):
 
 @asynccontextmanager
 async def present(receive: Receive) -> AsyncIterator[Callable[[], bool]]:
-    """Tells whether the client has gone away meanwhile; what it still sends is thrown away."""
+    """A function that says whether the client is still there; what it still sends is discarded."""
     listening = asyncio.ensure_future(disconnected(receive))
     try:
         yield lambda: listening.done() and listening.exception() is None
@@ -120,7 +119,7 @@ class Downloads:
     async def answer(
         self, client: str, data: bytes, media_type: str, headers: Mapping[str, str] | None = None
     ) -> Response:
-        """An answer that holds little memory: large ones come from a file. Raises Unavailable."""
+        """An answer that takes little memory: a large one is sent from a file. Raises Unavailable."""
         if len(data) <= PIECE:
             return Response(data, media_type=media_type, headers=headers)
 
@@ -137,14 +136,14 @@ class Downloads:
         return self._written.get(key)
 
     def admit(self, client: str, most_bytes: int) -> None:
-        """Raise TooManyRequests or Unavailable where that many more bytes are too much, for the client or for all.
+        """Raise TooManyRequests or Unavailable where `size` more bytes exceed the client's share or the room of all.
 
-        What is more than a quarter of the room is admitted like a quarter, so that a picture of any size can be sent.
+        A picture of more than a quarter of the room counts as a quarter, so that pictures of any size can be sent.
         """
         self._shares.check(client, min(most_bytes, ROOM // 4))
 
     def write(self, fill: Callable[[BinaryIO], None]) -> Written:
-        """A file that `fill` has written. For any thread. Raises Unavailable where the disk takes no more."""
+        """A file that `fill` has written. For any thread. Raises Unavailable where the disk is full."""
         try:
             file = self._new_file()
             fill(file)

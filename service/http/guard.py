@@ -39,13 +39,13 @@ CLOSE_CODES: dict[type[ServiceError], int] = {
     TooManyRequests: 4429,
     Unavailable: 4429,
 }  # of the stream
-HEALTH = "/healthz"  # answered always: an orchestrator restarts a server whose health check fails
-OPEN_OF_A_KEY = 128  # requests at a time, of which long-polls, event streams and streams are open for long
-REASON_CHARACTERS = 120  # a close frame holds 123 bytes of it
+HEALTH = "/healthz"  # always answered: an orchestrator restarts a server whose health check fails
+OPEN_OF_A_KEY = 128  # open requests of one key, long-polls, event streams and streams included
+REASON_CHARACTERS = 120  # a close frame has room for 123 bytes
 DEFAULT_PORTS = {"http": 80, "https": 443, "ws": 80, "wss": 443}
-LEAST_RATE, WITHIN_S = 1024, 30.0  # bytes a second of a body, on average over so many seconds of waiting for it
-LINGER_S, SILENT_S = 30.0, 2.0  # for a refused body: in all, and without a byte
-# Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are made.
+LEAST_RATE, WITHIN_S = 1024, 30.0  # bytes a second of a body, averaged over this many seconds of waiting for it
+LINGER_S, SILENT_S = 30.0, 2.0  # how long the rest of a refused body is read: in all, and without a byte
+# Scripts, styles and connections from this server only; pictures also from memory (blob:), where frames are decoded.
 CONTENT_POLICY = (
     "default-src 'self'; img-src 'self' blob: data:; object-src 'none'; "
     "base-uri 'none'; form-action 'none'; frame-ancestors 'self'"
@@ -152,9 +152,9 @@ class Guard:
 
 
 class _Body:
-    """Counts a body as it comes in: one of unannounced length is bounded too, and one that stalls is refused.
+    """Counts a body as it arrives: also one of unannounced length is bounded, and one that stalls is refused.
 
-    Whoever stores it bounds the sum of all bodies: of JSON in memory, and of uploads on the disk.
+    The sum of all bodies is bounded where they are stored: JSON in memory, uploads on the disk.
     """
 
     def __init__(self, config: Config, receive: Receive) -> None:
@@ -167,7 +167,7 @@ class _Body:
     async def receive(self) -> Message:
         """Raises TooLarge, TimedOut."""
         if self._ended:
-            return await self._receive()  # for the connection's end, which may take long
+            return await self._receive()  # waits for the connection's end, which may take long
         left_s = WITHIN_S - self._waited_s
         began = time.monotonic()
         try:
@@ -215,8 +215,8 @@ def _secured(send: Send, granted: str | None, close: bool = False) -> Callable[[
 
 
 def _lingering(send: Send, receive: Receive) -> Callable[[Message], Awaitable[None]]:
-    """Answers at once, and takes what still comes before the connection is closed: closed with bytes unread, TCP
-    resets it, and who is still sending loses the answer."""
+    """Answer at once, and read the rest of the body before the connection is closed: TCP resets a connection that is
+    closed with unread bytes, and a client that still sends would lose the answer."""
 
     async def sending(message: Message) -> None:
         if message["type"] != "http.response.body" or message.get("more_body", False):
@@ -262,7 +262,7 @@ async def _answer_preflight(send: Send, origin: str) -> None:
 async def _close(scope: Scope, receive: Receive, send: Send, code: int, reason: str) -> None:
     """Accept a stream, so that a browser tells its page the close code, and close it."""
     await receive()
-    # A browser fails the handshake when none of its offers is taken; a key is not to be sent back.
+    # A browser fails the handshake unless one of its protocols is chosen; a key must not be sent back.
     offered = [offer for offer in scope.get("subprotocols", []) if not offer.startswith(PROTOCOL)]
     await send({"type": "websocket.accept", "subprotocol": offered[0] if offered else None})
     await send({"type": "websocket.close", "code": code, "reason": reason[:REASON_CHARACTERS]})

@@ -25,7 +25,7 @@ class Keys:
         shown = [bearer.strip()] if scheme.lower() == "bearer" else []
         shown += [protocol.removeprefix(PROTOCOL) for protocol in protocols if protocol.startswith(PROTOCOL)]
         for key in shown:
-            # Each key is compared, wherever it differs, in the same time.
+            # Every comparison takes the same time, wherever the keys differ.
             matches = [hmac.compare_digest(key.encode(), known) for known in self._keys]
             if any(matches):
                 return sha256(self._keys[matches.index(True)]).hexdigest()[:16]

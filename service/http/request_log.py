@@ -14,7 +14,7 @@ from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
 from service.problems import Internal, ServiceError
 
-GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # of a proxy before us; another text is not taken into the logs
+GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # an id that a proxy or client sent; any other text is not logged
 ID_BYTES = 9
 ASKED_ALL_THE_TIME = ("/healthz", "/readyz", "/metrics")
 

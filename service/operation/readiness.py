@@ -22,7 +22,7 @@ SCENE: dict[str, Any] = {
 }
 SETTINGS = {"width": 8, "height": 8}
 PATIENCE_S = 10.0
-GOOD_S = 5.0  # how long an answer is valid: frequent checks then take no time from renders
+GOOD_S = 5.0  # how long an answer is reused, so that frequent checks take no time from renders
 SOFTWARE = "The renderer runs on the processor, and SUNBOX_REQUIRE_GPU asks for a GPU: {renderer}"
 
 
@@ -37,8 +37,8 @@ class Readiness:
         self._asking = asyncio.Lock()
 
     async def check(self) -> None:
-        """Return where a picture can be rendered now. Raises Unavailable with the reason where not."""
-        async with self._asking:  # a check that comes meanwhile gets the same answer
+        """Return if a picture can be rendered now. Raises Unavailable with the reason if not."""
+        async with self._asking:  # a concurrent check gets the same answer
             renderer = await self._renderers.ready(0)
             if self._require_gpu and renderer.get("software"):
                 raise Unavailable(SOFTWARE.format(renderer=renderer["renderer"]), 30)
@@ -47,7 +47,7 @@ class Readiness:
                 self._renderer, self._good_until = renderer, time.monotonic() + GOOD_S
 
     async def _render(self) -> None:
-        """Raises Unavailable where no picture can be rendered, or a wrong one is."""
+        """Raises Unavailable if no picture can be rendered, or a wrong one is."""
         try:
             if self._packed is None:
                 self._packed = await packing(lambda: self._reader.pack(self._reader.scene(SCENE)))

@@ -17,7 +17,7 @@ class Traffic:
         self.seconds = Distribution()
 
     def heard(self, method: str, route: str, status: int, seconds: float) -> None:
-        """`route` is the address's pattern, "" for none: addresses themselves would be endless."""
+        """Count a request. `route` is the address's pattern, "" for none: the number of addresses is unbounded."""
         known = method if method in METHODS else "OTHER"
         self.count[known, route or "other", str(status)] += 1
         if known != "WEBSOCKET":

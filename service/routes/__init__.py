@@ -1,12 +1,12 @@
 """The endpoints: a handler parses, asks, answers. What they share is `service.state`.
 
-renders      renders asked for over REST
+renders      renders over REST
 submission   how a request for a render becomes one that waits
 events       the progress of renders as server-sent events
-waiting      waiting as long as whoever asks is there
+waiting      waits that end when the client goes away
 stream       the stream's WebSocket
 materials    a material turned into another model
-bsdf         a material's BSDF as numbers
+bsdf         values of a material's BSDF
 assets       uploads
 documents    saved scenes and materials
 presets      built-in documents

@@ -26,10 +26,10 @@ from service.system.executors import opening, storing, storing_small
 
 router = APIRouter(prefix="/v1/assets", tags=["assets"])
 
-FOREVER = "{}, max-age=31536000, immutable"  # an id is the hash of what it names
+FOREVER = "{}, max-age=31536000, immutable"  # the bytes of an id never change: it is their hash
 BYTES = "application/octet-stream"
 SMALL_ASSET = 1 << 20  # bytes of a file that seldom takes longer than its hash and its record
-HEADER_BYTES = 4096  # proxies refuse headers not much longer
+HEADER_BYTES = 4096  # proxies refuse headers that are much longer
 
 
 @router.post(
@@ -50,7 +50,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
     file = await asyncio.to_thread(state.assets.incoming)
 
     def add() -> AssetInfo:
-        with file:  # here: a request that is cancelled does not wait for this thread
+        with file:  # closed in this thread: a cancelled request does not wait for it
             info = state.assets.add(file, kind, filename, partial(state.shares.room, owner))
         state.shares.uploaded(owner, state.assets.parts(info))
         return info
@@ -114,10 +114,10 @@ async def download(request: Request, id: answers.AssetId) -> Response:
 
     with ExitStack() as stack:
         source = await opening(partial(find, stack), caller_of(request))
-        # A cache that many share would answer other keys.
+        # A shared cache would answer other keys, too.
         cached = FOREVER.format("private" if owner else "public")
         headers = {"content-disposition": "attachment", "cache-control": cached}
         if isinstance(source, bytes):
             return Response(source, media_type=BYTES, headers=headers)
-        # A description of its own: the file stays open, whatever becomes of the asset meanwhile.
+        # A descriptor of its own: the file stays readable even if the asset is deleted meanwhile.
         return FileAnswer(os.fdopen(os.dup(source.fileno()), "rb"), BYTES, headers)

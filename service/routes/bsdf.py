@@ -1,4 +1,4 @@
-"""What a material's BSDF is, as numbers: from the functions that render."""
+"""Values of a material's BSDF, from the functions that render."""
 
 from __future__ import annotations
 
@@ -23,9 +23,9 @@ from service.system.executors import packing
 
 router = APIRouter(prefix="/v1/bsdf", tags=["materials"])
 
-AT_ONCE = 1 << 12  # numbers that are written in a few milliseconds
-PIECE = 1 << 10  # numbers that are written without giving way to other requests
-LOBES_PIECE = PIECE // 16  # directions whose specular lobes are written so
+AT_ONCE = 1 << 12  # numbers that are encoded at once, in a few milliseconds
+PIECE = 1 << 10  # numbers that are encoded before other requests get a turn
+LOBES_PIECE = PIECE // 16  # the same for specular lobes, in directions
 
 Arrays = dict[str, np.ndarray]
 

@@ -1,4 +1,4 @@
-"""openapi.json: what FastAPI knows of the routes, with the schemas of documents and the form of every refusal."""
+"""openapi.json: FastAPI's description of the routes, with the schemas of documents and of every refusal."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from service.routes.answers import PROBLEM, Problem
 
 HERE, THERE = "#/$defs/", "#/components/schemas/"
 
-# What programs that are generated from the description call the calls.
+# Operation ids: generated clients name their functions by them.
 NAMES = {
     "GET /healthz": "isAlive",
     "GET /readyz": "isReady",
@@ -48,7 +48,7 @@ OF_FILE, WRITTEN_OUT = ("asset",), ("vertices", "faces", "normals", "uvs", "colo
 
 
 def describe(app: FastAPI, keyed: bool) -> None:
-    """Make `app` describe itself; `keyed`: calls need a key."""
+    """Make `app` serve this description; `keyed`: calls need a key."""
     app.openapi = partial(_described, app, keyed)  # type: ignore[method-assign]
 
 

@@ -25,7 +25,7 @@ from service.system.executors import saving
 router = APIRouter(prefix="/v1/documents", tags=["documents"], responses=answers.problems(503))
 
 JSON = "application/json"
-# Neither slashes nor what moves the text around it, in a menu or a log: control characters, and marks of direction.
+# No slashes, and nothing that moves the text around it in a menu or a log: control characters, direction marks.
 NAME = r"^[^\x00-\x1f\x7f-\x9f/\u200e\u200f\u2028-\u202e\u2066-\u2069]+$"
 
 Name = Annotated[

@@ -14,7 +14,7 @@ from starlette.types import Scope
 from service.problems import FieldError, InvalidDocument, ServiceError, Unauthorized, answer, problem
 
 MEDIA_TYPE = "application/problem+json"
-GONE = 499  # nginx's status, for logs and metrics, of a request whose sender went away; nobody receives it
+GONE = 499  # nginx's status for a request whose client went away; it appears only in logs and metrics
 
 
 def respond(error: Exception) -> Response:
@@ -57,7 +57,7 @@ async def _unrouted(request: Request, error: Exception) -> Response:
     status, title, headers = error.status_code, error.detail, error.headers
     if status in (404, 405) and (
         allowed := _allowed(request)
-    ):  # files stand behind all routes, and know none of them
+    ):  # the mount of files is tried after all routes and does not know their methods
         status, title, headers = 405, "Method Not Allowed", {"allow": ", ".join(allowed)}
     body = {
         "type": "about:blank",

@@ -1,7 +1,7 @@
 """The progress of renders as server-sent events (the HTML standard, section 9.2).
 
-Starlette's StreamingResponse carries them: sse-starlette would add a dependency and a way of its own to watch for the
-server's end, and what is left to do here is to write two lines.
+Starlette's StreamingResponse sends them: sse-starlette would save two lines, and add a dependency that watches for
+the server's end in its own way.
 """
 
 from __future__ import annotations
@@ -21,17 +21,17 @@ from service.routes.waiting import place
 from service.state import app_state, bodiless, caller_of
 
 MIME = "text/event-stream"
-BETWEEN_S = 0.1  # two events of one render: of the contract, ten a second at most
+BETWEEN_S = 0.1  # between two events of one render; docs/operation.md promises ten a second at most
 AT_ONCE = 20  # events of several renders within that time: 200 KB/s, 1 % of a core
-KEEP_ALIVE_S = 15.0  # without an event, after which a comment keeps proxies from closing the connection
+KEEP_ALIVE_S = 15.0  # after this time without an event a comment keeps proxies from closing the connection
 KEEP_ALIVE = b": still there\n\n"
-# A client that reads slowly gets fewer events, and the newest: the next one is written when the network has taken the
-# one before. One that takes nothing is ended by the watch on all connections.
+# A client that reads slowly gets fewer and the newest events: the next one is written when the network has taken the
+# one before. connection_limits ends connections that take nothing.
 HEADERS = {"cache-control": "no-store", "x-accel-buffering": "no"}
 
 
 class _Counted(StreamingResponse):
-    """Takes one of the caller's places for as long as it is sent."""
+    """Occupies one of the caller's places while it is being sent."""
 
     def __init__(self, request: Request, events: AsyncIterator[bytes]) -> None:
         self._place = place(request)
@@ -53,7 +53,7 @@ def of_all(request: Request, renders: RenderQueue, owner: str, label: str | None
 
 
 def _answer(request: Request, events: AsyncIterator[bytes]) -> Response:
-    """At once where the request asks for the head only. Raises TooManyRequests, Unavailable."""
+    """The answer that streams these events; without them for a HEAD request. Raises TooManyRequests, Unavailable."""
     if bodiless(request):
         return Response(media_type=MIME, headers=HEADERS)
     app_state(request).waits.check(caller_of(request))

@@ -25,15 +25,14 @@ PAGE = 4096  # bytes, of /proc/PID/statm
 
 
 async def scrape(state: AppState, traffic: Traffic) -> bytes:
-    """One scrape. What changes on the event loop is read there, between two changes; a thread reads the disk and
-    writes the text."""
+    """The metrics as text. The loop's own state is read on the event loop; a thread reads the disk and writes."""
     await measuring(_prepare)
     found = _of_the_loop(state, traffic)
     return await measuring(partial(_written, found, state))
 
 
 def _prepare() -> None:
-    """Import what writes metrics, which is not imported at the start."""
+    """Import the library that writes metrics, which the start does without."""
     import prometheus_client.core  # noqa: F401
 
 
@@ -153,7 +152,7 @@ def _memory(state: AppState, members: Sequence[Member]) -> Iterator[Metric]:
 
 
 def _disk(state: AppState) -> Iterator[Metric]:
-    with suppress(Unavailable, OSError):  # the disk fails: all other metrics are still given
+    with suppress(Unavailable, OSError):  # where the disk fails, all other metrics are still sent
         stored = state.quota.used()
         yield _gauge("data_bytes", "Assets, documents and renders on the disk, in whole blocks.", stored.bytes)
         yield _gauge("data_files", "Files of assets, documents and renders.", stored.files)
@@ -221,7 +220,7 @@ def _each(members: Sequence[Member], value: Callable[[Statistics], float]) -> di
 def _each_of(
     members: Sequence[Member], values: Callable[[Statistics], Mapping[Any, float]]
 ) -> dict[tuple[str, str], float]:
-    """By renderer, and by what the renderer's own are by."""
+    """By renderer, and by the labels of the renderer's own counts."""
     return {
         (member.place.id, key): float(value) for member in members for key, value in values(member.statistics).items()
     }

@@ -1,4 +1,4 @@
-"""Pictures: asked for in one shot, or started, watched, looked at and cancelled."""
+"""Renders: answered at once, or started, watched, read and cancelled."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ Wait = Annotated[
 ]
 Kernel = Annotated[bool, Query(description="Answer with what the kernel was compiled for, too.")]
 Label = Annotated[str | None, Query(max_length=LONGEST_LABEL, description="Exactly this label.")]
-FLOAT_BYTES = 4  # of a number in a layer, as the renderer gives it
+FLOAT_BYTES = 4  # of a number in a layer, as the renderer sends it
 FILES = answers.files(*(images.FORMATS[name].mime for name in get_args(FileFormat)))
 
 
@@ -67,7 +67,7 @@ class Bits(IntEnum):
 
 
 class ImageQuery(BaseModel):
-    """How an image is written. EXR, npy and HDR hold linear values; exposure and tone map are for the others."""
+    """How an image is encoded. EXR, npy and HDR store linear values; exposure and tone map apply to the others."""
 
     model_config = ConfigDict(extra="forbid", allow_inf_nan=False)
     format: FileFormat = "png"

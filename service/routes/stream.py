@@ -16,7 +16,7 @@ router = APIRouter()
 
 SUBPROTOCOL = "sunbox.v1"
 CLOSE_CODES: dict[type[ServiceError], int] = {NotFound: 4404, TooManyRequests: 4429}
-REASON_CHARACTERS = 100  # a close frame holds 123 bytes of it
+REASON_CHARACTERS = 100  # a close frame has room for 123 bytes
 
 
 @router.websocket("/v1/stream")
@@ -38,7 +38,7 @@ async def stream(socket: WebSocket) -> None:
             state.sessions.leave(session)
     except WebSocketDisconnect:
         return
-    except RuntimeError:  # of Starlette, for what was to be sent when the connection had just been closed
+    except RuntimeError:  # Starlette raises it for a message to a connection that was closed meanwhile
         if socket.application_state is not WebSocketState.DISCONNECTED:
             raise
 

@@ -1,4 +1,4 @@
-"""A request for a render becomes a render that waits: read, validated, packed once, and stored."""
+"""A request for a render becomes a render in the queue: read, validated, packed once, and stored."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ from service.state import STARTING_S, AppState, app_state, caller_of, owner_of
 from service.storage.quota import Quota
 from service.system.executors import opening, packing
 
-ID_BYTES = 16  # 128 bits: an id cannot be guessed; as hex digits: none of them reads as an option in a shell
+ID_BYTES = 16  # 128 bits cannot be guessed; hex digits never look like an option in a shell
 LONGEST_KEY = 200  # characters
 
 _turns: weakref.WeakValueDictionary[tuple[int, str, str], asyncio.Lock] = weakref.WeakValueDictionary()
 
 
 async def one_shot(request: Request) -> Job:
-    """A render that waits for its turn, and is not listed."""
+    """A queued render that is not listed."""
     began, state = time.monotonic(), app_state(request)
     parsed = await _parsed(request, "request")
     job = await _packed(state, parsed, owner_of(request), began)
@@ -39,7 +39,7 @@ async def one_shot(request: Request) -> Job:
 
 
 async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
-    """A render that waits for its turn, or the one of before with this key: a status where it is gone."""
+    """A queued render, or the earlier one with this idempotency key: its status where it is gone."""
     began, state, owner = time.monotonic(), app_state(request), owner_of(request)
     if key is None:
         return await _submitted(state, await _parsed(request, "render"), owner, began)
@@ -81,7 +81,7 @@ async def _submitted(
 
 
 async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: float) -> Job:
-    """Packing is the last test that a scene has to pass; if it has to wait, it is packed again for its turn."""
+    """Packing is the last test that a scene has to pass; a render that has to wait is packed again at its turn."""
     packed = await packing(partial(state.reader.pack, parsed.scene, owner=owner))
     id, document = secrets.token_hex(ID_BYTES), parsed.document
     order = Order(id, owner, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))
@@ -89,7 +89,7 @@ async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: flo
 
 
 def _known(state: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job | dict[str, Any]:
-    """A render that the same request gave before. Where it is gone, only its state is stored."""
+    """The render that an equal request made earlier. Where it is gone, only its status is stored."""
     try:
         return state.render_queue.get(stored.order.id, stored.order.owner)
     except ServiceError:
@@ -97,13 +97,14 @@ def _known(state: AppState, stored: StoredRender, parsed: ParsedRequest) -> Job 
 
 
 def _turn(state: AppState, owner: str, key: str) -> asyncio.Lock:
-    """A lock that lets in one request at a time of a key: another one waits until it is accepted or refused."""
+    """A lock for one idempotency key: a second request waits until the first is accepted or refused."""
     return _turns.setdefault((id(state), owner, key), asyncio.Lock())
 
 
 @asynccontextmanager
 async def _pinned(quota: Quota, ids: Collection[str]) -> AsyncIterator[None]:
-    """The assets stay while it lasts. Making room may have the quota's lock for seconds, so threads wait for it."""
+    """A context in which these assets are not deleted. A thread waits for the quota's lock, as that may take
+    seconds."""
     if not ids:
         yield
         return

@@ -1,4 +1,4 @@
-"""Waiting for a render, a question or an event, as long as whoever asks is there."""
+"""Waits for a render, a question or an event that end when the client goes away."""
 
 from __future__ import annotations
 
@@ -14,8 +14,8 @@ from service.state import app_state, caller_of
 
 
 async def until(request: Request, ending: Awaitable[Any], seconds: float | None = None) -> bool:
-    """Return when `ending` has ended, after `seconds`, or when the client has gone: False. `ending` is cancelled
-    where it has not ended then, and no task of this stays behind. Raises what `ending` raises."""
+    """Wait for `ending`, at most `seconds`; False if the client went away before. If `ending` has not ended then, it
+    is cancelled; no task stays behind. Raises what `ending` raises."""
     ended = asyncio.ensure_future(ending)
     gone = asyncio.ensure_future(disconnected(request.receive))
     try:
