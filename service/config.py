@@ -62,7 +62,8 @@ def _default_data_dir() -> Path:
 
 
 class Config(BaseSettings):
-    """Each field is read from SUNBOX_ and its name in capitals; the descriptions are the README's table."""
+    """Each field is read from SUNBOX_ and its name in capitals; the descriptions are the table of
+    docs/operation.md."""
 
     model_config = SettingsConfigDict(env_prefix="SUNBOX_", frozen=True, extra="ignore")
 
@@ -197,7 +198,7 @@ class Config(BaseSettings):
     max_running: int = Field(
         8,
         ge=1,
-        description="Most renders at a time; others wait in line, and have [their turn](docs/operation.md#fairness) "
+        description="Most renders at a time; others wait in line, and have [their turn](#fairness) "
         "also where these are endless.",
     )
     max_queue: int = Field(
@@ -353,7 +354,7 @@ def _said(message: str) -> str:
 
 
 def table() -> str:
-    """The README's table of variables, in Markdown."""
+    """The table of variables in docs/operation.md, in Markdown."""
     lines = ["| variable | default | |", "|---|---|---|"]
     for name, field in Config.model_fields.items():
         lines.append(f"| `SUNBOX_{name.upper()}` | {_told(field.get_default())} | {field.description} |")
