@@ -17,8 +17,8 @@ Group = Literal["Base", "Specular", "Coat", "Sheen", "Transmission", "Subsurface
 # of a cosine, that of half vectors or that of mirrored directions.
 Width = Literal["roughness", "alpha", "exponent", "mirrored exponent"]
 
-REFUSAL = "refusal"  # the type of our own errors among pydantic's
-MOST_MISTAKES = 100  # that are searched for in one document: a list of ten thousand wrong spheres only repeats itself
+REFUSAL = "refusal"  # the type, among pydantic's errors, of those that our validators raise
+MOST_MISTAKES = 100  # after which the search ends: a list of ten thousand wrong spheres only repeats itself
 
 
 class Model(BaseModel):
@@ -30,9 +30,9 @@ class Model(BaseModel):
     @model_validator(mode="before")
     @classmethod
     def _without_most_unknown_names(cls, value: Any) -> Any:
-        """Leaves enough unknown names to refuse the object: pydantic makes an error of each, of a hundred thousand
-        too, and lets no other thread run meanwhile."""
-        if not isinstance(value, dict) or len(value) <= MOST_MISTAKES:  # nearly always, and `model_fields` takes time
+        """Drop unknown names beyond those that suffice to refuse the object: pydantic makes an error of each, even of
+        a hundred thousand, and lets no other thread run meanwhile."""
+        if not isinstance(value, dict) or len(value) <= MOST_MISTAKES:  # the usual case; `model_fields` takes time
             return value
         fields = cls.model_fields
         if len(value) <= len(fields) + MOST_MISTAKES:
@@ -42,7 +42,7 @@ class Model(BaseModel):
 
 
 def refusal(detail: str, at: str = "") -> PydanticCustomError:
-    """The error for a validator to raise; `at` is a JSON pointer from the value that it looks at."""
+    """The error for a validator to raise; `at` is a JSON pointer from the validated value."""
     return PydanticCustomError(REFUSAL, "{detail}", {"detail": detail, "at": at})
 
 
@@ -70,7 +70,8 @@ def hint(
     """The editor's hints for a field, as metadata for Annotated.
 
     `group` is the part of a material that the field belongs to. `soft` is where a slider ends whose range goes on,
-    or both its ends; `default` is given where the model's is None. For a field that may be left out: `absent` is a
+    or both its ends; `default`: shown in the schema where the field's own
+    default is None. For a field that may be left out: `absent` is a
     word for what holds then; `follows` names the field, of the range 0 to 1, that sets it then, and how. `ranges`
     names a field with a choice, and the range for each of its values; `used` the choices with which the field has a
     meaning, and `example` is what it begins with there. `highlight` says in what sense the field is the width of the
@@ -119,5 +120,5 @@ def _without_null(source: Any, handler: GetCoreSchemaHandler) -> CoreSchema:
     return handler(kind)
 
 
-# On `T | None = None`: the field may be left out, but null is no value for it (a merge patch leaves out by null).
+# On `T | None = None`: the field may be left out, but null is no value for it (in a merge patch null removes).
 OMITTABLE = GetPydanticSchema(_without_null)

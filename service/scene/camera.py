@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 from service.scene.base import OMITTABLE, Model, hint, refusal
 from service.scene.numbers import Direction, Length, Point, PositiveLength
 
-# Below this sine of the angle between up and the view, float64 rounding of coordinates of 1e9 decides what is up.
+# Below this sine of the angle between up and the view the rounding of float64 coordinates of 1e9 decides what is up.
 LEAST_SINE = 1e-7
 
 

@@ -1,4 +1,5 @@
-"""Colours: three linear Rec.709 numbers, one number for grey, or "#rrggbb" in sRGB. Linear triples once validated."""
+"""Colours: three linear Rec.709 numbers, one number for grey, or "#rrggbb" in sRGB. Validation gives linear
+triples."""
 
 from __future__ import annotations
 

@@ -87,7 +87,7 @@ def parse_scene(
     fields = document if isinstance(document, dict) else {}
     held = {name: fields[name] for name, kind in _KINDS.items() if isinstance(fields.get(name), kind)}
     errors = _too_many(held, limits)
-    if errors:  # nothing in there is looked at
+    if errors:  # its entries are not validated
         raise InvalidDocument(errors).under(pointer)
     # The scene's entries are validated one by one, and the rest of the scene without them.
     head = {**document, **{name: type(entries)() for name, entries in held.items()}} if held else document
@@ -113,7 +113,7 @@ def _too_many(held: dict[str, Any], limits: Limits | None) -> list[FieldError]:
 
 
 def _part(name: str, entries: Any, before: Parsed | None, errors: list[FieldError]) -> Any:
-    """The entries as they are understood; adds the mistakes in them to `errors`."""
+    """The validated entries; adds the mistakes in them to `errors`."""
     old: Any = None if before is None else before.document.get(name)
     made: Any = None if before is None else getattr(before.scene, name)
     if entries is old:
@@ -129,13 +129,14 @@ def _part(name: str, entries: Any, before: Parsed | None, errors: list[FieldErro
 
 
 def _place(error: FieldError) -> int:
-    """Where its field stands in the scene; unknown ones come last."""
+    """The position of the error's field in the scene; unknown fields come last."""
     first = error.pointer.split("/", 2)[1:2]
     return next((i for i, name in enumerate(Scene.model_fields) if [name] == first), len(Scene.model_fields))
 
 
 def _dangling(document: Any) -> Iterator[FieldError]:
-    """Names of what is not there; looked for in the raw document, so that other mistakes don't hide them."""
+    """Errors for references to missing entries, searched in the raw document so that other mistakes do not hide
+    them."""
     if not isinstance(document, dict):
         return
     materials, shapes, textures = (document.get(key) for key in ("materials", "shapes", "textures"))

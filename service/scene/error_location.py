@@ -1,7 +1,7 @@
-"""Pydantic's path of an error, without the steps that the document does not have.
+"""Pydantic's path of an error, without the steps that are not in the document.
 
-Pydantic puts the name of the chosen member behind every union: ("shapes", 3, "sphere", "radius"). Only the types tell
-such a tag from a field or from somebody's material named "sphere", so the path is walked along them.
+Pydantic adds the tag of the chosen member behind every union: ("shapes", 3, "sphere", "radius"). Only the types tell
+a tag from a field, or from a material named "sphere", so the path is followed along them.
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ def _bare(kind: Any) -> Any:
 
 
 def _tags(kind: Any) -> tuple[Any, ...]:
-    """What pydantic may call this member of a union: its Tag, or the values of its `type`."""
+    """The names that pydantic may use for this member of a union: its Tag, or the values of its `type`."""
     named = tuple(extra.tag for extra in getattr(kind, "__metadata__", ()) if isinstance(extra, Tag))
     fields = getattr(_bare(kind), "model_fields", {})
     values = get_args(fields["type"].annotation) if "type" in fields else ()

@@ -20,8 +20,8 @@ WORDS = {2: "two", 3: "three", 4: "four"}
 
 
 def _rows(value: Any, low: float, high: float, example: str, width: int = 3, to_number: bool = False) -> np.ndarray:
-    """(n, width) float64, read-only. Refuses with the pointer of the first bad row; `to_number`: of the number in it
-    that is bad, where the rest of the row is right."""
+    """(n, width) float64, read-only. An error has the pointer of the first bad row; with `to_number` that of the bad
+    number, where the rest of the row is right."""
     bounds = f"between {low:.10g} and {high:.10g}"
     if not isinstance(value, list | tuple | np.ndarray):
         raise refusal(f"must be an array of rows like {example}, not {described(value)}")
@@ -34,7 +34,7 @@ def _rows(value: Any, low: float, high: float, example: str, width: int = 3, to_
     except (OverflowError, ValueError):  # a whole number beyond float64
         i, j = next((i, j) for i, row in enumerate(value) for j, x in enumerate(row) if abs(x) > high)
         raise refusal(f"must be {bounds}", at=_place(i, j, to_number)) from None
-    good = (array >= low) & (array <= high)  # NaN is neither
+    good = (array >= low) & (array <= high)  # false for NaN
     if not good.all():
         i, j = np.argwhere(~good)[0].tolist()
         raise refusal(f"must be {bounds}, not {described(value[i][j])}", at=_place(i, j, to_number))
@@ -47,7 +47,7 @@ def _place(i: int, j: int, to_number: bool) -> str:
 
 
 def _check_kinds(rows: Any, example: str, width: int, to_number: bool) -> None:
-    # Sets of types: one pass in C each, and a fault is searched for only where there is one.
+    # Sets of types take one pass in C; the fault is searched for only where there is one.
     good = (
         set(map(type, rows)) <= {list, tuple}
         and set(map(len, rows)) == {width}
@@ -130,7 +130,7 @@ _COLOR_ROW = {"type": "array", "items": {"type": "number", "minimum": 0, "maximu
 
 Points = _type(_points, vector_schema())
 Directions = _type(_directions, vector_schema())
-# Those of a question, in which somebody wrote each number: refused with the pointer of the number.
+# The directions of a question, written by hand: an error has the pointer of the number.
 QuestionDirections = _type(partial(_directions, to_number=True), vector_schema())
 Triangles = _type(_indices, _INDEX_ROW)
 Coordinates = _type(_coordinates, _UV_ROW)

@@ -39,7 +39,8 @@ def is_number(value: object) -> bool:
 
 
 def check_number(value: Any, low: float, high: float, name: str = "") -> float:
-    """`value` as a float; refuses anything but a number within the range. `name` says which of several it is."""
+    """`value` as a float. Raises an error unless it is a number within the range, called `name` if there are
+    several."""
     subject = name and name + " "
     if not is_number(value):
         raise refusal(f"{subject}must be a number, not {described(value)}")

@@ -9,7 +9,7 @@ Step = str | int
 
 
 def places(scene: Any) -> Iterator[tuple[tuple[Step, ...], str]]:
-    """Where a document (valid or not) refers to an asset, step by step, and to which."""
+    """The path of each reference to an asset in a document, which need not be valid, and the asset."""
     if not isinstance(scene, dict):
         return
     holders: list[tuple[tuple[Step, ...], Any]] = [(("environment",), scene.get("environment"))]
@@ -32,7 +32,7 @@ def references(scene: Any) -> list[str]:
 
 
 def renamed(scene: Any, name: Callable[[str], str]) -> Any:
-    """The document with other names for its assets; what need not differ is shared with the one given."""
+    """The document with other names for its assets; unchanged parts are shared with the given one."""
     if not isinstance(scene, dict):
         return scene
     copies: dict[tuple[Step, ...], Any] = {(): scene.copy()}

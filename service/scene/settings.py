@@ -12,7 +12,7 @@ from service.scene.base import OMITTABLE, Model, hint
 from service.scene.numbers import BRIGHTEST, LARGEST
 from service.scene.validation import validated
 
-# The knobs of quality "balanced", which are the defaults; service.quality has the other presets.
+# The knobs of the quality "balanced" are the defaults; service.quality has the other presets.
 BALANCED: dict[str, Any] = {"max_samples": 256, "max_bounces": 8, "roulette_depth": 3, "resolution_scale": 1.0}
 
 Size = Annotated[int, Field(ge=1)]

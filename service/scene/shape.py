@@ -68,7 +68,7 @@ class BoxShape(_Placed):
     @model_validator(mode="after")
     def _has_volume(self) -> Self:
         for axis, low, high in zip("xyz", self.min, self.max, strict=True):
-            # As float32, which is what is traced: a box may also be too thin for its distance from the origin.
+            # In float32, as the box is traced: it may be too thin for its distance from the origin.
             if not np.float32(low) < np.float32(high):
                 raise refusal(f"max must be above min on every axis; on {axis} they are {high!r} and {low!r}")
         return self
@@ -143,7 +143,7 @@ class MeshShape(_Placed):
         return self
 
     def has_its_vertices(self) -> bool:
-        """Whether written faces name vertices that are there, in arrays of the right form."""
+        """Check that written faces name existing vertices, in arrays of the right form."""
         vertices, faces = self.vertices, self.faces
         if vertices is None or faces is None or vertices.dtype != np.float64 or faces.dtype != np.int32:
             return False

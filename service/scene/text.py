@@ -10,7 +10,7 @@ from typing import Any
 
 from service.problems import MalformedJson
 
-DEEPEST = 64  # containers within containers: a scene has six; deeper ones would exhaust the stack further on
+DEEPEST = 64  # nested containers: a scene has six; deeper texts would exhaust the stack later
 LARGE = 64 * 1024  # characters whose parsing keeps every other thread waiting for 10 ms
 
 _one_large = threading.Lock()
@@ -19,8 +19,8 @@ _one_large = threading.Lock()
 def load_json(data: bytes | bytearray | memoryview | str) -> Any:
     """The value of a JSON text in UTF-8.
 
-    Raises MalformedJson. NaN, Infinity and numbers beyond float64 do become floats: validation refuses them with the
-    pointer of their field, which is of more use than a line and a column.
+    Raises MalformedJson. NaN, Infinity and numbers beyond float64 are accepted as floats: validation refuses them
+    with the pointer of their field, which is more useful than a line and a column.
     """
     text = _decoded(data)
     # The scanner is written in C and lets no other thread run where there are no objects. One text at a time,
@@ -34,7 +34,7 @@ def load_json(data: bytes | bytearray | memoryview | str) -> Any:
 
 
 def most_bytes(text: bytes | bytearray | str) -> int:
-    """Memory that the values of a JSON text can take at most, judged by its punctuation alone.
+    """An upper bound, from the punctuation alone, on the bytes of memory of a JSON text's values.
 
     Up to 70 times the text: a list takes 96 bytes with its place in another one, a number or an empty string 40 with
     its own, an object 200, a key 110 with its value. ASCII; other characters take four bytes where they took two.
@@ -47,7 +47,7 @@ def most_bytes(text: bytes | bytearray | str) -> int:
 
 
 def weigh(value: Any) -> int:
-    """Memory that a JSON value takes, by the same measure."""
+    """The bytes of memory of a JSON value, by the same rules."""
     bytes_, waiting = 0, [value]
     while waiting:
         found = waiting.pop()

@@ -1,4 +1,4 @@
-"""Pictures on surfaces: textures by name, and the references to them that materials hold."""
+"""Pictures on surfaces: textures by name, and the references to them in materials."""
 
 from __future__ import annotations
 

@@ -53,7 +53,7 @@ def _matrix(value: Any) -> Matrix:
         raise refusal(f"must be 16 numbers, row by row, not {described(value)}")
     if len(value) != 16:
         raise refusal(f"must be 16 numbers, row by row, not {len(value)}")
-    # The quick way first, and numpy nowhere: a model may have 60 000 of them.
+    # Quick and without numpy: a model may have 60 000 transforms.
     if {*map(type, value)} <= {float, int} and abs(max(value, key=abs)) <= LARGEST:
         numbers = tuple(map(float, value))
     else:

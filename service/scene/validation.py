@@ -32,10 +32,10 @@ def validated(adapter: TypeAdapter[T], document: Any, pointer: str) -> T:
 def validated_entries(
     adapter: TypeAdapter[T], entries: Iterable[tuple[int | str, Any]], known: Callable[[int | str, Any], T | None]
 ) -> tuple[dict[int | str, T], list[FieldError]]:
-    """What `adapter` makes of each entry of an array or object, and the mistakes, seen from that.
+    """The validated entries of an array or object, and the mistakes, with pointers from it.
 
-    The search ends once there are MOST_MISTAKES. `known` gives what was made of an entry before, which saves doing it
-    again. One at a time, because pydantic keeps the errors of them all (1 KiB each) and lets no thread run meanwhile.
+    The search ends at MOST_MISTAKES. `known` gives the earlier result for an unchanged entry. Entries are validated
+    one at a time, because pydantic stores all errors (1 KiB each) and lets no other thread run meanwhile.
     """
     made: dict[int | str, T] = {}
     found: list[FieldError] = []
@@ -66,7 +66,7 @@ def mistakes(error: ValidationError, kind: Any) -> list[FieldError]:
         if pointer.endswith("/type") and entry["type"] in _WRONG_KIND:
             kinds.add(pointer)
         found.setdefault(pointer + entry.get("ctx", {}).get("at", ""), (entry, place))
-    # What kind of thing it is comes first: under a wrong type every other field may look wrong.
+    # Errors of `type` come first: under a wrong type every other field may look wrong.
     holders = {pointer.removesuffix("type") for pointer in kinds}
     kept = (pointer for pointer in found if pointer in kinds or not _is_below(pointer, holders))
     return [FieldError(pointer, _detail(*found[pointer])) for pointer in islice(kept, MOST_MISTAKES)]

@@ -1,6 +1,6 @@
 """How surfaces scatter and emit: a module for each model.
 
-surface         what every material may carry: emission, opacity, a normal map
+surface         emission, opacity and a normal map, which every material may have
 conversion      a material turned into another model
 peaks           widths of the peaks of facets' distributions
 parameters      parameters that several models share

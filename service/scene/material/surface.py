@@ -1,4 +1,4 @@
-"""What every material may carry, whatever its model: emission, a normal map, and nearly always opacity."""
+"""What materials of every model may have: emission, a normal map, and nearly always opacity."""
 
 from __future__ import annotations
 
