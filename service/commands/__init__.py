@@ -1,22 +1,22 @@
-"""The commands, a module each: `run(arguments) -> exit code`. The errors that end them early are here.
+"""The commands, a module each: `run(arguments) -> exit code`; and the errors that end them early.
 
 render         a picture of a document, into a file
 renders        the renders of a server: submitted, listed, waited for, fetched, cancelled
 api            requests to a server
 serve          the editor and the API
 bsdf           curves of a material's BSDF, into a table or a figure
-bsdf_curves    what those curves are, by kind
+bsdf_curves    the curves of each kind
 bsdf_figure    the figures, drawn by matplotlib
 import         a model as a document with files beside it
-info           what would render here
+info           what a scene contains, and what would render it here
 check_data     whether the data folder is sound
-bench          measurements
+bench          the benchmarks
 health         the container's health check
 assets         the assets of a scene, and their ids
-configuration  the configuration; what is wrong in it ends the command
+configuration  the configuration; a mistake in it ends the command
 documents      documents and settings, from files and from `--set`
-files          files, never half-written
-models         glTF and OBJ models with the files that they refer to
+files          files that are read, and written whole or not at all
+models         models with the files that they refer to
 progress       how far a render is, on stderr
 tracing        one render in this process
 """

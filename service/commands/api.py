@@ -15,16 +15,16 @@ from urllib.parse import quote, urlencode, urlsplit
 from service.commands import BadInput, Failed, health
 from service.commands.configuration import configuration
 
-TIMEOUT_S = 600.0  # without a byte; events have a comment every 15 s
-WRONG = {400, 401, 403, 404, 409, 410, 413, 415, 422}  # the statuses that say that the request was wrong
+TIMEOUT_S = 600.0  # longest wait for a byte; event streams send a comment every 15 s
+WRONG = {400, 401, 403, 404, 409, 410, 413, 415, 422}  # statuses of a wrong request
 
 
 class Api:
-    """A server, by the address that all its routes begin with."""
+    """A server, by the address with which all of its routes begin."""
 
     def __init__(self, url: str | None) -> None:
-        """Without `url` the server of this environment: SUNBOX_HOST and SUNBOX_PORT, and its first SUNBOX_API_KEY.
-        Raises BadInput."""
+        """Without `url`, the server at SUNBOX_HOST and SUNBOX_PORT. Requests carry the first SUNBOX_API_KEY. Raises
+        BadInput."""
         config = configuration()
         self.url = (url or f"http://{_authority(config.host)}:{config.port}").rstrip("/")
         if urlsplit(self.url).scheme not in ("http", "https") or not urlsplit(self.url).netloc:
@@ -38,13 +38,13 @@ class Api:
         return json.loads(data) if data else None
 
     def page(self, path: str, **query: Any) -> tuple[list[Any], bool]:
-        """A list, and whether there is another page of it. None is left out of the query."""
+        """A page of a list, and whether there is another one. Parameters that are None are left out of the query."""
         given = {name: value for name, value in query.items() if value is not None}
         with self.open("GET", f"{path}?{urlencode(given)}") as answer:
             return json.loads(answer.read()), 'rel="next"' in answer.headers.get("link", "")
 
     def upload(self, data: bytes, name: str) -> str:
-        """The id of an asset that is there now."""
+        """Upload an asset and return its id."""
         kind = {"content-type": "application/octet-stream"}
         with self.open("POST", f"/v1/assets?filename={quote(name)}", data, kind) as answer:
             return str(json.loads(answer.read())["id"])
@@ -64,8 +64,8 @@ class Api:
     def open(
         self, method: str, path: str, data: bytes | None = None, headers: Mapping[str, str] | None = None
     ) -> Iterator[HTTPResponse]:
-        """The answer to a request. Raises BadInput with the server's words where it refuses, Failed where it cannot
-        or is not there."""
+        """The answer to a request. Raises BadInput with the server's message where it refuses, Failed where it cannot
+        answer or cannot be reached."""
         given = {"content-type": "application/json", **self._headers, **(headers or {})}
         request = urllib.request.Request(self.url + path, data, given, method=method)
         try:
@@ -85,11 +85,11 @@ def _authority(host: str) -> str:
 
 
 def _lines(error: urllib.error.HTTPError) -> list[str]:
-    """What the server says is wrong, a line for each field."""
+    """The server's error message, a line for each field."""
     try:
         problem = json.loads(error.read())
         return [f"{each['pointer'] or '/'}: {each['detail']}" for each in problem.get("errors", [])] or [
             f"{problem['title']}: {problem['detail']}"
         ]
-    except (ValueError, KeyError, TypeError, OSError):  # a proxy in between
+    except (ValueError, KeyError, TypeError, OSError):  # a proxy's answer
         return [f"{error.url}: {error.code} {error.reason}"]

@@ -1,4 +1,4 @@
-"""The assets of a scene that the command line renders, and their ids: a picture names them by nothing else."""
+"""The assets of a scene that the command line renders, and their ids, by which a picture's metadata names them."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ log = logging.getLogger(__name__)
 
 
 class SourceAssets:
-    """Files by path and uploads by id. `names` leads from ids to files that may still lie where they lay."""
+    """Files by path and uploads by id. `names` gives the files that ids were once read from."""
 
     def __init__(self, found: FileAssets, store: AssetStore, names: dict[str, str]) -> None:
         self._found = found
@@ -30,15 +30,14 @@ class SourceAssets:
         return self._found.image(self._where(ref))
 
     def keep(self, scene: Any) -> None:
-        """Copies the files that a document refers to into the data folder: a picture of it can be made again.
-
-        Without room there the picture can be made again only beside these files.
+        """Copy the files that a document refers to into the data folder, so that its picture can be made again
+        without them. Where there is no room, they stay needed.
         """
         for ref in references.references(scene):
             if not ref.startswith("sha256:"):
                 try:
                     self._found.keep(ref)
-                except (ServiceError, OSError) as error:  # somebody else's folder may not even be listed
+                except (ServiceError, OSError) as error:  # another user's folder may not even be listed
                     log.warning("asset not kept ref=%s error=%s", ref, error)
 
     def by_id(self, scene: Any) -> tuple[Any, dict[str, str]]:
@@ -55,7 +54,7 @@ class SourceAssets:
         return references.renamed(scene, identified), names
 
     def _where(self, ref: str) -> str:
-        """The reference itself, or the path of the very file that it names where the data folder has it no more."""
+        """The reference itself, or where the data folder lacks it the path of the file that it was read from."""
         if ref not in self._names:
             return ref
         try:

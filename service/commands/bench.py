@@ -141,7 +141,7 @@ def write_figures(output: Path | None, document: Any) -> None:
 
 
 def output_path(name: str | None) -> Path | None:
-    """Where the JSON goes. Its folder is made: `make bench` names one that a fresh checkout lacks."""
+    """The path of the JSON. Its folder is made: `make bench` names one that a fresh checkout lacks."""
     if name is None:
         return None
     Path(name).parent.mkdir(parents=True, exist_ok=True)

@@ -1,6 +1,6 @@
 """`sunbox bsdf`: curves of a material's BSDF, into a table or a figure. The numbers are those of the renderer.
 
-The input is checked first; only then comes OpenGL.
+The input is checked before OpenGL is loaded.
 """
 
 from __future__ import annotations

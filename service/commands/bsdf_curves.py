@@ -17,9 +17,9 @@ if TYPE_CHECKING:
     from service.worker.in_process import InProcessRenderer
 
 STEP = 0.1  # degrees between two values of a curve
-ALBEDO_STEP = 1.0  # ... of the albedo, which is smooth and is sampled
+ALBEDO_STEP = 1.0  # degrees; the albedo is smooth, and sampled
 ALBEDO_SAMPLES = 1 << 16
-SLICE_STEP = 1.0  # ... of a slice, along both of its axes
+SLICE_STEP = 1.0  # degrees, along both axes of a slice
 CHANNELS = ("r", "g", "b")
 
 
@@ -34,14 +34,14 @@ class Specular:
 @dataclass(frozen=True)
 class Curves:
     """`theta` (n,) in degrees, and a column (n,) for each curve; of a slice, `image` is (theta_d, theta_h, 3).
-    `lobes` (n, 3) are the parts of the curves that were asked for, where they are not 0 everywhere."""
+    `lobes` (n, 3) are the requested lobes of the curves, without those that are 0 everywhere."""
 
     kind: str
     theta: np.ndarray
     columns: dict[str, np.ndarray]
     specular: dict[str, list[Specular]] = field(default_factory=dict)  # by curve
     image: np.ndarray | None = None
-    missing: str = ""  # why there is nothing to show
+    missing: str = ""  # the reason, where there is no curve
     lobes: dict[str, np.ndarray] = field(default_factory=dict)  # "f_45_diffuse"
 
     @property
@@ -53,7 +53,7 @@ class Curves:
 
     @property
     def notes(self) -> list[str]:
-        """What the columns cannot say."""
+        """Lines about lobes that columns cannot show."""
         return [
             f"{name}: a perfectly specular lobe at {lobe.theta:.1f} degrees reflects or transmits "
             + " ".join(f"{x:.4g}" for x in lobe.weight)
@@ -87,12 +87,12 @@ def table(materials: Mapping[str, Curves]) -> str:
 
 
 def _plain(name: str) -> str:
-    """A name without what has a meaning in the table."""
+    """A name without the characters that separate columns and rows."""
     return "".join("_" if c in ',"\r\n' else c for c in name)
 
 
 def _directions(theta: np.ndarray | float) -> np.ndarray:
-    """Directions (n, 3) in the plane of normal and tangent, at these degrees from the normal towards the tangent."""
+    """Unit vectors (n, 3) in the plane of normal and tangent, `theta` degrees from the normal to the tangent."""
     t = np.radians(np.atleast_1d(theta))
     cos = np.where(np.abs(np.atleast_1d(theta)) == 90, 0, np.cos(t))  # else 6e-17, which is above the horizon
     return np.stack([np.sin(t), np.zeros_like(t), cos], axis=1)

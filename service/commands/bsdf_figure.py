@@ -29,8 +29,8 @@ LOBES = {
     "clearcoat": "#4c7a1f",
     "transmission": "#3a55c4",
 }
-STYLES = ("-", "--")  # of the first material and of the one that it is compared with
-PEAKED = 20.0  # times the median of a lobe: then its radius is logarithmic, or nothing but the peak would be seen
+STYLES = ("-", "--")  # line styles of the first and the second material
+PEAKED = 20.0  # peak over median above which a lobe's radius is logarithmic: else only the peak would be visible
 
 
 def draw(materials: Mapping[str, Curves], format: str) -> bytes:
@@ -52,7 +52,7 @@ def draw(materials: Mapping[str, Curves], format: str) -> bytes:
 
 
 def _curves(materials: Mapping[str, Curves]) -> list[tuple[Curves, np.ndarray, dict[str, Any]]]:
-    """(its material's curves, values, how to draw it) of each curve."""
+    """For each curve: its material's curves, its values, and options of the plot."""
     out = []
     for (name, curves), style in zip(materials.items(), STYLES, strict=False):
         groups = list(dict.fromkeys(column.rpartition("_")[0] for column in curves.columns))  # one for each angle
@@ -73,7 +73,7 @@ def _curves(materials: Mapping[str, Curves]) -> list[tuple[Curves, np.ndarray, d
 
 
 def _opaque(materials: Mapping[str, Curves]) -> bool:
-    """Whether no polar diagram of them has a lower half."""
+    """Whether all polar diagrams lack a lower half."""
     return all(abs(curves.theta).max() <= 90 for curves in materials.values())
 
 
@@ -121,7 +121,7 @@ def _slices(sheet: Any, materials: Mapping[str, Curves]) -> None:
     for i, (name, curves) in enumerate(materials.items()):
         plot = sheet.add_subplot(1, len(materials), i + 1)
         assert curves.image is not None
-        # White is f = 1 / pi, the most that a matte surface has; sRGB's curve, nearly.
+        # White is f = 1 / pi, the greatest value of a matte surface; the curve is nearly sRGB's.
         shown = np.clip(curves.image * np.pi, 0, 1) ** (1 / 2.2)
         plot.imshow(shown, origin="lower", extent=(0, 90, 0, 90), interpolation="nearest")
         plot.set_title(name)

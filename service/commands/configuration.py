@@ -1,4 +1,4 @@
-"""The configuration, a mistake in it being the mistake of whoever typed the command."""
+"""The configuration, whose mistakes are errors in the command's input."""
 
 from __future__ import annotations
 

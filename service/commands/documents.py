@@ -21,13 +21,13 @@ if TYPE_CHECKING:
     from service.pack import Packed
     from service.scene import Scene, Settings
 
-WIDEST = 16.0  # width over height, at most, of a picture whose size a model's file decides
-SHOWN_ERRORS = 8  # a mesh of NaN has a mistake in every line
+WIDEST = 16.0  # most width over height of a picture whose size a model's file decides
+SHOWN_ERRORS = 8  # of a document: a mesh of NaN has a mistake in every line
 
 
 @contextmanager
 def refusals(place: str = "") -> Iterator[None]:
-    """Turn a caller's mistakes into BadInput, a line for each, with `place` before the pointer."""
+    """A context that turns errors in the input into BadInput, a line for each, with `place` before the pointer."""
     try:
         yield
     except InvalidDocument as error:
@@ -40,7 +40,7 @@ def refusals(place: str = "") -> Iterator[None]:
 
 @dataclass(frozen=True)
 class Source:
-    """A scene from a file. Of a picture that Sunbox made also the settings and the view that it was made with."""
+    """A scene from a file; from a picture of Sunbox's also its settings and its view."""
 
     path: Path
     document: Any
@@ -49,11 +49,9 @@ class Source:
     view: PictureView | None = None
     assets: dict[str, str] = field(default_factory=dict)  # names of files by the id that the document uses
     pointer: str = ""  # to the scene, from the root of what was read
-    store: AssetStore | None = None  # a model's, with what it was taken apart into
+    store: AssetStore | None = None  # of a model: its meshes and images
     aspect_ratio: float | None = None  # of the picture of a model's camera, width over height
-    warned: frozenset[str] = (
-        frozenset()
-    )  # what the warnings that were printed about a model say, without their places
+    warned: frozenset[str] = frozenset()  # texts of the printed warnings about a model, without their places
 
 
 def read_source(path: Path, roots: Sequence[str], config: Config) -> Source:
@@ -106,9 +104,9 @@ def _model(path: Path, data: bytes, roots: Sequence[str], config: Config) -> Sou
 
 
 def read_settings(assignments: Sequence[str], config: Config, base: dict[str, Any] | None = None) -> Settings:
-    """Settings from `key=value` texts, the last of a key counting; a value is JSON or else a bare word.
+    """Settings from `key=value` texts, of which the last of a key counts; a value is JSON or else a bare word.
 
-    `base` says what is not given; another quality's knobs are not among that.
+    `base` has the settings that the texts leave out, except for the knobs of another quality.
     """
     from service.quality import PRESETS
     from service.scene import parse_settings
@@ -126,9 +124,9 @@ def read_settings(assignments: Sequence[str], config: Config, base: dict[str, An
 
 
 def picture_size(settings: Settings, aspect: float | None) -> dict[str, int]:
-    """The width or height that is not given, or both, for a model whose camera has this aspect ratio.
+    """The missing width or height, or both, for a model whose camera has this aspect ratio.
 
-    Where neither is given there are about as many pixels as by default.
+    Where both are missing, the number of pixels is about the default.
     """
     given = settings.model_fields_set & {"width", "height"}
     if aspect is None or len(given) == 2:
@@ -144,7 +142,7 @@ def picture_size(settings: Settings, aspect: float | None) -> dict[str, int]:
 
 @contextmanager
 def source_assets(source: Source, roots: Sequence[str], config: Config) -> Iterator[SourceAssets]:
-    """Where the scene's assets are: beside its file, in `roots`, and by sha256 in the data folder."""
+    """The scene's assets: files beside it and in `roots`, and uploads by sha256 in the data folder."""
     from service.assets import FileAssets
     from service.commands.assets import SourceAssets
     from service.scene import references
@@ -171,7 +169,7 @@ def pack_scene(source: Source, assets: SourceAssets, config: Config) -> Packed:
     from service.scene.shape import MeshShape
 
     if any(isinstance(shape, MeshShape) and shape.asset for shape in source.scene.shapes):
-        # Loading numba takes about as long as the child that parses a large file, for which pack() would wait first.
+        # numba loads while a child process parses: both take about as long for a large file.
         Thread(target=warm_builder).start()
     with refusals(source.pointer):
         return pack(source.scene, assets, limits=config)

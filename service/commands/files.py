@@ -1,4 +1,4 @@
-"""Files that the commands read and write: nothing half-written is ever left under its final name."""
+"""Files that the commands read and write: under its final name a file is never half-written."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ def read(path: Path) -> bytes:
 
 
 def writable(path: Path) -> Path:
-    """The path to write to, links followed. Raises BadInput now rather than after an hour of rendering."""
+    """The path to write to, with links resolved. Raises BadInput now rather than after an hour of rendering."""
     try:
         target = Path(os.path.realpath(path))
         if target.is_dir():
@@ -33,9 +33,9 @@ def writable(path: Path) -> Path:
 
 
 def write(path: Path, data: bytes, lasting: bool = True) -> None:
-    """Writes beside `path` and renames: readers see the old file or the whole new one. Raises Failed.
+    """Write beside `path` and rename: readers see the old file or the whole new one. Raises Failed.
 
-    Not `lasting`, without waiting for the disk (15 ms): after a loss of power the new one may be empty.
+    With `lasting=False` the disk is not waited for (15 ms): after a loss of power the file may be empty.
     """
     beside = path.with_name(f".{path.name}.{os.getpid()}.tmp")
     try:

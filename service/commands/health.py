@@ -1,6 +1,6 @@
 """The image's HEALTHCHECK: `python -m service.commands.health` ends with 0 if the server in this container lives.
 
-It asks at the address that the server was started with: `serve --host --port` before SUNBOX_HOST and SUNBOX_PORT.
+The address is that of the server's command line, `serve --host --port`, or else SUNBOX_HOST and SUNBOX_PORT.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ def main() -> int:
     try:
         config = configuration(host=arguments.host, port=arguments.port)
         connection = http.client.HTTPConnection(reachable(config.host), config.port, timeout=TIMEOUT_S)
-        # By this name the server may always be asked.
+        # The server accepts this host name always.
         connection.request("GET", "/healthz", headers={"Host": "localhost"})
         status = connection.getresponse().status
     except (CommandError, OSError, http.client.HTTPException) as error:
@@ -38,11 +38,11 @@ def main() -> int:
 
 
 def _commands() -> Iterator[list[str]]:
-    """Of each `sunbox serve` among the processes that can be seen here, the words from `serve` on."""
+    """The command line, from `serve` on, of each `sunbox serve` among the visible processes."""
     for process in sorted(Path("/proc").glob("[0-9]*"), key=lambda path: int(path.name)):
         try:
             words = os.fsdecode((process / "cmdline").read_bytes()).split("\0")[:-1]
-        except OSError:  # it has ended, or is another user's
+        except OSError:  # a process that has ended, or of another user
             continue
         for index, word in enumerate(words[1:], 1):
             if word == "serve" and os.path.basename(words[index - 1]) in ("sunbox", "service.cli"):
@@ -50,7 +50,7 @@ def _commands() -> Iterator[list[str]]:
 
 
 def reachable(host: str) -> str:
-    """A server that listens on all addresses is asked on loopback."""
+    """The address to connect to: loopback for a server that listens on all addresses."""
     try:
         address = ipaddress.ip_address(host)
     except ValueError:

@@ -46,11 +46,12 @@ def run(arguments: argparse.Namespace) -> int:
         files.make_folder(folder)
 
         def written(id: str) -> str:
-            """Under a name that tells its content: importing again changes only what changed."""
+            """Write an asset under the name of its hash: importing again rewrites only what changed."""
             if id in builtin:
                 return id
             name = f"{id.removeprefix('sha256:')[:16]}.{store.info(id).format}"
-            files.write(folder / name, store.read(id), lasting=False)  # thousands, and the model is still there
+            # There may be thousands, and the model can be imported again
+            files.write(folder / name, store.read(id), lasting=False)
             return f"{folder.name}/{name}"
 
         named = {ref: written(ref) for ref in references.references(document)}

@@ -88,6 +88,6 @@ def _counted(kinds: Iterable[str]) -> str:
 
 
 def _print(rows: list[tuple[str, Any]]) -> None:
-    """Print rows at once, as what follows may take long."""
+    """Print rows, and flush: the next ones may take long."""
     for name, value in rows:
         print(f"{name:{WIDTH}}  {value}", flush=True)

@@ -1,7 +1,7 @@
 """Models as the command line takes them: a GLB, a .gltf or an OBJ with its files beside it, a zip of these, a PLY or
 an STL.
 
-What the importer gets is always one file: a .gltf with its files put into it, an OBJ and its files as a zip.
+The importer always reads one file: a .gltf with its files inlined, an OBJ and its files as a zip.
 """
 
 from __future__ import annotations
@@ -28,7 +28,7 @@ if TYPE_CHECKING:
 
 
 SUFFIXES = (".glb", ".gltf", ".obj", ".ply", ".stl", ".zip")
-WHOLE = ("glb", "zip", "ply", "stl")  # formats of which nothing lies in other files
+WHOLE = ("glb", "zip", "ply", "stl")  # formats that are one file
 MTLLIB = re.compile(rb"(?:^|[\r\n])[ \t]*mtllib[ \t]+([^#\r\n]*)")
 
 
@@ -44,7 +44,7 @@ def is_model(path: Path, data: bytes) -> bool:
 
 
 def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) -> Imported:
-    """The model as a document whose references are assets of `store`. Tells its warnings. Raises ServiceError."""
+    """The model as a document whose references are assets of `store`. Prints warnings. Raises ServiceError."""
     format = sniff(data, filename=path.name)
     title = None
     if format == "obj":
@@ -59,11 +59,11 @@ def import_model(path: Path, data: bytes, store: AssetStore, files: FileAssets) 
 
 
 def _embedded(data: bytes, files: FileAssets) -> bytes:
-    """The JSON of a .gltf with the files that it names put into it."""
+    """The JSON of a .gltf with the files that it names inlined."""
     try:
         tree = load(data)
     except ParseError:
-        return data  # the importer says what is wrong, and where in the file as it is
+        return data  # unchanged: the importer reports the mistake and its place
     for kind in ("buffers", "images"):
         items = tree.get(kind) if isinstance(tree, dict) else None
         for k, item in enumerate(items if isinstance(items, list) else ()):
@@ -84,7 +84,7 @@ def _read(uri: str, pointer: str, files: FileAssets) -> str:
 
 
 def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
-    """The OBJ with those of its libraries and textures that are there."""
+    """A zip of the OBJ and those of its libraries and textures that exist."""
     from service.assets.obj.importer import zipped
 
     found = {located: files.read(located) for located in _libraries(data, files)}
@@ -99,7 +99,7 @@ def _zipped(path: Path, data: bytes, files: FileAssets) -> bytes:
 
 
 def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:
-    """The paths of the material libraries that are there, relative to the model's folder."""
+    """The paths of the material libraries that exist, relative to the model's folder."""
     from service.assets.obj.paths import library_names, located
 
     for statement in dict.fromkeys(MTLLIB.findall(text(data))):
@@ -109,15 +109,15 @@ def _libraries(data: bytes, files: FileAssets) -> Iterator[str]:
 
 
 def _textures(library: str, content: bytes, files: FileAssets) -> Iterator[str]:
-    """The paths of the images that a library names and that are there, relative to the model's folder."""
+    """The paths of existing images that a library names, relative to the model's folder."""
     from service.assets.obj.mtl import read_mtl
     from service.assets.obj.paths import located
     from service.assets.scenes.warnings import Warnings
 
     try:
-        materials = read_mtl(library, content, Warnings())  # the importer tells what is odd about it
+        materials = read_mtl(library, content, Warnings())  # the importer reports its oddities
     except ParseError:
-        return  # and what is wrong
+        return  # and its mistakes
     for material in materials.values():
         for found in material.maps.values():
             path = located(library, found.reference)

@@ -11,7 +11,7 @@ from service.ipc.messages import Progress
 
 BAR_WIDTH = 24
 REDRAW_S = 0.2
-LINE_S = 10.0  # between lines where nothing can be redrawn: a log of an hour stays readable
+LINE_S = 10.0  # between lines where the output is no terminal: the log of an hour stays readable
 
 
 class ProgressLine:

@@ -1,6 +1,6 @@
 """`sunbox render`: a scene's document in, a picture in a file out.
 
-The input is checked from the cheap to the dear: arguments, document, settings, assets; only then comes OpenGL.
+Cheap checks come before expensive ones: arguments, document, settings, assets, OpenGL.
 """
 
 from __future__ import annotations
@@ -34,7 +34,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True)
 class Output:
-    """What to write where."""
+    """The path, the format and the view of the picture."""
 
     path: Path
     format: LosslessFormat
@@ -42,7 +42,7 @@ class Output:
 
     @property
     def is_repeatable(self) -> bool:
-        """Whether the file carries in its metadata what the picture was made from."""
+        """Whether the file's metadata says what the picture was made from."""
         from service import images
 
         return images.FORMATS[self.format].has_metadata
@@ -62,7 +62,7 @@ def run(arguments: argparse.Namespace) -> int:
     size = picture_size(given, source.aspect_ratio)
     base = source.settings | size
     chosen = read_settings(arguments.set or [], config, base) if base else given
-    _tell(source, output, exposure, (chosen.width, chosen.height) if size else None)
+    _print_notes(source, output, exposure, (chosen.width, chosen.height) if size else None)
     with source_assets(source, arguments.asset_root, config) as assets:
         packed = pack_scene(source, assets, config)
         with refusals():
@@ -93,7 +93,7 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, float | None]:
-    """Where to write, in which format, and the exposure where one is given."""
+    """The path, the format, and the exposure where one is given."""
     path = Path(arguments.output)
     format = next((name for name in LOSSLESS_FORMATS if path.suffix.lower() == "." + name), None)
     if format is None:
@@ -128,8 +128,8 @@ def _view(
     return view.model_copy(update={"aov": "color"}) if view.aov == "all" and format != "exr" else view
 
 
-def _tell(source: Source, output: Output, exposure: float | None, size: tuple[int, int] | None) -> None:
-    """Report what was taken from a model because the command line did not give it."""
+def _print_notes(source: Source, output: Output, exposure: float | None, size: tuple[int, int] | None) -> None:
+    """Print the values that were taken from a model because the command line does not give them."""
     if size:
         print(f"note: {size[0]} x {size[1]} pixels, as wide for its height as the camera's picture", file=sys.stderr)
     is_model = source.store is not None

@@ -30,10 +30,10 @@ def run(arguments: argparse.Namespace) -> int:
 
 
 def _closed(folder: Path) -> Path | None:
-    """The first path that prevents storing data: left by another user, root above all, or without permission."""
+    """The first path that prevents storing data: another user's, mostly root's, or one without permission."""
     for wanted in (folder, folder / "assets", folder / "documents.sqlite3"):
         path = wanted.absolute()
-        while not os.path.exists(path):  # it will be made, in the folder above
+        while not os.path.exists(path):  # it will be made in its parent
             path = path.parent
         if not os.access(path, os.R_OK | os.W_OK | (os.X_OK if path.is_dir() else 0)):
             return path

@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 
 
 class Interrupt:
-    """Remembers the first SIGINT or SIGTERM; the second one does what it always does."""
+    """Records the first SIGINT or SIGTERM; a second one ends the process as usual."""
 
     signal: int | None = None
 
@@ -53,7 +53,7 @@ class Tracing:
         self._render = renderer.render(packed.arrays, settings, self._receive)
 
     def run(self, interrupt: Interrupt) -> None:
-        """Returns when the first limit is reached, or soon after a signal."""
+        """Render until the first limit is reached, or until soon after a signal."""
         while self._reason is None:
             if interrupt.signal is not None:
                 self._render.stop()

@@ -1,8 +1,8 @@
-"""Pixels -> PNG, JPEG, WebP, EXR, Radiance HDR and npy, with what they were made from in PNG's and EXR's metadata.
+"""Pixels -> PNG, JPEG, WebP, EXR, Radiance HDR and npy; the metadata of PNG and EXR has the picture's recipe.
 
 encoders  how each format is written
-metadata  what PNG and EXR files carry beside their pixels
-recipe    what a picture was made from, in that metadata
+metadata  the metadata of PNG and EXR files
+recipe    the scene and settings that a picture was made from, in that metadata
 """
 
 from __future__ import annotations
@@ -42,8 +42,8 @@ __all__ = [
 
 @dataclass(frozen=True)
 class Format:
-    """`bits` are those that a channel may have; `is_displayed`: the values are display-encoded, not linear;
-    `by_openimageio`: it can only be written to a file with a descriptor."""
+    """`bits`: the numbers of bits that a channel may have. `is_displayed`: values are display-encoded, not linear.
+    `by_openimageio`: the format can only be written to a file with a descriptor."""
 
     mime: str
     write: Callable[[BinaryIO, Array, Choices], None]
@@ -53,7 +53,7 @@ class Format:
     by_openimageio: bool = False
 
     def encoding(self, bits: int) -> Encoding:
-        """The encoding that the renderer gives for this format; a number of bits that it lacks is ignored."""
+        """The encoding to request from the renderer; a number of bits that the format lacks is ignored."""
         if not self.is_displayed:
             return "linear"
         return "f4" if bits == 16 and 16 in self.bits else "u1"
@@ -90,8 +90,8 @@ def encode(
 ) -> bytes:
     """A file of one of FORMATS; `pixels` is (height, width, channels), row 0 at the top.
 
-    Displayed formats take display-encoded values with straight alpha, uint8 or float 0..1; JPEG is laid over black.
-    The others take linear float32, colour premultiplied; HDR drops alpha. `bits`, 8 or 16, is for PNG alone.
+    Displayed formats take display-encoded values with straight alpha, uint8 or float 0..1; JPEG is composited over
+    black. The others take linear float32, colour premultiplied; HDR drops alpha. `bits`, 8 or 16, is for PNG alone.
     """
     row, choices = _row(format), Choices(bits, quality, metadata)
     if row.by_openimageio:
@@ -109,7 +109,7 @@ def write(
     bits: int = 8,
     metadata: Metadata | None = None,
 ) -> None:
-    """Writes what `encode` gives to an empty file of the system, large formats without a copy in memory."""
+    """Write the bytes of `encode` to an empty file with a descriptor, large formats without a copy in memory."""
     _row(format).write(file, _three_axes(pixels), Choices(bits, metadata=metadata))
 
 
@@ -119,7 +119,7 @@ def encode_layers(layers: dict[str, Array], metadata: Metadata | None = None) ->
 
 
 def write_layers(file: BinaryIO, layers: dict[str, Array], metadata: Metadata | None = None) -> None:
-    """Writes what `encode_layers` gives, as `write` does."""
+    """Write the bytes of `encode_layers`, as `write` does."""
     names = [name for name in LAYERS if name in layers]
     flat = [_three_axes(layers[name]) for name in names]
     write_exr_layers(file, flat, tuple(c for name in names for c in LAYERS[name]), metadata)

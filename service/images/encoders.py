@@ -1,4 +1,4 @@
-"""One function for each format, which writes pixels to a file of the system.
+"""One function for each format, which writes pixels to a file with a descriptor.
 
 `pixels` is (height, width, channels), row 0 at the top. PNG, JPEG and WebP take display-encoded values with straight
 alpha, uint8 or float 0..1; the others linear float32, colour premultiplied.
@@ -20,8 +20,8 @@ from service.images.metadata import KEY, png_with_text
 
 QUALITY = 80
 FULL_COLOUR = 90  # from this JPEG quality on colour is kept at full resolution: 4:4:4
-PNG_LEVEL = 1  # zlib's: higher ones take several times as long for some percent
-BAND = 128  # rows of all layers that are put together at a time; a multiple of the 16 that EXR compresses at once
+PNG_LEVEL = 1  # zlib's level: higher ones take several times as long to save some percent
+BAND = 128  # rows of all layers that are interleaved at a time; a multiple of the 16 that EXR compresses at once
 CHANNELS = {1: ("Y",), 3: ("R", "G", "B"), 4: ("R", "G", "B", "A")}
 
 Array = npt.NDArray[Any]
@@ -30,7 +30,7 @@ Metadata = dict[str, Any] | str  # or the JSON of one, in ASCII
 
 @dataclass(frozen=True)
 class Choices:
-    """How a format is written; each format ignores what it has no choice of."""
+    """Options of all formats; each format ignores the ones that it lacks."""
 
     bits: int = 8
     quality: int | None = None
@@ -77,7 +77,7 @@ def write_rgba32f(file: BinaryIO, pixels: Array, choices: Choices) -> None:
 def write_exr_layers(
     file: BinaryIO, layers: Sequence[Array], channels: tuple[str, ...], metadata: Metadata | None
 ) -> None:
-    attributes = {"compression": "zip", "DateTime": ""}  # or the hour of writing: the same picture is the same file
+    attributes = {"compression": "zip", "DateTime": ""}  # else the time of writing: equal pictures give equal files
     if metadata is not None:
         attributes[KEY] = _text(metadata)
     _write(file, "openexr", layers, "float", attributes, channels)
@@ -106,7 +106,7 @@ def _write(
     attributes: Mapping[str, str | int],
     channels: tuple[str, ...] = (),
 ) -> None:
-    """By OpenImageIO. `layers` are (height, width, channels) each, and stand beside each other in the file."""
+    """An EXR, by OpenImageIO. `layers` are (height, width, channels) each, and are interleaved in the file."""
     import OpenImageIO as oiio
 
     height, width = layers[0].shape[:2]
@@ -119,7 +119,7 @@ def _write(
         spec.attribute(name, value)
     output = oiio.ImageOutput.create(format)
     assert output is not None, f"this OpenImageIO writes no {format}"
-    # The library knows files by name only, and each open one has this one.
+    # OpenImageIO takes a name and no descriptor; this is the name of an open file.
     fine = output.open(f"/proc/self/fd/{file.fileno()}", spec)
     for top in range(0, height, BAND):
         rows = [layer[top : top + BAND] for layer in layers]
@@ -166,5 +166,5 @@ def _three(pixels: Array) -> Array:
 
 
 def _text(metadata: Metadata) -> str:
-    """JSON in ASCII, so that the plainest text chunk can hold any name."""
+    """JSON in ASCII, so that the plainest text chunk can store any name."""
     return metadata if isinstance(metadata, str) else json.dumps(metadata, separators=(",", ":"))

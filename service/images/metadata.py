@@ -1,4 +1,4 @@
-"""What PNG and EXR files carry beside their pixels, read from the bytes alone: no library opens the file."""
+"""The metadata of PNG and EXR files, read from the bytes alone: no library opens the file."""
 
 import json
 import struct
@@ -9,12 +9,12 @@ from typing import Any
 KEY = "sunbox"
 PNG_MAGIC = b"\x89PNG\r\n\x1a\n"
 EXR_MAGIC = b"\x76\x2f\x31\x01"
-LONG_TEXT = 4096  # characters that image viewers still show whole
-TEXT_BYTES = 256 << 20  # of one inflated text chunk: a few kilobytes can claim gigabytes
+LONG_TEXT = 4096  # characters: the longest text that stays uncompressed, as image viewers show it whole
+TEXT_BYTES = 256 << 20  # most bytes of one inflated text chunk: a few kilobytes can claim gigabytes
 
 
 def read_metadata(data: bytes) -> dict[str, Any] | None:
-    """The JSON object that Sunbox left in a PNG or EXR, None where there is none. The caller validates it."""
+    """The JSON object that Sunbox wrote into a PNG or EXR; None without one. The caller validates it."""
     if data.startswith(PNG_MAGIC):
         text = next((text for key, text in _png_texts(data) if key == KEY.encode()), None)
     else:
@@ -55,7 +55,7 @@ def png_with_text(png: bytes, text: str) -> bytes:
 
 
 def _png_texts(data: bytes) -> Iterator[tuple[bytes, bytes]]:
-    """Key and text of every text chunk: tEXt as it is, zTXt and iTXt inflated where they are compressed."""
+    """Key and text of every text chunk; zTXt and iTXt are inflated where they are compressed."""
     at = len(PNG_MAGIC)
     while at + 12 <= len(data):
         size, kind = struct.unpack_from(">I4s", data, at)

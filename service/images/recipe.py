@@ -1,4 +1,4 @@
-"""What a picture was made from, as PNG and EXR files carry it: enough to make the same picture again."""
+"""The recipe in PNG and EXR files: scene, settings and view, enough to make the same picture again."""
 
 from __future__ import annotations
 
@@ -62,13 +62,13 @@ def write(
 
 
 def write_text(scene: str, settings: ResolvedSettings, samples: int, view: PictureView) -> str:
-    """The same as JSON, for a scene that is JSON already: reading one of 30 MB takes seconds."""
+    """The metadata as JSON, for a scene that is JSON already: parsing one of 30 MB takes seconds."""
     before, after = json.dumps(write(None, settings, samples, view), separators=(",", ":")).split('"scene":null', 1)
     return f'{before}"scene":{scene}{after}'
 
 
 def read(document: Any) -> Recipe:
-    """Raises InvalidDocument with pointers from the metadata's root."""
+    """Parse the metadata. Raises InvalidDocument with pointers from its root."""
     if isinstance(document, dict) and "scene" not in document:
         raise InvalidDocument([FieldError("/scene", "is not there: an older Sunbox made this picture")])
     found = validated(_RECIPE, document, "")
