@@ -4,8 +4,8 @@
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit
 layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
-layout(std430, binding = SLOT_OUTPUT) buffer met_buffer { uvec4 met[]; }; // index + 1 of shape and material, 0: none; the sum of
-                                                                      // angles of incidence in degrees, as a float
+layout(std430, binding = SLOT_FIRST_HITS) buffer hit_buffer { uvec4 hits[]; };
+// a first hit: index + 1 of shape and material, 0: none; the sum of angles of incidence in degrees, as a float
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"
@@ -19,7 +19,7 @@ void main() {
     uint slot;
     if (!camera_pixel(pixel, slot)) return;
     vec4 albedo = albedos[slot], normal = normals[slot];
-    float incidence = uintBitsToFloat(met[slot].z);
+    float incidence = uintBitsToFloat(hits[slot].z);
     uint i = 0u;
     do {
         Sampler rng = sobol_begin(pixel, frame.sample_first + i, 0u);
@@ -31,7 +31,7 @@ void main() {
         if (!budget_lasts()) hit.id = NONE;
         if (frame.sample_first + i == 0u) {
             uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
-            met[slot].xy = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
+            hits[slot].xy = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
         }
         if (hit.id != NONE) {
 #if HAS_TEXTURES
@@ -56,5 +56,5 @@ void main() {
     } while (++i < frame.sample_count);
     albedos[slot] = albedo;
     normals[slot] = normal;
-    met[slot].z = floatBitsToUint(incidence);
+    hits[slot].z = floatBitsToUint(incidence);
 }

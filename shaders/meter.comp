@@ -26,7 +26,7 @@ void main() {
     weights[b.y * blocks.x + b.x] = sum / float((high.x - low.x) * (high.y - low.y));
 }
 #else
-layout(std430, binding = SLOT_NORMAL) readonly buffer place_buffer { vec4 places[]; };
+layout(std430, binding = SLOT_METER_PLACES) readonly buffer place_buffer { vec4 places[]; };
 layout(std430, binding = SLOT_OUTPUT) writeonly buffer output_buffer { vec4 results[]; };
 uniform uint first; // pixel of the bound part
 uniform uint count; // of its pixels

@@ -5,7 +5,7 @@ layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
 layout(std430, binding = SLOT_SUM) buffer sum_buffer { vec4 sums[]; };
 layout(std430, binding = SLOT_COMPENSATION) buffer compensation_buffer { vec4 compensations[]; };
 layout(std430, binding = SLOT_MOMENTS) buffer moment_buffer { vec4 moments[]; };
-layout(std430, binding = SLOT_ALBEDO) buffer counter_buffer {
+layout(std430, binding = SLOT_COUNTERS) buffer counter_buffer {
     uint path_ended; // paths that their throughput has ended
     uint path_cut;   // samples that are short: see path/path.glsl
 };
@@ -39,7 +39,7 @@ void main() {
     uvec2 pixel;
     uint slot;
 #if ADAPTIVE
-    if (frame.replicate == 0u ? !plan_pixel(pixel, slot) : !camera_pixel(pixel, slot)) return;
+    if (frame.replicate == 0u ? !sample_plan_pixel(pixel, slot) : !camera_pixel(pixel, slot)) return;
 #else
     if (!camera_pixel(pixel, slot)) return;
 #endif
@@ -52,7 +52,7 @@ void main() {
         pixel = uvec2(moment.xy);
     }
 #if ADAPTIVE
-    uint first = uint(moment.w), count = plan_due(pixel, first);
+    uint first = uint(moment.w), count = sample_plan_due(pixel, first);
     if (count == 0u) return;
 #else
     uint first = frame.sample_first, count = frame.sample_count;

@@ -104,7 +104,7 @@ def constants() -> str:
     for prefix, enum in (("SHAPE", ShapeKind), ("LIGHT", LightKind)):
         out += [f"const uint {prefix}_{e.name} = {int(e)}u;" for e in enum if e is not ShapeKind.INSTANCE]
     out += [f"const uint MODEL_{model.name.upper()} = {model.number}u;" for model in MODELS]
-    out += [f"#define SLOT_{s.name} {int(s)}" for s in Slot]
+    out += [f"#define SLOT_{name} {int(slot)}" for name, slot in Slot.__members__.items()]
     out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
     out += [f"#define FRAME_BLOCK {bindings.FRAME_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]

@@ -6,7 +6,7 @@ from enum import IntEnum
 
 
 class Slot(IntEnum):
-    """Binding points of the storage buffers."""
+    """Binding points of the storage buffers. The last three serve several kernels, under a name for each use."""
 
     MATERIALS = 0
     SPHERES = 1
@@ -21,9 +21,17 @@ class Slot(IntEnum):
     SUM = 10
     COMPENSATION = 11
     MOMENTS = 12
+    OUTPUT = 15  # what a kernel computes
+    # guides.comp: the first hit
     ALBEDO = 13
     NORMAL = 14
-    OUTPUT = 15
+    FIRST_HITS = 15
+    # pathtrace.comp
+    COUNTERS = 13
+    SAMPLE_PLAN = 14
+    PLANNED_AREAS = 15
+    # meter.comp
+    METER_PLACES = 14
 
 
 class BlockSlot(IntEnum):

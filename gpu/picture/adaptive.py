@@ -148,8 +148,8 @@ class Adaptive:
         return max(1, usual_pass(self._picture, self.cost_s, samples, sharers))
 
     def bind(self) -> None:
-        self._counts.bind_to_storage_buffer(int(Slot.NORMAL))
-        self._work.bind_to_storage_buffer(int(Slot.OUTPUT))
+        self._counts.bind_to_storage_buffer(int(Slot.SAMPLE_PLAN))
+        self._work.bind_to_storage_buffer(int(Slot.PLANNED_AREAS))
 
     def dispatch(self, tile: Tile) -> Dispatch:
         """A dispatch of one group for each area listed in the tile; each pixel goes on from the samples that it

@@ -42,7 +42,7 @@ class Dispatcher:
     def bind(self) -> None:
         """Bind the buffers that every kernel reads; `bind_part` binds those that it writes."""
         self.scene.bind()
-        self.counters.bind_to_storage_buffer(int(Slot.ALBEDO))
+        self.counters.bind_to_storage_buffer(int(Slot.COUNTERS))
         self._frame_buffer.bind_to_uniform_block(bindings.FRAME_BLOCK)
         self._filter.bind_to_uniform_block(bindings.FILTER_BLOCK)
 

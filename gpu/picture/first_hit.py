@@ -72,15 +72,15 @@ class FirstHit:
     def read(self, aov: str) -> np.ndarray:
         """(height, width, channels) float32 of albedo, normal, depth, incidence (degrees), or one of ID_AOVS."""
         if aov in ID_AOVS:
-            met = np.frombuffer(self.buffers[Slot.OUTPUT].read(), np.uint32)
-            ids: np.ndarray = met.reshape(self._size[1], self._size[0], 4)[..., ID_AOVS.index(aov), None]
+            hits = np.frombuffer(self.buffers[Slot.FIRST_HITS].read(), np.uint32)
+            ids: np.ndarray = hits.reshape(self._size[1], self._size[0], 4)[..., ID_AOVS.index(aov), None]
             return ids.astype(np.float32)  # whole up to 2^24, the most shapes of a kind that a scene holds
         if aov not in ("depth", "incidence"):
             values = self._vectors(Slot.ALBEDO if aov == "albedo" else Slot.NORMAL)
             mean: np.ndarray = values[..., :3] / np.float32(self.samples)
             return mean
         hits = self._vectors(Slot.ALBEDO)[..., 3:]
-        sums = self._vectors(Slot.NORMAL)[..., 3:] if aov == "depth" else self._vectors(Slot.OUTPUT)[..., 2:3]
+        sums = self._vectors(Slot.NORMAL)[..., 3:] if aov == "depth" else self._vectors(Slot.FIRST_HITS)[..., 2:3]
         return np.where(hits > 0, sums / np.maximum(hits, 1), 0).astype(np.float32)
 
     def _vectors(self, slot: Slot) -> np.ndarray:

@@ -115,7 +115,7 @@ class NoiseMeter:
         kernel = self._kernels.get("meter.comp", defines(variance=int(variance)))
         output = contexts.allocate(self._context, VECTOR_BYTES * LINE * self.lines)
         output.bind_to_storage_buffer(int(Slot.OUTPUT))
-        self.buffers[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.NORMAL))
+        self.buffers[Slot.MOMENTS].bind_to_storage_buffer(int(Slot.METER_PLACES))
         kernel["width"].value, kernel["lines"].value = width, self.lines
         totals, seen = np.zeros(2), np.zeros(LINE * self.lines)
         for first in range(0, width * height, self._most):

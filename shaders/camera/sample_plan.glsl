@@ -1,23 +1,24 @@
 // Adaptive sampling: which pixels a dispatch renders, and how many samples each of them shall have
 // (gpu/picture/sample_plan.py).
 #if ADAPTIVE
-layout(std430, binding = SLOT_NORMAL) readonly buffer plan_buffer { uvec4 plan_counts[]; }; // by area and class of rows
-layout(std430, binding = SLOT_OUTPUT) readonly buffer work_buffer { uint plan_work[]; }; // areas: x, y << 16
+// counts by area and class of rows; areas as x, y << 16
+layout(std430, binding = SLOT_SAMPLE_PLAN) readonly buffer sample_plan_buffer { uvec4 sample_plan_counts[]; };
+layout(std430, binding = SLOT_PLANNED_AREAS) readonly buffer planned_area_buffer { uint sample_plan_areas[]; };
 
 // Finds the pixel of this invocation; false where there is none. tile_size.x is the number of areas.
-bool plan_pixel(out uvec2 pixel, out uint slot) {
+bool sample_plan_pixel(out uvec2 pixel, out uint slot) {
     uint at = camera_group().x;
-    uint area = at < frame.tile_size.x ? plan_work[at] : 0xffffffffu;
+    uint area = at < frame.tile_size.x ? sample_plan_areas[at] : 0xffffffffu;
     pixel = PLAN_AREA * uvec2(area & 0xffffu, area >> 16u) + gl_LocalInvocationID.xy;
     slot = pixel.y * frame.slot_width + pixel.x - frame.slot_first;
     return all(lessThan(pixel, frame.resolution));
 }
 
 // The number of samples that this dispatch adds to a pixel that has `done` samples.
-uint plan_due(uvec2 pixel, uint done) {
+uint sample_plan_due(uvec2 pixel, uint done) {
     uvec2 area = pixel / PLAN_AREA;
     uint columns = (frame.resolution.x + PLAN_AREA - 1u) / PLAN_AREA;
-    uint wanted = plan_counts[area.y * columns + area.x][pixel.y % PLAN_CLASSES];
+    uint wanted = sample_plan_counts[area.y * columns + area.x][pixel.y % PLAN_CLASSES];
     return min(wanted - min(done, wanted), frame.sample_count);
 }
 #endif

@@ -37,8 +37,8 @@ LightSample sphere_light_sample(Sphere s, vec3 p, vec2 u, uint sides, float tran
     float h = u.x * cap; // 1 - cos theta
     float sin2 = h * (2.0 - h), cos_t = 1.0 - h;
     float phi = TWO_PI * u.y, r = sqrt(max(sin2, 0.0));
-    Basis b = frame_basis(d2 > 0.0 ? to * inversesqrt(d2) : vec3(0.0, 0.0, 1.0));
-    vec3 wi = frame_to_world(b, vec3(r * cos(phi), r * sin(phi), cos_t));
+    Basis b = basis_make(d2 > 0.0 ? to * inversesqrt(d2) : vec3(0.0, 0.0, 1.0));
+    vec3 wi = basis_to_world(b, vec3(r * cos(phi), r * sin(phi), cos_t));
     // The ray meets the sphere at a corner of the triangle whose others are p and the centre.
     float reach = sqrt(max(0.0, s.radius * s.radius - d2 * sin2));
     SurfacePoint at;

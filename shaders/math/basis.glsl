@@ -5,15 +5,15 @@ struct Basis {
     vec3 z;
 };
 
-Basis frame_basis(vec3 n) {
+Basis basis_make(vec3 n) {
     float s = n.z >= 0.0 ? 1.0 : -1.0;
     float a = -1.0 / (s + n.z);
     float b = n.x * n.y * a;
     return Basis(vec3(1.0 + s * n.x * n.x * a, s * b, -s * n.x), vec3(b, s + n.y * n.y * a, -n.y), n);
 }
 
-vec3 frame_to_local(Basis b, vec3 w) { return vec3(dot(w, b.x), dot(w, b.y), dot(w, b.z)); }
-vec3 frame_to_world(Basis b, vec3 w) { return w.x * b.x + w.y * b.y + w.z * b.z; }
+vec3 basis_to_local(Basis b, vec3 w) { return vec3(dot(w, b.x), dot(w, b.y), dot(w, b.z)); }
+vec3 basis_to_world(Basis b, vec3 w) { return w.x * b.x + w.y * b.y + w.z * b.z; }
 
 // v turned by the quaternion q (x, y, z, w).
-vec3 frame_rotate(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
+vec3 basis_rotate(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }

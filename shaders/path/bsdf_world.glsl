@@ -4,7 +4,7 @@ Scatter bsdf_eval_world(Surface s, Interaction here, vec3 wi_w) {
 #if HAS_NORMAL_MAPS
     return normal_map_eval(s, here, wi_w);
 #else
-    return bsdf_eval(s, here.wo, frame_to_local(here.basis, wi_w));
+    return bsdf_eval(s, here.wo, basis_to_local(here.basis, wi_w));
 #endif
 }
 
@@ -40,7 +40,7 @@ BsdfSample bsdf_sample_world(Surface s, Interaction here, Sampler rng, uint boun
     r.scatter = bsdf_scatter_world(s, here, lobe, r.d);
     r.side = here.mapped ? dot(r.d, here.front) : lobe.wi.z;
     r.is_delta = lobe.is_delta;
-    bool agrees = here.mapped ? normal_map_keeps(s, lobe) : facing_agrees(lobe.wi.z, dot(r.d, here.front));
+    bool agrees = here.mapped ? normal_map_keeps(s, lobe) : sides_agrees(lobe.wi.z, dot(r.d, here.front));
     r.valid = r.scatter.pdf > 0.0 && agrees;
     return r;
 }

@@ -8,11 +8,11 @@ void delta_chain_step(Interaction here, Material m, Sampler rng, inout Path path
     float u = sobol_pair(rng, sobol_bounce_pair(path.bounce) + PAIR_CHOICE).y;
     LobeSample lobe = models_sample_delta(here.wo, here.behind, u, s);
     BsdfSample next;
-    next.d = frame_to_world(here.basis, lobe.wi);
+    next.d = basis_to_world(here.basis, lobe.wi);
     next.scatter = lobe.scatter;
     next.side = lobe.wi.z;
     next.is_delta = true;
-    next.valid = next.scatter.pdf > 0.0 && facing_agrees(lobe.wi.z, dot(next.d, here.front));
+    next.valid = next.scatter.pdf > 0.0 && sides_agrees(lobe.wi.z, dot(next.d, here.front));
     path.medium = interaction_medium(dot(here.front, next.d) < 0.0, path.medium, here.beyond);
     path_extend(next, 1.0, s, rng, path);
 }

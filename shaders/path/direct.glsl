@@ -76,12 +76,12 @@ void direct_add(Surface s, Interaction here, LightContext context, float share, 
     LightSample light = lights_sample(context, pick_bits, sobol_bits(rng, pair + PAIR_LIGHT));
     Scatter f = bsdf_eval_world(s, here, light.wi);
     float across = dot(light.wi, here.front), side = dot(light.wi, here.facing);
-    bool counts = direct_counts(light, path.hit.id) && (here.mapped || facing_agrees(side, across))
+    bool counts = direct_counts(light, path.hit.id) && (here.mapped || sides_agrees(side, across))
         && max_component(f.f * light.radiance) > 0.0;
     float weight = direct_weight(light, share * f.pdf);
     if (counts) {
         vec3 c = path.throughput * (f.f * light.radiance * (weight / light.pdf));
-        c *= facing_eta_scale(path.eta_scale, side, s, light.t);
+        c *= sides_eta_scale(path.eta_scale, side, s, light.t);
         c *= medium_share(interaction_medium(across < 0.0, path.medium, here.beyond), light.t);
         if (direct_arrives(path.at, light, c)) path.radiance += path_clamp(c, path.bounce > 0u) * share;
     }

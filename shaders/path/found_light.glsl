@@ -3,7 +3,7 @@
 #if HAS_SUN_DISKS
 // Radiance along d from the disks of directional lights, each weighted against sampling it directly. `pdf` is the
 // density of d.
-vec3 arriving_disks(vec3 d, float pdf) {
+vec3 found_light_disks(vec3 d, float pdf) {
     vec3 sum = vec3(0.0);
     uint i = 0u;
     do {
@@ -19,7 +19,7 @@ vec3 arriving_disks(vec3 d, float pdf) {
 #endif
 
 // Whether the camera sees the environment where it sees no surface.
-bool arriving_background() {
+bool found_light_background() {
 #if HAS_ENVIRONMENT
     return frame.environment_background != 0u;
 #else
@@ -29,7 +29,7 @@ bool arriving_background() {
 
 // Radiance from infinity along d, weighted against sampling it directly; `pdf` is the density of d. The camera does not
 // see the disks of directional lights: they count where the path was `scattered`.
-vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
+vec3 found_light_outside(vec3 d, float pdf, bool scattered) {
     vec3 arriving = vec3(0.0);
 #if HAS_ENVIRONMENT
     vec4 l = environment_radiance(d);
@@ -39,13 +39,13 @@ vec3 arriving_outside(vec3 d, float pdf, bool scattered) {
 #endif
 #endif
 #if HAS_SUN_DISKS
-    if (scattered) arriving += arriving_disks(d, pdf);
+    if (scattered) arriving += found_light_disks(d, pdf);
 #endif
     return arriving;
 }
 
 // Emission towards the side that a ray along d came from: the outward side, unless both sides of the material shine.
-vec3 arriving_emission(SurfacePoint at, vec3 d) {
+vec3 found_light_emission(SurfacePoint at, vec3 d) {
 #if HAS_TEXTURED_LIGHTS && HAS_EMISSION_BOTH
     bool both = material_pick(at.material).emission_sides == 2u;
     if (at.light != NONE && (dot(d, at.ng) < 0.0 || both)) return texture_emission(at);
@@ -61,7 +61,7 @@ vec3 arriving_emission(SurfacePoint at, vec3 d) {
 }
 
 // Ambient radiance, a constant that phong and blinn_phong add: both sides send it, and it is never sampled as a light.
-vec3 arriving_ambient(SurfacePoint at) {
+vec3 found_light_ambient(SurfacePoint at) {
 #if HAS_AMBIENT && HAS_TEXTURES
     return texture_ambient(at);
 #elif HAS_AMBIENT

@@ -59,13 +59,13 @@ Interaction interaction_make(inout Path path, out Material m) {
 #if HAS_COAT_NORMALS
     SurfacePoint coat_at = path.at;
     here.mapped = texture_coat_normal(path.at, texels, coat_at.ns);
-    here.coat = facing_normal(coat_at, wo_w);
+    here.coat = sides_normal(coat_at, wo_w);
 #endif
 #if HAS_NORMAL_MAPS
     here.mapped = texture_normal(path.at, texels, path.at.ns) || here.mapped;
 #endif
-    here.basis = frame_basis(facing_normal(path.at, wo_w));
-    here.wo = frame_to_local(here.basis, wo_w);
+    here.basis = basis_make(sides_normal(path.at, wo_w));
+    here.wo = basis_to_local(here.basis, wo_w);
     here.facing = here.mapped ? here.front : here.basis.z; // a folded lobe reaches all directions in front
     here.transmits = material_transmits(m);
     interaction_tangent(path.at, m, here);
@@ -77,7 +77,7 @@ Interaction interaction_make(inout Path path, out Material m) {
 Surface interaction_surface(Interaction here, Material m) {
     Surface s = surface_make(m, here.tangent);
 #if HAS_COAT_NORMALS
-    s.coat = frame_basis(frame_to_local(here.basis, here.coat));
+    s.coat = basis_make(basis_to_local(here.basis, here.coat));
 #endif
     models_face(here.wo, here.behind, s);
     return s;

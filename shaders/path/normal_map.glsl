@@ -13,7 +13,7 @@ Scatter normal_map_eval(Surface s, Interaction here, vec3 v) {
     bool more;
     uint k = 0u;
     do {
-        vec3 wi = frame_to_local(here.basis, w);
+        vec3 wi = basis_to_local(here.basis, w);
         Scatter f = bsdf_eval(s, here.wo, wi);
         if (!here.mapped || wi.z * side > 0.0) sum = Scatter(sum.f + f.f, sum.pdf + f.pdf);
         w = v - 2.0 * side * here.front;
@@ -21,7 +21,7 @@ Scatter normal_map_eval(Surface s, Interaction here, vec3 v) {
 #if HAS_COAT_NORMALS
         Scatter c = models_coat_eval(s, here.wo, wi);
         if (side > 0.0) sum = Scatter(sum.f + c.f, sum.pdf + c.pdf);
-        float coat_side = dot(frame_to_local(here.basis, w), s.coat.z);
+        float coat_side = dot(basis_to_local(here.basis, w), s.coat.z);
         more = more || (k == 0u && here.mapped && side > 0.0 && coat_side > 0.0);
 #endif
         k++;
@@ -42,10 +42,10 @@ bool normal_map_keeps(Surface s, LobeSample lobe) {
 
 // The sampled direction in world space, folded back to its lobe's side of the surface.
 vec3 normal_map_direction(Interaction here, LobeSample lobe) {
-    vec3 d = frame_to_world(here.basis, lobe.wi);
+    vec3 d = basis_to_world(here.basis, lobe.wi);
 #if ESTIMATOR == ESTIMATOR_UNIFORM
     // Uniform directions are drawn about the surface itself, where nothing needs folding.
-    if (here.mapped && !lobe.is_delta) d = frame_to_world(frame_basis(here.front), lobe.wi);
+    if (here.mapped && !lobe.is_delta) d = basis_to_world(basis_make(here.front), lobe.wi);
 #endif
     float across = dot(d, here.front);
     if (here.mapped && across * (lobe.coated ? 1.0 : lobe.wi.z) < 0.0) d -= 2.0 * across * here.front;

@@ -66,13 +66,13 @@ void path_extend(BsdfSample next, float share, Surface s, Sampler rng, inout Pat
     uint pair = sobol_bounce_pair(path.bounce);
     path.bounce++;
     path_roulette(rng, pair, reach, path);
-    path.eta_scale = facing_eta_scale(path.eta_scale, next.side, s, 0.0);
+    path.eta_scale = sides_eta_scale(path.eta_scale, next.side, s, 0.0);
 }
 
 // Adds the light from infinity, where the path has left the scene.
 void path_add_escaped(inout Path path) {
 #if HAS_ENVIRONMENT || HAS_SUN_DISKS
-    vec3 arriving = arriving_outside(path.d, path.found_pdf, path.bounce > 0u) * max(path.eta_scale, 1.0);
+    vec3 arriving = found_light_outside(path.d, path.found_pdf, path.bounce > 0u) * max(path.eta_scale, 1.0);
     if (path.escaped) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
 #endif
 }

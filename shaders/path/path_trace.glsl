@@ -7,11 +7,11 @@
 // Adds the emission of the surface that the path has come to, and its ambient light.
 void path_add_emission(inout Path path) {
 #if HAS_EMISSION
-    vec3 arriving = arriving_emission(path.at, path.d) * direct_found_weight(path) * path.eta_scale;
+    vec3 arriving = found_light_emission(path.at, path.d) * direct_found_weight(path) * path.eta_scale;
     if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * arriving, path.bounce > 1u);
 #endif
 #if HAS_AMBIENT
-    vec3 ambient = arriving_ambient(path.at) * path.eta_scale;
+    vec3 ambient = found_light_ambient(path.at) * path.eta_scale;
     if (path.hit.id != NONE) path.radiance += path_clamp(path.throughput * ambient, path.bounce > 1u);
 #endif
 }
@@ -23,7 +23,7 @@ void path_trace(Sampler rng, inout Path path) {
     if (!path.alive) path.hit.id = NONE; // the last surface has ended it, or this ray its budget
     bool met = path.hit.id != NONE;
     path.throughput *= medium_share(path.medium, path.hit.t);
-    path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || arriving_background());
+    path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || found_light_background());
     path.alive = met && path.bounce < frame.max_bounces;
     if (path.bounce == 0u) path.alpha = met || path.escaped ? 1.0 : 0.0;
     path_add_emission(path);

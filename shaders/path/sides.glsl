@@ -2,7 +2,7 @@
 
 // The shading normal on the viewer's side of the surface. At a silhouette interpolation or a map can turn it away from
 // the viewer; it is then bent back until it is just in view, as black rims would lose light.
-vec3 facing_normal(SurfacePoint at, vec3 wo_w) {
+vec3 sides_normal(SurfacePoint at, vec3 wo_w) {
     vec3 n = dot(at.ng, wo_w) < 0.0 ? -at.ns : at.ns;
 #if HAS_SMOOTH_NORMALS || HAS_NORMAL_MAPS
     float c = dot(n, wo_w);
@@ -13,7 +13,7 @@ vec3 facing_normal(SurfacePoint at, vec3 wo_w) {
 
 // The square of the refractive index on wi's side over that at the camera, from its value `eta_scale` on wo's side.
 // Light that comes from infinity, t = INFINITY_T, comes from outside, even where an open sheet of glass leads there.
-float facing_eta_scale(float eta_scale, float wi_z, Surface s, float t) {
+float sides_eta_scale(float eta_scale, float wi_z, Surface s, float t) {
 #if HAS_TRANSMISSION
     if (wi_z < 0.0) eta_scale /= s.eta * s.eta;
     return t == INFINITY_T ? max(eta_scale, 1.0) : eta_scale;
@@ -23,7 +23,7 @@ float facing_eta_scale(float eta_scale, float wi_z, Surface s, float t) {
 }
 
 // Whether a direction is on the same side of the shading normal and of the surface itself.
-bool facing_agrees(float shading, float geometric) {
+bool sides_agrees(float shading, float geometric) {
 #if HAS_TRANSMISSION
     return shading * geometric > 0.0;
 #else

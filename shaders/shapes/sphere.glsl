@@ -52,9 +52,9 @@ SurfacePoint sphere_point(Sphere s, vec3 p) {
     r.flat_id = NONE;
 #if HAS_ANISOTROPIC || HAS_TEXTURES
     // The tangent points along growing u = 1/2 + atan2(x, z) / 2 pi; at a pole any direction serves.
-    vec3 n = frame_rotate(vec4(-s.rotation.xyz, s.rotation.w), r.ng);
+    vec3 n = basis_rotate(vec4(-s.rotation.xyz, s.rotation.w), r.ng);
     vec3 t = dot(n.xz, n.xz) > 0.0 ? vec3(n.z, 0.0, -n.x) : vec3(1.0, 0.0, 0.0);
-    r.tangent = frame_rotate(s.rotation, t);
+    r.tangent = basis_rotate(s.rotation, t);
     r.handed = 1.0;
 #else
     r.tangent = vec3(1.0, 0.0, 0.0);

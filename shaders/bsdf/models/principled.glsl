@@ -68,8 +68,8 @@ float principled_layers(Surface s, float coat_i, float sheen_i) {
 // Into the coat's own frame and back; its normal may differ from that of the base.
 #if HAS_COAT_NORMALS
 float principled_coat_cosine(Surface s, vec3 w) { return dot(s.coat.z, w); }
-vec3 principled_coat_to_local(Surface s, vec3 w) { return frame_to_local(s.coat, w); }
-vec3 principled_coat_from_local(Surface s, vec3 w) { return frame_to_world(s.coat, w); }
+vec3 principled_coat_to_local(Surface s, vec3 w) { return basis_to_local(s.coat, w); }
+vec3 principled_coat_from_local(Surface s, vec3 w) { return basis_to_world(s.coat, w); }
 #else
 float principled_coat_cosine(Surface s, vec3 w) { return w.z; }
 vec3 principled_coat_to_local(Surface s, vec3 w) { return w; }

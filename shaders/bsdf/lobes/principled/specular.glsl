@@ -1,5 +1,5 @@
 // The microfacets of the base: metal and dielectric reflect, the dielectric refracts. wo, wi and wm are in the lobe's
-// own frame (bsdf_turn). Transmitted radiance is divided by the square of the index; facing_eta_scale multiplies it
+// own frame (bsdf_turn). Transmitted radiance is divided by the square of the index; sides_eta_scale multiplies it
 // back.
 #if HAS_PRINCIPLED
 
