@@ -6,7 +6,7 @@ from gpu.layout.bindings import Slot
 
 VECTOR_BYTES = 16  # of a vec4 or a uvec4
 ACCUMULATORS = (Slot.SUM, Slot.COMPENSATION, Slot.MOMENTS)  # of all samples, and again of a block of them
-FIRST_HIT = (Slot.ALBEDO, Slot.NORMAL, Slot.OUTPUT)  # AOVs, once one of them was asked for
+FIRST_HIT = (Slot.ALBEDO, Slot.NORMAL, Slot.FIRST_HITS)  # AOVs, once one of them was asked for
 
 # Bytes of a pixel.
 ACCUMULATOR_BYTES = VECTOR_BYTES * len(ACCUMULATORS)
