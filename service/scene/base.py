@@ -69,12 +69,12 @@ def hint(
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
-    `group` is the part of a material that the field belongs to. `soft` is where a slider ends whose range goes on,
-    or both its ends; `default`: shown in the schema where the field's own default is None. For a field that may be
-    left out: `absent` is a word for what holds then; `follows` names the field, of the range 0 to 1, that sets it
-    then, and how. `ranges` names a field with a choice, and the range for each of its values; `used` the choices with
-    which the field has a meaning, and `example` is what it begins with there. `highlight` says in what sense the field is the width of the
-    highlight, and names the field of the highlight's colour, where it has its own.
+    `group` is the part of a material that the field belongs to. `soft` is where a slider ends whose range goes on, or
+    both its ends; `default`: shown in the schema where the field's own default is None. For a field that may be left
+    out: `absent` is a word for what holds then; `follows` names the field, of the range 0 to 1, that sets it then,
+    and how. `ranges` names a field with a choice, and the range for each of its values; `used` the choices with which
+    the field has a meaning, and `example` is what it begins with there. `highlight` says in what sense the field is
+    the width of the highlight, and names the field of the highlight's colour, where it has its own.
     """
     extra: dict[str, Any] = {}
     if group is not None:
