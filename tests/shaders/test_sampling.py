@@ -30,9 +30,9 @@ def test_sobol_is_stratified_in_every_elementary_interval(prober: Prober, k: int
 
 
 def test_sobol_beats_independent_and_matches_scipys_scramble(prober: Prober) -> None:
-    def errors(draw: object) -> float:
+    def errors(draws: object) -> float:
         # An integrand with a slanted edge: mean of x + y < 0.8
-        return float(np.sqrt(np.mean([((u.sum(1) < 0.8).mean() - 0.32) ** 2 for u in draw])))  # type: ignore[attr-defined]
+        return float(np.sqrt(np.mean([((u.sum(1) < 0.8).mean() - 0.32) ** 2 for u in draws])))  # type: ignore[attr-defined]
 
     ours = errors(draw(prober, 0, 256, seed=s)[:, :2] for s in range(64))
     plain = errors(draw(prober, 0, 256, sampler=1, seed=s)[:, :2] for s in range(64))
@@ -56,8 +56,8 @@ def _edge_errors(prober: Prober, samples: int, **more: int) -> np.ndarray:
     """(blocks, 16): of pixels in blocks of 4 x 4, in the share of x + y / 2 < 0.7."""
     corners = [(4 * i, 4 * (i % 5)) for i in range(30)]
     pixels = [[(x + i % 4, y + i // 4) for i in range(16)] for x, y in corners]
-    draw = lambda pixel: draw(prober, 0, samples, pixel=pixel, **more)[:, :2]  # noqa: E731
-    return np.array([[(draw(p) @ [1, 0.5] < 0.7).mean() - 0.45 for p in block] for block in pixels])
+    drawn = lambda pixel: draw(prober, 0, samples, pixel=pixel, **more)[:, :2]  # noqa: E731
+    return np.array([[(drawn(p) @ [1, 0.5] < 0.7).mean() - 0.45 for p in block] for block in pixels])
 
 
 @pytest.mark.parametrize("samples", [1, 4, 16, 64])
