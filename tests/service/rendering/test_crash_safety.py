@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import asyncio
 import os
+import shutil
+import stat
+from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
@@ -83,6 +86,76 @@ def test_the_end_of_a_render(
         assert render.outcome.state == "running"
     else:
         assert render.outcome == ENDED
+
+
+class Disk:
+    """The folder of pictures as a power cut may leave it, after each step of what is done to it.
+
+    A file's bytes are certain once it was synced, a name or its absence once its folder was. What is not certain yet
+    may have come to the disk, or not: `left` gets the folder as it is certain, as it would be with every change of
+    names, and with each deletion alone. The database is certain with each row: SQLite syncs it.
+    """
+
+    def __init__(self, folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+        self._folder = folder
+        self._bytes = {path.stat().st_ino: path.read_bytes() for path in folder.iterdir()}  # of synced files
+        self._certain: dict[str, bytes] = {}
+        self.left: list[tuple[dict[str, bytes], Path]] = []
+        self._sync()
+        for where, name in ((os, "fsync"), (os, "replace"), (os, "unlink"), (RenderRows, "update")):
+            monkeypatch.setattr(where, name, self._noted(getattr(where, name), name))
+
+    def _noted(self, does: Callable[..., None], name: str) -> Callable[..., None]:
+        def step(*given: Any) -> None:
+            does(*given)
+            if name == "fsync" and stat.S_ISDIR(os.fstat(given[0]).st_mode):
+                self._sync()
+            elif name == "fsync":
+                self._bytes[os.fstat(given[0]).st_ino] = Path(f"/proc/self/fd/{given[0]}").read_bytes()
+            self._cut()
+
+        return step
+
+    def _now(self) -> dict[str, bytes]:
+        return {path.name: self._bytes.get(path.stat().st_ino, b"") for path in self._folder.iterdir()}
+
+    def _sync(self) -> None:
+        self._certain = self._now()
+
+    def _cut(self) -> None:
+        now, database = self._now(), self._folder.with_name(f"{len(self.left)}")
+        shutil.copytree(self._folder.parent, database, ignore=lambda *_: ["renders"])
+        deleted = self._certain.keys() - now.keys()
+        self.left += [(self._certain, database), (now, database)]
+        self.left += [({name: data for name, data in self._certain.items() if name != gone}, database)
+                      for gone in deleted]  # fmt: skip
+
+
+def test_a_power_cut_at_the_end_of_a_render(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """After each step, whatever of it came to the disk: the next start has its picture, or goes on with it."""
+
+    async def test() -> Disk:
+        recorder = await under_way(RenderStore(tmp_path / "data"))
+        disk = Disk(tmp_path / "data" / "renders", monkeypatch)
+        assert await recorder.end(ENDED, Done(1, 1, "max_samples", WHOLE, [], picture(2).saved))
+        monkeypatch.undo()
+        return disk
+
+    disk, found = asyncio.run(test()), set[str]()
+    for number, (files, database) in enumerate(disk.left):
+        folder = tmp_path / f"start {number}"
+        shutil.copytree(database, folder)
+        (folder / "renders").mkdir()
+        for name, data in files.items():
+            (folder / "renders" / name).write_bytes(data)
+        render, names = next_start(folder)
+        if render.outcome == ENDED:
+            assert "a.picture" in names
+        else:
+            assert render.outcome.state == "running" and "a.checkpoint" in names
+            assert "a.picture" in names or render.outcome.progress == HALF
+        found.add(render.outcome.state)
+    assert found == {"running", "done"}
 
 
 @pytest.mark.parametrize(("after", "gone"), [(False, False), (True, True)])
