@@ -4,12 +4,10 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-import numpy as np
-
-from service.scene import CubemapEnvironment, NormalTexture, Scene, SkyEnvironment
+from service.scene import CubemapEnvironment, Scene, SkyEnvironment
 from service.scene.material import Material, stretches
 from service.scene.shape import MeshShape
-from service.scene.texture import Reference, references
+from service.scene.texture import ColorTexture, references
 
 BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for which packing has an answer
 
@@ -49,24 +47,26 @@ def _skeleton(scene: Scene) -> tuple[object, ...]:
     """What arrays, light tables and kernels are made from: equal skeletons differ in values that are edited in place.
 
     Emission and its sides are part of it: they decide which shapes are lights, and how often each is picked. So is
-    which parameter reads which texture; factors are not. A mesh whose highlight is stretched has tangents.
+    which parameter reads which texture; factors are not. A mesh whose highlight is stretched has tangents. An ambient
+    term counts where it is blinding.
     """
     on_meshes = {shape.material for shape in scene.shapes if isinstance(shape, MeshShape)}
     materials = [
-        (name, m.type, m.emission, m.emission_sides, _looks(m), name in on_meshes and stretches(m))
+        (name, m.type, m.emission, m.emission_sides, _blinding(m), _looks(m), name in on_meshes and stretches(m))
         for name, m in scene.materials.items()
     ]
     return materials, scene.textures, scene.shapes, scene.lights, _environment(scene)
 
 
+def _blinding(material: Material) -> float:
+    """The brightness of its ambient term, where it is blinding."""
+    ambient = getattr(material, "ambient", (0.0,))
+    brightest = max(ambient.factor if isinstance(ambient, ColorTexture) else ambient)
+    return brightest if brightest > BLINDING else 0.0
+
+
 def _looks(material: Material) -> list[object]:
-    looks = references(material).items()
-    return [(field, r.texture, getattr(r, "channel", None), _counts(r)) for field, r in looks]
-
-
-def _counts(reference: Reference) -> bool:
-    """Whether its factor leaves something of the texture, which then raises what the number may need."""
-    return isinstance(reference, NormalTexture) or bool(np.any(np.greater(reference.factor, 0)))
+    return [(field, r.texture, getattr(r, "channel", None)) for field, r in references(material).items()]
 
 
 def _environment(scene: Scene) -> object:
