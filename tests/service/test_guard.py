@@ -26,7 +26,7 @@ from service.problems import Unauthorized
 from service.routes.errors import respond
 from tests.asset_files import OBJ
 from tests.calls import is_problem
-from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Server
+from tests.serving import ENDLESS, PATIENCE_S, SCENE, SMALL, Client, Server
 
 ANNA, BERT = {"authorization": "Bearer anna-1"}, {"authorization": "bearer  bert-2"}
 BODY = {"scene": SCENE, "settings": SMALL}
@@ -132,6 +132,20 @@ def test_a_stream_shows_its_key(keyed: Server, protocols: list[str], headers: An
         with pytest.raises(ConnectionClosed) as closed:
             stream.recv(20)
         assert closed.value.rcvd is not None and closed.value.rcvd.code == 4401
+
+
+@pytest.mark.parametrize("origin", ["http://example.com", "null", "http://127.0.0.1:1"])
+def test_a_stream_from_a_foreign_page_is_closed(server: Server, origin: str) -> None:
+    stream = Client(server.url, origin=origin)
+    with stream, pytest.raises(ConnectionClosed) as closed:
+        stream.until("hello")
+    assert closed.value.rcvd is not None and closed.value.rcvd.code == 4403
+
+
+def test_a_stream_from_the_servers_own_page_is_welcome(server: Server) -> None:
+    stream = Client(server.url, origin=server.url)
+    with stream:
+        assert stream.until("hello")
 
 
 def test_a_page_of_a_friend_reads_answers(http: httpx.Client) -> None:

@@ -172,17 +172,3 @@ def test_too_large_a_message_closes(server: Server) -> None:
             stream.socket.send('{"type": "ping", "padding": "' + "x" * (1 << 20) + '"}')
             stream.until("never")
         assert closed.value.rcvd is not None and closed.value.rcvd.code == 1009
-
-
-@pytest.mark.parametrize("origin", ["http://example.com", "null", "http://127.0.0.1:1"])
-def test_foreign_origins_are_closed(server: Server, origin: str) -> None:
-    stream = Client(server.url, origin=origin)
-    with stream, pytest.raises(ConnectionClosed) as closed:
-        stream.until("hello")
-    assert closed.value.rcvd is not None and closed.value.rcvd.code == 4403
-
-
-def test_own_origin_is_welcome(server: Server) -> None:
-    stream = Client(server.url, origin=server.url)
-    with stream:
-        assert stream.until("hello")
