@@ -6,6 +6,7 @@ pool            several renderers behind one door; a picture divided among them
 ray             renderers on the hosts of a Ray cluster, behind the same supervisor
 task            one task as the server has it
 replay_log      the messages of one task, so that another renderer can go on with it
+working_states  which states of a task a renderer may go back to
 statistics      counters and distributions, for /metrics
 ask             one question to them and its one answer
 first_frame     the first frame of a scene that no client asked for: for readiness, and to warm up

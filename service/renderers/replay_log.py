@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -26,18 +27,17 @@ from service.ipc.messages import (
     Want,
 )
 from service.ipc.orders import Pause, Resume, Settle, Stop
+from service.renderers.working_states import WorkingStates
 
 # A picture that the server has in memory, or can read from where it was stored; that is not for an event loop.
 Kept = Restore | Callable[[], Restore]
 
-STATES = 4  # that wait to be seen working; of more than these, the middle ones are passed over
-
 
 @dataclass
 class _State:
-    """A scene as it was sent, in the memory that the renderer maps too, and what was changed of it since."""
+    """A scene as it was sent, in the memory that the renderer maps too, and what was changed of it since. It begins
+    with a generation that may have been too much for the renderer."""
 
-    began: int  # the generation that may have been too much for the renderer
     scene: Encoded
     whole: bool  # the scene was that generation's, and not an earlier one's
     since: Update | None = None
@@ -53,7 +53,7 @@ class ReplayLog:
         self._checkpoint: Kept | None = None  # one under way
         self._driver = ""
         self._task = task
-        self._states: list[_State] = []  # the last one that was seen to work, and those after it
+        self._states = WorkingStates[_State](lambda state: channel.discard(state.scene))
         self._want: Want | None = None
         self._stopped = False
         self._paused: Pause | Resume | None = None
@@ -86,7 +86,7 @@ class ReplayLog:
         self._checkpoint = None
 
     def scene_told(self, update: Update, encoded: Encoded) -> None:
-        self._push(_State(update.generation, channel.another(encoded), whole=True))
+        self._push(update.generation, _State(channel.another(encoded), whole=True))
 
     def restored(self, restore: Restore) -> None:
         """The server had this picture already: the render goes on from it, or has ended with it."""
@@ -119,7 +119,7 @@ class ReplayLog:
         elif isinstance(message, Image):
             self.reads.pop(message.serial, None)
         elif isinstance(message, Loaded | Frame | Progressed | Checkpoint | Done):
-            self._works(message.generation)
+            self._states.works(message.generation)
         if isinstance(message, Checkpoint):
             self._checkpoint = Restore(message.task, message.generation, message.saved, None, message.progress)
             self._driver = message.saved.driver
@@ -130,7 +130,7 @@ class ReplayLog:
     def scenes(self) -> list[Encoded | ToRenderer]:
         """What gives another renderer the same scenes, in order; the encoded ones are whoever's sends them."""
         out: list[Encoded | ToRenderer] = []
-        for number, state in enumerate(self._states):
+        for number, (_, state) in enumerate(self._states.items()):
             if number:  # joined with the one before, that would be lost with it
                 out.append(Settle(self._task))
             out.append(channel.another(state.scene))
@@ -161,41 +161,29 @@ class ReplayLog:
         return [*out, *asked]
 
     def close(self) -> None:
-        while self._states:
-            channel.discard(self._states.pop().scene)
+        self._states.keep()
 
-    def _push(self, state: _State) -> None:
-        self._states.append(state)
-        if len(self._states) > STATES:
-            channel.discard(self._states.pop(1).scene)
+    def _push(self, generation: int, state: _State) -> None:
+        self._states.push(generation, state)
         self._stopped, self._stopped_at, self._checkpoint = False, None, None
 
     def _edited(self, update: Update) -> None:
-        if not self._states:
+        last = self._states.newest
+        if last is None:
             return
-        last = self._states[-1]
         since = last.since.then(update) if last.since is not None else update
         # It may be too large, and then the state before it is the one that counts.
         if update.settings is not None or update.environment_map is not None:
-            self._push(_State(update.generation, channel.another(last.scene), whole=False, since=since))
+            self._push(update.generation, _State(channel.another(last.scene), whole=False, since=since))
         else:
             last.since = since
             self._stopped, self._stopped_at, self._checkpoint = False, None, None
 
-    def _works(self, generation: int) -> None:
-        while len(self._states) > 1 and self._states[1].began <= generation:
-            channel.discard(self._states.pop(0).scene)
-
     def _fall_back(self, failed: Failed) -> None:
         """Forget the state that failed and the edits of it, but not a whole scene that was sent later."""
-        kept, later = [], False
-        for state in self._states:
-            later = later or (state.whole and state.began > failed.generation)
-            if later or (failed.fallback is not None and state.began <= failed.fallback):
-                kept.append(state)
-            else:
-                channel.discard(state.scene)
-        self._states = kept
+        works, whole = failed.fallback, (began for began, state in self._states.items() if state.whole)
+        later = next((began for began in whole if began > failed.generation), math.inf)
+        self._states.keep(lambda began: began >= later or (works is not None and began <= works))
 
     def _done(self, done: Done) -> Done:
         self._checkpoint = None

@@ -11,6 +11,7 @@ from service.ipc.messages import Update
 from service.pack import PackCache, pack_camera, pack_materials, pack_microfacets, pack_turn, repacked, scene_delta
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
+from service.renderers.working_states import WorkingStates
 from service.renders.memory import COPIES, picture_bytes
 from service.requests.request_reader import RequestReader, stop_rule, weight
 from service.scene import Scene, merge_patch
@@ -18,8 +19,6 @@ from service.scene.document import Parsed
 from service.scene.text import weigh
 from service.streams import protocol
 from service.streams.scene_diff import may_be_refused, scene_diff
-
-MOST_GOOD = 4  # generations; while the renderer compiles for one, dragging a slider makes hundreds
 
 
 @dataclass(frozen=True)
@@ -53,7 +52,7 @@ class EditSession:
         self._picture_bytes = 0
         self._bytes = 0  # that the scene's document takes at most
         self._given: Version | None = None  # the last one that the renderer has
-        self._good: dict[int, Accepted] = {}  # that the renderer may go back to, by generation
+        self._states = WorkingStates[Accepted]()
         self.packs = False  # `settle` will pack more than a camera and materials
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
         self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
@@ -89,7 +88,7 @@ class EditSession:
     def failed(self, generation: int, fallback: int | None) -> Update | None:
         """The renderer failed at `generation` and goes on with `fallback`: the update that it needs then, if any."""
         version, given = self.version, self._given
-        good = None if fallback is None else self._good.get(fallback)
+        good = None if fallback is None else self._states.at(fallback)
         self._given = None
         if good is not None:
             self._given, self._arrays = good.version, good.arrays
@@ -144,12 +143,8 @@ class EditSession:
         with self._room(version):
             update = self._difference(version)
         self._given = version
-        newest = max((g for g in self._good if g <= self.works), default=None)
-        if newest is not None:
-            self._good = {g: kept for g, kept in self._good.items() if g >= newest}
-        self._good[version.generation] = Accepted(version, self._arrays)
-        if len(self._good) > MOST_GOOD:  # the one that works, and the newest
-            del self._good[sorted(self._good)[1]]
+        self._states.works(self.works)
+        self._states.push(version.generation, Accepted(version, self._arrays))
         return update
 
     @contextmanager

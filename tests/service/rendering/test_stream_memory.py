@@ -14,9 +14,10 @@ from service.assets import Assets
 from service.config import Config
 from service.pack import CacheBudget, PackCache
 from service.problems import InvalidDocument, TooLarge, TooManyRequests
+from service.renderers import working_states
 from service.renderers.local.supervisor import Supervisor
 from service.requests.request_reader import RequestReader
-from service.streams import edit_session, protocol
+from service.streams import protocol
 from service.streams.edit_session import EditSession
 from service.streams.stream import WAITING_CHARACTERS, Stream
 from service.system.turns import CALLER
@@ -96,8 +97,8 @@ def test_versions_that_nobody_has_seen_are_not_all_kept() -> None:
     for generation in range(2, 50):
         say(client, generation, scene={"camera": {"vfov": generation}})
         client.settle()
-    kept = sorted(client._good)
-    assert len(kept) == edit_session.MOST_GOOD and kept[0] == 1 and kept[-1] == 49
+    kept = [generation for generation, _ in client._states.items()]
+    assert len(kept) == working_states.MOST and kept[0] == 1 and kept[-1] == 49
     assert client.failed(49, 1) is None and client.version is not None and client.version.generation == 1
 
 
