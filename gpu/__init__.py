@@ -21,7 +21,7 @@ precompile  kernels that are compiled before they are needed; public
 analysis    measurements of a scene and of the device at hand; public
 """
 
-from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, TextureArrays, apply_edit
+from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, SceneEdit, TextureArrays
 from gpu.bsdf.evaluator import BsdfAlbedo, BsdfEvaluator, BsdfTerms, BsdfValues
 from gpu.context import devices, software_device
 from gpu.device.scene import Scene
@@ -71,11 +71,11 @@ __all__ = [
     "Saved",
     "Scene",
     "SceneArrays",
+    "SceneEdit",
     "SceneTooLarge",
     "Steps",
     "TextureArrays",
     "WrongThread",
-    "apply_edit",
     "border_after",
     "devices",
     "picture_bytes",

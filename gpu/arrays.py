@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import Any, TypedDict
 
 import numpy as np
@@ -42,6 +42,11 @@ class EnvironmentArrays:
     cube: bool = False
     sun: SunDisk | None = None
     sun_share: float = 0.0
+
+    def has_map_of(self, other: EnvironmentArrays) -> bool:
+        """Whether this is the other one, turned or brightened at most: all of their other members are the same."""
+        names = (each.name for each in fields(self) if each.name not in ("rotation", "scale"))
+        return all(getattr(self, name) is getattr(other, name) for name in names)
 
 
 @dataclass(frozen=True)
@@ -138,39 +143,51 @@ class MovedArrays(TypedDict, total=False):
     radiance_scale: float
 
 
-def apply_edit(
-    arrays: SceneArrays,
-    camera: np.void | None = None,
-    materials: np.ndarray | None = None,
-    texture_words: np.ndarray | None = None,
-    microfacets: np.ndarray | None = None,
-    environment: tuple[float, float] | None = None,
-    environment_map: EnvironmentArrays | None = None,
-    moved: MovedArrays | None = None,
-) -> SceneArrays:
-    """The arrays after an edit. None leaves a part as it is.
+@dataclass(frozen=True)
+class SceneEdit:
+    """What an edit changes of a scene that is on the device; None leaves a part as it is."""
 
-    `materials` are as many records as before, `texture_words` their `TextureArrays.words`, `microfacets` the words of
-    the model `microfacet`, `environment_map` is another environment in the place of one, and `environment` its
-    (rotation, scale). The arrays of `moved` have the same lengths as before,
-    except that the scene's tree may differ in length where there are instances. Raises ValueError for another number
-    of materials.
-    """
-    changes: dict[str, Any] = dict(moved or {})
-    if camera is not None:
-        changes["camera"] = camera
-    if materials is not None:
-        if len(materials) != len(arrays.materials):
-            raise ValueError(f"{len(materials)} materials for a scene of {len(arrays.materials)}")
-        changes["materials"] = materials
-    if texture_words is not None and arrays.textures is not None:
-        changes["textures"] = replace(arrays.textures, words=texture_words)
-    if microfacets is not None:
-        changes["microfacets"] = microfacets
-    lit = arrays.environment if environment_map is None else environment_map
-    if environment is not None and lit is not None:
-        rotation, scale = environment
-        lit = replace(lit, rotation=rotation, scale=scale)
-    if lit is not arrays.environment:
-        changes["environment"] = lit
-    return replace(arrays, **changes)
+    camera: np.void | None = None  # layout.Camera
+    materials: np.ndarray | None = None  # layout.Material, as many as before
+    texture_words: np.ndarray | None = None  # `TextureArrays.words`
+    microfacets: np.ndarray | None = None  # as `SceneArrays.microfacets`
+    environment: tuple[float, float] | None = None  # rotation and scale
+    environment_map: EnvironmentArrays | None = None  # another one in the place of one
+    # Of the same lengths as before, except that the scene's tree may differ in length where there are instances.
+    moved: MovedArrays | None = None
+
+    @property
+    def needs_kernel(self) -> bool:
+        """Whether the scene may need another kernel after it. Of an edit of the camera, the camera's flags say."""
+        return not self._given.keys() <= {"camera", "environment"}
+
+    @property
+    def bytes(self) -> int:
+        """Bytes of the parts that may be large."""
+        parts = {**(self.moved or {}), **(vars(self.environment_map) if self.environment_map is not None else {})}
+        return sum(part.nbytes for part in parts.values() if isinstance(part, np.ndarray))
+
+    @property
+    def _given(self) -> dict[str, Any]:
+        return {name: value for name, value in vars(self).items() if value is not None}
+
+    def then(self, later: SceneEdit) -> SceneEdit:
+        """This edit and a later one as one."""
+        given = later._given
+        if self.moved is not None and later.moved is not None:
+            given["moved"] = {**self.moved, **later.moved}
+        return replace(self, **given)
+
+    def apply(self, arrays: SceneArrays) -> SceneArrays:
+        """The arrays after the edit. Raises ValueError for another number of materials."""
+        changes: dict[str, Any] = dict(self.moved or {})
+        if self.materials is not None and len(self.materials) != len(arrays.materials):
+            raise ValueError(f"{len(self.materials)} materials for a scene of {len(arrays.materials)}")
+        changes |= {n: v for n, v in self._given.items() if n in ("camera", "materials", "microfacets")}
+        if self.texture_words is not None and arrays.textures is not None:
+            changes["textures"] = replace(arrays.textures, words=self.texture_words)
+        lit = arrays.environment if self.environment_map is None else self.environment_map
+        if self.environment is not None and lit is not None:
+            rotation, scale = self.environment
+            lit = replace(lit, rotation=rotation, scale=scale)
+        return replace(arrays, environment=lit, **changes)

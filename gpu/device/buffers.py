@@ -58,7 +58,7 @@ def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, A
             if isinstance(buffers[slot], Pinned) or size > buffers[slot].size or not size:
                 made[slot] = shared(context, slot, new)
                 sent += made[slot].size
-        if not _equal(old.light_words, new.light_words):
+        if not _equal(old.light_tree, new.light_tree):
             texture = linear_texture(context, new.light_words, 4, "u4")
     except OutOfMemory:
         for buffer in made.values():
@@ -76,8 +76,7 @@ def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, A
         textures[bindings.LIGHT_TREE_TEXTURE].release()
         textures[bindings.LIGHT_TREE_TEXTURE] = texture
         sent += new.light_words.nbytes
-    changed = np.flatnonzero(old.instances != new.instances)
-    if len(changed):
+    if old.instances is not new.instances and len(changed := np.flatnonzero(old.instances != new.instances)):
         part = slice(int(changed[0]), int(changed[-1]) + 1)
         sent += update_range(textures[bindings.INSTANCES_TEXTURE], new.instances, part)
     return sent

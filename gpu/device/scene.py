@@ -10,7 +10,7 @@ import numpy as np
 
 from gpu import context as contexts
 from gpu import layout
-from gpu.arrays import EnvironmentArrays, MovedArrays, SceneArrays, apply_edit
+from gpu.arrays import EnvironmentArrays, SceneArrays
 from gpu.device import buffers
 from gpu.device.textures import IMAGE_UNITS, KINDS, TextureCache, bound_textures, linear_texture, placeholder
 from gpu.errors import OutOfMemory
@@ -84,7 +84,8 @@ class Scene:
         self._everything = everything
         self._raised = raised
         self.arrays = arrays
-        self._raise_flags()
+        self._raised = self._flags()
+        self._looped = features.looped(arrays)
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
         self._images: dict[int, Any] = {}  # textures of images, which scenes may share, by unit
@@ -134,14 +135,13 @@ class Scene:
     def _upload_images(self, images: dict[int, np.ndarray]) -> dict[int, Any]:
         return {unit: linear_texture(self._context, values, *KINDS[unit]) for unit, values in images.items()}
 
-    def _raise_flags(self) -> None:
-        self._looped = features.looped(self.arrays)
+    def _flags(self) -> frozenset[str]:
+        """The flags of its kernels, by its arrays and by the flags that it had before."""
         if self._everything:
-            self._raised = features.everything()
-        elif self._editing and self._raised:
-            self._raised = features.grown(self._raised, self.arrays)
-        else:
-            self._raised = features.flags(self.arrays, self._editing)
+            return features.everything()
+        if self._editing and self._raised:
+            return features.grown(self._raised, self.arrays)
+        return features.flags(self.arrays, self._editing)
 
     def _upload_environment(self, e: EnvironmentArrays | None) -> _Environment:
         """Raises OutOfMemory."""
@@ -181,32 +181,21 @@ class Scene:
         """The features that they are not compiled for."""
         return _words(features.everything() - self._raised)
 
-    def edit(
-        self,
-        camera: np.void | None = None,
-        materials: np.ndarray | None = None,
-        texture_words: np.ndarray | None = None,
-        microfacets: np.ndarray | None = None,
-        environment: tuple[float, float] | None = None,
-        environment_map: EnvironmentArrays | None = None,
-        moved: MovedArrays | None = None,
-    ) -> None:
-        """Change the parts that `gpu.arrays.apply_edit` describes, and upload nothing else.
+    def edit(self, arrays: SceneArrays, flags: frozenset[str] | None = None) -> None:
+        """Change to `arrays`, which a `SceneEdit` made of the scene's own, and upload what differs, nothing else.
 
-        The caller resets its pictures. Raises OutOfMemory or ValueError, and changes nothing then.
+        `flags` are those of its kernels then, where the caller has found them already. The caller resets the scene's
+        pictures. Raises OutOfMemory, and changes nothing then.
         """
         contexts.use(self._context)
-        arrays = apply_edit(
-            self.arrays, camera, materials, texture_words, microfacets, environment, environment_map, moved
-        )
-        tables = None
-        if microfacets is not None and not np.array_equal(microfacets, self.arrays.microfacets):
-            unit = bindings.MICROFACETS_TEXTURE
-            tables = linear_texture(self._context, microfacets, *KINDS[unit])
-        lit = self._upload_environment(environment_map) if environment_map is not None else None
+        old, tables, lit = self.arrays, None, None
+        if arrays.microfacets is not old.microfacets and not np.array_equal(arrays.microfacets, old.microfacets):
+            tables = linear_texture(self._context, arrays.microfacets, *KINDS[bindings.MICROFACETS_TEXTURE])
+        was, is_ = old.environment, arrays.environment
+        if was is not None and is_ is not None and not is_.has_map_of(was):
+            lit = self._upload_environment(is_)
         try:
-            if moved is not None:
-                self.uploaded += buffers.move(self._context, self.arrays, arrays, self._buffers, self._details)
+            self.uploaded += buffers.move(self._context, old, arrays, self._buffers, self._details)
         except OutOfMemory:
             if lit is not None:
                 lit.release()
@@ -219,9 +208,11 @@ class Scene:
         if lit is not None:
             _Environment(self._texels, self._buffers[Slot.ENVIRONMENT_CELLS], 0.0).release()
             self._take_environment(lit)
-        if len(arrays.materials) and (materials is not None or texture_words is not None):
+        same_materials = arrays.materials is old.materials and arrays.textures is old.textures
+        if len(arrays.materials) and not same_materials:
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
-        self._raise_flags()
+        self._looped = features.looped(arrays)
+        self._raised = self._flags() if flags is None else flags
         if "HAS_PRINCIPLED_LOBES" in self._raised and not self._tables:
             self._tables = upload_tables(self._context)
 

@@ -25,7 +25,6 @@ from gpu.precompile import kernel_keys
 from gpu.settings import RenderSettings
 
 _FACES = 6  # quads that a box becomes when it shines
-_EDITED = {"camera", "materials", "environment"}  # what `Scene.edit` can change, as far as `edits` goes
 
 
 def flags() -> frozenset[str]:
@@ -79,16 +78,14 @@ def superset_keys(
     return [key for key in found if key is not None]
 
 
-def edits(old: SceneArrays, new: SceneArrays) -> dict[str, Any] | None:
-    """The arguments of `Scene.edit` that lead from one scene to the other; None where no edit does."""
-    same = all(getattr(old, f.name) is getattr(new, f.name) for f in fields(SceneArrays) if f.name not in _EDITED)
+def can_become(old: SceneArrays, new: SceneArrays) -> bool:
+    """Whether the scene differs in its camera, its materials or its environment's turn at most, so that a
+    `FallbackScene` of it can be edited."""
+    edited = ("camera", "materials", "environment")
+    same = all(getattr(old, f.name) is getattr(new, f.name) for f in fields(SceneArrays) if f.name not in edited)
     was, is_ = old.environment, new.environment
-    if was is not None and is_ is not None:
-        same = same and was.texels is is_.texels and was.sun == is_.sun and was.background == is_.background
-    if not same or (was is None) != (is_ is None) or len(old.materials) != len(new.materials):
-        return None
-    turned = {} if is_ is None else {"environment": (is_.rotation, is_.scale)}
-    return {"camera": new.camera, "materials": new.materials, **turned}
+    lit = was is is_ or (was is not None and is_ is not None and is_.has_map_of(was))
+    return same and lit and len(old.materials) == len(new.materials)
 
 
 class FallbackScene(Scene):
@@ -100,9 +97,8 @@ class FallbackScene(Scene):
         self._superset = raised
         super().__init__(context, arrays, False, texels)
 
-    def _raise_flags(self) -> None:
-        self._looped = features.looped(self.arrays)
-        self._raised = flags() if self._superset is None else self._superset
+    def _flags(self) -> frozenset[str]:
+        return flags() if self._superset is None else self._superset
 
     def defines(self, settings: RenderSettings) -> dict[str, object]:
         return defines(self._superset, self.arrays)

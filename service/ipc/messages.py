@@ -15,11 +15,6 @@ from service.views import DEFAULT_TONE_MAP, Encoding
 BsdfQuestion = Literal["values", "albedo", "terms"]
 Reason = Literal["max_samples", "time_limit", "target_noise", "stopped"]
 
-EDITS = (  # what `Scene.edit` takes
-    "camera", "materials", "texture_words", "microfacets", "environment", "environment_map", "moved"
-)  # fmt: skip
-
-
 LARGE = 4 << 20  # bytes, which are copied in about a millisecond
 
 
@@ -28,6 +23,18 @@ class SceneData(Protocol):
 
     @property
     def materials(self) -> np.ndarray: ...
+
+
+class SceneEditData(Protocol):
+    """A gpu.SceneEdit, of which the server reads no more than this."""
+
+    @property
+    def environment_map(self) -> object: ...
+
+    @property
+    def bytes(self) -> int: ...
+
+    def then(self, later: Any) -> SceneEditData: ...
 
 
 @dataclass(frozen=True)
@@ -89,8 +96,8 @@ def driver_of(info: Mapping[str, Any]) -> str:
 class Update:
     """What changed of a task; its first one carries `scene`, `settings` and `stop`. None: as before.
 
-    `settings` are the arguments of gpu.RenderSettings. Any of these, or of EDITS, starts accumulation again; `stop`
-    and `denoise` do not.
+    `settings` are the arguments of gpu.RenderSettings. These, a scene or an edit of it start accumulation again;
+    `stop` and `denoise` do not.
     """
 
     task: int
@@ -98,33 +105,26 @@ class Update:
     scene: SceneData | None = None
     settings: dict[str, Any] | None = None
     stop: StopRule | None = None
-    camera: np.void | None = None  # gpu.layout.Camera
-    materials: np.ndarray | None = None
-    texture_words: np.ndarray | None = None
-    microfacets: np.ndarray | None = None
-    environment: tuple[float, float] | None = None
-    environment_map: object = None  # a gpu.EnvironmentArrays; `environment` comes with it
-    moved: Mapping[str, object] | None = None  # a gpu.MovedArrays
+    edit: SceneEditData | None = None  # of the scene that the task has
     denoise: bool | None = None
     base: int | None = None  # the generation that it changes; without one it is whole
     client: str = ""  # tasks of one client share its part of the GPU's time
     interactive: bool = False  # a first look at lower resolution is welcome, and edits will follow
 
     @property
-    def edits(self) -> dict[str, Any]:
-        return {name: getattr(self, name) for name in EDITS if getattr(self, name) is not None}
-
-    @property
     def is_large(self) -> bool:
         """Whether copying it to shared memory is too much for the event loop."""
-        if self.scene is not None:
-            return True
-        members = {**(self.moved or {}), **(vars(self.environment_map) if self.environment_map is not None else {})}
-        return sum(part.nbytes for part in members.values() if isinstance(part, np.ndarray)) > LARGE
+        return self.scene is not None or (self.edit is not None and self.edit.bytes > LARGE)
+
+    @property
+    def may_not_fit(self) -> bool:
+        """Whether the device may have no memory for what it brings."""
+        lit = self.edit is not None and self.edit.environment_map is not None
+        return self.scene is not None or self.settings is not None or lit
 
     @property
     def restarts(self) -> bool:
-        return self.scene is not None or self.settings is not None or bool(self.edits)
+        return self.scene is not None or self.settings is not None or self.edit is not None
 
     def then(self, later: Update) -> Update:
         """This update and a later one of the same task as one."""
@@ -132,10 +132,10 @@ class Update:
             denoise = self.denoise if later.denoise is None else later.denoise
             settings, stop = later.settings or self.settings, later.stop or self.stop
             return replace(later, settings=settings, stop=stop, denoise=denoise)
-        names = ("settings", "stop", "denoise", *EDITS)
+        names = ("settings", "stop", "denoise", "edit")
         values = {name: getattr(later, name) for name in names if getattr(later, name) is not None}
-        if self.moved is not None and later.moved is not None:
-            values["moved"] = {**self.moved, **later.moved}
+        if self.edit is not None and later.edit is not None:
+            values["edit"] = self.edit.then(later.edit)
         return replace(self, generation=later.generation, **values)
 
 

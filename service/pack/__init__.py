@@ -8,19 +8,20 @@ lights              lights with how often each is picked, and environments with 
 textures            images -> texels, and which number of which material reads which of them
 textured_emission   the mean emission of textured shapes that shine
 picture_bytes       the bytes that a picture takes
-edits               parts that are reused after an edit, and the arrays that differ
+parameter_edit      the edit that such parameters are
+edits               parts that are reused after an edit, and the edit that leads to other arrays
 """
 
 from service.pack.edits.cache import CacheBudget, PackCache
-from service.pack.edits.scene_delta import scene_delta
+from service.pack.edits.scene_edit import scene_edit
 from service.pack.geometry.scene_bvh import warm_builder
 from service.pack.lights.environment_blur import CUBE_FACES
 from service.pack.lights.light_bounds import warm_light_tree
 from service.pack.microfacets import pack_microfacets
-from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.parameter_edit import parameter_edit
+from service.pack.parameters import pack_camera, pack_materials
 from service.pack.picture_bytes import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES
 from service.pack.scene import Packed, pack, pack_material
-from service.pack.textures.words import repacked
 
 __all__ = [
     "CUBE_FACES",
@@ -34,9 +35,8 @@ __all__ = [
     "pack_material",
     "pack_materials",
     "pack_microfacets",
-    "pack_turn",
-    "repacked",
-    "scene_delta",
+    "parameter_edit",
+    "scene_edit",
     "warm_builder",
     "warm_light_tree",
 ]

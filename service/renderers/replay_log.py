@@ -172,8 +172,7 @@ class ReplayLog:
         if last is None:
             return
         since = last.since.then(update) if last.since is not None else update
-        # It may be too large, and then the state before it is the one that counts.
-        if update.settings is not None or update.environment_map is not None:
+        if update.may_not_fit:  # then the state before it is the one that counts
             self._push(update.generation, _State(channel.another(last.scene), whole=False, since=since))
         else:
             last.since = since

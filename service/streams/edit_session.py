@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from service.ipc.messages import Update
-from service.pack import PackCache, pack_camera, pack_materials, pack_microfacets, pack_turn, repacked, scene_delta
+from service.pack import PackCache, parameter_edit, scene_edit
 from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
 from service.quality import ResolvedSettings
 from service.renderers.working_states import WorkingStates
@@ -18,7 +18,7 @@ from service.scene import Scene, merge_patch
 from service.scene.document import Parsed
 from service.scene.text import weigh
 from service.streams import protocol
-from service.streams.scene_diff import may_be_refused, scene_diff
+from service.streams.scene_diff import SceneDiff, scene_diff
 
 
 @dataclass(frozen=True)
@@ -53,6 +53,7 @@ class EditSession:
         self._bytes = 0  # that the scene's document takes at most
         self._given: Version | None = None  # the last one that the renderer has
         self._states = WorkingStates[Accepted]()
+        self._difference: tuple[Version, Version, SceneDiff] | None = None  # of the last two that were compared
         self.packs = False  # `settle` will pack more than a camera and materials
         self.works = -(2**63)  # the newest generation that the renderer was seen to have taken
         self._arrays: Any = None  # a gpu.SceneArrays: what it was made from, but for edits since
@@ -66,13 +67,19 @@ class EditSession:
             last = self.version.generation
             raise InvalidDocument([FieldError("/generation", f"must rise: {message.generation} comes after {last}")])
         version = self._started(message) if isinstance(message, protocol.Start) else self._updated(message)
+        given, update = self._given, None
         # Whether such a scene can be packed is known when it was; then the update is as good as made.
-        update = (
-            self._give(version) if self._given is None or may_be_refused(self._given.scene, version.scene) else None
-        )
+        if given is None or self._diff(given, version).may_be_refused:
+            update = self._give(version)
         self.version = version
-        self.packs = update is None and self._given is not None and scene_diff(self._given.scene, version.scene).whole
+        self.packs = update is None and given is not None and self._diff(given, version).whole
         return update
+
+    def _diff(self, old: Version, new: Version) -> SceneDiff:
+        """What differs between two versions; the last difference is stored, as it is asked for more than once."""
+        if self._difference is None or self._difference[0] is not old or self._difference[1] is not new:
+            self._difference = old, new, scene_diff(old.scene, new.scene)
+        return self._difference[2]
 
     def settle(self) -> Update | None:
         """The update that brings the renderer up to the documents; None when it is there."""
@@ -141,7 +148,7 @@ class EditSession:
 
     def _give(self, version: Version) -> Update:
         with self._room(version):
-            update = self._difference(version)
+            update = self._update(version)
         self._given = version
         self._states.works(self.works)
         self._states.push(version.generation, Accepted(version, self._arrays))
@@ -158,7 +165,7 @@ class EditSession:
         finally:
             budget.hold("pictures", self, self._picture_bytes)
 
-    def _difference(self, new: Version) -> Update:
+    def _update(self, new: Version) -> Update:
         old, update = self._given, Update(self._task, new.generation, interactive=True)
         if old is None or old.settings.for_gpu() != new.settings.for_gpu():
             update = replace(update, settings=new.settings.for_gpu())
@@ -166,30 +173,15 @@ class EditSession:
             update = replace(update, stop=stop_rule(new.settings))
         if old is None or old.settings.denoise != new.settings.denoise:
             update = replace(update, denoise=new.settings.denoise)
-        touched = scene_diff(old.scene, new.scene) if old is not None else None
-        if touched is None or touched.whole:
+        touched = None if old is None else self._diff(old, new)
+        if old is None or touched is None or touched.whole:
             packed = self._reader.pack(new.scene, self._cache, self._owner)
-            arrays = packed.arrays
             self._reader.budget.hold("scenes", self, COPIES * weight(packed))
-            delta = None if old is None else scene_delta(self._arrays, arrays)
-            self._arrays, lit = arrays, arrays.environment
-            if old is None or delta is None:
-                return replace(update, scene=arrays)
-            return replace(
-                update, base=old.generation, moved=delta.moved, camera=arrays.camera, materials=arrays.materials,
-                texture_words=None if arrays.textures is None else arrays.textures.words,
-                microfacets=arrays.microfacets if len(arrays.microfacets) else None,
-                environment=None if lit is None else (lit.rotation, lit.scale),
-                environment_map=delta.environment_map,
-            )  # fmt: skip
-        environment = new.scene.environment
-        textures = self._arrays.textures
-        return replace(
-            update,
-            base=None if old is None else old.generation,
-            camera=pack_camera(new.scene.camera, self._arrays.origin) if touched.camera else None,
-            materials=pack_materials(new.scene) if touched.materials else None,
-            texture_words=repacked(textures, new.scene) if touched.materials and textures else None,
-            microfacets=pack_microfacets(new.scene) if touched.materials and len(self._arrays.microfacets) else None,
-            environment=pack_turn(environment) if touched.environment and environment is not None else None,
-        )
+            edit = None if old is None else scene_edit(self._arrays, packed.arrays)
+            self._arrays = packed.arrays
+            if old is None or edit is None:
+                return replace(update, scene=packed.arrays)
+            return replace(update, base=old.generation, edit=edit)
+        parts = {"camera": touched.camera, "materials": touched.materials, "environment": touched.environment}
+        edit = parameter_edit(self._arrays, new.scene, **parts) if any(parts.values()) else None
+        return replace(update, base=old.generation, edit=edit)

@@ -14,9 +14,11 @@ BLINDING = 1e6  # a brightness beyond this may lead past what float32 holds, for
 
 @dataclass(frozen=True)
 class SceneDiff:
-    """`whole`: the scene must be packed again; else only what is named differs."""
+    """`whole`: the scene must be packed again; else only what is named differs. `may_be_refused`: packing could be
+    refused where it was not before, as there are other files or more to store."""
 
     whole: bool = False
+    may_be_refused: bool = False
     camera: bool = False
     materials: bool = False
     environment: bool = False
@@ -24,7 +26,8 @@ class SceneDiff:
 
 def scene_diff(old: Scene, new: Scene) -> SceneDiff:
     if _skeleton(old) != _skeleton(new):
-        return SceneDiff(whole=True)
+        may_be_refused = any(part(old) != part(new) for part in (_files, _asked, _number))
+        return SceneDiff(whole=True, may_be_refused=may_be_refused)
     return SceneDiff(
         camera=old.camera != new.camera,
         materials=old.materials != new.materials,
@@ -32,9 +35,8 @@ def scene_diff(old: Scene, new: Scene) -> SceneDiff:
     )
 
 
-def may_be_refused(old: Scene, new: Scene) -> bool:
-    """Whether packing `new` could be refused where `old` was not: other files, or more to hold."""
-    return _files(old) != _files(new) or _asked(old) != _asked(new) or len(old.shapes) != len(new.shapes)
+def _number(scene: Scene) -> int:
+    return len(scene.shapes)
 
 
 def _asked(scene: Scene) -> list[object]:

@@ -7,7 +7,7 @@ from typing import cast
 
 import numpy as np
 
-from gpu import Band, RenderSettings, Saved, SceneArrays
+from gpu import Band, RenderSettings, Saved, SceneArrays, SceneEdit
 from service.ipc.messages import SavedPicture, SceneData, Update
 
 Result = tuple[Band, np.ndarray]  # a band, and its accumulators as `gpu.Picture.read_band` gives them
@@ -20,6 +20,11 @@ def scene_arrays(data: SceneData) -> SceneArrays:
 def updated_scene(update: Update) -> SceneArrays | None:
     """The whole scene that an update brings; None where it brings edits only."""
     return None if update.scene is None else scene_arrays(update.scene)
+
+
+def scene_edit(update: Update) -> SceneEdit | None:
+    """The edit that an update brings."""
+    return cast(SceneEdit | None, update.edit)
 
 
 def saved_picture(sent: SavedPicture, settings: RenderSettings) -> Saved:

@@ -228,12 +228,13 @@ class Task:
 
     def _try(self, update: Update) -> None:
         began, tracker, residency, updates = time.monotonic(), self._tracker, self._residency, self._updates
-        if update.scene is None and not residency.there:
+        edited = updates.edited(update)
+        if edited is None:
             return  # its first one failed, which was said; only a whole scene helps
         settings = RenderSettings(**update.settings) if update.settings is not None else updates.settings
         assert settings is not None  # a task's first update has them
         try:
-            made = residency.change(update, settings)
+            made = residency.change(update, edited, settings)
         except GpuError as error:
             fallback = self.generation if residency.there else None
             refused = isinstance(error, OutOfMemory | SceneTooLarge)
@@ -253,12 +254,11 @@ class Task:
         self._ending.checkpoints.restart()
         if update.restarts:
             self._restart()
-        whole = update.scene is not None or update.settings is not None
-        if whole or update.environment_map is not None:  # what may be too much for the device
+        if update.may_not_fit:
             setup_s, full = time.monotonic() - began, residency.full
             kernel = full.compile_ms + updates.take_compile_ms(), full.scene.features, full.scene.spared
             self._send(Loaded(self.number, self.generation, setup_s, *kernel, self._ending.warnings))
-        if whole:
+        if update.scene is not None or update.settings is not None:
             updates.foresee(settings)
 
     def evict(self) -> None:

@@ -6,7 +6,7 @@ from gpu import RenderSettings
 from gpu.precompile import kernel_keys
 from service.ipc.messages import Update
 from service.worker.context import WorkerContext
-from service.worker.device.loaded_scene import KernelRequest, kernel_request
+from service.worker.device.loaded_scene import EditedScene, KernelRequest, edited_scene, kernel_request
 from service.worker.device.residency import Residency
 from service.worker.helpers.kernel_wait import KernelWait
 from service.worker.progress.progress import ProgressTracker
@@ -25,7 +25,9 @@ class Updates:
         self.preview = FallbackPreview(number, context.send, context.renderer, context.spare)
         self._residency, self._tracker, self._soon, self._client = residency, tracker, context.soon, client
         self._wait = KernelWait(context.compiler, client)
-        self._request: KernelRequest | None = None  # of the pending update, once it was looked at
+        # Of the pending update, once it was looked at.
+        self._edited: EditedScene | None = None
+        self._request: KernelRequest | None = None
 
     @property
     def compiling(self) -> bool:
@@ -43,15 +45,23 @@ class Updates:
         if update.base is not None and update.base != known:
             return
         self.pending = self.pending.then(update) if self.pending is not None else update
+        self._edited = self._request = None
         self.stops = False
         self._wait.stop()
+
+    def edited(self, update: Update) -> EditedScene | None:
+        """The scene that the pending update leads to; None where there is none to edit. It is made once."""
+        if self._edited is None:
+            self._edited = edited_scene(update, self._residency.loaded or self._residency.offloaded)
+        return self._edited
 
     def begin_to_wait(self, update: Update, paused: bool) -> bool:
         """Whether the update's kernel is being compiled, so that the update has to wait for it."""
         self._request = None
         if self._wait.compiler is None:
             return False
-        request = kernel_request(update, self.settings, self._residency.loaded, self._residency.offloaded)
+        loaded = self._residency.loaded is not None
+        request = kernel_request(update, self.settings, self.edited(update), loaded)
         self._request = request
         if request is None:
             return False
@@ -70,7 +80,7 @@ class Updates:
         self.preview.release()
         if self._request is not None and self._tracker.generation == update.generation:
             self._wait.met(self._request.key)
-        self._request = None
+        self._edited = self._request = None
 
     def take_compile_ms(self) -> float:
         """Milliseconds that the kernel of the last update took to compile elsewhere; 0 when asked again."""

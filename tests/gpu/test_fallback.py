@@ -14,7 +14,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings, Scene
+from gpu import Renderer, RenderSettings, Scene, SceneEdit
 from gpu.kernels import features
 from gpu.precompile import fallback
 from service.ipc.messages import Frame, Loaded, StopRule, Update, View, Want
@@ -119,9 +119,9 @@ def test_what_it_does_not_know() -> None:
 def test_what_an_edit_tells_it() -> None:
     scene = {**SCENE, "environment": {"type": "constant", "radiance": 0.5}}
     arrays = arrays_of(scene)
-    assert fallback.edits(arrays, arrays) is not None
-    assert fallback.edits(arrays, arrays_of(scene)) is None, "other arrays, perhaps other shapes"
-    assert fallback.edits(arrays, arrays_of(SCENE)) is None
+    assert fallback.can_become(arrays, arrays)
+    assert not fallback.can_become(arrays, arrays_of(scene)), "other arrays, perhaps other shapes"
+    assert not fallback.can_become(arrays, arrays_of(SCENE))
 
 
 async def shown(supervisor: Supervisor, ears: Ears, task: int, generation: int) -> list[Frame | Loaded]:
@@ -214,7 +214,7 @@ def test_a_stream_sees_at_once_what_is_compiled_for(
         supervisor.send(Pause(task))
         open_lens = arrays.camera.copy()
         open_lens["aperture_radius"] = 0.1
-        supervisor.send(Update(task, 3, camera=open_lens, base=2))
+        supervisor.send(Update(task, 3, edit=SceneEdit(camera=open_lens), base=2))
         supervisor.send(Want(task, 300, View(encoding="linear")))
         while (only := await ears.next_of(task, Frame, Loaded)).generation != 3:
             pass

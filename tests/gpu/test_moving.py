@@ -11,7 +11,7 @@ from gpu import Renderer, RenderSettings, SceneArrays
 from gpu.kernels import features
 from gpu.layout import Instance, Node
 from gpu.precompile import kernel_keys
-from service.pack import PackCache, pack, scene_delta
+from service.pack import PackCache, pack, scene_edit
 from service.pack.edits import moved_meshes
 from service.pack.geometry import instances
 from service.scene import parse_scene
@@ -51,10 +51,10 @@ def test_what_moves_is_uploaded_and_nothing_else(gpu: Renderer, changes: dict[st
     cache = PackCache()
     old, new = (arrays_of(scene(**given), cache) for given in ({}, changes))
     assert len(new.instances) == 2
-    difference = scene_delta(old, new)
+    difference = scene_edit(old, new)
     assert difference is not None
     loaded, fresh = gpu.load(old), gpu.load(new)
-    loaded.edit(moved=difference.moved)
+    loaded.edit(difference.apply(old))
     assert 0 < loaded.uploaded <= sent
     seen = []
     for each in (loaded, fresh):
@@ -78,16 +78,16 @@ def test_what_moves_is_uploaded_and_nothing_else(gpu: Renderer, changes: dict[st
 )
 def test_what_else_differs_is_another_scene(other: Doc) -> None:
     cache = PackCache()
-    assert scene_delta(arrays_of(scene(), cache), arrays_of(other, cache)) is None
+    assert scene_edit(arrays_of(scene(), cache), arrays_of(other, cache)) is None
 
 
 def test_what_has_not_moved_sends_nothing(gpu: Renderer) -> None:
     cache = PackCache()
     old, new = (arrays_of(scene(), cache) for _ in range(2))
-    difference = scene_delta(old, new)
+    difference = scene_edit(old, new)
     assert difference is not None
     loaded = gpu.load(old)
-    loaded.edit(moved=difference.moved)
+    loaded.edit(difference.apply(old))
     assert loaded.uploaded == 0
     loaded.release()
 
@@ -102,9 +102,9 @@ def test_a_large_mesh_that_a_stream_moves_becomes_an_instance(monkeypatch: pytes
     turned = arrays_of(scene(place=1.4, ball=1), cache)
     assert len(turned.instances) == 2 and len(turned.triangles) == 1280
     again = arrays_of(scene(place=1.5, ball=1, material={**MATTE, "albedo": 0.3}), cache)
-    assert scene_delta(turned, again) is not None and again.triangles is turned.triangles
+    assert scene_edit(turned, again) is not None and again.triangles is turned.triangles
     back = arrays_of(first, cache)
-    assert len(back.instances) == 2 and scene_delta(again, back) is not None
+    assert len(back.instances) == 2 and scene_edit(again, back) is not None
     assert not len(pack(parse_scene(scene(place=1.4)), IMAGES).arrays.instances)
     assert not len(arrays_of({**first, "shapes": first["shapes"][2:]}, cache).instances)
     assert not len(arrays_of(first, cache).instances)

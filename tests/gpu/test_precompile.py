@@ -7,18 +7,19 @@ import os
 import signal
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
 
-from gpu import KernelKey, Renderer, RenderSettings
+from gpu import KernelKey, Renderer, RenderSettings, SceneEdit
 from gpu.kernels import features
 from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.renderers.local.supervisor import Supervisor
-from service.worker.device.loaded_scene import LoadedScene, kernel_request
+from service.worker.device.loaded_scene import LoadedScene, edited_scene, kernel_request
 from service.worker.helpers.compile_client import CompileClient, Compiled, records
 from service.worker.helpers.compile_main import LOCKS
 from tests.serving import PATIENCE_S, wait_until
@@ -138,19 +139,19 @@ def test_others_are_traced_while_a_first_normal_is_compiled_for(gpu: Renderer, a
 
 def test_who_is_woken_has_its_kernel(gpu: Renderer, arrays: Any) -> None:
     """What a slider raised while it was moved stays raised: no other kernel, and no other bits."""
-    loaded = LoadedScene(gpu, arrays, RenderSettings(32, 32), True, {})
+    loaded = LoadedScene(gpu, arrays, RenderSettings(32, 32), True, frozenset())
     rough = np.array(arrays.materials)
     glowing = rough.copy()
     glowing["emission"] = 1.0
     for materials in (glowing, rough):
-        loaded.scene.edit(materials=materials)
+        loaded.scene.edit(replace(loaded.arrays, materials=materials))
     loaded.ladder.reset()
     loaded.ladder.full.trace(60.0, 3)
     flags = loaded.scene.flags
     assert flags > features.flags(arrays, editing=True)
     offloaded = loaded.offloaded()
-    edit = Update(1, 2, materials=rough, base=1)
-    wanted = kernel_request(edit, offloaded.settings, None, offloaded)
+    edit = Update(1, 2, edit=SceneEdit(materials=rough), base=1)
+    wanted = kernel_request(edit, offloaded.settings, edited_scene(edit, offloaded), loaded=False)
     back = LoadedScene.back(gpu, offloaded)
     assert back.scene.flags == flags and back.ladder.full.samples == 3
     assert back.ladder.full.compile_ms == 0  # it is still there

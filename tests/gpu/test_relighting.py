@@ -3,6 +3,7 @@ loaded so."""
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -10,7 +11,7 @@ import pytest
 
 from gpu import OutOfMemory, Renderer, RenderSettings, Scene
 from gpu.device import buffers
-from service.pack import PackCache, pack, scene_delta
+from service.pack import PackCache, pack, scene_edit
 from service.scene import parse_scene
 from tests.documents import Shelf
 from tests.documents import picture as image
@@ -54,12 +55,11 @@ PAIRS: dict[str, tuple[Doc, Doc]] = {
 def test_another_environment_is_uploaded_and_nothing_else(gpu: Renderer, shelf: Shelf, pair: str) -> None:
     cache = PackCache()
     old, new = (pack(parse_scene(lit(environment)), shelf, cache).arrays for environment in PAIRS[pair])
-    delta = scene_delta(old, new)
+    delta = scene_edit(old, new)
     assert delta is not None and delta.environment_map is new.environment and new.environment is not None
-    assert delta.moved.keys() <= {"lights", "radiance_scale"}
+    assert delta.moved is not None and delta.moved.keys() <= {"lights", "radiance_scale"}
     loaded, fresh = gpu.load(old), gpu.load(new)
-    turn = new.environment.rotation, new.environment.scale
-    loaded.edit(environment=turn, environment_map=delta.environment_map, moved=delta.moved)
+    loaded.edit(delta.apply(old))
     assert loaded.uploaded <= new.lights.nbytes
     assert np.array_equal(seen(gpu, loaded), seen(gpu, fresh))
     assert loaded.flags >= fresh.flags
@@ -81,7 +81,7 @@ def test_another_kind_of_environment_is_another_scene(shelf: Shelf, pair: str) -
     """Its kernel is another one."""
     cache = PackCache()
     old, new = (pack(parse_scene(lit(environment)), shelf, cache).arrays for environment in OTHER_KINDS[pair])
-    assert scene_delta(old, new) is None
+    assert scene_edit(old, new) is None
 
 
 def test_where_memory_is_short_all_stays(gpu: Renderer, shelf: Shelf, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -95,6 +95,6 @@ def test_where_memory_is_short_all_stays(gpu: Renderer, shelf: Shelf, monkeypatc
 
     with monkeypatch.context() as patch, pytest.raises(OutOfMemory):
         patch.setattr(buffers, "move", full)
-        loaded.edit(environment_map=new.environment, moved={"lights": new.lights})
+        loaded.edit(replace(old, environment=new.environment, lights=new.lights))
     assert np.array_equal(seen(gpu, loaded), before) and loaded.arrays is old
     loaded.release()

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -215,7 +216,7 @@ def test_editing_a_scene_equals_making_it_anew(gpu: Renderer) -> None:
     scene["materials"]["coat"]["clearcoat"] = 0.2
     scene["camera"]["position"] = [1, 1, 4]
     arrays = pack(parse_scene(scene), Images()).arrays
-    made.scene.edit(camera=arrays.camera, materials=arrays.materials)
+    made.scene.edit(replace(made.scene.arrays, camera=arrays.camera, materials=arrays.materials))
     made.reset()
     made.trace(600, 4)
     anew = picture(gpu, scene, 4, editing=True)

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings
+from gpu import Renderer, RenderSettings, SceneEdit
 from gpu.arrays import SceneArrays
 from gpu.kernels import features
 from service.pack import pack
@@ -53,7 +53,7 @@ def test_an_edit_to_another_channel_gets_another_kernel(gpu: Renderer) -> None:
         picture = gpu.picture(scene, RenderSettings(16, 16, max_bounces=2))
         picture.trace(60.0, 1)
         if words is not None:
-            scene.edit(texture_words=words)
+            scene.edit(SceneEdit(texture_words=words).apply(arrays))
         picture.reset()
         picture.trace(60.0, 4)
         pictures.append(picture.read())

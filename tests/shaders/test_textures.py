@@ -15,7 +15,7 @@ from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS, KernelSource
 from gpu.layout import texture_records
 from gpu.layout.bindings import Slot
-from service.pack import pack, pack_materials, repacked
+from service.pack import pack, parameter_edit
 from service.problems import InvalidDocument
 from service.scene import parse_scene
 from service.streams.scene_diff import SceneDiff, scene_diff
@@ -353,7 +353,7 @@ def test_an_edit_of_a_factor_moves_numbers_only(gpu: Renderer) -> None:
     packs = [pack(scene, shelf).arrays for scene in scenes]
     loaded = [gpu.load(arrays) for arrays in packs]
     assert loaded[0]._images is loaded[1]._images, "the images stand on the device once"
-    loaded[0].edit(materials=pack_materials(scenes[1]), texture_words=repacked(packs[0].textures, scenes[1]))
+    loaded[0].edit(parameter_edit(packs[0], scenes[1], materials=True).apply(packs[0]))
     images = []
     for scene in loaded:
         made = gpu.picture(scene, RenderSettings(16, 16, max_bounces=2))

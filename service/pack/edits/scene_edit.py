@@ -1,46 +1,46 @@
-"""The difference between the arrays of two scenes in which shapes stand at other places, or which another environment
+"""The edit that leads from one scene to another in which shapes stand at other places, or which another environment
 lights: what must be uploaded."""
 
 from __future__ import annotations
 
 from dataclasses import fields
-from typing import Any, NamedTuple, cast
+from typing import Any, cast
 
 import numpy as np
 
-from gpu import EnvironmentArrays, MovedArrays, SceneArrays, TextureArrays
+from gpu import EnvironmentArrays, MovedArrays, SceneArrays, SceneEdit, TextureArrays
 
 MOVED = tuple(MovedArrays.__annotations__)  # the members that may differ
 MANY = ("nodes", "light_tree")  # those of them whose length may differ
-EDITED = ("camera", "materials", "microfacets")  # `Scene.edit` takes these, in their old length
+EDITED = {each.name for each in fields(SceneEdit)}  # members that an edit brings by themselves, in their old length
 SMALL = 1 << 20  # bytes of an array whose contents are compared; a larger one must be the same object
 
 
-class SceneDelta(NamedTuple):
-    """Arguments of `Scene.edit`."""
-
-    moved: MovedArrays
-    environment_map: EnvironmentArrays | None  # None: as it is
-
-
-def scene_delta(old: SceneArrays, new: SceneArrays) -> SceneDelta | None:
-    """What leads from one scene to the other, besides the members in EDITED; None where no edit does."""
+def scene_edit(old: SceneArrays, new: SceneArrays) -> SceneEdit | None:
+    """The edit that leads from one scene to the other; None where none does."""
     if len(old.materials) != len(new.materials) or bool(len(old.light_tree)) != bool(len(new.light_tree)):
         return None
     if not len(new.instances) and not _same(old.nodes, new.nodes):  # in which triangles lie, too
         return None
     for name in (field.name for field in fields(SceneArrays)):
         a, b = getattr(old, name), getattr(new, name)
-        if name in EDITED or name in MANY or name == "environment":
+        if name in EDITED or name in MANY:
             continue
         fits = _as_many(a, b) if name in MOVED else _same(a, b)
         if not fits:
             return None
     if not _alike(old.environment, new.environment):
         return None
-    map_stays = _same(old.environment, new.environment)
-    moved = {name: getattr(new, name) for name in MOVED if not _same(getattr(old, name), getattr(new, name))}
-    return SceneDelta(cast(MovedArrays, moved), None if map_stays else new.environment)
+    lit, moved = new.environment, {n: getattr(new, n) for n in MOVED if not _same(getattr(old, n), getattr(new, n))}
+    return SceneEdit(
+        camera=new.camera,
+        materials=new.materials,
+        texture_words=None if new.textures is None else new.textures.words,
+        microfacets=new.microfacets if len(new.microfacets) else None,
+        environment=None if lit is None else (lit.rotation, lit.scale),
+        environment_map=None if _same(old.environment, lit) else lit,
+        moved=cast(MovedArrays, moved),
+    )
 
 
 def _alike(a: EnvironmentArrays | None, b: EnvironmentArrays | None) -> bool:

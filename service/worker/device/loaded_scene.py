@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Any
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
 
-from gpu import RenderSettings, Steps, apply_edit, picture_bytes, scene_bytes
+from gpu import RenderSettings, Steps, picture_bytes, scene_bytes
 from gpu.precompile import fallback, kernel_keys
 from service.ipc.messages import Foresee, Update
 from service.worker.device.resolution_ladder import ResolutionLadder
-from service.worker.payloads import scene_arrays, updated_scene
+from service.worker.payloads import scene_arrays, scene_edit, updated_scene
 
 if TYPE_CHECKING:
     from gpu import KernelKey, Renderer, Saved, Scene, SceneArrays
@@ -35,15 +35,13 @@ class LoadedScene:
         arrays: SceneArrays,
         settings: RenderSettings,
         editing: bool,
-        edits: dict[str, Any],
-        flags: frozenset[str] = frozenset(),
+        flags: frozenset[str],
     ) -> None:
+        """While the scene is edited, its kernels have `flags` at least."""
         self._renderer = renderer
         self._editing = editing
         self.scene: Scene = renderer.load(arrays, editing, raised=flags)
         try:
-            if edits:
-                self.scene.edit(**edits)
             self.ladder = ResolutionLadder(renderer, self.scene, settings)
         except Exception:
             self.scene.release()
@@ -52,6 +50,14 @@ class LoadedScene:
     @property
     def editing(self) -> bool:
         return self._editing
+
+    @property
+    def arrays(self) -> SceneArrays:
+        return self.scene.arrays
+
+    @property
+    def flags(self) -> frozenset[str]:
+        return self.scene.flags
 
     @property
     def bytes(self) -> int:
@@ -72,7 +78,7 @@ class LoadedScene:
 
     @classmethod
     def back(cls, renderer: Renderer, offloaded: Offloaded) -> LoadedScene:
-        out = cls(renderer, offloaded.arrays, offloaded.settings, offloaded.editing, {}, offloaded.flags)
+        out = cls(renderer, offloaded.arrays, offloaded.settings, offloaded.editing, offloaded.flags)
         try:
             for scale, saved in offloaded.pictures.items():
                 out.ladder.picture(scale).restore(saved)
@@ -112,30 +118,41 @@ def slider_keys(foreseen: Foresee) -> list[KernelKey]:
     return fallback.superset_keys(arrays, settings, fallback.superset(arrays))
 
 
-def kernel_request(
-    update: Update, old: RenderSettings | None, loaded: LoadedScene | None, offloaded: Offloaded | None
-) -> KernelRequest | None:
-    """The request for an update's kernel; None where the present one serves, or the update cannot be applied."""
-    settings = old if update.settings is None else RenderSettings(**update.settings)
-    edits, raised = update.edits, frozenset[str]()
-    if settings is None:
-        return None
-    scene = updated_scene(update)
+@dataclass(frozen=True)
+class EditedScene:
+    """The scene that an update leads to."""
+
+    arrays: SceneArrays
+    flags: frozenset[str]  # of its kernel
+    editing: bool
+    same_kernel: bool  # the kernel of the scene that was edited serves, with the same settings
+
+
+def edited_scene(update: Update, before: LoadedScene | Offloaded | None) -> EditedScene | None:
+    """The scene that an update leads to, from its own or from the one `before`; None where there is neither.
+
+    Raises ValueError where the edit is none of that scene."""
+    scene, edit = updated_scene(update), scene_edit(update)
     if scene is not None:
-        arrays, editing = scene, update.interactive
-        raised = kernel_keys.flags(arrays, editing)
-    elif loaded is not None:
-        arrays, editing, raised = loaded.scene.arrays, loaded.editing, loaded.scene.flags
-        moved = arrays if update.camera is None else replace(arrays, camera=update.camera)
-        same_flags = kernel_keys.camera_flags(moved) == kernel_keys.camera_flags(arrays)
-        compiled = {"materials", "texture_words", "microfacets", "environment_map", "moved"}
-        if update.settings is None and same_flags and not edits.keys() & compiled:
-            return None
-    elif offloaded is not None:
-        arrays, editing, raised = offloaded.arrays, offloaded.editing, offloaded.flags
+        old, editing, flags = scene, update.interactive, kernel_keys.flags(scene, update.interactive)
+    elif before is not None:
+        old, editing, flags = before.arrays, before.editing, before.flags
     else:
         return None
-    if edits or update.scene is None:
-        arrays = apply_edit(arrays, **edits)
-        raised = kernel_keys.flags_after_edit(raised, arrays, editing)
-    return KernelRequest(arrays, settings, kernel_keys.kernel_key(arrays, settings, raised))
+    if edit is None:
+        return EditedScene(old, flags, editing, same_kernel=scene is None)
+    new = edit.apply(old)
+    if edit.needs_kernel or kernel_keys.camera_flags(old) != kernel_keys.camera_flags(new):
+        return EditedScene(new, kernel_keys.flags_after_edit(flags, new, editing), editing, same_kernel=False)
+    return EditedScene(new, flags, editing, same_kernel=scene is None)
+
+
+def kernel_request(
+    update: Update, old: RenderSettings | None, edited: EditedScene | None, loaded: bool
+) -> KernelRequest | None:
+    """The request for the kernel of the scene that an update leads to; None where the present one serves, which is
+    `loaded`, or where the update cannot be applied."""
+    settings = old if update.settings is None else RenderSettings(**update.settings)
+    if settings is None or edited is None or (loaded and update.settings is None and edited.same_kernel):
+        return None
+    return KernelRequest(edited.arrays, settings, kernel_keys.kernel_key(edited.arrays, settings, edited.flags))

@@ -6,12 +6,11 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, TypeVar
 
-from gpu import OutOfMemory, RenderSettings, apply_edit, scene_bytes
+from gpu import OutOfMemory, RenderSettings, scene_bytes
 from service.ipc.messages import Update
-from service.worker.device.loaded_scene import LoadedScene, Offloaded, needed
+from service.worker.device.loaded_scene import EditedScene, LoadedScene, Offloaded, needed
 from service.worker.device.memory import Holder, Memory
 from service.worker.device.resolution_ladder import ResolutionLadder
-from service.worker.payloads import updated_scene
 
 if TYPE_CHECKING:
     from gpu import Picture, Renderer
@@ -56,20 +55,19 @@ class Residency:
         """Note that it was in use until now."""
         self.rested_since = time.monotonic()
 
-    def change(self, update: Update, settings: RenderSettings) -> LoadedScene | None:
-        """Has on the device what the update asks for; where that is another scene, what shall take the place of
-        what is there, which goes only now that this has come."""
+    def change(self, update: Update, edited: EditedScene, settings: RenderSettings) -> LoadedScene | None:
+        """Put on the device what the update leads to. Where that is another scene, it is returned, and takes the
+        place of the present one, which is released only now that the other one is there."""
         if update.scene is None:
             self.wake()
             assert self.loaded is not None
-            if update.edits:
-                arrays = self.loaded.scene.arrays
-                growth = scene_bytes(apply_edit(arrays, **update.edits)) - scene_bytes(arrays)
+            if update.edit is not None:
+                growth = scene_bytes(edited.arrays) - scene_bytes(self.loaded.arrays)
                 if growth > 0:
                     self.make_room(growth)
-                self.loaded.scene.edit(**update.edits)
+                self.loaded.scene.edit(edited.arrays, edited.flags)
             if update.settings is None:
-                if update.edits:
+                if update.edit is not None:
                     self.ladder.reset()
                 return None
             old = self.full.settings
@@ -77,16 +75,16 @@ class Residency:
                 self.ladder.configure(settings)
                 return None
 
-        scene = updated_scene(update)
+        arrays = None if update.scene is None else edited.arrays
 
         def make() -> LoadedScene | None:
-            if scene is None:
+            if arrays is None:
                 assert self.loaded is not None
                 self.loaded.resize(settings)
                 return None
-            return LoadedScene(self._renderer, scene, settings, update.interactive, update.edits)
+            return LoadedScene(self._renderer, arrays, settings, edited.editing, edited.flags)
 
-        return self._with_room(needed(scene, settings), make, scene is not None)
+        return self._with_room(needed(arrays, settings), make, arrays is not None)
 
     def make_room(self, size: int) -> None:
         """Make room on the device for that many more bytes. Raises OutOfMemory."""

@@ -97,11 +97,12 @@ class Assistant:
 
     def _apply(self, update: Update) -> None:
         self._updates.pending = None
-        if update.scene is None and not self._residency.there:
+        edited = self._updates.edited(update)
+        if edited is None:
             return  # its first one failed, which was said
         settings = RenderSettings(**update.settings) if update.settings is not None else self._updates.settings
         assert settings is not None  # the first update has them
-        made = self._residency.change(update, settings)
+        made = self._residency.change(update, edited, settings)
         if made is not None:
             self._residency.release()
             self._residency.loaded = made

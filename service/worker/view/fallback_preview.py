@@ -109,17 +109,16 @@ class FallbackPreview:
         self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
         self._meter = NoiseReading()
         try:
-            same = self._scene is not None and self._raised == kernel.raised
-            edits = fallback.edits(self._scene.arrays, wanted.arrays) if self._scene is not None and same else None
-            if self._scene is not None and edits is not None:
-                self._scene.edit(**edits)
+            scene, same = self._scene, self._raised == kernel.raised
+            if scene is not None and same and fallback.can_become(scene.arrays, wanted.arrays):
+                scene.edit(wanted.arrays)
             else:
                 self.release()
-                self._scene = self._renderer.load_fallback(wanted.arrays, kernel.raised)
+                self._scene = scene = self._renderer.load_fallback(wanted.arrays, kernel.raised)
                 self._raised = kernel.raised
             if self._ladder is not None:
                 self._ladder.release()
-            self._ladder = ResolutionLadder(self._renderer, self._scene, settings, full=False)
+            self._ladder = ResolutionLadder(self._renderer, scene, settings, full=False)
             self._next = self._fitting(self._ladder, FIRST_S)
             self._ladder.picture(self._next)
             self._spare.met(kernel.key)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from gpu import SceneEdit
 from service.ipc import channel
 from service.ipc.messages import Frame, Progress, StopRule, Update, View, Want
 
@@ -131,20 +132,26 @@ def test_the_event_loop_hears_of_the_other_end_once() -> None:
     assert asyncio.run(exchange()) == 1
 
 
+def edit(**parts: Any) -> SceneEdit:
+    """An edit whose parts are words in place of arrays."""
+    return SceneEdit(**parts)
+
+
 def test_updates_are_joined() -> None:
     whole = Update(1, 1, scene="first", settings={"seed": 1}, stop=StopRule(10), interactive=True)
-    camera = Update(1, 2, camera="left")
+    camera = Update(1, 2, edit=edit(camera="left"))
     stop = Update(1, 3, stop=StopRule(20))
     joined = whole.then(camera).then(stop)
-    assert joined == Update(1, 3, "first", {"seed": 1}, StopRule(20), camera="left", interactive=True)
+    assert joined == Update(1, 3, "first", {"seed": 1}, StopRule(20), edit=edit(camera="left"), interactive=True)
     again = joined.then(Update(1, 4, scene="second", interactive=True))
     assert again == Update(1, 4, "second", {"seed": 1}, StopRule(20), interactive=True)
     assert joined.restarts and not stop.restarts
 
 
 def test_what_two_updates_moved_is_joined() -> None:
-    first = Update(1, 1, environment=(0.0, 1.0), environment_map="dusk", moved={"lights": "a", "nodes": "b"})
-    turned = Update(1, 2, environment=(0.5, 2.0))
-    joined = first.then(turned).then(Update(1, 3, moved={"lights": "c"}))
-    assert joined.moved == {"lights": "c", "nodes": "b"}
-    assert joined.environment_map == "dusk" and joined.environment == (0.5, 2.0)
+    first = edit(environment=(0.0, 1.0), environment_map="dusk", moved={"lights": "a", "nodes": "b"})
+    turned, moved = edit(environment=(0.5, 2.0)), edit(moved={"lights": "c"})
+    joined = Update(1, 1, edit=first).then(Update(1, 2, edit=turned)).then(Update(1, 3, edit=moved))
+    assert joined == Update(1, 3, edit=edit(
+        environment=(0.5, 2.0), environment_map="dusk", moved={"lights": "c", "nodes": "b"}
+    ))  # fmt: skip

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings
+from gpu import Renderer, RenderSettings, SceneEdit
 from service.ipc.messages import Done, Frame, Image, Progressed, Read, StopRule, Update, View, Want
 from service.renderers.local.process import Options, Process
 from service.renderers.pool.pool import Pool, Seat
@@ -150,7 +150,7 @@ def test_bits_are_those_of_one_renderer(
 def test_a_stream_on_all_renderers_takes_edits(gpu: Renderer) -> None:
     """Blocks of an older generation are thrown away; the picture after an edit is that of one renderer."""
     scene = gpu.load(arrays_of("plain"))
-    scene.edit(environment=(0.25, 0.0))
+    scene.edit(SceneEdit(environment=(0.25, 0.0)).apply(scene.arrays))
     picture = gpu.picture(scene, RenderSettings(**settings(SIDE, seed=4)))
     picture.trace(1e9, 256)
     expected = picture.read("color")
@@ -177,7 +177,7 @@ def test_a_stream_on_all_renderers_takes_edits(gpu: Renderer) -> None:
                     assert frame.progress.samples >= samples or frame.scale < 1.0
                     samples = frame.progress.samples
                 assert pool.tracing(task) == 3
-                pool.send(Update(task, 2, environment=(0.25, 0.0), stop=StopRule(256), base=1))
+                pool.send(Update(task, 2, edit=SceneEdit(environment=(0.25, 0.0)), stop=StopRule(256), base=1))
                 while (await ears.next(Done)).generation != 2:
                     pass
                 pool.send(Read(task, 1, LINEAR))

@@ -9,6 +9,7 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
+from gpu import SceneEdit
 from service.ipc.channel import Encoded
 from service.ipc.leases import Assist, Assistants, Lease, LeaseDone, LeaseFailed, LeaseRefuted
 from service.ipc.messages import Done, Failed, Progress, StopRule, ToRenderer, Update
@@ -96,7 +97,7 @@ def test_a_stream_has_as_many_as_it_asked_for_and_none_while_it_is_paused() -> N
 def test_edits_reach_all() -> None:
     division, peers = _pool("a", "a")
     _begin(division, 1, 0)
-    edit = Update(1, 2, environment=(1.0, 0.0), base=1)
+    edit = Update(1, 2, edit=SceneEdit(environment=(1.0, 0.0)), base=1)
     division.sent(edit)
     assert peers[1].told[-1] == edit
     assert edit not in peers[0].told  # the pool sends it there

@@ -8,7 +8,7 @@ from typing import Any
 
 import pytest
 
-from gpu import Renderer
+from gpu import Renderer, SceneEdit
 from service.ipc.messages import FromRenderer, StopRule, Update
 from service.ipc.orders import Pause
 from service.pack import pack
@@ -98,7 +98,9 @@ def test_a_flood_of_edits_takes_no_more_than_its_part(arrays: Any) -> None:
     """Whole scenes, one after the other: to load them is work like any other."""
 
     def flood(supervisor: Supervisor, tasks: list[int], count: int) -> None:
-        supervisor.send(Update(tasks[0], 1 + count, materials=arrays.materials, settings=SIDE | {"seed": count}))
+        supervisor.send(
+            Update(tasks[0], 1 + count, edit=SceneEdit(materials=arrays.materials), settings=SIDE | {"seed": count})
+        )
 
     shares = sharing(arrays, [("stream", "hostile"), ("stream", "kind"), ("render", "other")], 3.0, flood)
     assert shares[0] / sum(shares) < 0.5, shares

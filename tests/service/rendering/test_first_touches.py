@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import pytest
 
-from gpu import KernelKey, RenderSettings, SceneArrays, apply_edit
+from gpu import KernelKey, RenderSettings, SceneArrays
 from gpu.precompile import fallback, kernel_keys
 from service import presets
 from service.bench.scenes import BenchAssets
@@ -17,8 +16,7 @@ from service.ipc.messages import Update
 from service.requests.request_reader import RequestReader
 from service.streams import protocol
 from service.streams.edit_session import EditSession
-from service.worker.device.loaded_scene import KernelRequest, LoadedScene, kernel_request
-from service.worker.payloads import updated_scene
+from service.worker.device.loaded_scene import EditedScene, KernelRequest, Offloaded, edited_scene, kernel_request
 from tests.bench.sliders import Slider, sliders
 
 SETTINGS = {"width": 256, "height": 256}
@@ -36,20 +34,24 @@ class Shown:
         update = self._session.take(start) or self._session.settle()
         assert update is not None and update.settings is not None
         self.settings = RenderSettings(**update.settings)
+        self.loaded: Offloaded | None = None
         self._take(update)
+
+    @property
+    def arrays(self) -> SceneArrays:
+        assert self.loaded is not None
+        return self.loaded.arrays
 
     @property
     def packs(self) -> bool:
         return self._session.packs
 
-    def _take(self, update: Update) -> None:
+    def _take(self, update: Update) -> EditedScene:
         self.whole = update.scene is not None  # the last update brought all arrays
-        scene = updated_scene(update)
-        if scene is not None:
-            self.arrays, self.flags = scene, kernel_keys.flags(scene, True)
-        else:
-            self.arrays = apply_edit(self.arrays, **update.edits)
-            self.flags = kernel_keys.flags_after_edit(self.flags, self.arrays, True)
+        edited = edited_scene(update, self.loaded)
+        assert edited is not None
+        self.loaded = Offloaded(edited.arrays, self.settings, True, edited.flags, {})
+        return edited
 
     def change(self, patch: Any) -> KernelRequest | None:
         """The kernel that the renderer asks for after a merge patch; None where it goes on with the one it has."""
@@ -58,10 +60,7 @@ class Shown:
         update = self._session.take(message) or self._session.settle()
         if update is None:
             return None
-        loaded = SimpleNamespace(scene=SimpleNamespace(arrays=self.arrays, flags=self.flags), editing=True)
-        request = kernel_request(update, self.settings, cast(LoadedScene, loaded), None)
-        self._take(update)
-        return request
+        return kernel_request(update, self.settings, self._take(update), loaded=True)
 
 
 def foreseen(arrays: SceneArrays, settings: RenderSettings) -> tuple[set[KernelKey], frozenset[str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from gpu import Renderer
+from gpu import Renderer, SceneEdit
 from service.ipc.messages import Done, Failed, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.problems import Unavailable
 from service.renderers.local import restarts
@@ -77,7 +77,7 @@ def test_what_was_asked_while_there_was_none_is_answered(gpu: Renderer) -> None:
         supervisor.send(Want(task, 2, View()))  # nobody takes it any more
         while supervisor.process_id is not None:
             await asyncio.sleep(0)
-        supervisor.send(Update(task, 2, camera=arrays_of("plain").camera, base=1))
+        supervisor.send(Update(task, 2, edit=SceneEdit(camera=arrays_of("plain").camera), base=1))
         supervisor.send(Want(task, 3, View(), anyway=True))
         supervisor.send(Read(task, 1, LINEAR))
         await ears.next(str)

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer
+from gpu import Renderer, SceneEdit
 from service.ipc import messages
 from service.ipc.messages import Done, Frame, Image, Loaded, Read, StopRule, Update, View, Want
 from service.ipc.orders import Hold
@@ -42,7 +42,7 @@ def test_a_held_task_stands_still_for_a_moment_or_until_its_update(arrays: Any) 
             supervisor.send(Want(task, 2 * serial, View(), anyway=True))
             held = await ears.next(Frame)
             if ended_by == "an update":
-                supervisor.send(Update(task, 2, camera=arrays.camera, base=1))
+                supervisor.send(Update(task, 2, edit=SceneEdit(camera=arrays.camera), base=1))
             supervisor.send(Want(task, 2 * serial + 1, View()))
             frame = await ears.next(Frame)
             stood_s = time.monotonic() - began
@@ -75,7 +75,7 @@ def test_a_large_edit_is_copied_off_the_event_loop_and_survives_the_renderer(
             await supervisor.send_scene(Update(task, 1, scene, settings(), StopRule(4), interactive=True))
             await ears.next(Done)
             if edited:
-                edit = Update(task, 2, environment=turn, environment_map=dim, base=1)
+                edit = Update(task, 2, edit=SceneEdit(environment=turn, environment_map=dim), base=1)
                 assert edit.is_large
                 with monkeypatch.context() as patch:
                     patch.setattr(supervisor, "send", send)

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 
 import pytest
 
-from gpu import Renderer
+from gpu import Renderer, SceneEdit
 from gpu.picture.tiles import LEAST_A_PASS
 from service.ipc.messages import StopRule, Update
 from service.pack import pack
@@ -93,7 +93,7 @@ def test_a_hold_ends_with_an_update(gpu: Renderer) -> None:
     assert task.ready and task.left_s is None
     task.hold()
     assert not task.ready and task.left_s is not None and 0 < task.left_s <= HOLD_S
-    task.update(Update(1, 2, camera=arrays.camera, base=1))
+    task.update(Update(1, 2, edit=SceneEdit(camera=arrays.camera), base=1))
     assert task.ready and task.left_s is None
     task.turn()
     assert task.ready

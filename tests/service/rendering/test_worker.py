@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from gpu import Renderer, RenderSettings
+from gpu import Renderer, RenderSettings, SceneEdit
 from service.ipc.messages import (
     Done,
     Failed,
@@ -144,10 +144,11 @@ def test_each_rung_is_expected_to_cost_what_the_sharpest_so_far_did() -> None:
 
 
 def test_coalescing_keeps_order_where_it_matters() -> None:
-    camera, material, limit = Update(1, 2, camera="c"), Update(1, 3, camera="d"), Update(1, 4, stop=StopRule(9))
-    want, other = Want(1, 5, View()), Update(2, 1, camera="e")
+    first, second, third = (SceneEdit(camera=word) for word in ("c", "d", "e"))  # type: ignore[arg-type]
+    camera, material, limit = Update(1, 2, edit=first), Update(1, 3, edit=second), Update(1, 4, stop=StopRule(9))
+    want, other = Want(1, 5, View()), Update(2, 1, edit=third)
     assert list(coalesced(iter([camera, want, material, other, limit]))) == [
-        Update(1, 4, camera="d", stop=StopRule(9)),
+        Update(1, 4, edit=second, stop=StopRule(9)),
         other,
         want,
     ]
@@ -247,7 +248,7 @@ def test_a_failure_is_the_tasks_own(rendering: Any, arrays: Any) -> None:
         before = (await good.next(Progressed)).progress.samples
         while (await good.next(Progressed)).progress.samples <= before:  # a pass takes longer than a report
             pass
-        supervisor.send(Update(other, 2, materials=arrays.materials))  # in vain, and harmless
+        supervisor.send(Update(other, 2, edit=SceneEdit(materials=arrays.materials)))  # in vain, and harmless
         await supervisor.send_scene(Update(other, 3, arrays, settings(), StopRule(2)))
         assert (await bad.next(Done)).generation == 3
         supervisor.send(Read(other, 9, View(aov="beauty")))

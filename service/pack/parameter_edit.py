@@ -1,0 +1,23 @@
+"""The edit of a scene's camera, materials or environment's turn, for which nothing else is packed."""
+
+from __future__ import annotations
+
+from gpu import SceneArrays, SceneEdit
+from service.pack.microfacets import pack_microfacets
+from service.pack.parameters import pack_camera, pack_materials, pack_turn
+from service.pack.textures.words import repacked
+from service.scene import Scene
+
+
+def parameter_edit(
+    packed: SceneArrays, scene: Scene, camera: bool = False, materials: bool = False, environment: bool = False
+) -> SceneEdit:
+    """The edit of the named parts that leads to `scene`, of which the rest is as it was `packed`."""
+    e, textures = scene.environment, packed.textures
+    return SceneEdit(
+        camera=pack_camera(scene.camera, packed.origin) if camera else None,
+        materials=pack_materials(scene) if materials else None,
+        texture_words=repacked(textures, scene) if materials and textures else None,
+        microfacets=pack_microfacets(scene) if materials and len(packed.microfacets) else None,
+        environment=pack_turn(e) if environment and e is not None else None,
+    )
