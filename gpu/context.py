@@ -81,7 +81,7 @@ def create(device: int | None = None) -> Any:
             f"or Mesa's software renderer (on Debian `apt-get install {PACKAGES}`)"
         ) from error
     _thread.current = context
-    log.info("created context driver=%s version=%s", context.info["GL_RENDERER"], context.info["GL_VERSION"])
+    log.info("created context", {"driver": context.info["GL_RENDERER"], "version": context.info["GL_VERSION"]})
     return context
 
 

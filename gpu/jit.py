@@ -66,4 +66,4 @@ def _compiled(function: F, **options: Any) -> F:
 @functools.cache
 def _log_no_cache() -> None:
     folder = os.environ["NUMBA_CACHE_DIR"]
-    log.warning("machine code is compiled anew in each process, as its cache cannot be written folder=%s", folder)
+    log.warning("machine code is compiled anew in each process, as its cache cannot be written", {"folder": folder})

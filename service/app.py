@@ -66,11 +66,11 @@ DESCRIPTORS = 65_536
 SWITCH_S = 0.001
 OPEN_TO_ALL = (
     "serving without a key: whoever reaches this address can render, and can read, replace and delete what is saved; "
-    "set SUNBOX_API_KEY, or listen on 127.0.0.1 (in a container: publish the port on 127.0.0.1) host=%s"
+    "set SUNBOX_API_KEY, or listen on 127.0.0.1 (in a container: publish the port on 127.0.0.1)"
 )
 CROWDED = (
     "SUNBOX_DEVICES asks for more renderers on the processor than it has cores: together they are slower than one "
-    "for each core renderers=%d cores=%d"
+    "for each core"
 )
 
 FULL = Unavailable("There is no room for another connection just now (SUNBOX_MAX_CONNECTIONS).", 5)
@@ -125,26 +125,26 @@ def run(config: Config) -> int:
     hide()
     sys.setswitchinterval(SWITCH_S)
     if unknown := unknown_variables():
-        log.warning("these variables are no settings and change nothing names=%s", ",".join(unknown))
+        log.warning("these variables are no settings and change nothing", {"names": ",".join(unknown)})
     if (reason := missing_device(config)) is not None:
-        log.error("did not start reason=%s", reason)
+        log.error("did not start", {"reason": reason})
         return 1
     if config.software_renderers > cores():
-        log.warning(CROWDED, config.software_renderers, cores())
+        log.warning(CROWDED, {"renderers": config.software_renderers, "cores": cores()})
     most = min(config.max_connections, _take_descriptors() // 2)  # files, scenes and images take others
     try:
         listener = listen(config.host, config.port)
     except OSError as error:
-        log.error("could not listen host=%s port=%d error=%s", config.host, config.port, error.strerror or error)
+        log.error("could not listen", {"host": config.host, "port": config.port, "error": error.strerror or error})
         return 1
     host = listener.getsockname()[0]
     if not config.api_key and not ipaddress.ip_address(host).is_loopback:
-        log.warning(OPEN_TO_ALL, host)
+        log.warning(OPEN_TO_ALL, {"host": host})
     try:
         with listener, locked(config.data_dir):
             return _serve(config, listener, most)
     except (DamagedFile, FolderInUse, CannotJoin) as error:
-        log.error("did not start reason=%s", error)
+        log.error("did not start", {"reason": error})
         return 1
 
 
@@ -212,16 +212,16 @@ class _Server(uvicorn.Server):
 
     async def startup(self, sockets: list[socket.socket] | None = None) -> None:
         if (reason := await self._state.gpu_missing()) is not None:
-            log.error("did not start reason=%s", reason)
+            log.error("did not start", {"reason": reason})
             await self._state.renderers.close()
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
-        log.info("started address=%s version=%s", self._state.address, metadata.version("sunbox"))
+        log.info("started", {"address": self._state.address, "version": metadata.version("sunbox")})
         _announce(self._state.address)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:
-        log.info("shutting down connections=%d", len(self.server_state.connections))
+        log.info("shutting down", {"connections": len(self.server_state.connections)})
         await self._state.farewell()
         await super().shutdown(sockets)
 

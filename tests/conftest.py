@@ -12,6 +12,7 @@ import pytest
 
 from gpu import ContextError, Renderer
 from gpu import context as contexts
+from service.logs.formatters import Console
 from tests.privileges import shed
 from tests.rendering import release_pictures
 from tests.serving import Server
@@ -91,6 +92,13 @@ def server(gpu: Renderer, tmp_path_factory: pytest.TempPathFactory) -> Iterator[
     served.wait()
     yield served
     served.stop()
+
+
+@pytest.fixture
+def caplog(caplog: pytest.LogCaptureFixture) -> pytest.LogCaptureFixture:
+    """pytest's, whose text has the values of records."""
+    caplog.handler.setFormatter(Console())
+    return caplog
 
 
 @pytest.fixture

@@ -99,7 +99,7 @@ class Scene:
             raise
         self._tables = upload_tables(context) if "HAS_PRINCIPLED_LOBES" in self._raised else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
-        log.info("loaded scene shapes=%d lights=%d materials=%d", count, len(arrays.lights), len(arrays.materials))
+        log.info("loaded scene", {"shapes": count, "lights": len(arrays.lights), "materials": len(arrays.materials)})
 
     def _upload_all(self) -> None:
         for slot in buffers.BUFFERS:

@@ -108,7 +108,7 @@ class KernelCache:
             raise CompileError(f"{entry}: {source.explain(str(error))}") from error
         self.last_compile_ms = (time.perf_counter() - start) * 1e3
         on = sorted(name[4:].lower() for name, value in defines.items() if name.startswith("HAS_") and value)
-        log.info("compiled %s flags=%s ms=%.0f", entry, "+".join(on) or "none", self.last_compile_ms)
+        log.info(f"compiled {entry}", {"flags": "+".join(on) or "none", "ms": round(self.last_compile_ms)})
         return kernel
 
     def release(self) -> None:

@@ -154,9 +154,9 @@ class AssetFolder:
                     elif name.startswith(".") and name.endswith(PART):
                         deleted += _deleted_unless_written(self.path / name)
         except OSError as error:
-            log.warning("could not delete the leftovers of a crash folder=%s error=%s", self.path, error)
+            log.warning("could not delete the leftovers of a crash", {"folder": self.path, "error": error})
         if deleted:
-            log.info("deleted the leftovers of a crash files=%d", deleted)
+            log.info("deleted the leftovers of a crash", {"files": deleted})
 
     def recount(self) -> None:
         """Count the totals again, as somebody may have copied or deleted files by hand. Raises OSError."""

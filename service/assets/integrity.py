@@ -57,10 +57,10 @@ class Integrity:
         try:
             sound = "sha256:" + digest(file) == id
         except OSError as error:
-            log.error("could not read an asset id=%s error=%s", id, error)
+            log.error("could not read an asset", {"id": id, "error": error})
             sound = False
         if not sound:
-            log.error("the bytes of an asset are damaged; they were set aside id=%s", id)
+            log.error("the bytes of an asset are damaged; they were set aside", {"id": id})
             with suppress(OSError):  # in a read-only folder the file stays, and is refused again
                 self._files.set_aside(id, file)
             raise damaged(id)

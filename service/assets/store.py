@@ -269,14 +269,14 @@ class AssetStore:
         with self._storing(info.id):
             changed = self._files.put(info.id, files, lasting)
         self._integrity.stored(info.id, changed)
-        log.info("asset stored id=%s format=%s bytes=%d", info.id, info.format, info.bytes)
+        log.info("asset stored", {"id": info.id, "format": info.format, "bytes": info.bytes})
 
     @contextmanager
     def _storing(self, id: str) -> Iterator[None]:
         try:
             yield
         except OSError as error:
-            log.error("could not store an asset id=%s error=%s", id, error)
+            log.error("could not store an asset", {"id": id, "error": error})
             raise Unavailable(f"the asset could not be stored: {os.strerror(error.errno or 0)}") from None
 
     def _load(self, ref: str) -> Parsed:

@@ -38,7 +38,7 @@ class SourceAssets:
                 try:
                     self._found.keep(ref)
                 except (ServiceError, OSError) as error:  # another user's folder may not even be listed
-                    log.warning("asset not kept ref=%s error=%s", ref, error)
+                    log.warning("asset not kept", {"ref": ref, "error": error})
 
     def by_id(self, scene: Any) -> tuple[Any, dict[str, str]]:
         """The document with ids in the place of paths, and the paths by id."""

@@ -10,8 +10,8 @@ from pathlib import Path
 from service.commands.configuration import configuration
 
 CLOSED = (
-    "SUNBOX_DATA_DIR cannot be used by user %d: user %d owns %s and keeps others from reading or writing it. Uploads "
-    "and saved documents will be refused."
+    "SUNBOX_DATA_DIR cannot be used by user {user}: user {owner} owns {folder} and keeps others from reading or "
+    "writing it. Uploads and saved documents will be refused."
 )
 
 log = logging.getLogger(__name__)
@@ -24,7 +24,7 @@ def run(arguments: argparse.Namespace) -> int:
 
     setup.configure(config.log_format, config.log_level, queued=True, secrets=config.api_key)
     if (closed := _closed(config.data_dir)) is not None:
-        log.warning(CLOSED, os.geteuid(), closed.stat().st_uid, closed)
+        log.warning(CLOSED.format(user=os.geteuid(), owner=closed.stat().st_uid, folder=closed))
 
     return app.run(config)
 

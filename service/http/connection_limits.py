@@ -53,7 +53,7 @@ class Watch:
         waits = {each: wait for each in connections if (wait := self._wait(each, now)) is not None}
         for connection, wait in waits.items():
             if now - wait.since >= _limit_s(wait.owed):
-                log.info("connection ended owed=%s waited_s=%.0f", wait.owed, now - wait.since)
+                log.info("connection ended", {"owed": wait.owed, "waited_s": round(now - wait.since)})
                 connection.transport.abort()
         self._waits = waits
 

@@ -61,7 +61,7 @@ class JoinedWrites(asyncio.Transport):
         waiting = self.get_write_buffer_size()
         self._largest = max(len(data), self._largest if waiting else 0)
         if waiting + len(data) > self._largest + MOST_BESIDE:
-            log.info("connection ended unread=%d", waiting)
+            log.info("connection ended", {"unread": waiting})
             return self.abort()
         self.written += len(data)
         if self._size + len(data) > JOINED:

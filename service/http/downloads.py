@@ -149,7 +149,7 @@ class Downloads:
             fill(file)
             file.flush()
         except OSError as error:
-            log.error("could not write an answer error=%s", error)
+            log.error("could not write an answer", {"error": error})
             raise Unavailable("The answer could not be written to the disk.", RETRY_S) from None
         return Written(file)
 

@@ -8,10 +8,10 @@ import time
 from collections.abc import Callable
 from secrets import token_hex
 
-import structlog
 from starlette.datastructures import Headers, MutableHeaders
 from starlette.types import ASGIApp, Message, Receive, Scope, Send
 
+from service.logs.formatters import bound
 from service.problems import Internal, ServiceError
 
 GIVEN_ID = re.compile(r"[A-Za-z0-9._-]{1,64}")  # an id that a proxy or client sent; any other text is not logged
@@ -46,11 +46,11 @@ class Requests:
                 MutableHeaders(scope=message)["x-request-id"] = id
             await send(message)
 
-        with structlog.contextvars.bound_contextvars(request=id):
+        with bound(request=id):
             try:
                 await self._app(scope, receive, sending)
             except Exception:
-                log.exception("request failed path=%s", _path(scope))
+                log.exception("request failed", {"path": _path(scope)})
                 if scope["type"] == "http" and status == 0:
                     await self._refuse(Internal())(scope, receive, sending)
             finally:
@@ -60,7 +60,11 @@ class Requests:
         method = scope.get("method", "WEBSOCKET")
         self._heard(method, getattr(scope.get("route"), "path", ""), status, seconds)
         level = logging.DEBUG if scope["path"] in ASKED_ALL_THE_TIME else logging.INFO
-        log.log(level, "answered method=%s path=%s status=%d ms=%.1f", method, _path(scope), status, 1e3 * seconds)
+        log.log(
+            level,
+            "answered",
+            {"method": method, "path": _path(scope), "status": status, "ms": round(1e3 * seconds, 1)},
+        )
 
 
 def _path(scope: Scope) -> str:

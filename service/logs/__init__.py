@@ -1,5 +1,6 @@
 """What an operator reads: records, and where they go.
 
-setup   a line or a JSON object for each event
-output  where log records go
+setup       how log records are written, chosen once at the start
+formatters  a record as a line or as a JSON object, without secrets
+output      where log records go
 """

@@ -6,39 +6,20 @@ import atexit
 import copy
 import logging
 import queue
-import re
 import time
-from collections.abc import Iterable
 from contextlib import suppress
 from dataclasses import dataclass
 from logging.handlers import QueueHandler, QueueListener
 from types import TracebackType
-from typing import Any
 
-import structlog
+from service.logs.formatters import context_fields
 
 REPEAT_S = 10.0  # the same traceback is written at most once in this time
 MOST_REPEATED = 256  # tracebacks that are remembered; a caller can't make up more kinds than the code has places
 MOST_QUEUED = 10_000  # records that wait while nobody reads stderr; more are dropped, and counted
 LAST_LINES_S = 2.0  # for what is still to be written when the program ends
-HIDDEN = "***"
-LEAST_SECRET = 8  # characters; shorter keys are looked for only where keys stand: they may be words of a line
-# A session's id in an address, and a key as RFC 6750 and the stream's subprotocol carry it.
-SECRETS = r"(?<=session=)[^&\s\"'\\]+|(?<=beside=)[^&\s\"'\\]+|(?<=sunbox\.key\.)[^\s,\"'\\]+|(?<=[Bb]earer )[!-~]+"
 
 Place = tuple[str, ...]
-
-
-class Redacting(structlog.stdlib.ProcessorFormatter):
-    """Removes secrets from a line, wherever they stand, tracebacks included."""
-
-    def __init__(self, secrets: Iterable[str], **options: Any) -> None:
-        super().__init__(**options)
-        known = sorted((re.escape(each) for each in secrets if len(each) >= LEAST_SECRET), key=len, reverse=True)
-        self._secrets = re.compile("|".join([*known, SECRETS]))
-
-    def format(self, record: logging.LogRecord) -> str:
-        return self._secrets.sub(HIDDEN, super().format(record))
 
 
 @dataclass
@@ -76,7 +57,8 @@ class Output(logging.StreamHandler):  # type: ignore[type-arg]
                 del self._repeated[place]
                 if repeated.more:
                     first = repeated.first
-                    first.msg, first.args = "and %d more like it error=%s at=%s", (repeated.more, *place[:2])
+                    error, at, *_ = place
+                    first.msg, first.args = f"and {repeated.more} more like it", {"error": error, "at": at}
                     super().emit(first)
 
     def close(self) -> None:
@@ -95,7 +77,7 @@ class Queued(QueueHandler):
     def prepare(self, record: logging.LogRecord) -> logging.LogRecord:
         """The record with its exception, to be rendered in the other thread, and the request that it belongs to."""
         record = copy.copy(record)
-        record.context = structlog.contextvars.get_contextvars()
+        record.context = context_fields.get()
         return record
 
     def enqueue(self, record: logging.LogRecord) -> None:
@@ -163,7 +145,7 @@ def _lines_dropped(count: int) -> logging.LogRecord:
             "name": __name__,
             "levelno": logging.WARNING,
             "levelname": "WARNING",
-            "msg": "log lines were dropped count=%d",
-            "args": (count,),
+            "msg": "log lines were dropped",
+            "args": {"count": count},
         }
     )

@@ -55,9 +55,9 @@ async def warm_up(renderers: Renderers, reader: RequestReader, document: Any) ->
             if isinstance(error, BaseException):
                 raise error
     except ServiceError as error:
-        log.warning("did not warm up error=%s", error)
+        log.warning("did not warm up", {"error": error})
         return False
-    log.info("warmed up seconds=%.2f", time.monotonic() - began)
+    log.info("warmed up", {"seconds": round(time.monotonic() - began, 2)})
     return True
 
 
@@ -76,7 +76,7 @@ async def foresee(renderers: Renderers, reader: RequestReader, documents: Iterab
             packed = await packing(partial(_packed, reader, document))
             renderers.send(Foresee(task, packed.arrays, settings))
     except ServiceError as error:
-        log.warning("did not foresee scenes error=%s", error)
+        log.warning("did not foresee scenes", {"error": error})
     finally:
         renderers.drop(task)
 

@@ -102,7 +102,7 @@ class Ordered:
     def wait(self, reason: ServiceError) -> None:
         """Note that something is missing for it to begin. It is tried again every few seconds, and logged once."""
         if not self.waits:
-            log.warning("a render has to wait id=%s reason=%s", self.id[:6], reason)
+            log.warning("a render has to wait", {"id": self.id[:6], "reason": reason})
         self.waits = True
 
     def wake(self) -> None:

@@ -106,7 +106,7 @@ class RenderQueue:
             if job.finished.is_set():
                 self._kept.add(job)
         if self._jobs:
-            log.info("took up stored renders waiting=%d ended=%d", len(self._waiting), self.kept)
+            log.info("took up stored renders", {"waiting": len(self._waiting), "ended": self.kept})
         self._evict()
         self._slots.dispatch()
 
@@ -371,7 +371,7 @@ class RenderQueue:
         try:
             await self.store.forget([(recorder.number, recorder.id) for recorder in recorders])
         except ServiceError as error:
-            log.warning("could not delete renders from the disk error=%s", error)
+            log.warning("could not delete renders from the disk", {"error": error})
 
     def _remember(self, id: str, owner: str, number: int) -> None:
         self._gone[id] = owner, number

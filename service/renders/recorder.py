@@ -143,5 +143,5 @@ class Recorder:
         self.store.failures += 1
         unexpected = not isinstance(error, ServiceError)
         log.warning(
-            "could not store the %s of a render id=%s error=%s", what, self.id[:6], error, exc_info=unexpected
+            f"could not store the {what} of a render", {"id": self.id[:6], "error": error}, exc_info=unexpected
         )

@@ -59,7 +59,7 @@ class Rendering(Listener):
         except ServiceError as error:
             self._could_not_begin(error)
         except Exception:
-            log.exception("could not begin a render id=%s", render.id[:6])
+            log.exception("could not begin a render", {"id": render.id[:6]})
             self._could_not_begin(Internal("The server made a mistake; its log says which."))
         await render.life.left.wait()
 

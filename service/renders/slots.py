@@ -167,7 +167,7 @@ class Slots:
         for job, gives in zip(chosen, gave, strict=True):
             if gives:
                 await asyncio.wait([tasks[job]])
-                log.info("a render gave way to another one id=%s to=%s", job.id[:6], waiting.id[:6])
+                log.info("a render gave way to another one", {"id": job.id[:6], "to": waiting.id[:6]})
         await asyncio.sleep(0)  # for `_ran`
         left = self._leaving - set(self._running.values())
         self._claim, self._leaving = None, set()

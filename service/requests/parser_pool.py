@@ -149,7 +149,7 @@ def _death(child: Child, work: Work) -> Exception:
     code = child.exit_code()
     if code is None:
         return ParserFailed("the parser hung up")
-    log.warning("parser of a large body died code=%d", code)
+    log.warning("parser of a large body died", {"code": code})
     if code == -signal.SIGXCPU:
         return TooLarge(f"Reading this body takes more than the {work.seconds:.0f} s of processor time allowed.")
     if code == -signal.SIGKILL:

@@ -89,7 +89,7 @@ class AssetShares:
                     ids = [id for (id,) in database.execute("SELECT DISTINCT asset FROM asset_owners")]
                 self.forget(ids)
             except Unavailable as error:
-                log.warning("could not look for uploads that are deleted error=%s", error)
+                log.warning("could not look for uploads that are deleted", {"error": error})
 
     def forget(self, ids: Collection[str]) -> None:
         """Delete the rows of those of these assets that no longer exist. Raises Unavailable."""

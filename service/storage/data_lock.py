@@ -42,7 +42,7 @@ def locked(folder: Path) -> Iterator[None]:
             stack.callback(os.close, file)
             _lock(file, folder)
         except OSError as error:
-            log.warning("could not lock the data folder folder=%s error=%s", folder, error)
+            log.warning("could not lock the data folder", {"folder": folder, "error": error})
         yield
 
 

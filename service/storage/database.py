@@ -46,10 +46,10 @@ class Database:
                     database.execute(f'SELECT count(*) FROM "{table}"').fetchone()
         except (OSError, sqlite3.Error) as error:
             if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_FULL:
-                log.warning("could not migrate or compact the database file=%s error=%s", self.path, error)
+                log.warning("could not migrate or compact the database", {"file": self.path, "error": error})
             elif isinstance(error, sqlite3.OperationalError | OSError):
                 # Such an error may pass: a lock, or missing rights.
-                log.error("could not open the database file=%s error=%s", self.path, error)
+                log.error("could not open the database", {"file": self.path, "error": error})
             else:
                 raise DamagedFile(
                     f"the database is damaged ({error}): {self.path}; put a backup in its place, "
@@ -80,12 +80,12 @@ class Database:
         try:
             yield
         except DamagedFile as error:
-            log.error("could not use the database reason=%s", error)
+            log.error("could not use the database", {"reason": error})
             raise Unavailable("The server's database was written by a newer version of Sunbox.", 30) from None
         except (sqlite3.ProgrammingError, sqlite3.InterfaceError):
             raise  # a mistake in the code, such as a connection that another thread uses
         except of_the_disk as error:
-            log.error("could not reach the database file=%s error=%s", self.path, error)
+            log.error("could not reach the database", {"file": self.path, "error": error})
             if getattr(error, "sqlite_errorcode", 0) == sqlite3.SQLITE_BUSY:
                 raise Unavailable("Others are writing to the database just now.", 1) from None
             raise Unavailable("The database cannot be reached: the server's disk has a problem.", 30) from None
@@ -124,7 +124,7 @@ class Database:
                 if _version(database) != version:  # another process was faster
                     continue
                 if version or database.execute("SELECT count(*) FROM sqlite_master").fetchone() != (0,):
-                    log.info("migrating the database file=%s to=%d", self.path, version + 1)
+                    log.info("migrating the database", {"file": self.path, "to": version + 1})
                 for statement in MIGRATIONS[version].statements:
                     database.execute(statement)
                 database.execute(f"PRAGMA user_version = {version + 1}")

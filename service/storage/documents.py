@@ -193,7 +193,7 @@ class Documents:
                 if shared == BY_LINK:
                     database.execute("INSERT INTO document_links VALUES (?, ?, ?, ?)", (*key, time.time()))
                 _expire(database)
-        log.info("document saved kind=%s name=%s bytes=%d", kind, name, size)
+        log.info("document saved", {"kind": kind, "name": name, "bytes": size})
         return kept, old is None
 
     def delete(self, kind: str, name: str, owner: str = "", condition: Condition = ALWAYS) -> None:
@@ -217,7 +217,7 @@ class Documents:
             database.execute("DELETE FROM documents WHERE kind = ? AND name = ? AND owner = ?", key)
             database.execute("DELETE FROM uses WHERE kind = ? AND name = ? AND owner = ?", key)
             database.execute("DELETE FROM document_links WHERE kind = ? AND name = ? AND owner = ?", key)
-        log.info("document deleted kind=%s name=%s", kind, name)
+        log.info("document deleted", {"kind": kind, "name": name})
 
     @contextmanager
     def assets_in_use(self) -> Iterator[set[str]]:
@@ -281,7 +281,7 @@ def _expire(database: sqlite3.Connection) -> None:
     for table in ("documents", "uses", "document_links"):
         database.executemany(f"DELETE FROM {table} WHERE kind = ? AND name = ? AND owner = ?", old)
     if old:
-        log.info("deleted documents that nobody had read by their links for %d days count=%d", LINK_DAYS, len(old))
+        log.info(f"deleted documents that nobody had read by their links for {LINK_DAYS} days", {"count": len(old)})
 
 
 def check_kind(kind: str) -> Kind:

@@ -85,7 +85,7 @@ class Quota:
             try:
                 self._make_room(size, Usage() if reserved else self._reserve)
             except OSError as error:
-                log.error("could not make room error=%s", error)
+                log.error("could not make room", {"error": error})
                 raise Unavailable(f"room could not be made: {os.strerror(error.errno or 0)}", RETRY_S) from None
             self._pending += size
         try:
@@ -120,7 +120,7 @@ class Quota:
                     break
                 size -= assets[hash].usage.bytes
                 self._files.delete(hash)
-                log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)
+                log.info("asset evicted", {"id": f"sha256:{hash}", "bytes": assets[hash].usage.bytes})
                 goes.append(f"sha256:{hash}")
         self._say_gone(goes)
         return goes
@@ -134,7 +134,7 @@ class Quota:
         try:
             self._files.recount()
         except OSError as error:
-            log.warning("could not count the assets error=%s", error)
+            log.warning("could not count the assets", {"error": error})
 
     def _make_room(self, size: Usage, reserve: Usage) -> None:
         most = self._limit - reserve - self._pending - size
@@ -169,10 +169,10 @@ class Quota:
             for name in lost:
                 assert self._lost is not None
                 self._lost.delete(name)
-                log.info("a picture that no render has made room name=%s", name)
+                log.info("a picture that no render has made room", {"name": name})
             for hash in goes:
                 self._files.delete(hash)
-                log.info("asset evicted id=sha256:%s bytes=%d", hash, assets[hash].usage.bytes)
+                log.info("asset evicted", {"id": f"sha256:{hash}", "bytes": assets[hash].usage.bytes})
         self._say_gone([f"sha256:{hash}" for hash in goes])
 
     def _within_share(self, owned: Collection[tuple[str, str, int]]) -> set[str]:
@@ -188,4 +188,4 @@ class Quota:
             try:
                 self._gone(ids)
             except Unavailable as error:  # they are deleted all the same
-                log.warning("could not note which assets were deleted error=%s", error)
+                log.warning("could not note which assets were deleted", {"error": error})

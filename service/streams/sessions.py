@@ -129,7 +129,7 @@ class Sessions:
         if session.timer is not None:
             session.timer.cancel()
         session.running.cancel()
-        log.info("session ended sessions=%d", len(self._kept))
+        log.info("session ended", {"sessions": len(self._kept)})
 
 
 def _is_second(session: Session) -> bool:

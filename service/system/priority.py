@@ -35,4 +35,4 @@ def raise_process_niceness(niceness: int) -> None:
 
 @functools.cache
 def _log_refusal(reason: str) -> None:
-    log.warning("the system refused to change a thread's priority error=%s", reason)
+    log.warning("the system refused to change a thread's priority", {"error": reason})

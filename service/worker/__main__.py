@@ -75,10 +75,11 @@ def _serve(end: socket.socket, arguments: argparse.Namespace) -> int:
     limit = arguments.memory or default_limit(renderer.info, arguments.host_memory)
     told = {"denoiser": denoise.version(), "memory_limit": None if limit == UNLIMITED else limit}
     channel.send(end, Ready({**renderer.info, **told}))
-    log.info("started driver=%s", renderer.info.get("renderer"))
+    log.info("started", {"driver": renderer.info.get("renderer")})
     if renderer.info["software"] and (closed := closed_gpus(DEVICES)):
         log.warning(
-            "the processor renders, as this user may not use the GPU device=%s group=%s", closed[0], closed[0].group()
+            "the processor renders, as this user may not use the GPU",
+            {"device": closed[0], "group": closed[0].group()},
         )
     heartbeat, lifeline = Heartbeat(arguments.heartbeat), arguments.lifeline
     Loop(end, renderer, heartbeat, limit, device, arguments.checkpoint, lifeline).run()

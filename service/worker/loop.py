@@ -250,10 +250,10 @@ class Loop:
         except channel.Closed:
             raise
         except GpuError as error:
-            log.warning("task failed task=%d kind=%s error=%s", task.number, type(error).__name__, error)
+            log.warning("task failed", {"task": task.number, "kind": type(error).__name__, "error": error})
             detail, refused = str(error), isinstance(error, SceneTooLarge | OutOfMemory)
         except Exception:
-            log.exception("task failed task=%d", task.number)
+            log.exception("task failed", {"task": task.number})
             detail, refused = "The renderer made a mistake; its log says which.", False
         if read is None:
             task.fail()

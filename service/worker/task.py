@@ -282,7 +282,7 @@ class Task:
         saved = saved_picture(restore.saved, full.settings)
         others = restore.reason is None and restore.saved.driver not in ("", driver_of(self._renderer.info))
         if others or not full.fits(saved, goes_on=restore.reason is None):
-            log.warning("another driver or version saved this picture, which begins again task=%d", self.number)
+            log.warning("another driver or version saved this picture, which begins again", {"task": self.number})
             if restore.reason is None:
                 self._send(Discarded(self.number))
             return

@@ -230,7 +230,7 @@ def test_what_the_kernel_lacks_is_said_once(
     box.rights()
     assert not Rights(True, True, False, True, 1, True).missing  # without sockets no network is needed
     (record,) = caplog.records
-    assert record.levelname == "WARNING" and "landlock,seccomp" in record.getMessage()
+    assert record.levelname == "WARNING" and "landlock,seccomp" in caplog.text
 
 
 def test_the_server_says_it_and_is_hidden(server: Server) -> None:

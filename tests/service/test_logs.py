@@ -11,12 +11,14 @@ import threading
 import time
 from collections.abc import Iterator
 from pathlib import Path
+from typing import Any
 from urllib.parse import urlsplit
 
 import pytest
 
 from service.logs import output as log_output
 from service.logs import setup
+from service.logs.formatters import Console, Json, bound
 from tests.calls import metrics
 from tests.serving import PATIENCE_S, Client, Server, wait_until
 
@@ -50,7 +52,7 @@ def failing(secret: str = "a-local-secret") -> None:
     try:
         fail(secret)
     except ValueError:
-        log.exception("failed task=%d", 7)
+        log.exception("failed", {"task": 7})
 
 
 @pytest.mark.parametrize("form", ["console", "json"])
@@ -82,8 +84,8 @@ def test_who_logs_does_not_wait(untouched: None, monkeypatch: pytest.MonkeyPatch
     monkeypatch.setattr(logging.StreamHandler, "emit", write)
     monkeypatch.setattr(log_output.atexit, "register", lambda stop: None)
     setup.configure("json", "info", queued=True)
-    with setup.structlog.contextvars.bound_contextvars(request="mine"):
-        log.info("first count=%d", 1)
+    with bound(request="mine"):
+        log.info("first", {"count": 1})
         failing()
     (queued,) = logging.getLogger().handlers
     assert isinstance(queued, log_output.Queued) and not written
@@ -120,7 +122,7 @@ def test_nobody_reads_them(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("form", ["console", "json"])
 def test_no_secret_is_logged(text: str, form: str, untouched: None, capfd: pytest.CaptureFixture[str]) -> None:
     setup.configure(form, "debug", secrets=["a-SECRET_1-of-the-configuration", "key"])
-    log.info("heard text=%s", text)
+    log.info("heard", {"text": text})
     log.info(text)
     told = capfd.readouterr().err
     assert "SECRET" not in told and told.count("***") == 2
@@ -169,14 +171,45 @@ def test_session_ids_are_in_no_log(server: Server) -> None:
     assert session not in server.log.read_text()
 
 
-def test_every_message_has_its_fields_last() -> None:
-    """`what happened name=%s`: values that stand in the text can't be looked for."""
+def test_every_message_has_its_values_beside_it() -> None:
+    """`"what happened", {"name": value}`: values that stand in the text can't be looked for."""
     for path in sorted((*ROOT.glob("service/**/*.py"), *ROOT.glob("gpu/**/*.py"))):
         for call in ast.walk(ast.parse(path.read_text())):
             if not (isinstance(call, ast.Call) and ast.unparse(call.func).startswith("log.")):
                 continue
-            for message in (each.value for each in call.args if isinstance(each, ast.Constant)):
-                fields = [bool(match["field"]) for match in setup.CONVERSION.finditer(str(message))]
-                where = f"{path}:{call.lineno}: {message}"
-                assert fields == sorted(fields) and fields.count(False) <= 1, where
-                assert not str(message).endswith(": %s"), where
+            message, *values = call.args[1:] if ast.unparse(call.func) == "log.log" else call.args
+            where = f"{path}:{call.lineno}: {ast.unparse(call)}"
+            if isinstance(message, ast.Constant):
+                assert "%" not in message.value and "=" not in message.value, where
+            for each in values:
+                assert isinstance(each, ast.Dict | ast.Name) and len(values) == 1, where
+                names = [key.value for key in each.keys] if isinstance(each, ast.Dict) else []  # type: ignore[union-attr]
+                assert not {"event", "level", "logger", "timestamp", "exception"} & set(names), where
+
+
+@pytest.mark.parametrize(
+    ("message", "values", "console", "written"),
+    [
+        ("asset stored", {"id": "a b", "bytes": 3}, "id='a b' bytes=3", {"id": "a b", "bytes": 3}),
+        ("compiled", {"flags": "none", "ms": 1.23456789}, "flags=none ms=1.2346", {"flags": "none", "ms": 1.2346}),
+        ("100 %", {"of": None, "whole": True}, "of=None whole=True", {"of": "None", "whole": True}),
+        ("could not read", {"error": ValueError("x=1")}, "error='x=1'", {"error": "x=1"}),
+    ],
+)
+def test_values_become_fields(message: str, values: dict[str, Any], console: str, written: dict[str, Any]) -> None:
+    record = log.makeRecord(log.name, logging.WARNING, "", 0, message.replace("%", "%%"), (values,), None)
+    record.created = 0.5
+    line = Console().format(record)
+    assert line == f"1970-01-01T00:00:00.500000Z [warning  ] {message:30} [service.test] {console}"
+    same = {
+        "event": message,
+        "level": "warning",
+        "logger": "service.test",
+        "timestamp": "1970-01-01T00:00:00.500000Z",
+    }
+    assert list(json.loads(Json().format(record)).items()) == list((same | written).items())
+
+
+def test_a_level_has_a_colour_on_a_terminal() -> None:
+    line = Console(colors=True).format(log.makeRecord(log.name, logging.ERROR, "", 0, "failed", (), None))
+    assert "\033[31merror    \033[0m" in line and "\033[1mfailed" in line

@@ -21,7 +21,6 @@ import uvicorn
 from service import app, config
 from service.config import Config
 from service.logs import setup
-from service.logs.setup import _fields
 from service.routes.metrics import scrape
 from service.state import AppState
 from tests.calls import metrics
@@ -99,27 +98,6 @@ def test_logs_for_machines(server: Server, tmp_path: Path) -> None:
     assert "very-secret" not in text
 
 
-@pytest.mark.parametrize(
-    ("message", "arguments", "told"),
-    [
-        (
-            "told %s of it who=%s times=%d s=%.2f",
-            ("all", "a b", 3, 0.12345),
-            {"event": "told all of it", "who": "a b", "times": 3, "s": 0.12},
-        ),
-        ("100 %% of=%s", ("it",), {"event": "100 %", "of": "it"}),
-        ("told ms=%.0f %s", (96.0135, "all"), {"event": "told all", "ms": 96}),
-        ("nothing", (), {"event": "nothing"}),
-    ],
-)
-def test_messages_become_fields(message: str, arguments: tuple[Any, ...], told: dict[str, Any]) -> None:
-    record = logging.makeLogRecord({"msg": message, "args": arguments})
-    event = {"event": record.getMessage(), "_record": record, "positional_args": arguments}
-    out = dict(_fields(None, "info", event))
-    del out["_record"]
-    assert out == told
-
-
 def test_a_software_renderer_is_refused(server: Server, tmp_path: Path) -> None:
     if metrics(server)["sunbox_renderer_software"] != 1:
         pytest.skip("there is a GPU")
@@ -165,7 +143,7 @@ def test_logging_is_set_up_once(capfd: pytest.CaptureFixture[str]) -> None:
     before, level = root.handlers[:], root.level
     try:
         setup.configure("json", "warning")
-        logging.getLogger("a.b").warning("what happened count=%d", 3)
+        logging.getLogger("a.b").warning("what happened", {"count": 3})
         logging.getLogger("a.b").info("not told")
         told = json.loads(capfd.readouterr().err)
         assert (told["event"], told["count"], told["logger"]) == ("what happened", 3, "a.b")

@@ -149,10 +149,10 @@ class Sandbox:
 def _log_rights(rights: Rights) -> None:
     given_up = [name for name in asdict(rights) if name not in rights.missing]
     if rights.missing:
-        text = "the kernel leaves rights to the processes that parse uploads missing=%s given_up=%s"
-        log.warning(text, ",".join(rights.missing), ",".join(given_up) or "none")
+        text = "the kernel leaves rights to the processes that parse uploads"
+        log.warning(text, {"missing": ",".join(rights.missing), "given_up": ",".join(given_up) or "none"})
     else:
-        log.info("uploads are parsed without rights given_up=%s landlock=%d", ",".join(given_up), rights.landlock)
+        log.info("uploads are parsed without rights", {"given_up": ",".join(given_up), "landlock": rights.landlock})
 
 
 def _ask(child: Child, request: dict[str, Any], fd: int, limits: AssetLimits) -> tuple[dict[str, Any], int]:
@@ -170,7 +170,7 @@ def _death(child: Child, limits: AssetLimits) -> str:
     code = child.exit_code()
     if code is None:
         return "reading it crashed the parser"
-    log.warning("the parser died exit_code=%d", code)
+    log.warning("the parser died", {"exit_code": code})
     for number, text in CRASHES.items():
         if code == -number:
             return text.format(seconds=limits.seconds)

@@ -150,14 +150,14 @@ class Keeper:
             self.detail = message.detail
             if self.process is not None:
                 self.process.unable = True
-            log.error("could not start a renderer renderer=%s error=%s", self._id, message.detail)
+            log.error("could not start a renderer", {"renderer": self._id, "error": message.detail})
         else:
             self._events.received(message)
 
     def _waits(self, message: Waiting) -> None:
         if message.detail != self.waiting:
             level = logging.WARNING if message.needed else logging.INFO
-            log.log(level, "a renderer waits renderer=%s reason=%s", self._id, message.detail)
+            log.log(level, "a renderer waits", {"renderer": self._id, "reason": message.detail})
         self.waiting = message.detail
         self._events.changed()
 
@@ -166,7 +166,7 @@ class Keeper:
         self.process.ready, self.driver, self.waiting = True, message.driver, ""
         self.restarts.succeeded()
         seconds = time.monotonic() - self.process.began
-        log.info("renderer ready renderer=%s driver=%s seconds=%.2f", self._id, self.driver, seconds)
+        log.info("renderer ready", {"renderer": self._id, "driver": self.driver, "seconds": round(seconds, 2)})
         if self._ready is not None and not self._ready.done():
             self._ready.set_result(message.info)
         if self._lost_at is not None:
@@ -200,9 +200,17 @@ class Keeper:
         cause = await process.end(LAST_WORDS_S)
         self.restarts.lost(process, cause)
         self._statistics.restarts[cause] += 1
-        line = "renderer lost renderer=%s cause=%s lived_s=%.1f failures=%d"
         level = logging.INFO if cause == "released" else logging.ERROR
-        log.log(level, line, self._id, cause, process.lived_s, self.restarts.failures)
+        log.log(
+            level,
+            "renderer lost",
+            {
+                "renderer": self._id,
+                "cause": cause,
+                "lived_s": round(process.lived_s, 1),
+                "failures": self.restarts.failures,
+            },
+        )
         self._events.lost(process, cause)
         if self.restarts.hopeless:
             self._events.given_up()

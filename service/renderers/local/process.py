@@ -140,8 +140,8 @@ class Process:
         limit_s += 0.0 if self.ready else STARTING_S
         if silent_s > limit_s and self._condemned is None:
             self._condemned = "stopped" if _is_stopped(self.id) else "hung"
-            line = "renderer %s renderer=%s silent_s=%.1f task=%d"
-            log.error(line, self._condemned, self._options.name, silent_s, self.heartbeat.task)
+            fields = {"renderer": self._options.name, "silent_s": round(silent_s, 1), "task": self.heartbeat.task}
+            log.error(f"renderer {self._condemned}", fields)
             self._process.kill()
 
     async def end(self, patience_s: float) -> Cause:

@@ -170,7 +170,7 @@ class Tasks:
 
     def _lose_picture(self, number: int, task: Task, error: Exception) -> None:
         """The server's copy of a picture cannot be read: what was under way begins again."""
-        log.error("could not read a picture that was stored task=%d error=%s", number, error)
+        log.error("could not read a picture that was stored", {"task": number, "error": error})
         if task.resident or number not in self.by_number:
             return
         if task.record.saved is not None:
@@ -236,7 +236,7 @@ class Tasks:
             return self._events.leased(LeaseFailed(number, 0, f"the renderer {cause}"))
         task.strikes += 1
         task.struck_at = time.monotonic()
-        log.warning("blamed a task for the loss of the renderer task=%d strikes=%d", number, task.strikes)
+        log.warning("blamed a task for the loss of the renderer", {"task": number, "strikes": task.strikes})
         if task.strikes >= STRIKES:
             self.forget(number)
             task.listener.lost(f"Rendering this scene brought the renderer down {STRIKES} times ({cause}).")

@@ -157,7 +157,9 @@ class Division:
             self._peers[held.home].relay(message)
         else:
             self._peers[sender].leases["failed"] += 1
-            log.warning("a renderer cannot assist task=%d renderer=%d error=%s", message.task, sender, message.detail)
+            log.warning(
+                "a renderer cannot assist", {"task": message.task, "renderer": sender, "error": message.detail}
+            )
             held.unfit |= {sender}
             self.assign()
 
@@ -165,9 +167,9 @@ class Division:
         self._peers[message.assistant].leases["wrong"] += 1
         log.error(
             "two renderers got different bits for the same part of a picture: check their memory; the second one "
-            "assists in no other picture task=%d home=%d renderer=%d",
-            message.task, self._tasks[message.task].home, message.assistant,
-        )  # fmt: skip
+            "assists in no other picture",
+            {"task": message.task, "home": self._tasks[message.task].home, "renderer": message.assistant},
+        )
         self._wrong.add(message.assistant)
         self.assign()
 

@@ -189,7 +189,7 @@ class Pool:
                 self._move(number, home)
                 moved += 1
         if moved:
-            log.info("moved tasks to other renderers renderer=%s tasks=%d", lost.place.id, moved)
+            log.info("moved tasks to other renderers", {"renderer": lost.place.id, "tasks": moved})
 
     async def _move_to_driver(self, number: int, driver: str) -> None:
         """Move a task of which nothing has been sent yet to a renderer that can go on with its picture.

@@ -97,7 +97,7 @@ class Cluster:
         if excused:
             gateway.heard = max(gateway.heard, now)
         if now - gateway.heard > SILENT_S:
-            log.error("the gateway to the Ray cluster hung silent_s=%.0f", now - gateway.heard)
+            log.error("the gateway to the Ray cluster hung", {"silent_s": round(now - gateway.heard)})
             self._end(0.0)
 
     @property

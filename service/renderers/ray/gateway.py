@@ -33,7 +33,7 @@ DRAINS_S = 2.0  # between two looks for nodes that are about to go
 SILENT = "SUNBOX_RAY: the Ray cluster ({}) gave no answer in {:g} s"
 WITHOUT_TOKEN = (
     "the Ray cluster has no token: whoever reaches its ports can run programs on its nodes, and in this server; make "
-    "one with `ray get-auth-token --generate` and put it on all nodes (docs/scaling.md) address=%s"
+    "one with `ray get-auth-token --generate` and put it on all nodes (docs/scaling.md)"
 )
 ALIVE_S = 1.0  # between two signs of life
 FAREWELL_S = 5.0  # for renderers to end by themselves
@@ -118,7 +118,7 @@ class Gateway:
     def _finished(self, running: asyncio.Task[None]) -> None:
         lane = self._lanes.pop(running)
         if not running.cancelled() and (error := running.exception()) is not None:
-            log.error("a renderer's lane failed renderer=%d", lane.number, exc_info=error)
+            log.error("a renderer's lane failed", {"renderer": lane.number}, exc_info=error)
 
     async def _say_alive(self) -> None:
         while True:
@@ -175,9 +175,9 @@ def main() -> int:
     with suppress(OSError):
         control.send(end, joined)
     _written.clear()
-    log.info("joined address=%s renderers=%d", joined.address, joined.renderers)
+    log.info("joined", {"address": joined.address, "renderers": joined.renderers})
     if not has_token():
-        log.warning(WITHOUT_TOKEN, joined.address)
+        log.warning(WITHOUT_TOKEN, {"address": joined.address})
     end.setblocking(False)
     asyncio.run(Gateway(end, ask, joined).serve())
     _leave()
@@ -236,7 +236,7 @@ def _keep_others_from_writing() -> None:
         with open(reading, errors="replace") as lines:
             for line in lines:
                 _written.append(line.strip()[:300])
-                log.debug("Ray wrote to its output line=%s", line.strip())
+                log.debug("Ray wrote to its output", {"line": line.strip()})
 
     threading.Thread(target=read, name="ray-output", daemon=True).start()
 

@@ -68,7 +68,7 @@ def close_token_file() -> None:
     with suppress(OSError):  # there is none, or it is another user's
         if path.stat().st_mode & 0o077:
             path.chmod(0o600)
-            log.info("left the token of Ray to its owner path=%s", path)
+            log.info("left the token of Ray to its owner", {"path": path})
 
 
 def _stay_on_this_machine() -> None:

@@ -93,7 +93,7 @@ class Lane:
         """Leave the node, which is about to go: renders are saved, and Ray restarts the actor elsewhere."""
         if self._loss == "node lost":
             self._loss = "drained"
-            log.warning("a node is being drained renderer=%d tasks=%d", self.number, len(self._tasks))
+            log.warning("a node is being drained", {"renderer": self.number, "tasks": len(self._tasks)})
             for task in self._tasks:
                 self._received(TakeCheckpoint(task))
             asyncio.get_running_loop().call_later(DRAIN_S, self._actors.restart, self.number)
@@ -122,12 +122,12 @@ class Lane:
             self._link.send(Unable(str(error)))
             return Ended("crashed")
         except TimeoutError:
-            log.error("an actor did not answer renderer=%d seconds=%.0f", self.number, SILENCE_S)
+            log.error("an actor did not answer", {"renderer": self.number, "seconds": round(SILENCE_S)})
             self._actors.restart(self.number)
         except RayActorError as error:
-            log.warning("an actor was lost renderer=%d error=%s", self.number, _said(error))
+            log.warning("an actor was lost", {"renderer": self.number, "error": _said(error)})
         except RayError as error:
-            log.error("Ray failed renderer=%d error=%s", self.number, _said(error))
+            log.error("Ray failed", {"renderer": self.number, "error": _said(error)})
             self._actors.restart(self.number)
         return Ended(self._loss)
 

@@ -84,9 +84,9 @@ class PictureFiles:
         leftovers = {f"{id}.{kind}" for id in gone for kind in KINDS}
         try:
             if back := self.lost.bring_back(known):
-                log.info("moved pictures back whose renders are known again files=%d", back)
+                log.info("moved pictures back whose renders are known again", {"files": back})
         except OSError as error:
-            log.error("could not move pictures back folder=%s error=%s", self.lost.path, error)
+            log.error("could not move pictures back", {"folder": self.lost.path, "error": error})
         strangers, crashed = list[str](), list[str]()
         with suppress(FileNotFoundError), os.scandir(self._folder) as entries:
             for entry in entries:
@@ -99,22 +99,21 @@ class PictureFiles:
         try:
             self._tidy(crashed, strangers)
         except OSError as error:
-            log.error("could not tidy up the pictures of renders folder=%s error=%s", self._folder, error)
+            log.error("could not tidy up the pictures of renders", {"folder": self._folder, "error": error})
 
     def _tidy(self, crashed: Collection[str], strangers: Collection[str]) -> None:
         for path in crashed:
             os.unlink(path)
         if crashed:
-            log.info("deleted what a crash left of renders files=%d", len(crashed))
+            log.info("deleted what a crash left of renders", {"files": len(crashed)})
         for name in strangers:
             self.lost.put(name)
         if len(strangers) > MOST_STRANGERS * (len(strangers) + self._total.files):
             self.lost.keep()
         if strangers:
             log.warning(
-                "moved pictures of renders that the database does not know files=%d folder=%s",
-                len(strangers),
-                self.lost.path,
+                "moved pictures of renders that the database does not know",
+                {"files": len(strangers), "folder": self.lost.path},
             )
 
     @property

@@ -74,10 +74,10 @@ class RenderStore:
         for each in stored:
             if each.unfit is not None and not each.gone:
                 log.error(
-                    "a stored render cannot be read, so it failed id=%s reason=%s", each.order.id[:6], each.unfit
+                    "a stored render cannot be read, so it failed", {"id": each.order.id[:6], "reason": each.unfit}
                 )
         if left_out := set[str]().union(*(each.unknown for each in stored)):
-            log.warning("left out what this version does not know of renders fields=%s", ",".join(sorted(left_out)))
+            log.warning("left out what this version does not know of renders", {"fields": ",".join(sorted(left_out))})
         kept, gone = ([each.order.id for each in stored if each.gone is is_gone] for is_gone in (False, True))
         self._files.prepare(kept, gone)
         return [each if each.gone else self._reached(each) for each in stored]
@@ -125,7 +125,7 @@ class RenderStore:
         except FileNotFoundError:
             return Progress()
         except (DamagedPicture, OSError) as error:
-            log.error("could not read a checkpoint, so its render begins again id=%s error=%s", id[:6], error)
+            log.error("could not read a checkpoint, so its render begins again", {"id": id[:6], "error": error})
             with suppress(OSError):
                 self._files.set_aside(id, "checkpoint")
             return Progress()
@@ -172,7 +172,7 @@ class RenderStore:
             except FileNotFoundError:
                 return None
             except DamagedPicture as error:
-                log.error("a stored picture is damaged id=%s kind=%s error=%s", id[:6], kind, error)
+                log.error("a stored picture is damaged", {"id": id[:6], "kind": kind, "error": error})
                 return None
 
         large = self._files.size(id) > LARGE
@@ -201,7 +201,7 @@ class RenderStore:
         except ServiceError:
             raise
         except OSError as error:
-            log.error("could not reach a stored picture error=%s", error)
+            log.error("could not reach a stored picture", {"error": error})
             raise Unavailable(
                 "The picture can't be stored: the server's disk is full or has a problem.", RETRY_S
             ) from None

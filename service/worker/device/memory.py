@@ -55,7 +55,7 @@ class Memory:
         if not idle:
             return False
         oldest = min(idle, key=lambda holder: holder.rested_since)
-        log.info("evicted bytes=%d used=%d", oldest.bytes, self.used)
+        log.info("evicted", {"bytes": oldest.bytes, "used": self.used})
         oldest.evict()
         return True
 

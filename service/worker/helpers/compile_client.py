@@ -157,7 +157,7 @@ class CompileClient:
                 self._records.mkdir(parents=True, exist_ok=True)
                 (self._records / key.digest(self._driver)).touch()
             except OSError as error:
-                log.info("could not record a compiled kernel error=%s", error)
+                log.info("could not record a compiled kernel", {"error": error})
 
     def forget(self, told: Told) -> None:
         """Drop one caller's wait; a kernel that nobody waits for is not begun."""
@@ -180,9 +180,9 @@ class CompileClient:
             if not answer.cached:
                 log.warning("compiled ahead in vain: the driver has no disk cache to write to")
             if answer.detail:
-                log.debug("could not compile ahead error=%s ms=%.0f", answer.detail, answer.milliseconds)
+                log.debug("could not compile ahead", {"error": answer.detail, "ms": round(answer.milliseconds)})
             else:
-                log.debug("compiled ahead ms=%.0f", answer.milliseconds)
+                log.debug("compiled ahead", {"ms": round(answer.milliseconds)})
             if answer.cached and not answer.detail:
                 self._record(self._orders[0].key)
             self._tell(answer.milliseconds)
@@ -202,7 +202,7 @@ class CompileClient:
         self.close()
         if self._orders:
             self._failures += 1
-            log.warning("left a kernel to be compiled in the loop reason=%s", detail)
+            log.warning("left a kernel to be compiled in the loop", {"reason": detail})
             self._tell(0.0)
 
     def _tell(self, milliseconds: float) -> None:
@@ -221,7 +221,7 @@ class CompileClient:
                 self._runnable = None if self._helper.process_id is None else RunnableTime(self._helper.process_id)
                 return
         except (channel.Closed, OSError) as error:  # it can't be started
-            log.info("could not start the compiler error=%s", error or "it had ended")
+            log.info("could not start the compiler", {"error": error or "it had ended"})
             self.close()
         self._able = False
         log.warning("gave up compiling ahead: kernels are compiled in the loop")

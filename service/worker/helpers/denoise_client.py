@@ -98,7 +98,7 @@ class DenoiseClient:
             self._deaths = 0
             self._took_s = time.monotonic() - self._asked_at
         if delivery.detail:
-            log.warning("could not denoise error=%s", delivery.detail)
+            log.warning("could not denoise", {"error": delivery.detail})
         if delivery.missing:
             self.missing = delivery.detail
         told, self._told = self._told, None

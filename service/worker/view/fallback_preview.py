@@ -123,7 +123,7 @@ class FallbackPreview:
             self._ladder.picture(self._next)
             self._spare.met(kernel.key)
         except GpuError as error:
-            log.info("could not show a preview by the fallback kernel error=%s", error)
+            log.info("could not show a preview by the fallback kernel", {"error": error})
             self.release()
 
     def step(self) -> int:
@@ -131,7 +131,7 @@ class FallbackPreview:
         try:
             return 0 if self._ladder is None else self._trace(self._ladder)
         except OutOfMemory as error:
-            log.info("could not show a preview by the fallback kernel error=%s", error)
+            log.info("could not show a preview by the fallback kernel", {"error": error})
             self.release()
             return 0
 
