@@ -13,7 +13,7 @@ from service.renders.store.record import Order
 from service.scene import parse_settings
 
 SETTINGS = resolve(parse_settings({"width": 4, "height": 4}, "", None))
-PROGRESS = Progress(8, 0.25, 1.5, None, {4: 0.125})
+PROGRESS = Progress(8, 0.25, 1.5, None)
 DOCUMENT = zlib.compress(b"{}")
 
 
