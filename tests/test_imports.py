@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 
+from gpu.layout.models import NUMBERS
 from tests.conftest import LONG_FILES, TESTS
 
 ROOT = Path(__file__).parents[1]
@@ -347,6 +348,14 @@ def test_modules_of_the_editor_keep_to_their_rooms() -> None:
             mine, its = (each.rpartition("/")[0] for each in (module, other))
             assert mine == its or height[its] < height[mine], f"{module} imports {other}: that arrow points up"
     assert circles(arrows) == []
+
+
+def test_neither_the_editor_nor_a_route_knows_a_material_model() -> None:
+    """They ask the schema and the server's functions, so that a new model needs no line there."""
+    routes = (path for path in ROOT.glob("service/routes/*.py") if path.stem != "examples")
+    for path in (*ROOT.glob("web/**/*.js"), *ROOT.glob("web/*.html"), *routes):
+        for name in NUMBERS:
+            assert not re.search(rf"""["']{name}["']|\b{name}:""", path.read_text()), f"{path.name} knows {name}"
 
 
 @pytest.mark.parametrize("path", LEAVES, ids=lambda path: str(path.relative_to(ROOT)))

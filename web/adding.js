@@ -2,7 +2,7 @@
 
 import { box, remember, together } from "./document/bounds.js";
 import { axes, isInSight } from "./document/camera.js";
-import { PLAIN, fresh } from "./document/materials.js";
+import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
 import { ballOf, solids, union, wayOut } from "./document/placing.js";
@@ -33,7 +33,7 @@ export class Adder {
     const material = fresh(title.toLowerCase(), materials);
     const made = make(acts.camera, this.controller.radius(), material);
     if (kind === "lights") return acts.add(kind, this.#apart(made));
-    return this.#put([made], { materials: { [material]: PLAIN }, stands: made.type !== "quad" });
+    return this.#put([made], { materials: { [material]: acts.plainMaterial }, stands: made.type !== "quad" });
   }
 
   async duplicate(thing) {
@@ -78,7 +78,12 @@ export class Adder {
   addMesh(asset, name, around) {
     const material = fresh(name, this.acts.state.scene.materials);
     const shape = { type: "mesh", asset, material };
-    return this.#put([shape], { materials: { [material]: PLAIN }, around, stands: true, isFramed: true });
+    return this.#put([shape], {
+      materials: { [material]: this.acts.plainMaterial },
+      around,
+      stands: true,
+      isFramed: true,
+    });
   }
 
   // The things of another scene; `around` is the box around them, where that is known.

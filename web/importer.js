@@ -6,7 +6,6 @@ import { question } from "./lib/ask.js";
 import { measure, remember } from "./document/bounds.js";
 import { accepted, browse, kindOf } from "./lib/files.js";
 import { isUnderNoSky, studio } from "./document/lighting.js";
-import { PLAIN } from "./document/materials.js";
 import { pointer } from "./lib/patch.js";
 import { fileValueWords, problemText, warningText } from "./server/problem-text.js";
 import { readRecipe } from "./document/recipe.js";
@@ -189,7 +188,7 @@ export class Importer {
     const document = await fetchAssetScene(id);
     return {
       ...document,
-      materials: { [material]: PLAIN },
+      materials: { [material]: this.acts.plainMaterial },
       shapes: document.shapes.map((shape) => ({ ...shape, material })),
     };
   }

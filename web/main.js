@@ -7,7 +7,7 @@ import { Comparison } from "./picture/compare.js";
 import { DisplayControls } from "./panels/display-controls.js";
 import { Editor } from "./document/editor.js";
 import * as exporting from "./picture/export.js";
-import { sentence } from "./lib/format-text.js";
+import { learnNames, sentence } from "./lib/format-text.js";
 import { Importer, watchDrops } from "./importer.js";
 import { askForKey } from "./server/key.js";
 import { fillSheet, watchKeys } from "./keys.js";
@@ -20,7 +20,7 @@ import { pictureRecipes } from "./picture/picture-recipe.js";
 import { Preparing } from "./panels/preparing.js";
 import { detailWords, fieldTitles, problemText } from "./server/problem-text.js";
 import { SavePage } from "./panels/save-page.js";
-import { materialModels } from "./server/schema.js";
+import { blackMaterial, materialModels, modelNames } from "./server/schema.js";
 import { essence, linkTo, revived } from "./document/share.js";
 import { Status } from "./panels/status.js";
 import { Stream } from "./server/stream.js";
@@ -65,8 +65,9 @@ const { schema, library, calls, name, scene, left } = await boot({
     messages.show("connection", { title: "The server does not answer.", detail: "Trying again…", lasting: true });
   },
 });
+learnNames(modelNames(schema.scene));
 titles = fieldTitles(schema.scene, schema.settings, schema.view);
-editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal") });
+editor = new Editor({ schema, name, scene, complain, forgive: () => messages.hide("refusal"), waits: tellState });
 if (left) editor.amend(left.state);
 const page = new PageState({ schema, editor, ui, root, fit: (box) => comparison.fit(box) });
 
@@ -183,7 +184,7 @@ const comparison = new Comparison(
 // --- the panel ---
 
 const thumbnails = new Thumbnails(() => page.isConnected && page.isDone && !page.isPaused);
-const textureThumbnails = new TextureThumbnails();
+const textureThumbnails = new TextureThumbnails(blackMaterial(schema.scene));
 const adder = new Adder({ acts: editor, controller });
 const importer = new Importer({
   schema,
@@ -294,7 +295,7 @@ function showPrices() {
 }
 
 function tellState() {
-  root.setAttribute("aria-busy", String(!stream.isNewest(page.painted)));
+  root.setAttribute("aria-busy", String(editor.isWaiting || !stream.isNewest(page.painted)));
   status.state(page.word(preparing.isShown));
 }
 

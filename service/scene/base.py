@@ -66,6 +66,7 @@ def hint(
     used: tuple[str, Sequence[str]] | None = None,
     example: list[float] | None = None,
     highlight: tuple[Width, str | None] | None = None,
+    new: dict[str, str] | None = None,
 ) -> Any:
     """The editor's hints for a field, as metadata for Annotated.
 
@@ -74,7 +75,8 @@ def hint(
     out: `absent` is a word for what holds then; `follows` names the field, of the range 0 to 1, that sets it then,
     and how. `ranges` names a field with a choice, and the range for each of its values; `used` the choices with which
     the field has a meaning, and `example` is what it begins with there. `highlight` says in what sense the field is
-    the width of the highlight, and names the field of the highlight's colour, where it has its own.
+    the width of the highlight, and names the field of the highlight's colour, where it has its own. `new`
+    is what the editor begins an entry of a table with.
     """
     extra: dict[str, Any] = {}
     if group is not None:
@@ -105,6 +107,8 @@ def hint(
     if highlight is not None:
         width, color = highlight
         extra["x-highlight"] = {"as": width} | ({} if color is None else {"color": color})
+    if new is not None:
+        extra["x-new"] = new
     return Field(title=title, description=description, json_schema_extra=extra)
 
 

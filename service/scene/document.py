@@ -39,7 +39,9 @@ class Scene(Model):
     textures: Annotated[dict[str, Texture], hint("Textures", "By names of your choice.")] = Field(
         default_factory=dict
     )
-    materials: Annotated[dict[str, Material], hint("Materials", "By names of your choice.")]
+    materials: Annotated[
+        dict[str, Material], hint("Materials", "By names of your choice.", new={"type": "principled"})
+    ]
     shapes: Annotated[list[Shape], hint("Shapes", "Each made of one of the materials.")]
 
 

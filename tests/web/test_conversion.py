@@ -1,53 +1,16 @@
-"""A material turned into another model, another distribution of its facets, and sliders over far ranges."""
+"""The editor turns a material into another model or distribution of facets, and slides over far ranges."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from itertools import pairwise
-from typing import Any
 
 import pytest
 from playwright.sync_api import Browser, Page
 
-from service.scene.material.microfacet import ALPHA_RANGES, GAMMA_RANGES
-from tests import microfacets
 from tests.serving import Server
 from tests.web.conftest import Editor
 from tests.web.modules import call
-
-CONVERT = """async ([old, type]) => {
-    const schema = await (await fetch("/v1/schema")).json();
-    const [{ converted }, { fields, materialModels }] = await Promise.all(
-        ["document/conversion.js", "server/schema.js"].map((name) => import(new URL(name, location))));
-    const models = materialModels(schema.scene);
-    const known = (name) => ({ type: name, fields: fields(schema.scene, models[name]) });
-    return converted(old, known(old.type), known(type));
-}"""
-REDISTRIBUTE = """async ([old, distribution]) => {
-    const schema = await (await fetch("/v1/schema")).json();
-    const [{ redistributed }, { fields, materialModels }] = await Promise.all(
-        ["document/distribution.js", "server/schema.js"].map((name) => import(new URL(name, location))));
-    return redistributed(old, distribution, fields(schema.scene, materialModels(schema.scene).microfacet));
-}"""
-EVERY: list[dict[str, Any]] = [
-    {"type": "diffuse", "albedo": [0.5, 0.3, 0.1], "alpha": 0.5, "alpha_cutoff": 0.2},
-    {"type": "disney", "base_color": 0.5, "specular": 0.3, "roughness": 0, "alpha": 0.5},
-    {
-        "type": "principled",
-        "base_color": 0.5,
-        "metallic": 1,
-        "roughness": 0.3,
-        "ior": 1.8,
-        "specular": 1,
-        "alpha": 0.1,
-    },
-    {"type": "metal_rough", "base_color": {"texture": "wood"}, "metallic": 0, "roughness": {"texture": "wood"}},
-    {"type": "blinn_phong", "diffuse": 0.2, "specular": [0.5, 0.4, 0.3], "shininess": 300},
-    {"type": "phong", "diffuse": 0.2, "specular": [0.5, 0.4, 0.3], "shininess": 300},
-    {"type": "microfacet", "distribution": "phong", "alpha": 1e5, "f0": [1, 0.8, 0.3]},
-    {"type": "microfacet", "distribution": "abc", "alpha": 10, "gamma": 900, "diffuse": 0.5, "ior": 2},
-]
 
 
 @pytest.fixture(scope="module")
@@ -56,58 +19,6 @@ def page(browser: Browser, server: Server) -> Iterator[Page]:
     opened.goto(server.url + "/icon.svg")  # any page of the same origin
     yield opened
     opened.close()
-
-
-@pytest.mark.parametrize("old", EVERY, ids=lambda old: old["type"])
-def test_every_model_becomes_every_other_one(page: Page, server: Server, old: dict[str, Any]) -> None:
-    """The service takes each of them: `specular` and `alpha` mean something else elsewhere."""
-    scene = {"version": 1, "camera": {"position": [0, 0, 5], "target": [0, 0, 0]}, "shapes": [
-        {"type": "sphere", "center": [0, 0, 0], "radius": 1, "material": "m"}]}  # fmt: skip
-    scene["textures"] = {"wood": {"type": "checker", "a": 0.1, "b": 0.9}}
-    for kind in dict.fromkeys(each["type"] for each in EVERY):
-        made = page.evaluate(CONVERT, [old, kind])
-        body = {"scene": scene | {"materials": {"m": made}}, "settings": {"width": 8, "height": 8, "max_samples": 1}}
-        answer = server.http.post("/v1/render", json=body, timeout=60)
-        assert made["type"] == kind and answer.status_code == 200, answer.text
-
-
-def test_colour_and_highlight_stay(page: Page) -> None:
-    metal = {"type": "principled", "base_color": [1, 0.8, 0.4], "metallic": 1, "roughness": 0.5}
-    assert page.evaluate(CONVERT, [metal, "microfacet"]) == {
-        "type": "microfacet", "alpha": 0.25, "f0": [1, 0.8, 0.4], "diffuse": [0, 0, 0],
-    }  # fmt: skip
-    facets = {"type": "microfacet", "f0": [1, 0.8, 0.4], "alpha": 0.25, "emission": 2}
-    assert page.evaluate(CONVERT, [facets, "disney"]) == {
-        "type": "disney",
-        "base_color": [1, 0.8, 0.4],
-        "emission": 2,
-    }
-    assert page.evaluate(CONVERT, [{**facets, "diffuse": 0.3}, "diffuse"])["albedo"] == 0.3
-    blinn, phong = (page.evaluate(CONVERT, [{**metal, "metallic": 0}, kind]) for kind in ("blinn_phong", "phong"))
-    assert blinn["shininess"] == 30 and phong["shininess"] == 7.5
-    assert blinn["diffuse"] == [1, 0.8, 0.4] and blinn["specular"] == pytest.approx([0.04 * 38 / 8] * 3, rel=1e-3)
-
-
-@pytest.mark.parametrize("distribution", list(ALPHA_RANGES))
-def test_another_distribution_has_a_peak_as_wide(page: Page, distribution: str) -> None:
-    """Until D has fallen by a hundredth; by its definition in double precision."""
-    old = {"type": "microfacet", "alpha": 0.1}
-    new = page.evaluate(REDISTRIBUTE, [old, distribution])
-    gamma = new.get("gamma", 2.0)
-    assert new["distribution"] == distribution and GAMMA_RANGES.get(distribution, (0, 1000))[0] <= gamma
-    at = math.radians(0.4)
-
-    def fall(kind: str, alpha: float) -> float:
-        return 1 - float(microfacets.d(kind, alpha, gamma, math.tan(at)) / microfacets.d(kind, alpha, gamma, 0.0))
-
-    assert fall(distribution, new["alpha"]) == pytest.approx(fall("ggx", 0.1), rel=0.03)
-    back = page.evaluate(REDISTRIBUTE, [new, "ggx"])
-    assert back["alpha"] == pytest.approx(0.1, rel=0.01)
-    extreme = page.evaluate(REDISTRIBUTE, [{**old, "distribution": "abc", "alpha": 1e6, "gamma": 1000}, distribution])
-    low, high = ALPHA_RANGES[distribution]
-    assert low <= extreme["alpha"] <= high
-    if distribution in GAMMA_RANGES:
-        assert GAMMA_RANGES[distribution][0] <= extreme["gamma"] <= GAMMA_RANGES[distribution][1]
 
 
 @pytest.mark.parametrize(("low", "high"), [(0, 1e6), (0.001, 10), (1e-3, 1e6), (0.01, 2), (0.1, 10), (0, 1000)])
@@ -173,3 +84,41 @@ def test_a_conductor_begins_with_numbers_of_its_own(editor: Editor) -> None:
     page.keyboard.press("Control+z")
     editor.settled()
     assert editor.text("#messages") == "" and editor.complaints == []
+
+
+def test_going_back_to_a_model_brings_back_what_was_there(editor: Editor) -> None:
+    """As long as nobody edits what it was turned into."""
+    editor.settled()
+    page = editor.page
+    coat = editor.field("clearcoat", "number")
+    page.fill(coat, "0.75")
+    page.press(coat, "Enter")
+    for model in ("diffuse", "blinn_phong", "principled"):
+        page.select_option("#model", model)
+        editor.settled()
+    assert page.input_value(coat) == "0.75"
+    page.select_option("#model", "blinn_phong")
+    editor.settled()
+    page.fill(editor.field("shininess", "number"), "77")
+    page.press(editor.field("shininess", "number"), "Enter")
+    page.select_option("#model", "principled")
+    editor.settled()
+    assert page.input_value(coat) == "0", "it was another material meanwhile"
+    page.keyboard.press("Control+z")
+    assert (
+        page.input_value("#model") == "blinn_phong" and page.input_value(editor.field("shininess", "number")) == "77"
+    )
+    assert editor.text("#messages") == "" and editor.complaints == []
+
+
+def test_without_the_server_the_material_stays(editor: Editor) -> None:
+    editor.settled()
+    page = editor.page
+    page.route("**/v1/materials/convert", lambda route: route.abort())
+    page.select_option("#model", "disney")
+    editor.wait("the message", lambda: "does not answer" in editor.text("#messages"))
+    assert page.input_value("#model") == "principled"
+    page.unroute("**/v1/materials/convert")
+    page.select_option("#model", "disney")
+    editor.settled()
+    assert page.input_value("#model") == "disney" and editor.text("#messages") == ""

@@ -1,71 +1,40 @@
-// A material turned into another model: what both know stays, and so do the colour and the width of the highlight.
+// Materials turned into other models, which the server does; an answer is asked for once.
 
-import { linear } from "../lib/color.js";
-import { equal, isObject } from "../lib/patch.js";
+import { convertMaterial } from "../server/api.js";
 
-const BASE_F0 = 0.04; // head-on reflectance of the dielectrics of `metal_rough`, and by default of the others
-const ALPHA = { min: 0.001, max: 10 }; // of the distribution that `microfacet` begins with
+const MOST = 64; // answers that stay
 
-const tidy = (x) => Number(Math.min(1, x).toPrecision(4));
-const isPlain = ({ roughness, base_color, metallic }) =>
-  roughness !== undefined && ![roughness, base_color, metallic].some(isObject);
-const diffuse = ({ base_color = 0.5, metallic = 0 }) => linear(base_color).map((x) => tidy(x * (1 - metallic)));
-const reflectance = ({ base_color = 0.5, metallic = 0 }) =>
-  linear(base_color).map((x) => BASE_F0 * (1 - metallic) + x * metallic);
+export class Conversions {
+  #answers = new Map(); // by what was asked: a promise of a material
 
-// Blinn and Phong's highlight for a roughness: its exponent 2 / alpha^2 - 2, alpha being roughness^2, and the
-// reflectance at normal incidence times (exponent + 8) / 8, the normalisation that this model leaves out
-// [Akenine-Moeller et al., Real-Time Rendering].
-function blinnPhong(old) {
-  const shininess = Number(Math.max(0, 2 / Math.max(old.roughness, 0.05) ** 4 - 2).toPrecision(3));
-  return { shininess, specular: reflectance(old).map((x) => tidy((x * (shininess + 8)) / 8)), diffuse: diffuse(old) };
-}
-
-// About the mirrored direction angles are twice those of half vectors: a quarter of the exponent has the same width.
-function phong(old) {
-  const { shininess, ...colors } = blinnPhong(old);
-  return { ...colors, shininess: Number((shininess / 4).toPrecision(3)) };
-}
-
-function microfacet(old) {
-  const alpha = Math.min(Math.max(old.roughness ** 2, ALPHA.min), ALPHA.max);
-  return { alpha: Number(alpha.toPrecision(4)), f0: reflectance(old).map(tidy), diffuse: diffuse(old) };
-}
-
-const HIGHLIGHTS = { blinn_phong: blinnPhong, phong, microfacet };
-
-// The name of a model's colour. That of `microfacet` is the diffuse one, or where that is black the facets'.
-function colorName({ type, fields }, material) {
-  if (type !== "microfacet") return fields.find(({ widget }) => widget === "color")?.name;
-  const { diffuse: own = 0, f0 } = material ?? {};
-  return f0 !== undefined && !isObject(own) && Math.max(...linear(own)) === 0 ? "f0" : "diffuse";
-}
-
-// Whether a field of two models means the same. `specular` is an amount here and a colour there; `alpha` is the
-// opacity, or a distribution's parameter whose range depends on that.
-const means = (one, other) => one.widget === other?.widget && equal(one.ranges ?? null, other.ranges ?? null);
-
-// `from` and `to` are {type, fields}, with the fields of schema.js.
-export function converted(old, from, to) {
-  const material = { type: to.type };
-  for (const field of to.fields) {
-    const value = old[field.name];
-    const isTaken =
-      value !== undefined &&
-      means(
-        field,
-        from.fields.find(({ name }) => name === field.name),
-      );
-    if (isTaken && (field.takesTexture || !isObject(value))) material[field.name] = value;
+  // The material as one of the model `to`; `choose` are values of that model's menus.
+  to(material, to, choose = {}) {
+    const key = JSON.stringify([material, to, choose]);
+    if (!this.#answers.has(key)) {
+      if (this.#answers.size === MOST) this.#answers.delete(this.#answers.keys().next().value);
+      const answer = convertMaterial(material, to, choose).then(({ material: made }) => made);
+      answer.catch(() => this.#answers.delete(key));
+      this.#answers.set(key, answer);
+    }
+    return this.#answers.get(key);
   }
-  const [color, own] = [colorName(from, old), colorName(to)];
-  if (color && own && material[color] === undefined) {
-    material[own] = old[color] ?? from.fields.find(({ name }) => name === color).initial;
+}
+
+// The documents that a material was turned from, for whoever goes back without an edit between.
+export class Origins {
+  #made = new Map(); // by place: {made, from: {type: material}}
+
+  // What the document at a place was as a model of this type, or undefined.
+  of(place, document, type) {
+    return this.#from(place, document)[type];
   }
-  if (isPlain(old)) Object.assign(material, HIGHLIGHTS[to.type]?.(old));
-  // What a model asks for and no other has: the middle of its slider.
-  for (const { name, required, widget, soft } of to.fields) {
-    if (required && material[name] === undefined && widget !== "choice") material[name] = (soft.min + soft.max) / 2;
+
+  keep(place, document, made) {
+    this.#made.set(place, { made, from: { ...this.#from(place, document), [document.type]: document } });
   }
-  return material;
+
+  #from(place, document) {
+    const { made, from } = this.#made.get(place) ?? {};
+    return made === document ? from : {};
+  }
 }

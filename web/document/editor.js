@@ -3,11 +3,10 @@
 
 import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
-import { converted } from "./conversion.js";
-import { redistributed } from "./distribution.js";
+import { Conversions, Origins } from "./conversion.js";
 import { exposed } from "./lighting.js";
 import { at, pointer, put } from "../lib/patch.js";
-import { defaults, environmentModels, fields, materialModels, model } from "../server/schema.js";
+import { defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
 
 // The shape that the eye goes to: the first which is not flat.
@@ -36,13 +35,19 @@ export class Editor extends Store {
   #schema;
   #cameraDefaults;
   #picks = 0;
+  #turns = 0; // of materials into other models
+  #turning = 0; // the number of the one that waits for the server, or 0
+  #origins = new Origins();
+  conversions = new Conversions();
 
-  // `complain(problem)` shows what was refused, `forgive()` takes it away.
-  constructor({ schema, name, scene, complain, forgive }) {
+  // `complain(problem)` shows what was refused, `forgive()` takes it away; `waits()` hears that `isWaiting` is true.
+  constructor({ schema, name, scene, complain, forgive, waits }) {
     super({ settings: {}, view: {}, ...picked(name, scene) });
     this.#schema = schema.scene;
     this.complain = complain;
     this.forgive = forgive;
+    this.waits = waits;
+    this.plainMaterial = newMaterial(schema.scene);
     this.#cameraDefaults = defaults(schema.scene, model(schema.scene, schema.scene, "camera"));
     const move =
       (how) =>
@@ -54,7 +59,7 @@ export class Editor extends Store {
       pan: move(moving.pan),
       zoom: move(moving.zoom),
       fly: move(moving.fly),
-      turn: (share) => this.#turn(share),
+      turn: (share) => this.#turnEnvironment(share),
       rest: () => this.seal(),
     };
   }
@@ -77,7 +82,7 @@ export class Editor extends Store {
   }
 
   // Turns the environment by shares of a whole turn.
-  #turn(share) {
+  #turnEnvironment(share) {
     const { environment } = this.state.scene;
     if (!environment) return;
     const { min, max } = fields(this.#schema, environmentModels(this.#schema)[environment.type]).find(
@@ -102,17 +107,15 @@ export class Editor extends Store {
   // A choice of the material at a place with what follows from it; `own` are the fields of its model.
   choose(place, name, value, own) {
     const material = at(this.state, place);
-    const isDistribution = own.some(({ ranges }) => ranges?.field === name);
+    const isFollowed = own.some(({ ranges }) => ranges?.field === name);
+    if (isFollowed) return this.#turn(place, material.type, { choose: { [name]: value } });
     const begun = own
       .filter(
         ({ name: each, used, example }) =>
           example && used?.field === name && used.values.includes(value) && material[each] === undefined,
       )
       .map(({ name: each, example }) => [each, example]);
-    this.edit(place, {
-      ...(isDistribution ? redistributed(material, value, own) : { ...material, [name]: value }),
-      ...Object.fromEntries(begun),
-    });
+    this.edit(place, { ...material, [name]: value, ...Object.fromEntries(begun) });
   }
 
   rest() {
@@ -175,16 +178,39 @@ export class Editor extends Store {
     this.change(put(this.state, this.materialPlace, material));
   }
 
-  converted(old, type) {
-    const models = materialModels(this.#schema);
-    return converted(
-      old,
-      ...[old.type, type].map((each) => ({ type: each, fields: fields(this.#schema, models[each]) })),
-    );
+  pickModel(type) {
+    return this.#turn(this.materialPlace, type);
   }
 
-  pickModel(type) {
-    this.putMaterial(this.converted(this.material, type));
+  // Whether a material is being turned into another model.
+  get isWaiting() {
+    return this.#turning > 0;
+  }
+
+  // Turns the material at a place into another model, or gives it other values of its menus with what follows; the
+  // result stands at `to`.
+  async #turn(place, type, { choose, to = place } = {}) {
+    const turn = ++this.#turns;
+    const old = at(this.state, place);
+    if (!old) return this.waits(); // it was deleted meanwhile
+    this.#turning = turn;
+    this.waits();
+    try {
+      const known = choose ? undefined : old.type === type ? old : this.#origins.of(place, old, type);
+      const made = known ?? (await this.conversions.to(old, type, choose));
+      if (turn !== this.#turns) return; // another one was picked meanwhile
+      this.#turning = 0;
+      const now = at(this.state, place);
+      if (now !== old) return this.#turn(place, type, { choose, to }); // edited meanwhile
+      if (choose) return this.edit(to, made);
+      this.#origins.keep(to, old, made);
+      this.change(put(this.state, to, made));
+    } catch (problem) {
+      if (turn !== this.#turns) return;
+      this.#turning = 0;
+      this.complain(problem);
+      this.amend({}); // the pickers go back to what there is
+    }
   }
 
   // --- two variants ---
@@ -204,8 +230,9 @@ export class Editor extends Store {
     this.amend({ compare: { ...compare, side }, chosen: { ...chosen, material: compare.material } });
   }
 
-  putVariant(document) {
-    this.change({ compare: { ...this.state.compare, document } });
+  // Makes B what A would be as another model.
+  pickVariant(type) {
+    return this.#turn(pointer("scene", "materials", this.state.compare.material), type, { to: "/compare/document" });
   }
 
   swapVariants() {

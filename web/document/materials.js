@@ -3,9 +3,6 @@
 
 import { at, pointer } from "../lib/patch.js";
 
-// What a thing is made of that nobody has given anything else.
-export const PLAIN = { type: "principled" };
-
 // A name that is not taken, from one that is wished for: "copper", "copper-2", "copper-3".
 export function fresh(wanted, taken) {
   const [, stem, number] = /^(.*?)(?:-(\d+))?$/s.exec(wanted);

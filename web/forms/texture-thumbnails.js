@@ -8,20 +8,20 @@ const SIDE = 64;
 const SQUARES = 4; // of a checker, along each side
 const MEAN_SAMPLES = 16; // of a pixel, which spread evenly over it
 
-// A square that shines as the image tells, and fills the picture.
-const lit = (texture, looks = { emission: { texture: "image" } }) => ({
+// A square of a black material that shines as the image tells, and fills the picture.
+const lit = (black, texture, looks = { emission: { texture: "image" } }) => ({
   version: 1,
   camera: { position: [0, 0, 1], target: [0, 0, 0], vfov: 90 },
   textures: { image: texture },
-  materials: { image: { type: "diffuse", albedo: 0, ...looks } },
+  materials: { image: { ...black, ...looks } },
   shapes: [{ type: "quad", origin: [-1, -1, 0], u: [2, 0, 0], v: [0, 2, 0], material: "image" }],
 });
 // A square that shines where it is opaque.
 const OPACITY = { emission: 1, alpha: { texture: "image", channel: "a" } };
 const SETTINGS = { width: SIDE, height: SIDE, max_bounces: 0, filter: "box" };
 
-const rendered = async (asset) =>
-  createImageBitmap(await renderPicture(lit({ asset }), { ...SETTINGS, max_samples: 4 }));
+const rendered = async (black, asset) =>
+  createImageBitmap(await renderPicture(lit(black, { asset }), { ...SETTINGS, max_samples: 4 }));
 
 // The mean colour of a square's picture, whose pixels are single-precision numbers behind the header of a .npy file.
 async function meanOf(scene) {
@@ -53,12 +53,17 @@ export class TextureThumbnails {
   #means = new Map(); // by texture and what is read of it: a promise of [r, g, b, a]
   #last = Promise.resolve();
 
+  // `black` is a material that reflects nothing.
+  constructor(black) {
+    this.black = black;
+  }
+
   // An image that is on its way to the server needs not come back from there.
   keep(asset, file) {
     this.#bitmaps.set(
       asset,
       shrink(file)
-        .catch(() => rendered(asset))
+        .catch(() => rendered(this.black, asset))
         .catch(() => null),
     );
   }
@@ -67,7 +72,7 @@ export class TextureThumbnails {
     if (!this.#bitmaps.has(asset)) {
       const made = this.#last.then(async () => {
         try {
-          return await shrink(await fetchAsset(asset)).catch(() => rendered(asset));
+          return await shrink(await fetchAsset(asset)).catch(() => rendered(this.black, asset));
         } catch {
           return null; // without a picture the name has to do
         }
@@ -92,8 +97,8 @@ export class TextureThumbnails {
       const image = { asset, ...(color_space ? { color_space } : {}) };
       const made =
         reads === "a"
-          ? meanOf(lit(image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity])
-          : meanOf(lit(image)).then((color) => [...color, 1]);
+          ? meanOf(lit(this.black, image, OPACITY)).then(([opacity]) => [1, 1, 1, opacity])
+          : meanOf(lit(this.black, image)).then((color) => [...color, 1]);
       this.#means.set(
         key,
         made.catch(() => [1, 1, 1, 1]),

@@ -8,7 +8,6 @@ const NAMES = {
   mis: "MIS",
   bsdf: "BSDF",
   blackman_harris: "Blackman\u2013Harris",
-  blinn_phong: "Blinn-Phong",
   ggx: "GGX",
   gtr: "GTR",
   abc: "ABC",
@@ -21,6 +20,9 @@ const NAMES = {
   shape_id: "Shapes",
   material_id: "Materials",
 };
+
+// Takes over how names of the server's are written: {name: words}.
+export const learnNames = (names) => Object.assign(NAMES, names);
 
 export const unitText = (unit) => UNITS[unit] ?? unit;
 

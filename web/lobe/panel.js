@@ -45,7 +45,7 @@ export class LobePanel {
   #shown = null; // {view, data} that the plot shows
   #wanted = null; // the key of what was asked for last
   #latest = new Latest();
-  #warming = new Warming(askBsdf);
+  #warming = new Warming(askBsdf, (material, type) => this.acts.conversions.to(material, type));
   #waiting = null; // the timer of an answer that does not come
   #means = new Map(); // of textures, as far as they are known
 
@@ -346,7 +346,7 @@ export class LobePanel {
     const others = Object.keys(this.models).filter((type) => type !== material.type);
     this.#warming.begin([
       ...this.views.map((name) => ({ material, needs: VIEWS[name].needs })),
-      ...others.map((type) => ({ material: this.acts.converted(material, type), needs: this.#view.needs })),
+      ...others.map((type) => ({ material, type, needs: this.#view.needs })),
     ]);
   }
 

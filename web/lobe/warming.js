@@ -17,15 +17,17 @@ export class Warming {
   #done = new Set();
   #round = 0;
 
-  constructor(ask) {
-    this.ask = ask;
+  // `turn(material, type)` promises it as another model.
+  constructor(ask, turn) {
+    Object.assign(this, { ask, turn });
   }
 
-  // `wanted` are [{material, needs}] in the order of their need. What was begun before ends.
+  // `wanted` are [{material, type, needs}] in the order of their need; with a `type` the material is turned into that
+  // model. What was begun before ends.
   async begin(wanted, rest_ms = REST_MS) {
     const round = ++this.#round;
-    for (const { material, needs } of wanted) {
-      const key = `${material.type} ${needs}`;
+    for (const { material, type = material.type, needs } of wanted) {
+      const key = `${type} ${needs}`;
       if (this.#done.has(key) || !(needs in QUESTIONS)) continue;
       await new Promise((resolve) => {
         setTimeout(resolve, rest_ms);
@@ -33,7 +35,9 @@ export class Warming {
       if (round !== this.#round) return;
       this.#done.add(key);
       const [path, body] = QUESTIONS[needs];
-      await this.ask(path, { material, ...body }).catch(() => this.#done.delete(key)); // the panel itself says what is wrong
+      await (type === material.type ? Promise.resolve(material) : this.turn(material, type))
+        .then((turned) => this.ask(path, { material: turned, ...body }))
+        .catch(() => this.#done.delete(key)); // the panel itself says what is wrong
     }
   }
 

@@ -13,7 +13,7 @@ export class MaterialPanel {
   constructor(root, { acts, say }) {
     Object.assign(this, { root, acts, say });
     const clicks = {
-      "new-material": () => this.#add((state) => materials.added(state, "material", materials.PLAIN)),
+      "new-material": () => this.#add((state) => materials.added(state, "material", acts.plainMaterial)),
       "duplicate-material": () => this.#copy(),
       "own-material": () => this.#copy(),
       "rename-material": () => this.#rename(),

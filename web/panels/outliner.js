@@ -1,7 +1,7 @@
 // What the scene contains, as a list to pick from; and which fields the picked thing has.
 
 import { element } from "../lib/dom.js";
-import { PLAIN, added } from "../document/materials.js";
+import { added } from "../document/materials.js";
 import { at, equal, pointer } from "../lib/patch.js";
 import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
@@ -29,7 +29,8 @@ export class Outliner {
     });
     this.list.addEventListener("keydown", (event) => this.#walk(event));
     this.#find("thing-material").addEventListener("change", ({ target }) => {
-      if (target.selectedOptions[0] === this.#newMaterial) return acts.change(added(acts.state, "material", PLAIN));
+      if (target.selectedOptions[0] === this.#newMaterial)
+        return acts.change(added(acts.state, "material", acts.plainMaterial));
       acts.edit(`/scene${this.thing}/material`, target.value);
       acts.select(this.thing);
     });

@@ -66,8 +66,7 @@ export class Comparison {
       {
         "aria-label": "Turn variant B into another model",
         onchange: () => {
-          const { compare, scene } = this.acts.state;
-          if (turn.value) this.acts.putVariant(this.acts.converted(scene.materials[compare.material], turn.value));
+          if (turn.value) this.acts.pickVariant(turn.value);
           turn.value = "";
         },
       },

@@ -68,6 +68,10 @@ export const renderValues = async (scene, settings) =>
 // What the shader functions say of a material: `question` is "" for values, "/albedo" or "/terms".
 export const askBsdf = async (question, body) => (await ask("POST", `bsdf${question}`, json(body))).json();
 
+// {material, lost}: a material as one of the model `to`, with values of that model's menus.
+export const convertMaterial = async (material, to, choose) =>
+  (await ask("POST", "materials/convert", json({ material, to, choose }))).json();
+
 // A render as a job of the server's: {id, ...}; how far it is, asked for until it ends or `wait` seconds passed; its
 // picture so far.
 export const submitRender = async (scene, settings) =>

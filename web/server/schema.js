@@ -24,7 +24,7 @@ export function property(schema, model, name) {
   return resolve(schema, resolve(schema, model).properties[name]);
 }
 
-// The models that a union offers, by the value of their `type`: {disney: model, ...}.
+// The models that a union offers, by the value of their `type`: {type: model, ...}.
 export function variants(schema, union) {
   const found = {};
   const visit = (node) => {
@@ -42,6 +42,19 @@ export const model = (schema, owner, name) =>
 
 export const materialModels = (schema) =>
   variants(schema, property(schema, schema, "materials").additionalProperties);
+// How models of materials are called, where that is not their `type` in words: {type: name}.
+export const modelNames = (schema) =>
+  Object.fromEntries(
+    Object.entries(materialModels(schema)).flatMap(([type, { "x-name": name }]) => (name ? [[type, name]] : [])),
+  );
+// The simplest material, which the schema names first, reflecting nothing.
+export function blackMaterial(schema) {
+  const [[type, simplest]] = Object.entries(materialModels(schema));
+  const asked = fields(schema, simplest).filter(({ required }) => required);
+  return { type, ...Object.fromEntries(asked.map(({ name }) => [name, 0])) };
+}
+// What a thing is made of that nobody has given anything else.
+export const newMaterial = (schema) => property(schema, schema, "materials")["x-new"];
 export const environmentModels = (schema) => variants(schema, schema.properties.environment);
 export const shapeModels = (schema) => variants(schema, schema.properties.shapes.items);
 export const lightModels = (schema) => variants(schema, schema.properties.lights.items);

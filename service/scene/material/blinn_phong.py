@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Any, Literal
 
+from pydantic import ConfigDict
+
 from service.scene.base import Width, hint
 from service.scene.material.surface import Surface
 from service.scene.texture import AnyFactor, AnyRadiometric, AnyReflectance
@@ -25,6 +27,7 @@ def shininess(width: Width) -> Any:
 class BlinnPhongMaterial(Surface):
     """The classic highlight of early rasterisers, as a baseline: it conserves no energy."""
 
+    model_config = ConfigDict(json_schema_extra={"x-name": "Blinn-Phong"})
     type: Literal["blinn_phong"]
     diffuse: Annotated[
         AnyReflectance,

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from typing import Annotated, Literal
 
+from pydantic import ConfigDict
+
 from service.scene.material.blinn_phong import BlinnPhongMaterial, shininess
 from service.scene.texture import AnyFactor
 
@@ -11,5 +13,6 @@ from service.scene.texture import AnyFactor
 class PhongMaterial(BlinnPhongMaterial):
     """The first highlight of all, about the mirrored direction; like `blinn_phong` it conserves no energy."""
 
+    model_config = ConfigDict(json_schema_extra={"x-name": "Phong"})
     type: Literal["phong"]  # type: ignore[assignment]
     shininess: Annotated[AnyFactor, shininess("mirrored exponent")]
