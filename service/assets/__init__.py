@@ -7,7 +7,7 @@ source        the bytes of an upload, in memory or in a file
 store         uploaded assets
 describe      the description of an asset: size, bounds, warnings
 folder        the files of the store, each written whole or not at all
-folder_totals  what they take on the disk, kept with each change
+folder_totals  the disk space of all assets, updated with each change
 integrity     whether the bytes on the disk still match their hash
 cache         parsed assets in memory
 local_files   assets that are files beside a scene

@@ -2,7 +2,7 @@
 
 
 class ParseError(Exception):
-    """A file was refused; the message tells its author what is wrong and where.
+    """A file was refused; the message says to its author what is wrong and where.
 
     `pointer` (RFC 6901) is the place in the file's own JSON, where it has one; of an OBJ's files FILE or FILE:LINE.
     """

@@ -34,7 +34,8 @@ RECORD, SCENE, DAMAGED, PART = ".json", ".scene.json", ".damaged", ".tmp"
 
 @dataclass
 class StoredAsset:
-    """One asset on the disk: what its files take, and when it was last read (ns since 1970; 0 for damaged bytes)."""
+    """One asset on the disk: the bytes of its files, and when it was last read (ns since 1970; 0 for damaged
+    bytes)."""
 
     usage: Usage = field(default_factory=Usage)
     used: int = 0
@@ -159,7 +160,7 @@ class AssetFolder:
             log.info("deleted the leftovers of a crash", {"files": deleted})
 
     def recount(self) -> None:
-        """Count the totals again, as somebody may have copied or deleted files by hand. Raises OSError."""
+        """Count the totals again, as files may have been copied or deleted by hand. Raises OSError."""
         if self.path.exists():
             with self.locked():
                 self.count()

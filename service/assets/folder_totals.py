@@ -1,4 +1,4 @@
-"""What an asset folder takes on the disk, kept up to date with each change instead of counted again.
+"""The disk space of an asset folder, updated with each change instead of counted again.
 
 The totals are in a file beside the folder, for all processes that use it. The file is marked while a change is under
 way: after a crash in the middle of one, the next reader finds no totals and counts.
@@ -57,7 +57,7 @@ class FolderTotals:
 
 
 class Change:
-    """Adds up what files that are added and removed change of the totals."""
+    """Sums the changes of the totals by files that are added and removed."""
 
     def __init__(self) -> None:
         self.difference = Usage()
@@ -67,7 +67,7 @@ class Change:
         self.difference += usage(path.lstat())
 
     def replaces(self, path: Path) -> None:
-        """Subtract the file of this name, if there is one: it is about to be replaced or deleted."""
+        """Subtract the file of this name, if it exists: it is about to be replaced or deleted."""
         with suppress(FileNotFoundError):
             self.difference -= usage(path.lstat())
 

@@ -24,12 +24,12 @@ class Integrity:
         self._sound: dict[str, int] = {}  # time of change (ns) of the files that were found sound, by asset
 
     def stored(self, id: str, changed: int) -> None:
-        """Note that bytes were just stored that had been hashed; `changed` is what `AssetFolder.put` returned."""
+        """Record that hashed bytes were just stored; `changed` is the result of `AssetFolder.put`."""
         with self._lock:
             self._sound[id] = changed
 
     def open(self, id: str, again: bool = False) -> BinaryIO | None:
-        """An asset's file, whose time of use is now; None where it was just deleted to make room.
+        """An asset's file, marked as used now; None where it was just deleted to make room.
 
         It is hashed (0.2 s for 256 MiB) when this process opens it for the first time, when it has changed since, and
         with `again`. Raises NotFound where it is damaged; the file is then renamed.

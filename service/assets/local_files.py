@@ -45,7 +45,7 @@ class FileAssets:
             return file.read()
 
     def holds(self, ref: str) -> bool:
-        """Whether there is such a file. Raises AssetError where it may not be looked for."""
+        """Whether such a file exists. Raises AssetError for a path that may not be read."""
         return _exists(self._find(ref))
 
     def keep(self, ref: str) -> None:

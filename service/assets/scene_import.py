@@ -1,4 +1,4 @@
-"""A scene's file taken apart: what it holds becomes assets of their own, and the document refers to them."""
+"""A scene's file taken apart: its meshes and images become assets, to which the document refers."""
 
 from __future__ import annotations
 
@@ -11,13 +11,13 @@ from typing import Any
 from service.assets.types import SceneFile, ScenePart
 from service.problems import AssetError, InvalidDocument
 
-IMPORTER = 3  # counted up whenever a file is to be imported anew: its document or what is said of it has changed
+IMPORTER = 3  # raised when files must be imported anew, because their documents or warnings change
 PART = re.compile(r"part:(\d+)")
 
 
 @dataclass(frozen=True)
 class Imported:
-    """A valid document but for the environment that it may lack, and what the file asks for and does not get."""
+    """A valid document, except that it may lack an environment; and warnings about unsupported parts of the file."""
 
     document: dict[str, Any]
     warnings: list[dict[str, Any]]
@@ -28,7 +28,7 @@ class Imported:
 
     @classmethod
     def read(cls, text: bytes) -> Imported:
-        """What `written` gave. Raises ValueError, also on what an older importer wrote."""
+        """Parse the text of `written`. Raises ValueError, also for a text of an older importer."""
         try:
             found = cls(**json.loads(text))
             found.references()
@@ -52,7 +52,7 @@ class Imported:
 
 
 def take_apart(file: SceneFile, keep: Callable[[ScenePart], str]) -> Imported:
-    """`keep` stores a part and gives its id. Raises AssetError, and what `keep` raises."""
+    """`keep` stores a part and returns its id. Raises AssetError, and the exceptions of `keep`."""
     from service.scene import parse_scene  # a quarter of a second, which each parsing child would wait for, too
 
     ids: list[str] = []

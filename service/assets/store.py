@@ -33,7 +33,7 @@ FORMATS = (
     "OBJ, PLY, STL, glTF and GLB meshes; ZIP archives of an OBJ with its materials and textures; "
     "EXR, Radiance HDR, PNG, JPEG and WebP images"
 )
-RECORD_BYTES = 512  # about what the record of an asset takes
+RECORD_BYTES = 512  # about the size of an asset's record
 
 Room = Callable[[Usage], AbstractContextManager[None]]
 
@@ -60,8 +60,8 @@ class HasLimits(Protocol):
 class AssetStore:
     """For any number of threads, and for several processes on one folder.
 
-    `builtin` returns assets, by id, that nobody needs to upload; it is called when one of them is first asked for.
-    `room` is a context around storing files: it is given what they will take, and raises where that is too much.
+    `builtin` returns built-in assets by id; it is called when one of them is first requested.
+    `room` is a context for storing files: it gets the disk space that they take, and raises where that is too much.
     """
 
     def __init__(
@@ -162,7 +162,7 @@ class AssetStore:
         return self._builtin is not None and id in self._builtin()
 
     def missing(self, id: str) -> str | None:
-        """Why there is no such asset here; None where there is one."""
+        """The reason why there is no such asset, or None if there is one."""
         if self.holds(id):
             return None
         try:

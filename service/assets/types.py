@@ -59,7 +59,7 @@ class ImageData:
     """Texels as stored, row 0 at the top of the image; nothing is decoded from sRGB. The array is read-only."""
 
     pixels: npt.NDArray[np.float32] | npt.NDArray[np.uint8]  # (height, width, 1 | 3 | 4), finite; 16 bits became 0..1
-    warnings: tuple[str, ...] = ()  # what the file says that is not followed
+    warnings: tuple[str, ...] = ()  # about statements in the file that are ignored
 
     @property
     def is_8bit(self) -> bool:
@@ -98,7 +98,7 @@ class SceneFile:
 class AssetInfo:
     """The answer to an upload. A mesh has no width and an image no triangles: those are None.
 
-    `warnings`, `[{pointer, detail, count?}]`, say what is odd about it, or what a scene asks for and does not get; a
+    `warnings`, `[{pointer, detail, count?}]`, are about oddities, and about unsupported parts of a scene; a
     pointer is into the file's own JSON, or FILE:LINE of an OBJ's files, the first of `count` places.
     """
 

@@ -1,14 +1,14 @@
 """Scene -> gpu.SceneArrays: the only package that knows both the document's words and the renderer's.
 
 scene               the arrays of a whole scene, from a document and its assets
-parameters          camera, materials, the environment's rotation: an edit of one of them needs nothing else from here
+parameters          camera, materials, the environment's rotation: their edits need no other module here
 microfacets         the terms of `microfacet`, and the tables for those that have no closed form
 geometry            shapes in world space, as records, triangles and the tree over them
-lights              lights with how often each is picked, and environments with the tables that draw from them
-textures            images -> texels, and which number of which material reads which of them
+lights              lights with their probabilities, and environments with the tables that draw from them
+textures            images -> texels, and the numbers of materials that read them
 textured_emission   the mean emission of textured shapes that shine
-picture_bytes       the bytes that a picture takes
-parameter_edit      the edit that such parameters are
+picture_bytes       the bytes of a picture
+parameter_edit      the edit that changes such parameters
 edits               parts that are reused after an edit, and the edit that leads to other arrays
 """
 

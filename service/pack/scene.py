@@ -80,9 +80,9 @@ def pack(
 ) -> Packed:  # fmt: skip
     """The renderer's arrays for `scene`.
 
-    `cache` is that of a document that is being edited. `environments` keeps those of other documents; what an edit
-    makes is not kept there, as nobody asks for it again.
-    Raises InvalidDocument, its pointers from the scene's root. Slow where there is geometry: not for an event loop.
+    `cache` belongs to a document that is being edited. `environments` caches those of other documents, without the
+    results of edits, which are not requested again.
+    Raises InvalidDocument with pointers from the scene's root. Slow with geometry: not for an event loop.
     """
     materials = pack_materials(scene)
     textures, uses, texels, texture_warnings = pack_textures(scene, assets, cache, limits)

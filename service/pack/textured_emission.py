@@ -23,7 +23,7 @@ LEAST = 0.02  # share of the texture's mean that a triangle gets where all of it
 
 
 def dark(uses: Sequence[TextureReference], texels: PackedTexels) -> list[int]:
-    """The materials whose emission is a black texture: they are no lamps, as they have no power."""
+    """The materials whose emission is a black texture: without power they are no lamps."""
     return [
         use.material
         for use in uses

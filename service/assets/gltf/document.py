@@ -92,7 +92,7 @@ class GltfDocument:
 
 
 def embedded(place: JsonView) -> Bytes:
-    """What a `data:` URI holds."""
+    """The bytes of a `data:` URI."""
     uri = place.text("uri")
     if not uri:
         held = place.object("extensions")

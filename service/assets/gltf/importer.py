@@ -71,7 +71,7 @@ class _Importer:
         if told is not None:
             lighting.add("", told)
         exposure = self._metered(used, aspect, lighting) if lights else None
-        warnings = [*lighting.document(), *self.notes.document()]  # first what concerns the whole picture
+        warnings = [*lighting.document(), *self.notes.document()]  # warnings about the whole picture come first
         triangles = sum(part.triangles for part in self.placements.shown)
         bounds = [corner.tolist() for corner in around]
         return SceneFile(used, self.files.kept, warnings, triangles, bool(lights), exposure, aspect, bounds)
@@ -129,7 +129,7 @@ class _Importer:
 
     def _write(self, primitive: Primitive, place: JsonView) -> Part:
         vertices = primitive.vertices
-        bad = np.flatnonzero(~(np.abs(vertices) <= MAX_COORDINATE).all(axis=1))  # also what is not a number
+        bad = np.flatnonzero(~(np.abs(vertices) <= MAX_COORDINATE).all(axis=1))  # true for NaN, too
         if len(bad):
             raise _wrong(primitive, place, "POSITION", vertices, bad[0], "is not finite or lies beyond 1e9 m")
         for name, rows in primitive.detail():

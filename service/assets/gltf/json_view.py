@@ -107,7 +107,7 @@ def whole(value: Any, pointer: str, low: int = 0) -> int:
     if value is None:
         raise ParseError("is missing", pointer)
     if isinstance(value, float) and value.is_integer() and abs(value) < LARGEST_WHOLE:
-        value = int(value)  # 3.0: JSON doesn't tell them apart
+        value = int(value)  # 3.0 is 3 in JSON
     if type(value) is not int or not low <= value < LARGEST_WHOLE:
         raise ParseError(f"must be a whole number of at least {low}, not {shown(value)}", pointer)
     return value

@@ -86,7 +86,7 @@ def camera(
 
 def _perspective(place: JsonView, node: Node, bounds: Bounds) -> dict[str, Any]:
     position, forward = node.world[:3, 3], np.array(_axis(node, 2, -1))
-    # As far as what it looks at, so that turning about the target turns about the model.
+    # At the distance of the model, so that turning about the target turns about the model.
     distance = float((sum(bounds) / 2 - position) @ forward)
     size = float(np.linalg.norm(bounds[1] - bounds[0]))
     target = position + forward * (distance if distance > 0.01 * size else max(size, 1.0))

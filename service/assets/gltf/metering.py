@@ -58,7 +58,7 @@ class _Metered:
         self._albedo: list[float] = []
         self._emitted: list[float] = []
         self._direct: list[float] = []  # irradiance by the lights
-        self._reflected: list[float] = []  # irradiance by what the lights light, after one reflection
+        self._reflected: list[float] = []  # irradiance by light that was reflected once
         self._closed = 0  # rays from these points that meet something
 
     def add(self, scene: Scene, point: Doubles, hit: Hit) -> None:

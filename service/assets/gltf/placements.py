@@ -87,7 +87,7 @@ class Placements:
 
     @property
     def bounds(self) -> Bounds:
-        """The box around all shapes, of which there is at least one."""
+        """The box around all shapes, at least one."""
         boxes, worlds = np.array([part.bounds for part in self.shown], np.float64), self._worlds[self._stands]
         linear, moved = worlds[:, :3, :3], worlds[:, :3, 3]
         middles = np.einsum("nij,nj->ni", linear, boxes.mean(axis=1)) + moved

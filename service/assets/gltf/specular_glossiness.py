@@ -20,7 +20,7 @@ if TYPE_CHECKING:
     from service.assets.gltf.material_reader import MaterialReader
 
 F0 = 0.04
-LARGEST = 4096  # texels a side of what is computed
+LARGEST = 4096  # texels a side of a computed image
 CHUNK = 1 << 18  # texels at once: float copies of a whole image take gigabytes
 
 

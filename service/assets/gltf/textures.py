@@ -30,7 +30,8 @@ Chart = tuple[np.ndarray, np.ndarray]  # the least and the greatest coordinates 
 
 @dataclass
 class Textures:
-    """The textures of a file. `keep` takes an image's bytes and place, and returns its reference in the document."""
+    """The textures of a file. `keep` stores an image, given its bytes and place; it returns the document's
+    reference."""
 
     file: GltfDocument
     notes: Warnings
@@ -113,7 +114,7 @@ class Textures:
         return self._kept[place.pointer]
 
     def channels(self, info: JsonView) -> str:
-        """Which of "L" (grey), "RGB" and "A" the image of a texture has; "" where there is none that is read."""
+        """Which of "L" (grey), "RGB" and "A" the image of a texture has; "" without an image that can be read."""
         place = self.source(self.file.follow(info, "index", "textures"))
         if place is None:
             return ""

@@ -81,13 +81,13 @@ class _Converter:
         return self.illum in MIRRORS and ks > 0 and kd <= DARK * ks and "map_kd" not in self.material.maps
 
     def _base_color(self, is_glass: bool) -> Any:
-        """Kd; for glass Tf, the transmission filter, where there is one, as base_color tints transmitted light."""
+        """Kd, or for glass with a transmission filter Tf, as base_color tints transmitted light."""
         if is_glass and max(self.material.color("tf", 0.0)) > 0:
             return _plain(self._fraction("tf", 0.0))
         return self._color("kd", "map_kd", 0.8)
 
     def _miss_ambient(self, is_glass: bool) -> None:
-        """Warn where what the file shows stands under ambient light alone: most files repeat Kd there, or say 1."""
+        """Warn about a colour that only Ka has: most files repeat Kd there, or say 1."""
         numbers, maps, places = self.material.numbers, self.material.maps, self.material.places
         if "map_ka" in places and "map_kd" not in maps:
             self.notes.add(places["map_ka"], "a texture of ambient light (map_Ka) is not used; map_Kd is")

@@ -26,6 +26,6 @@ def located(source: str, reference: str) -> str:
 
 
 def library_names(statement: str) -> list[str]:
-    """The names after `mtllib`: those of several files, or of one file whose name has blanks in it."""
+    """The names after `mtllib`: several files, or one whose name contains blanks."""
     words = statement.split()
     return [statement, *words] if len(words) > 1 else words

@@ -61,7 +61,7 @@ class Textures:
         return self._names[key]
 
     def holds(self, found: Map) -> bool:
-        """Whether the image of a map can be used; if not, there is a warning."""
+        """Whether the image of a map can be used; warns if not."""
         return self._image(found)[1] is not None
 
     def channel(self, found: Map, default: str) -> str:
@@ -131,7 +131,7 @@ def _opened(data: bytes, found: Map) -> Any:
     """An image whose header was read, and nothing else of it."""
     from PIL import Image
 
-    Image.MAX_IMAGE_PIXELS = None  # `check_size` bounds what is decoded
+    Image.MAX_IMAGE_PIXELS = None  # `check_size` bounds the size
     try:
         return Image.open(io.BytesIO(data), formats=list(PILLOW.values()))
     except (OSError, SyntaxError, ValueError):

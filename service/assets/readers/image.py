@@ -37,7 +37,7 @@ SRGB_GAMMA = 1 / 2.2
 
 
 def parse_image(format: str, data: bytes, limits: AssetLimits) -> ImageData:
-    """Raises ParseError, or what the libraries raise."""
+    """Raises ParseError, or the libraries' exceptions."""
     if not data.startswith(SIGNATURES[format]):
         raise ParseError(f"not a {format.upper()} file: it begins with {data[:12]!r}")
     is_8bit = format in PILLOW and not (format == "png" and data[24:25] == b"\x10")
@@ -149,7 +149,7 @@ def _path(data: bytes) -> Iterator[str]:
 
 
 def _check_header(format: str, data: bytes, limits: AssetLimits) -> None:
-    """Check the size that the file claims before a library reads it, whose error would not name the size."""
+    """Check the size in the header before a library reads the file: the library's error would not name the size."""
     if format == "hdr":
         header = HDR_SIZE.search(data[:65536])
         if header is None:

@@ -271,7 +271,7 @@ def _vectors(found: Lines, keyword: str, width: int) -> tuple[Doubles, Doubles |
 def _corners(faces: Lines, faults: Faults) -> tuple[Longs, Longs, Longs, Longs]:
     """The number of corners of each face, and each corner's v, vt and vn as written, 0 where absent.
 
-    A corner is v, v/vt, v//vn or v/vt/vn: the slashes before a number in its corner say what it is.
+    A corner is v, v/vt, v//vn or v/vt/vn: the slashes before a number say which of them it is.
     """
     letters = np.frombuffer(faces.text, np.uint8)
     corners = starts_of_words(letters)

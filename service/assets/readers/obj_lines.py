@@ -20,7 +20,7 @@ from service.assets.readers.polygons import Longs
 
 Letters = npt.NDArray[np.uint8]
 
-BLOCK = 1 << 19  # bytes; what is made of a block is some forty times as large
+BLOCK = 1 << 19  # bytes; a parsed block takes some forty times as much
 NAMING = (b"usemtl", b"mtllib", b"s")
 NEWLINE, BLANK = 10, 32  # the latter and all below separate words
 NUMBERS = rb"\s*(?:[-+]?(?:\d+\.?\d*|\.\d+|inf|nan)(?:e[-+]?\d+)?(?:\s+|$))+"
@@ -61,7 +61,7 @@ class Lines:
 
 @dataclass(frozen=True)
 class Named:
-    """A `usemtl`, `mtllib` or `s` with what follows it; `faces` is how many faces of its block precede it."""
+    """A `usemtl`, `mtllib` or `s` with its argument; `faces` is the number of faces before it in its block."""
 
     keyword: str
     name: str
@@ -85,7 +85,7 @@ def blocks(data: bytes | memoryview) -> Iterator[Block]:
         end = _end(view, at)
         text = _plain(bytes(view[at:end]))
         at = end
-        if isinstance(view.obj, mmap.mmap):  # what was read of the file need not count as this process' memory
+        if isinstance(view.obj, mmap.mmap):  # pages that were read need not count as this process' memory
             view.obj.madvise(mmap.MADV_DONTNEED, 0, at)
         starts, found, others = _classified(text)
         numbers = line + np.arange(len(starts))

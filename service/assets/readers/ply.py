@@ -206,7 +206,7 @@ def _header(view: memoryview) -> tuple[list[Element], str, int]:
 
 
 class Body:
-    """The data after the header, eaten element by element; never gives out more than the file holds."""
+    """The data after the header, read element by element; returns no more than the file contains."""
 
     def __init__(self, data: bytes | memoryview, at: int) -> None:
         self.data, self.at = data, at
@@ -298,7 +298,7 @@ def _whole(values: npt.NDArray[Any]) -> Corners:
 
 
 def _text_as_binary(data: memoryview, start: int, elements: list[Element]) -> Body:
-    """The numbers of a text file as float64, so that one reader does for both: they hold any 32-bit index exactly."""
+    """The numbers of a text file as float64, for one reader of both: float64 represents any 32-bit index exactly."""
     with warnings.catch_warnings():
         warnings.simplefilter("error")  # numpy warns where it stops short of the end
         try:

@@ -62,7 +62,7 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
     limits = AssetLimits(**request["limits"])
     try:
         bound(request["memory"], limits.seconds)
-        # A signal when the parent hangs up, whose default is to end: also in the middle of a library's loop.
+        # A signal when the parent hangs up, which ends the process by default, even inside a library's loop.
         fcntl.fcntl(link, fcntl.F_SETOWN, os.getpid())
         fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
         parsed = _parse(request["format"], source, limits, request["whole"])

@@ -29,7 +29,7 @@ BYTES_PER_MESH_BYTE, BYTES_PER_BIG_MESH_BYTE, BIG_MESH_BYTES = 64, 12, 4 << 30
 SECONDS_PER_BYTE = 0.25 / (1 << 20)
 FILES = 64  # for one child
 USUAL_RATIO = 6  # of a zip's files to the zip: a text of numbers shrinks to a third, its faces to a fifth
-# What a big file took goes back to the machine: glibc else keeps blocks of up to 32 MiB for the next one.
+# The memory of a big file returns to the machine: by default glibc reuses blocks of up to 32 MiB.
 ENVIRONMENT = {
     "OPENIMAGEIO_THREADS": "1",
     "MALLOC_MMAP_THRESHOLD_": "1048576",
@@ -40,7 +40,7 @@ CRASHES = {
     signal.SIGKILL: "reading it was stopped: the machine ran out of memory",
 }
 
-# The type of each array of a mesh, and what one row of it holds.
+# The type of each array of a mesh, and the shape of its rows.
 MESH_ARRAYS: dict[str, tuple[str, tuple[tuple[int, ...], ...]]] = {
     "vertices": ("<f8", ((3,),)),
     "faces": ("<i4", ((3,),)),

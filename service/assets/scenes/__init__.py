@@ -1,11 +1,11 @@
 """What the importers of whole scenes share.
 
 part_files  meshes and images that become assets of their own, equal ones once
-ply_writer  a mesh as a PLY file, which the store keeps
+ply_writer  a mesh as a PLY file, for the store
 framing     a camera that shows everything
 room        a camera inside of closed rooms
 rays        rays against a file's triangles
 plain_mesh  the scene around a single mesh
 names       names for materials and textures
-warnings    what is said about a file, equal things once
+warnings    warnings about a file, equal ones once
 """

@@ -9,7 +9,7 @@ from service.assets.types import ScenePart
 
 @dataclass
 class PartFiles:
-    """The parts of a scene; `kept[k]` is the one that the document calls "part:k"."""
+    """The parts of a scene; `kept[k]` is "part:k" in the document."""
 
     kept: list[ScenePart] = field(default_factory=list)
     _numbers: dict[bytes, int] = field(default_factory=dict)

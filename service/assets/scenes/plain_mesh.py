@@ -11,7 +11,7 @@ from service.assets.scenes.rays import Placed
 from service.assets.scenes.room import stand_inside
 from service.assets.types import MeshData
 
-GREY = {"type": "diffuse", "albedo": 0.8}  # the material of what has none
+GREY = {"type": "diffuse", "albedo": 0.8}  # the material of a mesh without one
 NAME = "default"
 
 

@@ -1,4 +1,4 @@
-"""A mesh as a PLY file, as the store keeps it. The same triangles always give the same bytes."""
+"""A mesh as a PLY file for the store. The same triangles always give the same bytes."""
 
 from __future__ import annotations
 

@@ -36,7 +36,7 @@ class Hit:
     distance: float  # along the ray, in lengths of its direction
     placed: Placed
     normal: Doubles  # (3,), of length one, towards the ray's origin
-    is_front: bool  # whether the ray met the outward side
+    is_front: bool  # whether the ray hit the outward side
 
 
 class Triangles:
@@ -89,7 +89,7 @@ class Scene:
         self._triangles: dict[int, Triangles] = {}
 
     def nearest(self, origin: Doubles, direction: Doubles, most: float = np.inf) -> Hit | None:
-        """The first hit of a ray before `most` lengths of its direction; None where there is none."""
+        """The first hit of a ray before `most` lengths of its direction, or None."""
         enters = entry(self._low, self._high, origin, direction, most)
         found = None
         for k in np.argsort(enters, kind="stable"):

@@ -25,7 +25,7 @@ MOSTLY = 0.5  # of the rays from each side that hit something: doors and windows
 FURNISHED = 0.02  # of all rays, those that meet more than a wall and the wall across
 INSET = 0.12  # from the walls to where the camera may stand, of the box's extents
 VFOV = 65.0  # degrees; that of the default camera shows only a corner of a room
-VIEW = 5  # rays along each edge of the picture that tell how much is seen from a place
+VIEW = 5  # rays along each edge of the picture, which measure how much a place sees
 EYE, LAMP = 0.5, 0.8  # heights over the floor, of the room's
 BRIGHTNESS = 0.7  # by which a lamp at a room's middle gives walls of albedo 0.5 a radiance of about 0.2
 CHUNK = 1 << 16  # triangles at once
@@ -40,7 +40,7 @@ def stand_inside(document: Document, placed: list[Placed], bounds: Bounds, has_c
     enclosed = _enclosed(placed, bounds)
     if enclosed < LEAST_ENCLOSED:
         return None
-    scene = Scene([replace(one, is_two_sided=True) for one in placed])  # walls are met from behind as well
+    scene = Scene([replace(one, is_two_sided=True) for one in placed])  # rays hit walls from behind as well
     if not _is_room(scene, {one.material: one.is_two_sided for one in placed}, bounds, enclosed):
         return None
     camera = None if has_camera else _camera(scene, bounds)
@@ -143,7 +143,7 @@ def _camera(scene: Scene, bounds: Bounds) -> Document | None:
 
 
 def _seen(scene: Scene, eye: Doubles, target: Doubles) -> float:
-    """The mean distance to what a camera sees; backs, which are seen from within walls and furniture, count as 0."""
+    """The mean distance that a camera sees; backs, which are seen from within walls and furniture, count as 0."""
     forward = (target - eye) / np.linalg.norm(target - eye)
     right = np.cross(forward, (0.0, 1.0, 0.0))
     up = np.cross(right, forward)

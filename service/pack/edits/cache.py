@@ -1,4 +1,4 @@
-"""A cache of packed parts, by what they were made from, so that an edit costs only what it changes."""
+"""A cache of packed parts by their sources, so that an edit packs only the parts that it changes."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ T = TypeVar("T")
 
 
 class CacheBudget:
-    """The bytes that several caches may hold together. It may be used from any thread."""
+    """A bound on the bytes of several caches together. For any thread."""
 
     def __init__(self, most: int = 1 << 30) -> None:
         self._most = most
@@ -39,7 +39,7 @@ class CacheBudget:
         return self.bytes > self._most
 
     def shrink(self, size: int) -> None:
-        """Free that many bytes, as far as they are not a cache's newest part; the largest caches lose first."""
+        """Free bytes from the largest caches first; the newest part of each cache stays."""
         with self._lock:
             caches = sorted(self._caches, key=lambda cache: cache.bytes, reverse=True)
         for cache in caches:
@@ -48,8 +48,7 @@ class CacheBudget:
 
 
 class PackCache:
-    """The last used geometries and environments within `budget`; the newest stays in any case. It may be used from
-    any thread."""
+    """The last used geometries and environments within `budget`; the newest always stays. For any thread."""
 
     def __init__(self, entries: int = 4, budget: CacheBudget | None = None) -> None:
         self.bytes = 0
@@ -61,7 +60,7 @@ class PackCache:
         self.moves = MovedMeshes()
 
     def get(self, key: Hashable, make: Callable[[], T]) -> T:
-        """The part that was made for an equal key, or else `make()`, which runs outside the lock."""
+        """The part of an equal key, or else `make()`, which runs outside the lock."""
         with self._lock:
             if key in self._kept:
                 self._kept.move_to_end(key)
@@ -77,12 +76,12 @@ class PackCache:
         return value
 
     def find(self, key: Hashable) -> Any:
-        """The part that was made for an equal key; None where there is none."""
+        """The part of an equal key, or None."""
         with self._lock:
             return self._kept.get(key, (None, 0))[0]
 
     def drop_oldest(self) -> int:
-        """Forget the part that was used longest ago, unless it is the only one. Returns its bytes."""
+        """Drop the least recently used part, unless it is the only one. Returns its bytes."""
         with self._lock:
             if len(self._kept) < 2:
                 return 0
@@ -97,7 +96,7 @@ class PackCache:
 
 
 def _freeze(value: object) -> int:
-    """Make the arrays in a dataclass read-only, as they are shared from now on. Returns their bytes."""
+    """Make the arrays in a dataclass read-only, as they will be shared. Returns their bytes."""
     size = 0
     for member in vars(value).values():
         for array in member.values() if isinstance(member, dict) else [member]:
@@ -122,5 +121,5 @@ def digest(value: Any) -> Hashable:
 
 
 def lasting(reference: str | None) -> bool:
-    """Whether an asset's reference will always name the same bytes; a path may not."""
+    """Whether a reference always names the same bytes: an asset's id does, a path does not."""
     return reference is None or reference.startswith("sha256:")

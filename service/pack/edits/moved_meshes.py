@@ -1,4 +1,4 @@
-"""Large meshes of a document that is being edited: from the first move on they have trees of their own."""
+"""Large meshes of a document that is being edited get trees of their own when they are first moved."""
 
 from __future__ import annotations
 
@@ -36,5 +36,5 @@ class MovedMeshes:
 
 
 def _still(content: Hashable) -> Hashable:
-    """The part of a mesh's content that a move leaves as it is; None for another shape."""
+    """The part of a mesh's content that a move does not change; None for another shape."""
     return tuple(content[i] for i in STILL) if isinstance(content, tuple) else None

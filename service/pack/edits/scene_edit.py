@@ -13,11 +13,11 @@ from gpu import EnvironmentArrays, MovedArrays, SceneArrays, SceneEdit, TextureA
 MOVED = tuple(MovedArrays.__annotations__)  # the members that may differ
 MANY = ("nodes", "light_tree")  # those of them whose length may differ
 EDITED = {each.name for each in fields(SceneEdit)}  # members that an edit brings by themselves, in their old length
-SMALL = 1 << 20  # bytes of an array whose contents are compared; a larger one must be the same object
+SMALL = 1 << 20  # bytes up to which the contents of arrays are compared; larger ones must be the same object
 
 
 def scene_edit(old: SceneArrays, new: SceneArrays) -> SceneEdit | None:
-    """The edit that leads from one scene to the other; None where none does."""
+    """The edit that leads from one scene to the other; None where there is none."""
     if len(old.materials) != len(new.materials) or bool(len(old.light_tree)) != bool(len(new.light_tree)):
         return None
     if not len(new.instances) and not _same(old.nodes, new.nodes):  # in which triangles lie, too
@@ -44,7 +44,7 @@ def scene_edit(old: SceneArrays, new: SceneArrays) -> SceneEdit | None:
 
 
 def _alike(a: EnvironmentArrays | None, b: EnvironmentArrays | None) -> bool:
-    """Whether kernels read both in the same way."""
+    """Whether kernels read both scenes in the same way."""
     if a is None or b is None:
         return a is b
     kinds = [(e.cube, e.sun is None, e.texels.size > 3) for e in (a, b)]

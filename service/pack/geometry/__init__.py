@@ -2,18 +2,18 @@
 
 assemble          the geometry of a whole scene
 geometry          the dataclass of the result
-reuse             parts of earlier geometries that are used again
+reuse             reuse of the parts of earlier geometries
 world             the document's shapes in world space: analytic ones, meshes and instances, in float64
 analytic          spheres, quads, boxes and ellipsoids in world space
 meshes            meshes in world space, and their triangles as records
 vertex_normals    smooth normals at the corners, and their codes
 tangents          the directions that a material's highlights and normal maps run along
 shared_meshes     meshes whose triangles several shapes share, each with a tree of its own
-instances         which meshes are shared, and the records of the shapes that show them
+instances         the choice of shared meshes, and the records of the shapes that show them
 scene_bvh         the tree over the scene, and the few shapes that stand in a loop instead
 records           analytic shapes -> records with their bounds
 triangle_buffers  the finished arrays of all triangles, in shared memory
-shape_records     members that the records of all kinds have in common: hidden shapes, lights
+shape_records     members of the records of all kinds: hidden shapes, lights
 rebase            the origin that float32 coordinates are relative to
 parallel          work over many rows, in threads
 warnings          equal warnings about many shapes as one with a count; odd meshes whose materials show it

@@ -13,7 +13,7 @@ from service.scene.numbers import LARGEST
 Vec3 = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]  # x, y, z, w
 
-SAME_SCALE = 1e-6  # relative difference of scales up to which a sphere stays one: matrices are typed with 7 digits
+SAME_SCALE = 1e-6  # relative difference of scales up to which a sphere stays a sphere: typed matrices have 7 digits
 SLACK = 2.0  # a box or an edge may reach from one end of the range of coordinates to the other
 LEAST = 1e-12  # m; the cube of a shorter length, or of its inverse, is outside float32
 
@@ -86,7 +86,7 @@ class AnalyticShapes:
             self.quads_used.append(used)
 
     def box(self, low: Vec3, high: Vec3, matrix: np.ndarray | None, used: tuple[int, int], emissive: bool) -> None:
-        """A box that shines is six quads: lights are sampled face by face."""
+        """Add a box; one that shines becomes six quads, as lights are sampled face by face."""
         center = np.add(low, high) / 2
         axes = np.diag(np.subtract(high, low) / 2)
         if matrix is not None:
@@ -102,7 +102,7 @@ class AnalyticShapes:
             self.quad(origin, u, v, placed, used)
 
     def _fits(self, used: tuple[int, int], position: Vec3 | np.ndarray, *lengths: float) -> bool:
-        """Whether the shape is large enough for float32; if not, it is noted. Raises InvalidDocument where its
+        """Whether the shape is large enough for float32; records one that is not. Raises InvalidDocument where its
         transform puts it out of range."""
         check_reach(used[1], max(*map(abs, position), *lengths))
         if min(lengths) < LEAST:

@@ -25,7 +25,7 @@ from service.pack.parameters import vec3
 from service.scene.shape import Shape
 from service.system.shared_memory import LEAST, SharedArena, trim
 
-MANY = 100_000  # triangles from which on the memory that packing needed is given back to the system
+MANY = 100_000  # triangles from which on packing returns its freed memory to the system
 
 
 @dataclass
@@ -35,7 +35,7 @@ class _Tree:
     bvh: SceneBvh
     instances: np.ndarray  # layout.Instance
     kinds: frozenset[ShapeKind]  # kinds that rays find through trees
-    large: dict[ShapeKind, int]  # of such a kind: how many stand first, out of the tree
+    large: dict[ShapeKind, int]  # of such a kind: the number of shapes that stand first, outside the tree
 
 
 def assemble(
@@ -72,7 +72,7 @@ def assemble(
     records[ShapeKind.TRIANGLE] = buffers.triangles
     extents = replace(extents, warnings=extents.warnings + _degenerate(world, triangles))
     for array in (*records.values(), nodes, placed, *buffers.arrays):
-        array.flags.writeable = array.nbytes < LEAST  # others may have it mapped
+        array.flags.writeable = array.nbytes < LEAST  # larger ones may be mapped by other processes
     if len(buffers.triangles) > MANY:
         trim()
     return Geometry(

@@ -34,7 +34,7 @@ class Geometry:
 
     shapes: dict[ShapeKind, np.ndarray]
     triangle_normals: np.ndarray
-    tangents: bool  # whether these have them
+    tangents: bool  # whether the normals have tangents
     triangle_uvs: np.ndarray
     triangle_uvs_1: np.ndarray
     triangle_colors: np.ndarray
@@ -45,13 +45,14 @@ class Geometry:
     node_origin: Vec3
     node_scale: Vec3
     bvh_kinds: frozenset[ShapeKind]
-    large: dict[ShapeKind, int]  # how many shapes of such a kind stand first, outside the tree
+    large: dict[ShapeKind, int]  # the number of shapes of such a kind that stand first, outside the tree
     instances: np.ndarray
     instance_nodes: np.ndarray
     models: tuple[SharedMesh, ...]  # that the instances show, in the order of their triangles
-    unshared_key: Hashable  # equal where all other triangles are; None: they shine, or cannot be compared
+    # Equal for equal triangles without those of models; None: they shine, or compare with none
+    unshared_key: Hashable
     origin: Vec3
-    radius: float  # of a ball around everything; 1 where there is nothing
+    radius: float  # of a ball around everything; 1 for an empty scene
     meshes: MeshExtents
     warnings: tuple[str, ...]
 

@@ -34,10 +34,10 @@ class PlacedMesh:
     single_sided: bool
     material: int
     shape: int
-    uvs: np.ndarray | None = None  # (n, 2), as the vertices
+    uvs: np.ndarray | None = None  # (n, 2), one for each vertex
     uvs_1: np.ndarray | None = None
     colors: np.ndarray | None = None  # (n, 3 or 4)
-    tangents: Tangents | None = None  # where the material runs along them
+    tangents: Tangents | None = None  # where the material needs them
 
 
 @dataclass(frozen=True)
@@ -228,7 +228,7 @@ def _squares(v: np.ndarray) -> np.ndarray:
 
 @dataclass(frozen=True)
 class _Smooth:
-    """A mesh's normals, with what is computed once for each normal and not at each corner."""
+    """A mesh's normals, with values that are computed once for each normal and not for each corner."""
 
     normals: np.ndarray
     codes: np.ndarray

@@ -34,7 +34,7 @@ def in_order(make: Callable[[T], U], take: Callable[[T, U], None], jobs: Sequenc
         for job in jobs:
             take(job, make(job))
         return
-    ahead = 2 * (os.cpu_count() or 1)  # results that are made and not yet taken, at most
+    ahead = 2 * (os.cpu_count() or 1)  # most results that are made and not yet taken
     with ThreadPoolExecutor(os.cpu_count()) as pool:
         made = deque(pool.submit(make, job) for job in jobs[:ahead])
         for job, following in zip(jobs, [*jobs[ahead:], *[None] * ahead], strict=False):

@@ -1,5 +1,4 @@
-"""The origin that is subtracted from every position before it becomes float32, and warnings of what float32 then
-loses."""
+"""The origin that is subtracted from every position before it becomes float32, and warnings about lost precision."""
 
 from __future__ import annotations
 
@@ -34,7 +33,7 @@ class Rebased:
     records: dict[ShapeKind, np.ndarray]
     bounds: dict[ShapeKind, Bounds]
     origin: np.ndarray  # float64, world
-    radius: float  # of a ball around everything; 1 where there is nothing
+    radius: float  # of a ball around everything; 1 for an empty scene
     warnings: list[str]  # about shapes that are too small, or too far away for float32
 
 
@@ -63,7 +62,7 @@ def rebase(placed: AnalyticShapes, meshes: MeshExtents) -> Rebased:
 def choose_origin(low: np.ndarray, high: np.ndarray) -> tuple[np.ndarray, float]:
     """(origin, radius of a ball around everything) of boxes (n, 3), one for each shape.
 
-    The origin is 0 unless everything lies far from it, or small shapes do: most scenes keep their numbers.
+    The origin is 0 unless everything, or small shapes, lie far from it: in most scenes no number changes.
     """
     if not len(low):
         return np.zeros(3), 1.0

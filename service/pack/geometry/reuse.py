@@ -1,4 +1,4 @@
-"""Parts of geometries that were packed before, for use in the next one."""
+"""Reuse of the parts of earlier geometries in the next one."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ class Earlier:
         return {model.key: model for earlier in self.geometries for model in earlier.models}
 
     def among_other_shapes(self, shapes: Sequence[Shape], materials: ShapeMaterials) -> Geometry | None:
-        """The newest geometry with the same meshes, but now with `shapes` beside them; None where there is none.
+        """The newest geometry with the same meshes, now beside `shapes`; None where no geometry has them.
 
         Raises InvalidDocument.
         """
@@ -52,7 +52,7 @@ class Earlier:
         return own, vec3(origin) if own else None, tuple(materials.names), tuple(materials.charts.items())
 
     def same_triangles(self, unshared_key: Hashable, models: Sequence[SharedMesh]) -> Geometry | None:
-        """The newest geometry with the same triangles in the same order; None where there is none."""
+        """The newest geometry with the same triangles in the same order, or None."""
         for earlier in reversed(self.geometries):
             same = len(earlier.models) == len(models) and all(map(operator.is_, earlier.models, models))
             if same and unshared_key is not None and earlier.unshared_key == unshared_key:

@@ -1,4 +1,4 @@
-"""The tree over a scene: which kinds of shapes go into it, and the order that it gives them."""
+"""The tree over a scene: the kinds of shapes in it, and their order."""
 
 from __future__ import annotations
 
@@ -132,7 +132,7 @@ def build_scene_bvh(bounds: dict[ShapeKind, Bounds], large: dict[ShapeKind, np.n
 
 
 def warm_builder() -> None:
-    """Load numba and the builder's compiled code, or compile it, which takes the first mesh half a second or
+    """Load numba and the builder's compiled code, or compile it: the first mesh waits half a second for it, or
     several."""
     low = np.arange(3.0 * (LINEAR[ShapeKind.TRIANGLE] + 1), dtype=np.float32).reshape(-1, 3)
     build_scene_bvh({ShapeKind.TRIANGLE: (low, low + 1)}, {ShapeKind.TRIANGLE: np.zeros(0, np.intp)})

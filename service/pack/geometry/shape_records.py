@@ -1,4 +1,4 @@
-"""Members that records of all kinds have in common: which shapes the camera looks through, and which are lights."""
+"""Members of the records of all kinds: shapes that the camera looks through, and lights."""
 
 from __future__ import annotations
 

@@ -37,7 +37,7 @@ class UnwrittenTriangles:
 @dataclass(frozen=True)
 class SharedMesh:
     key: Hashable
-    center: np.ndarray  # (3,) float64: of the mesh's own coordinates, what is 0 here
+    center: np.ndarray  # (3,) float64: the origin of this space, in the mesh's own coordinates
     source: WrittenTriangles | UnwrittenTriangles
     count: int
     degenerate: int  # triangles that were skipped
@@ -128,7 +128,7 @@ def shared_mesh(key: Hashable, mesh: PlacedMesh) -> SharedMesh | None:
 
 
 def blank(mesh: PlacedMesh) -> PlacedMesh:
-    """The mesh as all shapes share it, without a material and without a shape."""
+    """The mesh without a material and a shape, as it is shared."""
     return replace(mesh, material=0, shape=0)
 
 

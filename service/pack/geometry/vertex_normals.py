@@ -75,7 +75,7 @@ def corner_normals(
     length = np.sqrt(np.einsum("ij,ij->j", sums, sums))
     cancelled = length < 1e-9  # where faces are back to back, only rounding is left
     sums /= np.where(cancelled, np.inf, length)
-    return np.ascontiguousarray(sums.T), joined  # rows: what takes some of them would copy all of them first
+    return np.ascontiguousarray(sums.T), joined  # contiguous: else taking some rows would copy all of them first
 
 
 def split(faces: np.ndarray, groups: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:

@@ -28,7 +28,7 @@ class ShapeMaterials:
 
     names: Sequence[str]  # in order
     emissive: Collection[str] = frozenset()  # those that shine
-    charts: Mapping[str, RequiredCharts] = field(default_factory=dict)  # the charts of shapes that they read
+    charts: Mapping[str, RequiredCharts] = field(default_factory=dict)  # the charts that they need of shapes
 
 
 @dataclass
@@ -141,7 +141,7 @@ def _mesh(each: MeshRequest, matrix: np.ndarray | None) -> PlacedMesh:
 
 
 def _smooth(shape: MeshShape, data: MeshData) -> np.ndarray | bool:
-    """The document's word, or else the file's."""
+    """The document's value, or else the file's."""
     return data.smoothing if shape.smooth is None else shape.smooth
 
 

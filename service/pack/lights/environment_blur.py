@@ -10,10 +10,9 @@ import numpy as np
 from gpu.tables.alias_table import cube_solid_angles, solid_angles
 
 MOST_WIDTH = 2048  # texels of a blurred picture, twice as wide as high: the most costly blur takes some seconds
-LEAST_WIDTH = 64  # texels; the rows of a coarser picture would blur more than asked
-PER_BLUR = (
-    4  # texels to one standard deviation at least: bilinear filtering between them errs by less than 1 % of a peak
-)
+LEAST_WIDTH = 64  # texels; the rows of a coarser picture would blur more than requested
+# The least number of texels of a standard deviation: bilinear filtering then errs by less than 1 % of a peak.
+PER_BLUR = 4
 REACH = 6  # standard deviations: there the kernel is 2e-8 of its peak, which hides the light of any sun
 LEAST = 1e-14  # of a frequency, which is as much as rounding leaves of it
 # Face -> directions at its middle, along s to the right and along t down, where s and t go from -1 to 1.

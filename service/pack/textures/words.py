@@ -178,7 +178,7 @@ def _warnings(uses: list[TextureReference], texels: PackedTexels) -> Iterator[st
         if isinstance(use.texture, CheckerTexture):
             pixels = np.array([[use.texture.a, use.texture.b]], np.float32)
         elif texels.places[use.kept][1].is_8bit:
-            continue  # 0..1: what the factor makes of that keeps to the range by definition
+            continue  # 0..1: times the factor it stays in the range by definition
         else:
             pixels = texels.places[use.kept][1].pixels
         values = values_of(use, pixels)
