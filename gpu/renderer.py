@@ -31,7 +31,7 @@ class Renderer:
         self._kernels = KernelCache(self._context, shaders)
         self._texels = TextureCache()
         self._bsdf = BsdfEvaluator(self._context, self._kernels)
-        self._frame = self._context.buffer(reserve=layout.Frame.dtype.itemsize)
+        self._uniform_buffer = self._context.buffer(reserve=layout.Uniforms.dtype.itemsize)
         self.info: dict[str, Any] = contexts.describe(self._context)
 
     def _own(self) -> None:
@@ -71,7 +71,7 @@ class Renderer:
         Raises CompileError, OutOfMemory.
         """
         self._own()
-        return Picture(self._context, self._kernels, self._frame, scene, settings)
+        return Picture(self._context, self._kernels, self._uniform_buffer, scene, settings)
 
     @property
     def bsdf(self) -> BsdfEvaluator:
@@ -100,7 +100,7 @@ class Renderer:
         self._kernels.release()
         self._texels.release()
         self._bsdf.release()
-        self._frame.release()
+        self._uniform_buffer.release()
         contexts.release(self._context)
 
     def __enter__(self) -> Renderer:

@@ -20,13 +20,13 @@ void main() {
     uint place = first + gl_GlobalInvocationID.x;
     uint row = place / batches, from = (place - row * batches) * batch;
     vec3 wo = directions[row].xyz;
-    Lone lone = lone_make(wo);
+    BsdfAlone alone = bsdf_alone_make(wo);
     vec3 sum = vec3(0.0), squares = vec3(0.0);
     uint k = from, end = min(from + batch, samples);
     do {
         Sampler rng = sobol_begin(uvec2(row, 0u), k, 0u);
-        LobeSample lobe = bsdf_sample(lone.s, wo, sobol_pair(rng, PAIR_CHOICE).y, sobol_pair(rng, PAIR_BSDF));
-        Scatter scatter = bsdf_eval(lone.s, wo, lobe.wi);
+        LobeSample lobe = bsdf_sample(alone.s, wo, sobol_pair(rng, PAIR_CHOICE).y, sobol_pair(rng, PAIR_BSDF));
+        Scatter scatter = bsdf_eval(alone.s, wo, lobe.wi);
         if (lobe.is_delta) scatter = lobe.scatter;
         vec3 weight = scatter.pdf > 0.0 ? scatter.f / scatter.pdf : vec3(0.0);
         sum += weight;

@@ -16,7 +16,7 @@ void main() {
     if (gl_GlobalInvocationID.x >= count) return;
     uint i = first + gl_GlobalInvocationID.x;
     vec3 wo = directions[0].xyz, w = directions[i + 1u].xyz, wi = vec3(-w.xy, w.z);
-    Surface s = lone_make(wo).s;
+    Surface s = bsdf_alone_make(wo).s;
     Terms found = models_terms(s, wo, wi, w);
     terms[2u * i] = vec4(found.f, found.d);
     terms[2u * i + 1u] = vec4(4.0 * wo.z * wi.z * found.visibility, found.has_facets ? 1.0 : 0.0, 0.0, 0.0);

@@ -21,18 +21,18 @@ void main() {
     uint pair = first + gl_GlobalInvocationID.x;
     uint row = pair / wi_count, column = pair - row * wi_count;
     vec3 wo = directions[row].xyz, wi = directions[wo_count + row * wi_step + column].xyz;
-    Lone lone = lone_make(wo);
-    wo = lone_turn(lone, wo);
-    Scatter value = bsdf_eval(lone.s, wo, lone_turn(lone, wi));
-    if (!lone.visible || wi.z == 0.0) value = Scatter(vec3(0.0), 0.0);
+    BsdfAlone alone = bsdf_alone_make(wo);
+    wo = bsdf_alone_turn(alone, wo);
+    Scatter value = bsdf_eval(alone.s, wo, bsdf_alone_turn(alone, wi));
+    if (!alone.visible || wi.z == 0.0) value = Scatter(vec3(0.0), 0.0);
     else value.f /= abs(wi.z);
     values[pair] = vec4(value.f, value.pdf);
     LobeSample specular[BSDF_DELTAS];
-    bsdf_deltas(lone.s, wo, specular);
+    bsdf_deltas(alone.s, wo, specular);
     if (column == 0u) {
         for (int k = 0; k < BSDF_DELTAS; k++) {
             uint at = 2u * (row * uint(BSDF_DELTAS) + uint(k));
-            deltas[at] = vec4(lone_turn(lone, specular[k].wi), lone.visible ? specular[k].scatter.pdf : 0.0);
+            deltas[at] = vec4(bsdf_alone_turn(alone, specular[k].wi), alone.visible ? specular[k].scatter.pdf : 0.0);
             deltas[at + 1u] = vec4(specular[k].scatter.f, 0.0);
         }
     }

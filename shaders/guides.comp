@@ -22,14 +22,14 @@ void main() {
     float incidence = uintBitsToFloat(hits[slot].z);
     uint i = 0u;
     do {
-        Sampler rng = sobol_begin(pixel, frame.sample_first + i, 0u);
+        Sampler rng = sobol_begin(pixel, uniforms.sample_first + i, 0u);
         vec3 o, d;
         camera_ray(pixel, rng, o, d);
         SurfacePoint at;
         budget_begin();
         Hit hit = transparency_nearest(o, d, NONE, 0u, rng, at);
         if (!budget_lasts()) hit.id = NONE;
-        if (frame.sample_first + i == 0u) {
+        if (uniforms.sample_first + i == 0u) {
             uint shape = (at.shape & ~(SINGLE_SIDED | HIDDEN)) + 1u;
             hits[slot].xy = hit.id != NONE ? uvec2(shape, at.material + 1u) : uvec2(0u);
         }
@@ -53,7 +53,7 @@ void main() {
             normal += vec4(n, hit.t);
             incidence += degrees(atan(length(cross(d, n)), -dot(d, n)));
         }
-    } while (++i < frame.sample_count);
+    } while (++i < uniforms.sample_count);
     albedos[slot] = albedo;
     normals[slot] = normal;
     hits[slot].z = floatBitsToUint(incidence);

@@ -30,8 +30,8 @@ void add(vec4 color) {
     lost = (total - sum) - x;
     sum = total;
     moment.w += 1.0;
-    vec3 delta = (color.rgb - before) * frame.moment_scale;
-    vec3 after = (color.rgb - sum.rgb / moment.w) * frame.moment_scale;
+    vec3 delta = (color.rgb - before) * uniforms.moment_scale;
+    vec3 after = (color.rgb - sum.rgb / moment.w) * uniforms.moment_scale;
     moment.rgb += max(delta * after, vec3(0.0));
 }
 
@@ -39,14 +39,14 @@ void main() {
     uvec2 pixel;
     uint slot;
 #if ADAPTIVE
-    if (frame.replicate == 0u ? !sample_plan_pixel(pixel, slot) : !camera_pixel(pixel, slot)) return;
+    if (uniforms.replicate == 0u ? !sample_plan_pixel(pixel, slot) : !camera_pixel(pixel, slot)) return;
 #else
     if (!camera_pixel(pixel, slot)) return;
 #endif
     sum = sums[slot];
     lost = compensations[slot];
     moment = moments[slot];
-    uint replicate = frame.replicate;
+    uint replicate = uniforms.replicate;
     if (replicate != 0u) { // the meter's buffers name the pixel and its replicate (gpu/picture/noise_meter.py)
         replicate += uint(fract(moment.x) * float(METER_REPLICATES));
         pixel = uvec2(moment.xy);
@@ -55,7 +55,7 @@ void main() {
     uint first = uint(moment.w), count = sample_plan_due(pixel, first);
     if (count == 0u) return;
 #else
-    uint first = frame.sample_first, count = frame.sample_count;
+    uint first = uniforms.sample_first, count = uniforms.sample_count;
 #endif
     Medium medium = medium_at_camera();
     uint i = 0u, cut = 0u;

@@ -86,7 +86,7 @@ class Picker:
 
     def _run(self, sample: int, count: int, asks: np.ndarray, p: Any, n: Any, through: bool) -> np.ndarray:
         self._texture.use(bindings.LIGHT_TREE_TEXTURE)
-        frame = np.zeros((), layout.Frame.dtype)
+        frame = np.zeros((), layout.Uniforms.dtype)
         frame["light_count"] = len(self._lights)
         kinds = {f"HAS_{LightKind(int(kind)).name}_LIGHTS" for kind in set(self._lights["kind"])} & set(FLAGS)
         flags = kinds | {"HAS_LIGHTS", "HAS_MANY_LIGHTS", "HAS_LIGHT_TREE", "HAS_TRANSMISSION", "HAS_PRINCIPLED"}

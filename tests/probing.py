@@ -82,9 +82,10 @@ class Prober:
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
         table[:, 0] = filters.inverse(filter_name, features.FILTER_TABLE_SIZE)
         blocks = [self.context.buffer(table.tobytes())]
-        blocks.append(self.context.buffer((np.zeros((), layout.Frame.dtype) if frame is None else frame).tobytes()))
+        frame = np.zeros((), layout.Uniforms.dtype) if frame is None else frame
+        blocks.append(self.context.buffer(frame.tobytes()))
         blocks[0].bind_to_uniform_block(bindings.FILTER_BLOCK)
-        blocks[1].bind_to_uniform_block(bindings.FRAME_BLOCK)
+        blocks[1].bind_to_uniform_block(bindings.UNIFORM_BLOCK)
         for name, value in {**uniforms, "count": count}.items():
             kernel[name].value = value
         if "HAS_PRINCIPLED" in raised:

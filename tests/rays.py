@@ -32,8 +32,8 @@ def trace(gpu: Renderer, scene: Scene, o: np.ndarray, d: np.ndarray, away: np.nd
         return np.concatenate([a, np.zeros((len(a), 1))], 1).astype(np.float32)
 
     scene.bind()
-    frame = np.zeros((), layout.Frame.dtype)
-    scene.write_frame(frame)
+    frame = np.zeros((), layout.Uniforms.dtype)
+    scene.write_uniforms(frame)
     inputs = {Slot.SUM: wide(o), Slot.COMPENSATION: wide(d), Slot.MOMENTS: wide(away)}
     outputs = (Slot.OUTPUT, Slot.ALBEDO, Slot.NORMAL)
     known = scene.defines(RenderSettings(8, 8)) | {"HAS_ANISOTROPIC": 1}

@@ -209,8 +209,8 @@ class _Dispatch:
         """Upload the material, and what else its kernels read."""
         record = np.ascontiguousarray(material.materials).view(np.uint8)
         self._blocks[bindings.COUNTED["material"]] = contexts.allocate(self._context, record)
-        self._blocks[bindings.FRAME_BLOCK] = contexts.allocate(self._context, layout.Frame.dtype.itemsize)
-        self._blocks[bindings.FRAME_BLOCK].clear()
+        self._blocks[bindings.UNIFORM_BLOCK] = contexts.allocate(self._context, layout.Uniforms.dtype.itemsize)
+        self._blocks[bindings.UNIFORM_BLOCK].clear()
         for unit, texels in bound_textures(material, flags).items():
             self._textures[unit] = linear_texture(self._context, texels, *KINDS[unit])
 

@@ -1,7 +1,7 @@
 """Arrays as OpenGL objects.
 
 scene     a scene on the device: its buffers, its flags, and the edits that need no upload
-buffers   the arrays of a scene as buffers, and what is uploaded again where its shapes have moved
+buffers   the arrays of a scene as buffers, and their upload after shapes have moved
 textures  images and rows of numbers as textures, and those that scenes share
 pinned    buffers that are the caller's own memory, on a software renderer
 """

@@ -1,4 +1,4 @@
-"""The arrays of a scene as buffers on the device, and what is uploaded again where its shapes have moved."""
+"""The arrays of a scene as buffers on the device, and the upload of those that differ after shapes have moved."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ BUFFERS = {
     Slot.NODES: "nodes",
     Slot.LIGHTS: "lights",
 }
-SPARE = 2  # the room for a scene's tree behind those of instances, in units of its present size
+SPARE = 2  # the room for the scene's own tree behind those of instances, in units of its present size
 
 
 def upload(context: Any, array: np.ndarray) -> Any:
@@ -48,7 +48,7 @@ def shared(context: Any, slot: Slot, arrays: SceneArrays) -> Any:
 def move(context: Any, old: SceneArrays, new: SceneArrays, buffers: dict[Slot, Any], textures: dict[int, Any]) -> int:
     """Upload what differs: of BUFFERS all but triangles, instances, the lights' tree. Returns the number of bytes.
 
-    Raises OutOfMemory, and nothing has changed then.
+    Raises OutOfMemory, and then changes nothing.
     """
     made, texture, sent = dict[Slot, Any](), None, 0
     differing = [slot for slot, name in BUFFERS.items() if not _equal(getattr(old, name), getattr(new, name))]

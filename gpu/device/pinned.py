@@ -1,6 +1,6 @@
-"""Buffers that are the caller's own memory, on a software renderer, whose memory is the machine's anyway.
+"""Buffers in the caller's own memory, on a software renderer.
 
-With GL_AMD_pinned_memory a million triangles are in memory once, and not a second time as the driver's copy.
+With GL_AMD_pinned_memory a million triangles are in memory once: the driver makes no copy of them.
 """
 
 from __future__ import annotations
@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-LEAST = 1 << 18  # bytes; less is copied
+LEAST = 1 << 18  # bytes; smaller arrays are copied
 _TARGET, _STATIC_DRAW = 0x9160, 0x88E4  # EXTERNAL_VIRTUAL_MEMORY_BUFFER_AMD
 _SOFTWARE = "llvmpipe"
 
@@ -24,7 +24,7 @@ class Pinned:
         self._array = array
         self.size = array.nbytes
         gl, name = _functions(), ctypes.c_uint()
-        context.error  # noqa: B018  # an older one is not this buffer's
+        context.error  # noqa: B018  # clears an older error
         gl.glGenBuffers(1, ctypes.byref(name))
         self._name = name
         gl.glBindBuffer(_TARGET, name)

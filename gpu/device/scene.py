@@ -23,16 +23,16 @@ from gpu.tables import energy
 log = logging.getLogger(__name__)
 
 _BLOCKS = {layout.BUFFERS[name][1]: block for name, block in bindings.COUNTED.items()}
-_BLOCK_MAX = 16384  # bytes that every driver gives a uniform block; of longer buffers kernels see the first records
+_BLOCK_MAX = 16384  # bytes of a uniform block on every driver; of a longer buffer kernels see the first records
 
 
-RADIANCE_MAX = 1e20  # what a texel times the environment's scale may reach
+RADIANCE_MAX = 1e20  # most of a texel times the environment's scale
 
 
 def upload_tables(context: Any) -> dict[int, Any]:
     """The tables of `energy` as textures, by unit, linear and clamped: their first axes are folded into the third.
 
-    The index of stretched lobes goes with the second: 2 048 layers are all that a driver need have.
+    The index of refraction of stretched lobes is folded into the second: a driver need support only 2 048 layers.
     """
     out = {}
     for name, unit in bindings.ENERGY_TEXTURES.items():
@@ -88,7 +88,7 @@ class Scene:
         self._looped = features.looped(arrays)
         self._buffers: dict[Slot, Any] = {}
         self._details: dict[int, Any] = {}  # textures by unit
-        self._images: dict[int, Any] = {}  # textures of images, which scenes may share, by unit
+        self._images: dict[int, Any] = {}  # textures of images, shared among scenes, by unit
         self._key = ""  # the images' key in the cache of textures
         self.uploaded = 0  # bytes that edits which move shapes have uploaded
         try:
@@ -128,7 +128,7 @@ class Scene:
             self._images, self._key = self._shared.take(key, lambda: self._upload_images(images)), key
         else:
             self._images = self._upload_images(images)
-        if self._everything:  # its kernels read every unit, where another scene's texture may still be bound
+        if self._everything:  # its kernels read every unit; another scene's texture may still be bound there
             missing = KINDS.keys() - self._details.keys() - self._images.keys()
             self._details |= {unit: placeholder(self._context, unit) for unit in missing}
 
@@ -178,14 +178,14 @@ class Scene:
 
     @property
     def spared(self) -> tuple[str, ...]:
-        """The features that they are not compiled for."""
+        """The features that its kernels are not compiled for."""
         return _words(features.everything() - self._raised)
 
     def edit(self, arrays: SceneArrays, flags: frozenset[str] | None = None) -> None:
         """Change to `arrays`, which a `SceneEdit` made of the scene's own, and upload what differs, nothing else.
 
         `flags` are those of its kernels then, where the caller has found them already. The caller resets the scene's
-        pictures. Raises OutOfMemory, and changes nothing then.
+        pictures. Raises OutOfMemory, and then changes nothing.
         """
         contexts.use(self._context)
         old, tables, lit = self.arrays, None, None
@@ -202,7 +202,7 @@ class Scene:
             raise
         self.arrays = arrays
         if tables is not None:
-            if bindings.MICROFACETS_TEXTURE in self._details:  # else this edit brings the first such material
+            if bindings.MICROFACETS_TEXTURE in self._details:  # false where this edit adds the first such material
                 self._details[bindings.MICROFACETS_TEXTURE].release()
             self._details[bindings.MICROFACETS_TEXTURE] = tables
         if lit is not None:
@@ -226,33 +226,33 @@ class Scene:
         for unit, texture in (*self._tables.items(), *self._details.items(), *self._images.items()):
             texture.use(unit)
 
-    def write_frame(self, frame: np.ndarray) -> None:
-        """Fill the scene's part of a `layout.Frame` record."""
+    def write_uniforms(self, uniforms: np.ndarray) -> None:
+        """Fill the scene's part of a `layout.Uniforms` record."""
         a = self.arrays
-        frame["camera"] = a.camera
-        frame["node_origin"] = a.node_origin
-        frame["node_scale"] = a.node_scale
-        frame["node_count"] = a.node_count
-        frame["node_first"], frame["instance_shift"] = len(a.instance_nodes), a.instance_shift
-        frame["light_count"] = len(a.lights)
+        uniforms["camera"] = a.camera
+        uniforms["node_origin"] = a.node_origin
+        uniforms["node_scale"] = a.node_scale
+        uniforms["node_count"] = a.node_count
+        uniforms["node_first"], uniforms["instance_shift"] = len(a.instance_nodes), a.instance_shift
+        uniforms["light_count"] = len(a.lights)
         for member, count in self._looped.items():
-            frame[member] = count
+            uniforms[member] = count
         suns = np.flatnonzero((a.lights["kind"] == LightKind.DIRECTIONAL) & (a.lights["spread"] > 0))
-        frame["sun_first"], frame["sun_count"] = suns.min(initial=len(a.lights)), len(suns)
-        frame["moment_scale"] = 1.0 / a.radiance_scale
-        frame["environment_turn"] = (1.0, 0.0)
+        uniforms["sun_first"], uniforms["sun_count"] = suns.min(initial=len(a.lights)), len(suns)
+        uniforms["moment_scale"] = 1.0 / a.radiance_scale
+        uniforms["environment_turn"] = (1.0, 0.0)
         if a.environment is not None:
             e = a.environment
-            frame["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
-            frame["environment_scale"] = min(e.scale, self._scale_max)
-            frame["environment_background"] = e.background
-            frame["environment_cube"] = e.cube
+            uniforms["environment_turn"] = (math.cos(e.rotation), math.sin(e.rotation))
+            uniforms["environment_scale"] = min(e.scale, self._scale_max)
+            uniforms["environment_background"] = e.background
+            uniforms["environment_cube"] = e.cube
             if e.sun is not None:
-                frame["environment_sun"] = e.sun.direction
-                frame["environment_sun_cap"] = e.sun.cap
-                frame["environment_sun_radiance"] = e.sun.radiance
-                frame["environment_sun_share"] = e.sun_share
-            frame["environment_probability"] = a.lights["probability"][
+                uniforms["environment_sun"] = e.sun.direction
+                uniforms["environment_sun_cap"] = e.sun.cap
+                uniforms["environment_sun_radiance"] = e.sun.radiance
+                uniforms["environment_sun_share"] = e.sun_share
+            uniforms["environment_probability"] = a.lights["probability"][
                 a.lights["kind"] == LightKind.ENVIRONMENT
             ].sum()
 

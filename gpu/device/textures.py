@@ -61,7 +61,7 @@ def linear_texture(context: Any, values: np.ndarray, channels: int, dtype: str) 
     pitch = bindings.TEXELS_A_ROW * channels * BYTES[dtype]
     height, rest = divmod(len(flat), pitch)
     size = (bindings.TEXELS_A_ROW, rows(len(flat), channels, dtype))
-    context.error  # noqa: B018  # an older one is not this texture's
+    context.error  # noqa: B018  # clears an older error
     try:
         texture = context.texture(size, channels, dtype=dtype)
     except Exception as error:  # moderngl.Error is not importable without its binary parts
@@ -109,15 +109,15 @@ class _Shared:
 
 
 class TextureCache:
-    """Images on the device, by `TextureArrays.key`. The images that a scene gave back last stay, so that an edit that
-    packs the scene anew does not upload them again.
+    """Images on the device, by `TextureArrays.key`. The images of the scene that was released last stay, so that an
+    edit that packs the scene anew does not upload them again.
     """
 
     def __init__(self) -> None:
         self._held: dict[str, _Shared] = {}
 
     def take(self, key: str, make: Callable[[], dict[int, Any]]) -> dict[int, Any]:
-        """The textures by unit, for a caller that must give them back."""
+        """The textures by unit; the caller must release them."""
         held = self._held.get(key)
         if held is None:
             held = self._held[key] = _Shared(make(), 0)

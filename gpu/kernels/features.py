@@ -83,15 +83,15 @@ def _loop(name: str) -> str:
 
 
 def looped(scene: SceneArrays) -> dict[str, int]:
-    """The number of shapes of each kind that stand in the kernel's loops, by their member of `layout.Frame`."""
+    """The number of shapes of each kind that stand in the kernel's loops, by their member of `layout.Uniforms`."""
     return {f"looped_{records}": looped_count(scene, kind) for kind, records in SHAPES.items()}
 
 
-def loops_from_frame() -> dict[str, object]:
-    """The defines of a kernel that reads from the frame how many turns its loops make. Its rays begin a new walk down
-    the tree after each layer that they pass: in a kernel with every kind of shape, one walk past all layers takes
-    LLVM 160 s longer to compile."""
-    return {_loop(name): f"frame.looped_{SHAPES[kind]}" for name, kind in COUNTS.items()} | {"OPACITY_WALK": 0}
+def loops_from_uniforms() -> dict[str, object]:
+    """The defines of a kernel that reads from the uniforms how many turns its loops make. Its rays begin a new walk
+    down the tree after each layer that they pass: in a kernel with every kind of shape, one walk past all layers
+    takes LLVM 160 s longer to compile."""
+    return {_loop(name): f"uniforms.looped_{SHAPES[kind]}" for name, kind in COUNTS.items()} | {"OPACITY_WALK": 0}
 
 
 def counts(scene: SceneArrays) -> dict[str, object]:

@@ -6,7 +6,7 @@ from gpu import layout
 from gpu.kernels import textures_glsl
 from gpu.layout import Instance, ShapeKind, bindings
 
-FRAME = ("node_first", "instance_shift")  # the last members of `layout.Frame`, which only these kernels have
+UNIFORMS = ("node_first", "instance_shift")  # the last members of `layout.Uniforms`, which only these kernels have
 GROUPS = Instance.words // 4
 
 

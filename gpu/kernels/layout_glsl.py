@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from gpu import layout
 from gpu.kernels import instances_glsl, microfacets_glsl, models_glsl, textures_glsl
-from gpu.layout import Frame, LightKind, ShapeKind, bindings
+from gpu.layout import LightKind, ShapeKind, Uniforms, bindings
 from gpu.layout.bindings import BlockSlot, Slot
 from gpu.layout.models import MODELS
 from gpu.layout.record import Record
@@ -107,7 +107,7 @@ def constants() -> str:
     out += [f"#define SLOT_{name} {int(slot)}" for name, slot in Slot.__members__.items()]
     out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
-    out += [f"#define FRAME_BLOCK {bindings.FRAME_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
+    out += [f"#define UNIFORM_BLOCK {bindings.UNIFORM_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
     for name in (
         "NONE",
         "SINGLE_SIDED",
@@ -143,24 +143,24 @@ def constants() -> str:
 
 
 def text() -> str:
-    """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `frame`."""
+    """The text of `layout.glsl`: constants, structs, buffers with their loaders, and the uniform block `uniforms`."""
     structs = [_struct(r) for r in dict.fromkeys(r for r, _ in layout.BUFFERS.values())]
     loaders = [_loader(name, r, slot) for name, (r, slot) in layout.BUFFERS.items()]
     loaders += [_picker(name, layout.BUFFERS[name][0]) for name in bindings.COUNTED]
     nodes = f"layout(std430, binding = {int(Slot.NODES)}) readonly buffer node_buffer {{ uvec4 node_words[]; }};"
-    parts = [constants(), *structs, *loaders, nodes, _frame(), instances_glsl.text(), textures_glsl.text()]
+    parts = [constants(), *structs, *loaders, nodes, _uniforms(), instances_glsl.text(), textures_glsl.text()]
     parts += [models_glsl.predicates(), microfacets_glsl.text()]
     return "\n".join(parts)
 
 
-def _frame() -> str:
-    structs = "\n".join(_struct(kind) for kind in Frame.members.values() if issubclass(kind, Record))
-    members = {name: f"{kind.glsl} {name};" for name, kind in Frame.members.items()}
-    last = " ".join(members.pop(name) for name in instances_glsl.FRAME)
+def _uniforms() -> str:
+    structs = "\n".join(_struct(kind) for kind in Uniforms.members.values() if issubclass(kind, Record))
+    members = {name: f"{kind.glsl} {name};" for name, kind in Uniforms.members.items()}
+    last = " ".join(members.pop(name) for name in instances_glsl.UNIFORMS)
     body = " ".join(members.values())
     return f"""{structs}
-layout(std140, binding = {bindings.FRAME_BLOCK}) uniform frame_block {{ {body}
+layout(std140, binding = {bindings.UNIFORM_BLOCK}) uniform uniform_block {{ {body}
 #if HAS_INSTANCES
 {last}
 #endif
-}} frame;"""
+}} uniforms;"""

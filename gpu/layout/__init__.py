@@ -1,7 +1,7 @@
 """The bytes that the host and the shaders share, each declared once. Public; runs without GL.
 
 record           what a declared record is: its members and their offsets, as a numpy dtype
-records          the records of materials, shapes, lights, the tree and the frame, with their enumerations
+records          the records of materials, shapes, lights, the tree and the uniforms, with their enumerations
 texture_records  how materials use textures, and which numbers of a material a texture may give
 models           a row for each material model: its number, its lobes, what it can do
 microfacet_records  the terms of the model `microfacet`, their parameters and tables
@@ -44,7 +44,6 @@ from gpu.layout.records import (
     WORK_GROUP,
     Camera,
     EnvironmentCell,
-    Frame,
     Instance,
     Light,
     LightCluster,
@@ -61,6 +60,7 @@ from gpu.layout.records import (
     Sphere,
     Triangle,
     TriangleNormals,
+    Uniforms,
 )
 
 __all__ = [
@@ -95,7 +95,6 @@ __all__ = [
     "WORK_GROUP",
     "Camera",
     "EnvironmentCell",
-    "Frame",
     "Instance",
     "Light",
     "LightCluster",
@@ -112,4 +111,5 @@ __all__ = [
     "Sphere",
     "Triangle",
     "TriangleNormals",
+    "Uniforms",
 ]

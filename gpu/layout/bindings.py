@@ -42,7 +42,7 @@ class BlockSlot(IntEnum):
     MOMENTS = 2
 
 
-FRAME_BLOCK = 0  # binding points of uniform blocks
+UNIFORM_BLOCK = 0  # binding points of uniform blocks
 FILTER_BLOCK = 1
 # Binding points, as uniform blocks, of the buffers whose NAME_COUNT kernels are compiled for, where it is above 0.
 COUNTED = {"material": 2, "sphere": 3, "quad": 4, "box": 5, "ellipsoid": 6, "triangle": 7, "light": 8}

@@ -7,7 +7,7 @@ LEAF_COUNT_SHIFT = 24
 LEAF_FIRST_MASK = 0x00FFFFFF
 LEAF_MAX_COUNT = 16
 # A hit's id is kind << LEAF_KIND_SHIFT with the shape's index. In an instance it is this bit with the instance's
-# number << frame.instance_shift and the triangle's index.
+# number << uniforms.instance_shift and the triangle's index.
 INSTANCED = 0x80000000
 # A treelet's link has bit 31 clear, bit 30 set, its number of nodes << LEAF_COUNT_SHIFT, and the place of its first
 # node, counted from the end of the octants' orders.

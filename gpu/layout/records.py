@@ -260,8 +260,8 @@ class Camera(Record):
     forward: vec3
 
 
-class Frame(Record):
-    """Uniforms of one dispatch."""
+class Uniforms(Record):
+    """The uniform block of one dispatch."""
 
     camera: Camera
     environment_turn: vec2  # cosine, sine of the rotation
@@ -304,9 +304,8 @@ class Frame(Record):
 
 WORK_GROUP = 8  # invocations a side of the work groups of kernels over pixels; fewer than 8 can hang llvmpipe
 BSDF_GROUP = 64  # invocations of a work group of the kernels that evaluate a BSDF
-PLAN_AREA = (
-    WORK_GROUP  # pixels a side of the areas of a sample plan, each of which is a work group of the path tracer
-)
+# Pixels a side of the areas of a sample plan, each of which is a work group of the path tracer.
+PLAN_AREA = WORK_GROUP
 PLAN_CLASSES = 4  # of an area's rows, each planned by itself: llvmpipe works on a row of eight pixels at once
 METER_REPLICATES = 8  # more than the noise meter takes of a pixel; the replicate's number over this is x's fraction
 

@@ -2,7 +2,7 @@
 
 picture       its life: accumulators on the device, settings, saving and restoring
 blocks        the parts into which a picture's samples are cut, and how their sums become one
-accumulators  the sums of samples on the device
+accumulators  sums of samples on the device
 bands         parts of a block that different renderers trace
 passes        which samples are traced next, slice by slice
 schedule      the protocol of `tiles` and `adaptive`, which cut a pass into dispatches
@@ -11,9 +11,9 @@ adaptive      passes over the areas of a sample plan
 sample_plan   how many samples each part of a picture gets
 noise_meter   a picture's error, from a second, independent estimate of a share of its pixels
 readout       a picture's mean, variance, noise and first hits, read from the accumulators
-dispatcher    kernels run over parts of a picture
+dispatcher    runs kernels over parts of a picture
 first_hit     AOVs of the first hit
-resolve       accumulators to what a display takes, on the device
+resolve       accumulators to display values, on the device
 display       AOVs as pictures for the eye
 filters       pixel filters as inverse distributions
 saved         a picture's state off the device

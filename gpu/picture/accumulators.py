@@ -24,7 +24,7 @@ def defines() -> dict[str, object]:
 
 
 class Accumulators:
-    """Those of the total are there from `allocate` on; those of the block take memory when they are first needed."""
+    """The total's accumulators are allocated by `allocate`, the block's when they are first needed."""
 
     def __init__(self, dispatcher: Dispatcher, kernels: KernelCache) -> None:
         self._dispatcher, self._kernels = dispatcher, kernels
@@ -32,7 +32,7 @@ class Accumulators:
         self._size = settings.width, settings.height
         self.total: dict[Slot, Any] = {}
         self.block: dict[Slot, Any] = {}
-        self.open = False  # whether there is a block under way, which belongs to the picture
+        self.open = False  # whether a block of the picture is under way
         self._clean = False  # whether the block's buffers hold zeros
         self._zero: Any = None  # one pixel, bound in the place of a block
 
@@ -49,7 +49,7 @@ class Accumulators:
             raise
 
     def reset(self) -> None:
-        """Begin again without samples. With `adaptive` there is never a block."""
+        """Start again at zero samples. With `adaptive` there is never a block."""
         for buffer in self.total.values():
             buffer.clear()
         self.close()
@@ -61,13 +61,13 @@ class Accumulators:
         self.open = self._clean = False
 
     def allocate_block(self) -> None:
-        """Have memory for a block, with whatever contents. Raises OutOfMemory, and is then as before."""
+        """Allocate a block's memory, with undefined contents. Raises OutOfMemory, and then changes nothing."""
         if not self.block:
             self._take(self.block)
             self._clean = False
 
     def empty_block(self) -> None:
-        """Have a block that is not the picture's yet, and zero everywhere. Raises OutOfMemory."""
+        """Make a block of zeros, which is not part of the picture yet. Raises OutOfMemory."""
         self.allocate_block()
         if not self._clean:
             for buffer in self.block.values():
@@ -90,7 +90,7 @@ class Accumulators:
 
     @property
     def buffers(self) -> list[Any]:
-        """Those of the block under way."""
+        """The buffers of the block under way."""
         return list(self.block.values()) if self.open else []
 
     @property
@@ -110,7 +110,7 @@ class Accumulators:
         self._context.finish()
 
     def end_block(self) -> None:
-        """Note that all of the block was merged."""
+        """End the block, all of which was merged."""
         self.open, self._clean = False, True
 
     def bind(self, kernel: Any, first: int, count: int) -> None:
@@ -119,12 +119,12 @@ class Accumulators:
         bind(kernel, self.total, block, self._zero, first, count, self.moment_scale)
 
     def bind_alone(self, total: dict[Slot, Any], kernel: Any, first: int, count: int) -> None:
-        """The same of other sums, given as SUM and MOMENTS."""
+        """Bind other sums in their place, given as SUM and MOMENTS."""
         bind(kernel, total, None, self._zero, first, count, self.moment_scale)
 
     def means(self, first: int, count: int) -> np.ndarray:
-        """Mean radiance and alpha of pixels [first, first + count): (count, 4) float32, as `accumulators_sum` has
-        them."""
+        """Mean radiance and alpha of pixels [first, first + count): (count, 4) float32, as `accumulators_sum`
+        computes them."""
         sum_, moments = (self._vectors(self.total[slot], first, count) for slot in (Slot.SUM, Slot.MOMENTS))
         n = moments[:, 3:]
         if self.open:
@@ -134,7 +134,7 @@ class Accumulators:
         return mean
 
     def read(self, first: int, count: int) -> Sums:
-        """All that is known of the samples of pixels [first, first + count): each (count, 4) float32."""
+        """The sums of the samples of pixels [first, first + count): each (count, 4) float32."""
         total = Sums(*(self._vectors(buffer, first, count) for buffer in self.total.values()))
         if not self.open:
             return total
@@ -168,7 +168,7 @@ class Accumulators:
         return np.concatenate(parts, axis=-1).reshape(rows, width, 4 * len(ACCUMULATORS))
 
     def write_rows(self, top: int, values: np.ndarray) -> None:
-        """Write what `read_rows` gave."""
+        """Write rows of the block, as `read_rows` returns them."""
         for k, buffer in enumerate(self.block.values()):
             part = np.ascontiguousarray(values[..., 4 * k : 4 * k + 4], np.float32)
             buffer.write(part, offset=VECTOR_BYTES * self._size[0] * top)
@@ -200,7 +200,7 @@ def bind(
             else:
                 buffer.bind_to_storage_buffer(place, offset=VECTOR_BYTES * first, size=VECTOR_BYTES * count)
     for name, value in (("block_stride", int(block is not None)), ("moment_scale", moment_scale)):
-        uniform = kernel.get(name, None)  # a kernel that needs no moments has no scale of them
+        uniform = kernel.get(name, None)  # a kernel without moments lacks this uniform
         if uniform is not None:
             uniform.value = value
 

@@ -1,4 +1,4 @@
-"""A picture sampled by plan: which areas a pass goes over, in which slices, and the plan's place on the device."""
+"""A picture with a sample plan: the areas of a pass, their slices, and the plan's buffers on the device."""
 
 from __future__ import annotations
 
@@ -29,12 +29,12 @@ class Adaptive:
         self._context, self._kernels, self._picture, self._most = context, kernels, size, most
         self.max_bounces = max_bounces
         self._caution = max(1.0, max_bounces / USUAL_BOUNCES)
-        self.rounds = self.chunk = 1  # of the pass under way: how often it comes to an area; samples of an invocation
+        self.rounds = self.chunk = 1  # of the pass under way: visits of an area at most; samples of an invocation
         self.stops: tuple[int, ...] = DECISIONS
         self._pixels = pixels_of(*size)
         self.rates = np.zeros(len(self._pixels))  # by row of areas
         self._areas, self._amounts = np.zeros(0, np.int64), np.zeros(0)  # listed; samples that each gets
-        self._turns = np.zeros(1, np.int64)  # where each round ends in the list
+        self._turns = np.zeros(1, np.int64)  # the end of each round in the list
         self._plan: SamplePlan | None = SamplePlan(self._pixels)
         count = self._pixels.shape[0] * self._pixels.shape[1]
         self._words = contexts.allocate(context, WORDS.itemsize * count)
@@ -57,7 +57,7 @@ class Adaptive:
         return (self._words,)
 
     def resume(self, row: int, column: int) -> tuple[int, int]:
-        """Begin the pass again: pixels that have their samples already get no more."""
+        """Begin the pass again; pixels that have their samples already get no more."""
         return 0, 0
 
     def forget(self) -> None:
@@ -106,7 +106,7 @@ class Adaptive:
         plan = self._kept()
         wanted = plan.at(after)
         self._counts.write(wanted.tobytes())
-        # Just decided anew, the plan would have some pixels at a sample that they do not have.
+        # A plan that was just made anew may start some pixels at samples that they do not have.
         had = plan.counts if before in DECISIONS else plan.at(before)
         left = (wanted - had).astype(np.int64).max(axis=2).ravel()
         fits = SLICE_S / (self.rates.max() * AREA * AREA) if self.cost_s else 1
@@ -152,8 +152,7 @@ class Adaptive:
         self._work.bind_to_storage_buffer(int(Slot.PLANNED_AREAS))
 
     def dispatch(self, tile: Tile) -> Dispatch:
-        """A dispatch of one group for each area listed in the tile; each pixel goes on from the samples that it
-        has."""
+        """A dispatch of one group for each area listed in the tile; each pixel continues after its last sample."""
         self.bind()
         y, x = np.divmod(self._areas[tile[1] : tile[1] + tile[3]], self._pixels.shape[1])
         self._work.write((x | y << 16).astype(np.uint32).tobytes())

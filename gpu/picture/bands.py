@@ -16,7 +16,7 @@ class BandTracer:
     def __init__(self, band: Band) -> None:
         self.band = band
         self._done = 0  # samples in whole passes
-        self._samples = 0  # of the pass under way; 0: none is
+        self._samples = 0  # of the pass under way; 0: none
         self._row, self._column = band.top, 0
 
     @property
@@ -32,7 +32,7 @@ class BandTracer:
         return (x, y, width, min(rows, band.top + band.rows - y)), band.first + self._done, self._samples
 
     def took(self, tile: Tile, width: int) -> None:
-        """Note that a tile of a picture of this width was traced."""
+        """Record that a tile of a picture of this width was traced."""
         self._column = tile[0] + tile[2]
         if self._column >= width:
             self._column, self._row = 0, self._row + tile[3]

@@ -65,7 +65,7 @@ def merged(total: Sums, block: Sums, moment_scale: float) -> Sums:
 
 
 def merged_moments(total: Sums, block: Sums, moment_scale: float) -> np.ndarray:
-    """The moments of `merged` alone."""
+    """The moments of `merged`, without the other sums."""
     na, nb = total.moments[..., 3:], block.moments[..., 3:]
     n = na + nb
     delta = (_mean(block) - _mean(total)) * np.float32(moment_scale)
@@ -74,7 +74,7 @@ def merged_moments(total: Sums, block: Sums, moment_scale: float) -> np.ndarray:
 
 
 def _chosen(both: np.ndarray, total: Sums, block: Sums, k: int) -> np.ndarray:
-    """`both` where both have samples; else the k-th accumulator of the one that has."""
+    """`both` where both have samples; else the k-th accumulator of the one that has samples."""
     na, nb = total.moments[..., 3:] > 0, block.moments[..., 3:] > 0
     if na.all() and nb.all():
         return both

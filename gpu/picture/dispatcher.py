@@ -1,4 +1,4 @@
-"""Runs kernels over parts of a picture: what all of them read is bound here, and their `Frame` is written."""
+"""Runs kernels over parts of a picture: what all of them read is bound here, and their `Uniforms` are written."""
 
 from __future__ import annotations
 
@@ -10,30 +10,30 @@ import numpy as np
 from gpu import context as contexts
 from gpu.device.scene import Scene
 from gpu.kernels import features
-from gpu.layout import Frame, bindings
+from gpu.layout import Uniforms, bindings
 from gpu.layout.bindings import Slot
 from gpu.layout.pixel_layers import VECTOR_BYTES
 from gpu.picture import filters
 from gpu.picture.schedule import Tile, group_stride
 from gpu.settings import RenderSettings
 
-_ALIGNED = 32  # pixels; with any driver a binding may begin at a multiple of this
+_ALIGNED = 32  # pixels; on every driver a binding may begin at a multiple of this
 
 
 class Dispatcher:
-    """Made for one picture; `frame` is the device's buffer of that record, which all pictures share."""
+    """Made for one picture; `uniform_buffer` is the device's buffer of `Uniforms`, which all pictures share."""
 
-    def __init__(self, context: Any, frame: Any, scene: Scene, settings: RenderSettings) -> None:
-        self.context, self._frame_buffer = context, frame
+    def __init__(self, context: Any, uniform_buffer: Any, scene: Scene, settings: RenderSettings) -> None:
+        self.context, self._uniform_buffer = context, uniform_buffer
         self.scene, self.settings = scene, settings
         # As drivers bind no more than 128 MiB at once, to be sure of.
         self.most_pixels = contexts.storage_block_bytes(context) // VECTOR_BYTES // _ALIGNED * _ALIGNED - _ALIGNED
-        self.counters = context.buffer(reserve=16)  # paths that were ended, and cut
+        self.counters = context.buffer(reserve=16)  # paths ended by their throughput, samples cut short
         self._spreads = bool(contexts.describe(context)["software"])
         self._filter = context.buffer(reserve=16 * (features.FILTER_TABLE_SIZE + 1))
 
     def configure(self, settings: RenderSettings) -> None:
-        """Use these settings from now on."""
+        """Set the settings of the dispatches that follow."""
         self.settings = settings
         table = np.zeros((features.FILTER_TABLE_SIZE + 1, 4), np.float32)
         table[:, 0] = filters.inverse(settings.filter, features.FILTER_TABLE_SIZE)
@@ -43,7 +43,7 @@ class Dispatcher:
         """Bind the buffers that every kernel reads; `bind_part` binds those that it writes."""
         self.scene.bind()
         self.counters.bind_to_storage_buffer(int(Slot.COUNTERS))
-        self._frame_buffer.bind_to_uniform_block(bindings.FRAME_BLOCK)
+        self._uniform_buffer.bind_to_uniform_block(bindings.UNIFORM_BLOCK)
         self._filter.bind_to_uniform_block(bindings.FILTER_BLOCK)
 
     def bind_part(self, buffers: dict[Slot, Any], tile: Tile, width: int) -> int:
@@ -55,28 +55,32 @@ class Dispatcher:
             buffer.bind_to_storage_buffer(int(slot), offset=first * VECTOR_BYTES, size=count * VECTOR_BYTES)
         return first
 
-    def frame(self, origin: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:
-        """The `Frame` for samples [first, first + count) of the invocations of a tile."""
+    def uniforms(self, origin: tuple[int, int], size: tuple[int, int], first: int, count: int) -> np.ndarray:
+        """The `Uniforms` for samples [first, first + count) of the invocations of a tile."""
         s = self.settings
-        frame: np.ndarray = np.zeros((), Frame.dtype)
-        self.scene.write_frame(frame)
-        frame["resolution"] = (s.width, s.height)
-        frame["tile_origin"], frame["tile_size"] = origin, size
-        frame["sample_first"], frame["sample_count"] = first, count
-        frame["max_bounces"], frame["roulette_depth"], frame["seed"] = s.max_bounces, s.roulette_depth, s.seed
-        frame["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
-        frame["slot_width"] = s.width
-        return frame
+        uniforms: np.ndarray = np.zeros((), Uniforms.dtype)
+        self.scene.write_uniforms(uniforms)
+        uniforms["resolution"] = (s.width, s.height)
+        uniforms["tile_origin"], uniforms["tile_size"] = origin, size
+        uniforms["sample_first"], uniforms["sample_count"] = first, count
+        uniforms["max_bounces"], uniforms["roulette_depth"], uniforms["seed"] = (
+            s.max_bounces,
+            s.roulette_depth,
+            s.seed,
+        )
+        uniforms["clamp_radiance"] = math.inf if s.clamp is None else s.clamp
+        uniforms["slot_width"] = s.width
+        return uniforms
 
-    def run(self, kernel: Any, frame: np.ndarray, groups: tuple[int, int]) -> None:
+    def run(self, kernel: Any, uniforms: np.ndarray, groups: tuple[int, int]) -> None:
         """Start a kernel; the caller waits for it."""
-        frame["group_stride"] = group_stride(groups[0] * groups[1]) if self._spreads else 1
-        self._frame_buffer.write(frame.tobytes())
+        uniforms["group_stride"] = group_stride(groups[0] * groups[1]) if self._spreads else 1
+        self._uniform_buffer.write(uniforms.tobytes())
         kernel.run(*groups)
 
     @property
     def counts(self) -> tuple[int, int]:
-        """Paths that the kernel has ended for their throughput, and samples that were cut short."""
+        """Counts of paths that were ended by their throughput, and of samples that were cut short."""
         ended, cut = np.frombuffer(self.counters.read(8), np.uint32).tolist()
         return ended, cut
 

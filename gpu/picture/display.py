@@ -41,7 +41,7 @@ def encode(aov: str, values: np.ndarray, dtype: str = "u1") -> np.ndarray:
 
 
 def _coloured(ids: np.ndarray) -> np.ndarray:
-    """(h, w, 1) whole numbers as (h, w, 3): hues a golden section apart: no two of a few are alike. 0 is black."""
+    """(h, w, 1) whole numbers as (h, w, 3): hues a golden section apart, so that a few differ clearly. 0 is black."""
     hue = 2 * np.pi * ((ids.astype(np.float64) * 0.6180339887498949) % 1)
     phase = np.array([0, 2, 4]) * np.pi / 3
     return np.where(ids > 0, 0.55 + 0.4 * np.cos(hue - phase), 0.0)

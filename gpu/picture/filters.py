@@ -1,4 +1,4 @@
-"""Pixel filters as inverse distributions: where in the pixel's neighbourhood a sample falls."""
+"""Pixel filters as inverse distributions, which give a sample's place in the pixel's neighbourhood."""
 
 from __future__ import annotations
 

@@ -15,13 +15,12 @@ from gpu.picture.schedule import Tile
 from gpu.picture.tiles import SLICE_S, Tiles
 from gpu.settings import ID_AOVS
 
-SAMPLES = 256  # samples that they average at most
+SAMPLES = 256  # samples that an AOV averages at most
 _GUESS_S = SLICE_S / 1024  # seconds of a pixel's first hit in a picture that was restored and not traced since
 
 
 class FirstHit:
-    """Made for a picture of `size`, of which no more than `most` pixels are bound at once. The first `trace` takes
-    its memory."""
+    """Made for a picture of `size`, of which at most `most` pixels are bound at once. `allocate` takes its memory."""
 
     def __init__(self, context: Any, size: tuple[int, int], most: int) -> None:
         self._context, self._size, self._most = context, size, most
@@ -48,7 +47,7 @@ class FirstHit:
             self.buffers[slot].clear()
 
     def limit(self, samples: int) -> None:
-        """Begin again if more samples than these were traced."""
+        """Start again if more than `samples` samples were traced."""
         if (self.samples, self._row, self._column) > (samples, 0, 0):
             self.clear()
 

@@ -29,14 +29,13 @@ from gpu.picture import blocks
 from gpu.picture.accumulators import Accumulators
 from gpu.picture.schedule import work_groups
 
-FROM = (
-    blocks.FIRST
-)  # samples of each pixel, all in the total, at which the meter starts; before, their variance must do
-LINE = 64  # metered pixels in a row of their buffers
+# Samples of each pixel, all in the total, at which the meter starts; before, the samples' variance must do.
+FROM = blocks.FIRST
+LINE = 64  # metered pixels in a row of the meter's buffers
 _PIXELS, _FEWEST = 2048, 256  # metered pixels; in small pictures a quarter of all, but at least the second number
 _EVEN = 0.5  # share of the metered pixels that is drawn evenly
-MOST = 4  # estimates of a pixel at most
-_BLOCKS = 1 << 20  # blocks of pixels at most for which weights are computed
+MOST = 4  # most estimates of a pixel
+_BLOCKS = 1 << 20  # most blocks of pixels for which weights are computed
 _LUMINANCE = np.array(LUMINANCE)
 
 
@@ -57,13 +56,13 @@ class NoiseMeter:
         self.buffers: dict[Slot, Any] = {}
 
     def allocate(self) -> None:
-        """Make accumulators like the picture's. In place of second moments they begin with x, whose fraction is the
-        estimate's number, y, and 1 / probability of the pixel."""
+        """Allocate accumulators like the picture's. Their second moments begin as x, whose fraction is the estimate's
+        number, y, and 1 / probability of the pixel."""
         for slot in ACCUMULATORS:
             self.buffers[slot] = contexts.allocate(self._context, VECTOR_BYTES * LINE * self.lines)
 
     def place(self, main: dict[Slot, Any], seed: int) -> None:
-        """Draw the pixels by the picture's second moments so far."""
+        """Draw the metered pixels by the picture's second moments."""
         side = max(1, int(np.ceil(np.sqrt(self._size[0] * self._size[1] / _BLOCKS))))
         weights = self._weigh(main[Slot.MOMENTS], side)
         places = np.zeros((LINE * self.lines, 4), np.float32)
@@ -74,7 +73,7 @@ class NoiseMeter:
             self.buffers[slot].clear()
 
     def _weigh(self, moments: Any, side: int) -> np.ndarray:
-        """(rows, columns) of blocks of `side` x `side` pixels: the variance a pixel has there, relative."""
+        """(rows, columns) of blocks of `side` x `side` pixels: the relative variance of a pixel in each."""
         width, height = self._size
         kernel = self._kernels.get("meter.comp", defines(weigh=1))
         columns, parts = -(-width // side), []
@@ -136,7 +135,7 @@ def squared_error(places: np.ndarray, seen: np.ndarray, other: np.ndarray) -> fl
     variances."""
     used = places[:, 2] > 0
     places, seen, other = places[used], seen[used], other[used]
-    first = np.flatnonzero(places[:, 0] % 1 == 0)  # of each pixel's estimates, which stand side by side
+    first = np.flatnonzero(places[:, 0] % 1 == 0)  # of each pixel's estimates, which are adjacent
     if not len(first):
         return 0.0
     counts = np.diff(first, append=len(places))
@@ -194,7 +193,7 @@ def around(values: np.ndarray) -> np.ndarray:
 def inclusion(shares: np.ndarray, count: int, most: int = 1) -> np.ndarray:
     """Numbers that sum to `count`, each at most `most`, and in proportion to `shares` where they are below that."""
     factor, full = count / float(shares.sum(dtype=float)), 0
-    for _ in range(8):  # each round fills some more to `most`; what is left after these is a rounding error
+    for _ in range(8):  # each round fills more entries to `most`; after 8 the remainder is a rounding error
         free = shares < most / factor
         before, full = full, len(shares) - int(np.count_nonzero(free))
         rest = count - most * full

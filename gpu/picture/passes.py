@@ -22,12 +22,12 @@ from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.schedule import Schedule, Tile, work_groups
 from gpu.picture.tiles import MAX_SAMPLES_A_PASS, SLICE_S, Tiles, samples_at_once
 
-_MERGED = 1 << 18  # pixels that are merged in a slice: this takes llvmpipe some milliseconds
+_MERGED = 1 << 18  # pixels that a slice merges, in some milliseconds of llvmpipe
 
 
 class Passes:
-    """The progress of a picture, whose accumulators are `sums`. After each pass the meter's pixels are traced, and
-    after that which completes a block, the block is merged."""
+    """The progress of a picture, whose accumulators are `sums`. The meter's pixels are traced after each pass, and a
+    block is merged after the pass that completes it."""
 
     def __init__(self, dispatcher: Dispatcher, kernels: KernelCache, sums: Accumulators, meter: NoiseMeter) -> None:
         self._dispatcher, self._kernels, self._sums, self._meter = dispatcher, kernels, sums, meter
@@ -38,12 +38,13 @@ class Passes:
 
     def _begin_again(self) -> None:
         self.samples = 0  # of every pixel; in the mean, where the schedule is adaptive
-        self._pass_samples = 0  # of the pass under way; 0: none is
-        # Where its next tile begins. Rows beyond the schedule's are the meter's; after them come the rows to merge.
+        self._pass_samples = 0  # of the pass under way; 0: none
+        # The beginning of the next tile. The picture's rows are followed by the meter's, and these by the rows to
+        # merge.
         self._row, self._column = 0, 0
 
     def reset(self) -> None:
-        """Start at zero samples, with the scene and the settings as they are now. The accumulators are cleared."""
+        """Start at zero samples, with the present scene and settings. The accumulators are cleared."""
         d = self._dispatcher
         kernel = self._kernels.get("pathtrace.comp", d.scene.defines(d.settings))
         self.compile_ms += self._kernels.last_compile_ms
@@ -69,11 +70,11 @@ class Passes:
 
     @property
     def under_way(self) -> tuple[int, int, int]:
-        """The pass under way: its samples (0: there is none), row and column of the next tile."""
+        """The pass under way: its samples (0: none), row and column of the next tile."""
         return self._pass_samples, self._row, self._column
 
     def restore(self, samples: int, under_way: tuple[int, int, int]) -> None:
-        """Go on from there; the caller has written the buffers."""
+        """Continue a saved pass; the caller has written the buffers."""
         self.samples = samples
         self._pass_samples, row, column = under_way
         self.schedule.forget()
@@ -118,7 +119,7 @@ class Passes:
         return self.schedule
 
     def complete(self, end: int) -> None:
-        """Go on as after a pass up to `end` samples that has come to the end of the picture."""
+        """Continue as after a pass up to `end` samples, at the end of the picture."""
         self._pass_samples = end - self.samples
         self._row, self._column = self.schedule.size[1], 0
         self._begin_schedule()
@@ -152,18 +153,17 @@ class Passes:
         else:
             self._schedule = Tiles(*size, d.most_pixels, s.max_bounces, samples)
         if rates is not None:
-            self._schedule.expect(rates)  # by another kernel, but nothing is nearer
+            self._schedule.expect(rates)  # of another kernel: the best estimate
         self._meter_tiles = Tiles(noise_meter.LINE, self._meter.lines, d.most_pixels, s.max_bounces, samples)
 
     def _compile_fully(self) -> None:
-        """Run the kernel over no pixel: drivers make machine code in a kernel's first run, which must not be
-        timed."""
+        """Run the kernel over no pixel: drivers make machine code in the first run, which must not be timed."""
         start = time.perf_counter()
         d = self._dispatcher
         d.bind()
         d.bind_part(self._sums.total, (0, 0, 1, 1), 1)
         self.schedule.bind()
-        d.run(self._kernel, d.frame((0, 0), (0, 0), 0, 1), (1, 1))
+        d.run(self._kernel, d.uniforms((0, 0), (0, 0), 0, 1), (1, 1))
         d.context.finish()
         self.compile_ms += (time.perf_counter() - start) * 1e3
 
@@ -220,9 +220,9 @@ class Passes:
         samples: int, groups: tuple[int, int],
     ) -> None:  # fmt: skip
         d = self._dispatcher
-        frame = d.frame(origin, size, first, samples)
-        frame["slot_first"] = d.bind_part(sums, part, d.settings.width)
-        d.run(self._kernel, frame, groups)
+        uniforms = d.uniforms(origin, size, first, samples)
+        uniforms["slot_first"] = d.bind_part(sums, part, d.settings.width)
+        d.run(self._kernel, uniforms, groups)
 
     def _trace_meter(self) -> None:
         d, schedule = self._dispatcher, self.schedule
@@ -231,14 +231,14 @@ class Passes:
         tile = self._meter_tiles.tile(row, self._column, samples)
         start = time.perf_counter()
         schedule.bind()
-        frame = d.frame(tile[:2], tile[2:], first, samples)
-        frame["replicate"], frame["moment_scale"], frame["slot_width"] = 1, 0, noise_meter.LINE
-        frame["slot_first"] = d.bind_part(self._meter.buffers, tile, noise_meter.LINE)
-        d.run(self._kernel, frame, work_groups(tile[2], tile[3]))
+        uniforms = d.uniforms(tile[:2], tile[2:], first, samples)
+        uniforms["replicate"], uniforms["moment_scale"], uniforms["slot_width"] = 1, 0, noise_meter.LINE
+        uniforms["slot_first"] = d.bind_part(self._meter.buffers, tile, noise_meter.LINE)
+        d.run(self._kernel, uniforms, work_groups(tile[2], tile[3]))
         self._took(self._meter_tiles, tile, samples, start)
 
     def _took(self, tiles: Schedule, tile: Tile, samples: int, start: float) -> None:
-        """Wait for a tile that was begun at `start`, and go on to the next."""
+        """Wait for the tile that began at `start`, and advance to the next one."""
         self._dispatcher.context.finish()
         tiles.took(tile, samples, time.perf_counter() - start)
         self._advance(tile, tiles.size[0])

@@ -1,4 +1,4 @@
-"""One picture in the making: its life, from its accumulators on the device to what is read of it."""
+"""One picture in the making: accumulators, settings, tracing, reading, saving and restoring."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ from gpu.picture.readout import Readout
 from gpu.picture.saved import NO_BLOCK, Saved
 from gpu.settings import FIRST_HIT_AOVS, RenderSettings
 
-PIECE_BYTES = 16 << 20  # bytes of a saved buffer that one step reads, in some milliseconds
+PIECE_BYTES = 16 << 20  # of a saved buffer that one step reads, in some milliseconds
 
 
 def _bytes(size: int) -> np.ndarray:
@@ -37,12 +37,12 @@ class Picture:
     two slices it can be read."""
 
     def __init__(
-        self, context: Any, kernels: KernelCache, frame: Any, scene: Scene, settings: RenderSettings
+        self, context: Any, kernels: KernelCache, uniform_buffer: Any, scene: Scene, settings: RenderSettings
     ) -> None:
         self.context, self.scene, self.settings = context, scene, settings
         self.released = False
         size = settings.width, settings.height
-        self._dispatcher = Dispatcher(context, frame, scene, settings)
+        self._dispatcher = Dispatcher(context, uniform_buffer, scene, settings)
         self._meter = NoiseMeter(context, kernels, size, self._dispatcher.most_pixels)
         self._sums = Accumulators(self._dispatcher, kernels)
         self._passes = Passes(self._dispatcher, kernels, self._sums, self._meter)
@@ -65,7 +65,7 @@ class Picture:
         self.reset()
 
     def reset(self) -> None:
-        """Start again at zero samples, with the scene as it is now."""
+        """Start again at zero samples, with the present scene."""
         contexts.use(self.context)
         self._dispatcher.configure(self.settings)
         self._passes.reset()
@@ -77,7 +77,7 @@ class Picture:
 
     @property
     def _beside(self) -> list[Any]:
-        """The buffers of its state beside the accumulators."""
+        """The buffers of its state, without the accumulators."""
         plan = self._passes.schedule.buffers
         return [*self._meter.buffers.values(), self._dispatcher.counters, *plan]
 
@@ -88,7 +88,7 @@ class Picture:
 
     @property
     def state_sizes(self) -> list[int]:
-        """The bytes of what `save` reads."""
+        """The bytes that `save` reads."""
         return [buffer.size for buffer in self.state] + [NO_BLOCK.nbytes] * self._says_no_block
 
     @property
@@ -103,7 +103,7 @@ class Picture:
 
     @property
     def under_way(self) -> tuple[int, int, int]:
-        """The pass under way: its samples (0: there is none), row and column of the next tile."""
+        """The pass under way: its samples (0: none), row and column of the next tile."""
         return self._passes.under_way
 
     @property
@@ -123,13 +123,13 @@ class Picture:
         return self._passes.schedule.cost_s
 
     def expect_costs(self, other: Picture) -> None:
-        """Size the first slices by what the other picture of the scene has cost: without, one that begins with the
-        sky would take what is below for sky as well."""
+        """Size the first slices by the measured cost of another picture of the scene: without it a picture that
+        begins with the sky would take everything below for sky as well."""
         self._passes.schedule.expect(other._passes.schedule.rates)
 
     @property
     def guided(self) -> bool:
-        """Whether it holds AOVs of the first hit."""
+        """Whether AOVs of the first hit are allocated."""
         return bool(self._readout.first_hit.buffers)
 
     @property
@@ -146,7 +146,7 @@ class Picture:
     def save(self, room: Callable[[int], np.ndarray] = _bytes) -> Generator[None, None, Saved]:
         """Read the picture's state piece by piece, a step each; the picture must not be traced meanwhile.
 
-        `room` gives the memory for a number of bytes.
+        `room` allocates the memory for a number of bytes.
         """
         out: list[np.ndarray] = []
         for buffer in self.state:
@@ -174,7 +174,7 @@ class Picture:
         return not self.settings.adaptive and sizes in [even + more for more in parted]
 
     def restore(self, saved: Saved) -> None:
-        """Go on where a picture of the same scene and settings was saved. Raises OutOfMemory."""
+        """Continue from a saved picture of the same scene and settings. Raises OutOfMemory."""
         contexts.use(self.context)
         self._sharing = self._lent = None
         even = [*self._sums.total.values(), *self._beside]
@@ -204,11 +204,11 @@ class Picture:
 
     @property
     def own_done(self) -> bool:
-        """Whether the rows of its own have all their samples of the block that it shares."""
+        """Whether this picture's rows of the shared block are complete."""
         return self._sharing is None or self._sharing.own_done
 
     def allocate_block(self) -> None:
-        """Take the memory of the block under way, unless it is there: `share` then needs none. Raises OutOfMemory."""
+        """Allocate the memory of the block under way if it is not, so that `share` needs none. Raises OutOfMemory."""
         contexts.use(self.context)
         self._sums.allocate_block()
 
@@ -240,7 +240,7 @@ class Picture:
         self._passes.complete(sharing.end)
 
     def unshare(self) -> None:
-        """Drop what was traced of the shared block, if there is one: the picture is as it was before `share`."""
+        """Drop the shared block, if there is one: the picture is as it was before `share`."""
         if self._sharing is not None:
             self._sharing = self._lent = None
             self._sums.close()
@@ -283,8 +283,8 @@ class Picture:
             self._dispatcher.counts = ended + counts[0], cut + counts[1]
 
     def write_band(self, band: Band, values: np.ndarray) -> None:
-        """Write what `read_band` gave elsewhere. Raises ValueError for a band that is not of the shared block, and
-        values of another shape."""
+        """Write a band that another picture's `read_band` returned. Raises ValueError for a band that is not of the
+        shared block, and for values of another shape."""
         contexts.use(self.context)
         if self._sharing is None:
             raise ValueError("no block is shared")
@@ -364,7 +364,7 @@ class Picture:
         return self._readout.display(exposure, tone_map, dtype, color)
 
     def release(self) -> None:
-        """Give the device's memory back."""
+        """Release the device's memory."""
         contexts.use(self.context)
         self._sums.release()
         for buffer in self._meter.buffers.values():

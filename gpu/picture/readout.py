@@ -31,7 +31,7 @@ class Readout:
         self.first_hit = FirstHit(dispatcher.context, self._size, dispatcher.most_pixels)
 
     def _pieces(self) -> Iterator[tuple[int, int]]:
-        """The first pixel, and the number of pixels, of pieces that stay in a processor's cache."""
+        """The first pixel and the number of pixels of pieces that fit into a processor's cache."""
         pixels = self._size[0] * self._size[1]
         return ((first, min(_PIECE, pixels - first)) for first in range(0, pixels, _PIECE))
 
@@ -43,7 +43,7 @@ class Readout:
         return mean.reshape(self._size[1], self._size[0], 4)
 
     def variance(self) -> np.ndarray:
-        """Of each pixel's mean, as if its samples were independent: (height, width, 3) float32."""
+        """Variance of each pixel's mean, as if its samples were independent: (height, width, 3) float32."""
         out = np.empty((self._size[0] * self._size[1], 3), np.float32)
         scale = float(np.float32(self._dispatcher.scene.arrays.radiance_scale))
         for first, count in self._pieces():
@@ -76,8 +76,8 @@ class Readout:
         return pixels.reshape(self._size[1], self._size[0], 4)
 
     def trace_first_hits(self, want: int, until: float, rates: np.ndarray) -> bool:
-        """Trace them until there are `want` samples, or `until` (perf_counter); whether they are all there. `rates`
-        are those of the picture's schedule."""
+        """Trace first hits until there are `want` samples, or until the clock (perf_counter) is at `until`. Returns
+        whether all samples are there. `rates` are those of the picture's schedule."""
         d = self._dispatcher
         if not self.first_hit.buffers:
             self.first_hit.allocate()
@@ -89,7 +89,7 @@ class Readout:
 
     def _trace_first_hit(self, kernel: Any, tile: Tile, sample: int) -> None:
         d = self._dispatcher
-        frame = d.frame(tile[:2], tile[2:], sample, 1)
-        frame["slot_first"] = d.bind_part(self.first_hit.buffers, tile, d.settings.width)
-        d.run(kernel, frame, work_groups(tile[2], tile[3]))
+        uniforms = d.uniforms(tile[:2], tile[2:], sample, 1)
+        uniforms["slot_first"] = d.bind_part(self.first_hit.buffers, tile, d.settings.width)
+        d.run(kernel, uniforms, work_groups(tile[2], tile[3]))
         d.context.finish()

@@ -32,8 +32,8 @@ def resolve(
     tone_map: str,
     dtype: str,
 ) -> np.ndarray:
-    """(n, 4) exposed, tone-mapped, sRGB: uint8, or float32 with dtype "f4", of `pixels` pixels. `bind(kernel,
-    first, count)` binds the sums of some, no more than `most` at once."""
+    """(`pixels`, 4) exposed, tone-mapped, sRGB: uint8, or float32 with dtype "f4". `bind(kernel, first, count)` binds
+    the sums of at most `most` pixels."""
     floats = dtype == "f4"
     kernel = kernels.get("resolve.comp", defines(tone_map, dtype))
     kernel["exposure"].value = 2.0**exposure

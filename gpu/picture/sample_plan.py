@@ -20,11 +20,11 @@ from gpu.layout import PLAN_AREA as AREA
 from gpu.layout import PLAN_CLASSES as CLASSES
 
 DECISIONS = (8, 32, 128)  # mean samples of a pixel at which a new plan is made; at most CLASSES - 1 of them
-LEAST, MOST = 1 / 8, 32.0  # in units of the mean: the least finds light that few paths find, the most bounds a pass
-_EXPONENT = (
-    0.4  # of the variance: 1 / (1 + p) is least where a pixel's squared error falls with samples^-p; Sobol's 1.5
-)
-_NEAR = 0.7  # weight of an area itself; its neighbours share the rest, as few samples say little about one area
+LEAST, MOST = 1 / 8, 32.0  # bounds in units of the mean: the least finds light of few paths, the most bounds a pass
+# Exponent of the variance: the error is least with 1 / (1 + p), where a pixel's squared error falls with samples^-p;
+# p is 1.5 for Sobol' points.
+_EXPONENT = 0.4
+_NEAR = 0.7  # weight of the area itself; its neighbours share the rest: few samples say little about one area
 _COUNTED = 1 << 24  # samples of a pixel: the greatest number that float32 counts to
 
 WORDS = np.dtype([("counts", np.uint32, CLASSES), ("weights", np.float32, CLASSES)])  # words of an area on the device

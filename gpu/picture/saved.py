@@ -8,8 +8,8 @@ import numpy as np
 
 from gpu.settings import RenderSettings
 
-# The last buffer of a picture that is parted into blocks of samples and has none under way. Pictures of versions that
-# did not part them have neither this nor a block.
+# The last buffer of a picture with blocks of samples of which none is under way. Pictures of versions without blocks
+# have neither this nor a block.
 NO_BLOCK = np.zeros(1, np.uint8)
 
 

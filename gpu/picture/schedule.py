@@ -22,7 +22,7 @@ class Dispatch(NamedTuple):
     part: Tile  # of the picture: the accumulators of these pixels are bound
     origin: tuple[int, int]  # of the invocations, in the picture or in a list of areas
     size: tuple[int, int]  # of the same
-    first: int  # sample; 0 where each pixel goes on from those it has
+    first: int  # the first sample; 0 where each pixel continues after its last one
     samples: int  # of an invocation
     groups: tuple[int, int]
 
@@ -33,7 +33,7 @@ def work_groups(columns: int, rows: int) -> tuple[int, int]:
 
 
 def group_stride(groups: int) -> int:
-    """A stride that comes to each of so many work groups once, and to all parts of a tile in any stretch of them.
+    """A stride that visits each of `groups` work groups once, and spreads any stretch of visits over the tile.
 
     llvmpipe cuts a dispatch into as many stretches as it has threads and waits for the slowest; the upper half of a
     tile may be sky and the lower one a mesh. Steps of the golden section spread evenly for any number of threads.
@@ -47,14 +47,14 @@ def group_stride(groups: int) -> int:
 
 
 def mean_rate(rates: np.ndarray) -> float:
-    """The mean over what is known; 0 where nothing is."""
+    """The mean of the known rates; 0 if none is known."""
     known = rates[rates > 0]
     return float(known.mean()) if len(known) else 0.0
 
 
 def resampled(rates: np.ndarray, count: int) -> np.ndarray:
-    """Rates of another picture of the same scene, for that many parts of this one's height; none stays unknown where
-    any is known."""
+    """Rates of another picture of the same scene, resampled to `count` parts of this one's height; all are known if
+    any is."""
     filled = np.where(rates > 0, rates, mean_rate(rates))
     parts = (np.arange(count) + 0.5) * (len(filled) / count) - 0.5
     out: np.ndarray = np.interp(parts, np.arange(len(filled)), filled)
@@ -79,10 +79,10 @@ class Schedule(Protocol):
 
     @property
     def buffers(self) -> Sequence[Any]:
-        """What belongs to the picture's saved state."""
+        """The schedule's buffers in the picture's saved state."""
 
     def decide(self, samples: int, main: dict[Slot, Any]) -> None:
-        """Look at the accumulators, before the pass that begins at `samples`."""
+        """Plan by the accumulators, before the pass that begins at `samples`."""
 
     def pass_samples(self, samples: int, sharers: int) -> int:
         """The mean number of samples that a pixel gets in the pass that begins at `samples`, where `sharers` pictures
@@ -98,16 +98,16 @@ class Schedule(Protocol):
         """Size the first tiles by the rates of another picture of about the same cost."""
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
-        """Record what a tile has cost, to size the next ones."""
+        """Record a tile's cost, by which the next ones are sized."""
 
     def bind(self) -> None:
-        """Bind what the kernel reads of the schedule."""
+        """Bind the buffers of the schedule that the kernel reads."""
 
     def dispatch(self, tile: Tile) -> Dispatch:
         """The dispatch for a tile; it binds the schedule's own buffers."""
 
     def meter_rounds(self, since: int) -> int:
-        """How often the pass under way comes to the noise meter's pixels, which began at 0 and joined at `since`."""
+        """The visits of the noise meter's pixels, which began at 0 and joined at `since`, in the pass under way."""
 
     def meter_samples(self, since: int, turn: int) -> tuple[int, int]:
         """First sample and number of samples for these pixels in one of the rounds."""
@@ -119,4 +119,4 @@ class Schedule(Protocol):
         """Forget the plan: `buffers` were written or cleared."""
 
     def release(self) -> None:
-        """Give the device's memory back."""
+        """Release the device's memory."""

@@ -18,21 +18,21 @@ from gpu.picture.schedule import Dispatch, Tile, resampled, work_groups
 # threads waits for another. With 8 ms a sample takes llvmpipe 1.1 to 1.2 times as long, with 30 ms as long as now.
 SLICE_S = 0.015
 PASS_S = 0.2  # seconds of a pass, once there are some samples
-# Samples per pass, at least, as soon as there are twice as many: to begin and end an invocation, which fetches and
+# The least samples of a pass once the picture has twice as many: beginning and ending an invocation, which loads and
 # stores 48 bytes of sums, costs llvmpipe a third of a sample of a simple scene.
 LEAST_A_PASS = 4
-# Seconds in which all that share the device get a pass each, and so a new picture, if they can: their passes get
-# shorter, down to one sample. A picture that is alone always gets LEAST_A_PASS.
+# Seconds within which every picture on a shared device shall complete a pass: passes get shorter for it, down to one
+# sample. A picture that is alone always gets LEAST_A_PASS.
 ROUND_S = 2.0
 MAX_SAMPLES_A_PASS = 256
-METER_ROUND = 8  # samples that an invocation for the noise meter takes at most, whose few pixels fill a slice so
+METER_ROUND = 8  # most samples of an invocation for the noise meter, whose few pixels then fill a slice
 LOOP_TURNS = 65_535  # turns of all loops of an invocation together, after which llvmpipe ends them
 BAND = 16  # rows
 _LEAST = WORK_GROUP  # columns of a tile
 _LONG_BAND, _LONG_LEAST = 4, 16  # rows and columns where paths may be so long that 128 pixels take 0.1 s
-GUESS_S = 2e-7  # seconds for a sample of a pixel, before any was measured
-_LARGE = 64 * 64  # pixels of a tile that costs no more a pixel than a larger one
-USUAL_BOUNCES = 16  # with more, paths that come later may be that many times as long as those measured
+GUESS_S = 2e-7  # seconds of a sample of a pixel, before any is measured
+_LARGE = 64 * 64  # pixels of a tile whose cost a pixel is that of larger tiles
+USUAL_BOUNCES = 16  # above this, later paths may be max_bounces / 16 times as long as measured ones
 
 
 class Tiles:
@@ -49,7 +49,7 @@ class Tiles:
         self._most_rows = max(self._band, most // width // self._band * self._band)
         self._most_columns = max(_LEAST, (most - (self._band - 1) * width) // _LEAST * _LEAST)
         self.rates = np.zeros(-(-height // self._band))  # by band
-        self._known, self._known_s = 0, 0.0  # how many of them are known, and their sum
+        self._known, self._known_s = 0, 0.0  # the number of known rates, and their sum
         self.stops: tuple[int, ...] = ()
         self._before, self.chunk = 0, 1  # the first sample of the pass under way, and how many it takes
 
@@ -80,7 +80,7 @@ class Tiles:
         return column, row, min(columns, self._most_columns, width - column), rows
 
     def took(self, tile: Tile, samples: int, seconds: float) -> None:
-        """Record what a tile has cost: a rise counts at once, a fall little by little."""
+        """Record a tile's cost: a rise counts at once, a fall little by little."""
         _, y, width, height = tile
         rate = seconds / (width * height * samples)
         bands = self.rates[y // self._band : -(-(y + height) // self._band)]
@@ -97,8 +97,8 @@ class Tiles:
         return max(1, min(fits, usual_pass(self.size, self.cost_s, samples, sharers), self._most_samples))
 
     def band_samples(self) -> int:
-        """The samples to take at once of a band of rows, which nobody sees before it is complete: as many as a slice
-        has time for in a large tile, as small ones cost more."""
+        """Samples of a pass over a band, which is shown only when it is complete: as many as a slice has time for in
+        a large tile, as small ones cost more."""
         if self.cost_s == 0:
             return 1
         fits = int(SLICE_S / (self.rates.max() * self._least * self._band))
@@ -130,7 +130,7 @@ class Tiles:
     def resume(self, row: int, column: int) -> tuple[int, int]:
         return row, column
 
-    # There is no plan, and nothing of it on the device.
+    # `Tiles` has no plan, and no buffers.
     @property
     def buffers(self) -> tuple[Any, ...]:
         return ()

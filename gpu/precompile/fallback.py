@@ -5,8 +5,8 @@ the flags on that a slider of the scene could raise. Its samples take 1.1 to 1.6
 one, and it compiles in 1 to 3 s (llvmpipe, the built-in scenes).
 
 The kernel for many scenes has every flag on but those of features that it does not support, and reads the numbers of
-shapes from the frame. So its machine code depends on no scene, only on whether the sides of the environment's map are
-powers of two. It is several times slower than a scene's own, and takes LLVM about a minute to compile.
+shapes from the uniforms. So its machine code depends on no scene, only on whether the sides of the environment's map
+are powers of two. It is several times slower than a scene's own, and takes LLVM about a minute to compile.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def defines(raised: frozenset[str] | None = None, arrays: SceneArrays | None = N
     depend on no light. Neither passes all layers of a veil in one walk, which takes LLVM half again as long."""
     clamped = RenderSettings(1, 1, clamp=1.0)
     if raised is None or arrays is None:
-        return features.defines(flags(), clamped) | features.loops_from_frame()
+        return features.defines(flags(), clamped) | features.loops_from_uniforms()
     counts = features.counts(arrays) | {"LIGHT_COUNT": 0, "QUAD_LAMP": -1}
     return features.defines(raised, clamped, counts) | {"OPACITY_WALK": 0}
 

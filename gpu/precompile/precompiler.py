@@ -72,7 +72,7 @@ class Precompiler:
             raise CompileError(str(error)) from error
         for slot in range(len(bindings.Slot)):
             self._zeros.bind_to_storage_buffer(slot)
-        for block in (bindings.FRAME_BLOCK, bindings.FILTER_BLOCK, *bindings.COUNTED.values()):
+        for block in (bindings.UNIFORM_BLOCK, bindings.FILTER_BLOCK, *bindings.COUNTED.values()):
             self._zeros.bind_to_uniform_block(block)
         kernel.run(1, 1)
         self._context.finish()

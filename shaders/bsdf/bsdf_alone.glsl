@@ -2,25 +2,25 @@
 // frame whose z is the outward normal and whose x is the tangent. wo.z < 0 is inside a body that transmits; of other
 // materials nothing is seen from there.
 
-struct Lone {
+struct BsdfAlone {
     Surface s;
     float side;   // 1 outside, -1 inside: there y and z of the surface's own frame point the other way
     bool visible; // false: wo is behind a surface that does not transmit, or in its plane
 };
 
 // Into the frame in which the lobes see the surface from wo's side, and back.
-vec3 lone_turn(Lone lone, vec3 w) { return vec3(w.x, lone.side * w.yz); }
+vec3 bsdf_alone_turn(BsdfAlone alone, vec3 w) { return vec3(w.x, alone.side * w.yz); }
 
-Lone lone_make(vec3 wo) {
+BsdfAlone bsdf_alone_make(vec3 wo) {
     Material m = material_load(0u);
-    Lone lone;
+    BsdfAlone alone;
     bool behind = wo.z < 0.0;
-    lone.side = behind ? -1.0 : 1.0;
-    lone.visible = wo.z > 0.0 || (behind && material_transmits(m));
+    alone.side = behind ? -1.0 : 1.0;
+    alone.visible = wo.z > 0.0 || (behind && material_transmits(m));
 #if HAS_ANISOTROPIC
-    m.anisotropic_rotation *= lone.side; // it turns from u towards v on both sides, as in interaction_tangent
+    m.anisotropic_rotation *= alone.side; // it turns from u towards v on both sides, as in interaction_tangent
 #endif
-    lone.s = surface_make(m, vec2(1.0, 0.0));
-    models_face(lone_turn(lone, wo), behind, lone.s);
-    return lone;
+    alone.s = surface_make(m, vec2(1.0, 0.0));
+    models_face(bsdf_alone_turn(alone, wo), behind, alone.s);
+    return alone;
 }

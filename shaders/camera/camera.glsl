@@ -1,16 +1,16 @@
 // The middle of the lens, where the search for the bodies around the camera begins.
-vec3 camera_origin() { return frame.camera.position; }
+vec3 camera_origin() { return uniforms.camera.position; }
 
 // A direction given along the camera's right, up and forward, in world space.
 vec3 camera_to_world(vec3 v) {
-    return v.x * frame.camera.right + v.y * frame.camera.up + v.z * frame.camera.forward;
+    return v.x * uniforms.camera.right + v.y * uniforms.camera.up + v.z * uniforms.camera.forward;
 }
 
 // The ray of a thin-lens camera through a pixel. Row 0 is the top of the picture; columns count from the left.
 void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
-    Camera c = frame.camera;
+    Camera c = uniforms.camera;
     vec2 at = vec2(pixel) + 0.5 + sampling_filter(sobol_pair(rng, PAIR_PIXEL));
-    vec2 half_size = 0.5 * vec2(frame.resolution);
+    vec2 half_size = 0.5 * vec2(uniforms.resolution);
     vec2 xy = (at - half_size) * (c.tan_half_vfov / half_size.y);
     vec3 through = xy.x * c.right - xy.y * c.up + c.forward;
     o = c.position;
@@ -26,14 +26,14 @@ void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
 // The place of this work group among those of the dispatch: neighbours in order stand apart (gpu/picture/schedule.py).
 uvec2 camera_group() {
     uvec2 size = gl_NumWorkGroups.xy;
-    uint place = (gl_WorkGroupID.y * size.x + gl_WorkGroupID.x) * frame.group_stride % (size.x * size.y);
+    uint place = (gl_WorkGroupID.y * size.x + gl_WorkGroupID.x) * uniforms.group_stride % (size.x * size.y);
     return uvec2(place % size.x, place / size.x);
 }
 
 // Finds the pixel of this invocation; false where there is none.
 bool camera_pixel(out uvec2 pixel, out uint slot) {
     uvec2 g = uint(WORK_GROUP) * camera_group() + gl_LocalInvocationID.xy;
-    pixel = frame.tile_origin + g;
-    slot = pixel.y * frame.slot_width + pixel.x - frame.slot_first;
-    return g.x < frame.tile_size.x && g.y < frame.tile_size.y;
+    pixel = uniforms.tile_origin + g;
+    slot = pixel.y * uniforms.slot_width + pixel.x - uniforms.slot_first;
+    return g.x < uniforms.tile_size.x && g.y < uniforms.tile_size.y;
 }

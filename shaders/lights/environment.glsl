@@ -4,12 +4,12 @@
 
 #if HAS_ENVIRONMENT
 vec3 environment_turn(vec3 d) { // world to image: undo the rotation about +Y
-    vec2 cs = frame.environment_turn;
+    vec2 cs = uniforms.environment_turn;
     return vec3(cs.x * d.x - cs.y * d.z, d.y, cs.y * d.x + cs.x * d.z);
 }
 
 vec3 environment_turn_back(vec3 d) {
-    vec2 cs = frame.environment_turn;
+    vec2 cs = uniforms.environment_turn;
     return vec3(cs.x * d.x + cs.y * d.z, d.y, -cs.y * d.x + cs.x * d.z);
 }
 
@@ -42,14 +42,14 @@ vec4 environment_radiance(vec3 w) {
 #endif
 #if HAS_ENVIRONMENT_CUBE
     vec4 cube = cubemap_radiance(d);
-    if (frame.environment_cube != 0u) l = cube;
+    if (uniforms.environment_cube != 0u) l = cube;
 #endif
 #if HAS_SUN
     bool sunny = sun_holds(d);
-    if (sunny && d.y > 0.0) l.rgb += frame.environment_sun_radiance;
-    l.a = mix(l.a, sunny ? 1.0 / (TWO_PI * frame.environment_sun_cap) : 0.0, frame.environment_sun_share);
+    if (sunny && d.y > 0.0) l.rgb += uniforms.environment_sun_radiance;
+    l.a = mix(l.a, sunny ? 1.0 / (TWO_PI * uniforms.environment_sun_cap) : 0.0, uniforms.environment_sun_share);
 #endif
-    return vec4(l.rgb * frame.environment_scale, l.a);
+    return vec4(l.rgb * uniforms.environment_scale, l.a);
 }
 
 // Whether the environment differs between directions.
@@ -58,7 +58,7 @@ bool environment_varies() { return textureSize(environment_texels, 0).x > 1; }
 LightSample environment_light_sample(uvec2 bits) {
     vec2 u = sobol_units(bits);
 #if HAS_SUN
-    uint cut = uint(frame.environment_sun_share * 4294967296.0);
+    uint cut = uint(uniforms.environment_sun_share * 4294967296.0);
     bool sunny = bits.x < cut;
     vec3 to_sun = sun_sample(vec2(float(bits.x) / max(float(cut), 1.0), u.y));
     bits.x = sunny ? bits.x : sun_rest(bits.x, cut);
@@ -87,7 +87,7 @@ LightSample environment_light_sample(uvec2 bits) {
     float y = 1.0 - 2.0 * h, r = 2.0 * sqrt(max(0.0, h * (1.0 - h)));
     vec3 d = vec3(r * sin(phi), y, -r * cos(phi));
 #if HAS_ENVIRONMENT_CUBE
-    if (frame.environment_cube != 0u) d = cubemap_point(corner, block * vec2(u.y, v));
+    if (uniforms.environment_cube != 0u) d = cubemap_point(corner, block * vec2(u.y, v));
 #endif
 #if HAS_SUN
     if (sunny) d = to_sun;

@@ -127,7 +127,7 @@ float light_tree_chance(LightTreeEnd end, Light l) {
 // down the tree, the others to the alias table of the lights that are outside it.
 Light light_tree_pick(uint bits, LightContext context) {
     uvec4 head = light_tree_head();
-    uint code = bits >> 2u, far = frame.light_count - head.w;
+    uint code = bits >> 2u, far = uniforms.light_count - head.w;
     bool near = code < head.x, even = code < head.y;
     float x = float(code - head.x) * (float(far) / float(max(LIGHT_CODES - head.x, 1u)));
     uint i = head.w + min(uint(x), far - 1u), first = near ? (even ? code >> head.z : 0u) : i;

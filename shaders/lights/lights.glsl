@@ -27,8 +27,8 @@ uniform sampler2D environment_texels; // rgb radiance; a: density of picking a d
 
 // Picks a light from the alias table of all.
 Light lights_table_pick(uint bits) {
-    float x = sobol_unit(bits) * float(frame.light_count);
-    uint i = min(uint(x), frame.light_count - 1u);
+    float x = sobol_unit(bits) * float(uniforms.light_count);
+    uint i = min(uint(x), uniforms.light_count - 1u);
     Light drawn = light_pick(i); // two of its words are used: loading all of it would cost as much again
     return light_pick(x - float(i) >= drawn.threshold ? drawn.alias : i);
 }

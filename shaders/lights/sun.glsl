@@ -4,20 +4,20 @@
 #if HAS_SUN
 // 1 - cos is taken from the difference of the directions, as cos itself is 0.5 % off for a disk this small.
 bool sun_holds(vec3 d) {
-    vec3 off = d - frame.environment_sun;
-    return dot(off, off) < 2.0 * frame.environment_sun_cap;
+    vec3 off = d - uniforms.environment_sun;
+    return dot(off, off) < 2.0 * uniforms.environment_sun_cap;
 }
 
 vec3 sun_sample(vec2 u) {
-    float h = u.x * frame.environment_sun_cap;
+    float h = u.x * uniforms.environment_sun_cap;
     float r = sqrt(h * (2.0 - h)), phi = TWO_PI * u.y;
-    return basis_to_world(basis_make(frame.environment_sun), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
+    return basis_to_world(basis_make(uniforms.environment_sun), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
 }
 
 // The first of the two random numbers, stretched to all 32 bits again where the sun was not picked.
 uint sun_rest(uint bits, uint cut) {
     uint x = bits - cut;
-    float stretch = frame.environment_sun_share / (1.0 - frame.environment_sun_share);
+    float stretch = uniforms.environment_sun_share / (1.0 - uniforms.environment_sun_share);
     return x + uint(float(x) * stretch);
 }
 #endif

@@ -79,7 +79,7 @@ uint sobol_place(uint place, uint turn) { return place == 0u ? 0u : (place - 1u 
 #endif
 
 uint sobol_seed(uvec2 at, uint replicate) {
-    return sobol_hash(at.x ^ sobol_hash(at.y ^ sobol_hash(frame.seed ^ sobol_hash(replicate))));
+    return sobol_hash(at.x ^ sobol_hash(at.y ^ sobol_hash(uniforms.seed ^ sobol_hash(replicate))));
 }
 
 // `replicate` names one of the independent scrambles; 0 is the picture's own.

@@ -7,13 +7,13 @@ vec3 found_light_disks(vec3 d, float pdf) {
     vec3 sum = vec3(0.0);
     uint i = 0u;
     do {
-        Light l = light_load(frame.sun_first + i);
+        Light l = light_load(uniforms.sun_first + i);
         vec3 c = directional_light_radiance(l, d);
 #if ESTIMATOR == ESTIMATOR_MIS
         c *= power_heuristic(pdf, directional_light_pdf(l) * l.probability);
 #endif
-        if (i < frame.sun_count) sum += c; // a kernel with every flag raised may have no disk
-    } while (++i < frame.sun_count);
+        if (i < uniforms.sun_count) sum += c; // a kernel with every flag raised may have no disk
+    } while (++i < uniforms.sun_count);
     return sum;
 }
 #endif
@@ -21,7 +21,7 @@ vec3 found_light_disks(vec3 d, float pdf) {
 // Whether the camera sees the environment where it sees no surface.
 bool found_light_background() {
 #if HAS_ENVIRONMENT
-    return frame.environment_background != 0u;
+    return uniforms.environment_background != 0u;
 #else
     return false;
 #endif
@@ -35,7 +35,7 @@ vec3 found_light_outside(vec3 d, float pdf, bool scattered) {
     vec4 l = environment_radiance(d);
     arriving = l.rgb;
 #if ESTIMATOR == ESTIMATOR_MIS
-    arriving *= power_heuristic(pdf, l.a * frame.environment_probability);
+    arriving *= power_heuristic(pdf, l.a * uniforms.environment_probability);
 #endif
 #endif
 #if HAS_SUN_DISKS

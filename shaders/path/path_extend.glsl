@@ -34,14 +34,14 @@ const float PDF_DELTA = 1e30;
 vec3 path_clamp(vec3 c, bool indirect) {
 #if HAS_CLAMP
     float m = max_component(c);
-    if (indirect && m > frame.clamp_radiance) c *= frame.clamp_radiance / m;
+    if (indirect && m > uniforms.clamp_radiance) c *= uniforms.clamp_radiance / m;
 #endif
     return c;
 }
 
 // Russian roulette: ends paths that carry little by chance, and scales up those that survive.
 void path_roulette(Sampler rng, uint pair, float reach, inout Path path) {
-    if (path.bounce >= frame.roulette_depth && path.bounce < frame.max_bounces) {
+    if (path.bounce >= uniforms.roulette_depth && path.bounce < uniforms.max_bounces) {
         float survive = min(1.0, reach / ROULETTE_THRESHOLD);
         if (sobol_pair(rng, pair + PAIR_ROULETTE).x >= survive) path.alive = false;
         path.throughput /= survive > 0.0 ? survive : 1.0;

@@ -24,7 +24,7 @@ void path_trace(Sampler rng, inout Path path) {
     bool met = path.hit.id != NONE;
     path.throughput *= medium_share(path.medium, path.hit.t);
     path.escaped = path.alive && !met && path.counts && (path.bounce > 0u || found_light_background());
-    path.alive = met && path.bounce < frame.max_bounces;
+    path.alive = met && path.bounce < uniforms.max_bounces;
     if (path.bounce == 0u) path.alpha = met || path.escaped ? 1.0 : 0.0;
     path_add_emission(path);
     path.radiance_before = path.radiance;

@@ -1,11 +1,11 @@
 // Instances: triangles with a tree of their own under an affine map. A ray is intersected in their space, where its
 // direction is not of unit length, so that t is the same in both spaces; these functions map hits back to the world.
 #if HAS_INSTANCES
-uint instance_id(uint number, uint triangle) { return INSTANCED | (number << frame.instance_shift) | triangle; }
+uint instance_id(uint number, uint triangle) { return INSTANCED | (number << uniforms.instance_shift) | triangle; }
 
-uint instance_number(uint id) { return (id & ~INSTANCED) >> frame.instance_shift; }
+uint instance_number(uint id) { return (id & ~INSTANCED) >> uniforms.instance_shift; }
 
-uint instance_triangle(uint id) { return id & ((1u << frame.instance_shift) - 1u); }
+uint instance_triangle(uint id) { return id & ((1u << uniforms.instance_shift) - 1u); }
 
 // The identity: the scene's own triangles as one instance.
 Instance instance_none() {

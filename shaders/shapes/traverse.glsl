@@ -49,9 +49,9 @@ struct Tree {
 };
 
 Tree traverse_scene_tree() {
-    Tree tree = Tree(NONE, 0u, frame.node_count, frame.node_origin, frame.node_scale, 0u, 0u);
+    Tree tree = Tree(NONE, 0u, uniforms.node_count, uniforms.node_origin, uniforms.node_scale, 0u, 0u);
 #if HAS_INSTANCES
-    tree.node_first = frame.node_first;
+    tree.node_first = uniforms.node_first;
 #endif
     return tree;
 }

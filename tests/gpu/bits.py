@@ -22,7 +22,7 @@ def assert_same(one: Picture, other: Picture) -> None:
 
 def beside(made: Picture) -> Picture:
     """A picture on another renderer: as `made`, without samples."""
-    other = Picture(made.context, made._passes._kernels, made._dispatcher._frame_buffer, made.scene, made.settings)
+    other = Picture(made.context, made._passes._kernels, made._dispatcher._uniform_buffer, made.scene, made.settings)
     return other
 
 

@@ -59,8 +59,8 @@ def test_every_member_arrives(gpu: Renderer, name: str, block: bool) -> None:
         thing.release()
 
 
-def test_frame_block_arrives(gpu: Renderer) -> None:
-    record = layout.Frame
+def test_uniform_block_arrives(gpu: Renderer) -> None:
+    record = layout.Uniforms
     words = np.random.default_rng(6).integers(0x00800000, 0x7F000000, record.words, np.uint32)
     lines, expected = [], []
     camera = {
@@ -70,7 +70,7 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
     assert members.pop("camera") == (layout.Camera, 0)
     for member, (kind, offset) in {**camera, **members}.items():
         for k, axis in enumerate("xyzw"[: kind.words]):
-            value = f"frame.{member}" + (f".{axis}" if kind.words > 1 else "")
+            value = f"uniforms.{member}" + (f".{axis}" if kind.words > 1 else "")
             bits = value if kind.base is np.uint32 else f"floatBitsToUint({value})"
             lines.append(f"    echo[{len(expected)}] = {bits};")
             expected.append(words[offset + k])
@@ -81,7 +81,7 @@ def test_frame_block_arrives(gpu: Renderer) -> None:
         "void main() {\n    if (gl_GlobalInvocationID.x > 0u) return;\n" + "\n".join(lines) + "\n}\n"
     )
     data, echo = gpu._context.buffer(words.tobytes()), gpu._context.buffer(reserve=4 * len(expected))
-    data.bind_to_uniform_block(bindings.FRAME_BLOCK)
+    data.bind_to_uniform_block(bindings.UNIFORM_BLOCK)
     echo.bind_to_storage_buffer(15)
     kernel.run(1)
     assert np.frombuffer(echo.read(), np.uint32).tolist() == [int(x) for x in expected]

@@ -14,7 +14,7 @@ def draw(
     prober: Prober, what: int, count: int = N, sampler: int = 0, pair: int = 2, seed: int = 0, replicate: int = 0,
     pixel: tuple[int, int] = (3, 7), filter_name: str = "box", doublings: int = 0, adaptive: int = 0,
 ) -> np.ndarray:  # fmt: skip
-    frame = np.zeros((), layout.Frame.dtype)
+    frame = np.zeros((), layout.Uniforms.dtype)
     frame["seed"], frame["replicate"] = seed, replicate
     defines = {"WHAT": what, "SAMPLER": sampler, "ADAPTIVE": adaptive}
     out = prober.run("numbers.comp", count, {}, defines=defines, frame=frame, filter_name=filter_name,

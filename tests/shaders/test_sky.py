@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from gpu import ESTIMATORS, Renderer
-from gpu.layout import Frame, LightKind
+from gpu.layout import LightKind, Uniforms
 from gpu.layout.bindings import Slot
 from gpu.tables import alias_table, sky
 from service.pack import pack
@@ -54,8 +54,8 @@ class Probe:
     def __init__(self, gpu: Renderer, prober: Prober, environment: dict[str, Any], images: Any = None) -> None:
         self._scene = gpu.load(packed(environment, images))
         self._prober = prober
-        self._frame = np.zeros((), Frame.dtype)
-        self._scene.write_frame(self._frame)
+        self._frame = np.zeros((), Uniforms.dtype)
+        self._scene.write_uniforms(self._frame)
         self._scene.bind()
 
     def _run(self, asks: np.ndarray, sample: int) -> list[np.ndarray]:

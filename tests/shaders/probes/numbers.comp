@@ -13,7 +13,7 @@ uniform uint doublings; // 2: the quarters of a quarter of the samples
 void main() {
     uint i = gl_GlobalInvocationID.x;
     if (i >= count) return;
-    Sampler whole = sobol_begin(pixel, i >> doublings, frame.replicate);
+    Sampler whole = sobol_begin(pixel, i >> doublings, uniforms.replicate);
     vec2 u = sobol_pair(sobol_part(whole, i & ((1u << doublings) - 1u), doublings), pair);
     vec4 a = vec4(u, 0.0, 0.0);
 #if WHAT == 1
