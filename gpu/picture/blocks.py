@@ -53,7 +53,7 @@ class Sums(NamedTuple):
     """Accumulators of some pixels, each (..., 4) float32."""
 
     sum: np.ndarray  # radiance and alpha
-    lost: np.ndarray  # what rounding added to the sum [Kahan 1965]
+    lost: np.ndarray  # the rounding error of the sum [Kahan 1965]
     moments: np.ndarray  # second moments of the scaled radiance about its mean; the number of samples
 
 

@@ -2,7 +2,7 @@
 // in numpy.
 struct Accumulated {
     vec4 sum;     // radiance and alpha
-    vec4 lost;    // what rounding added to the sum [Kahan 1965]
+    vec4 lost;    // the rounding error of the sum [Kahan 1965]
     vec4 moments; // second moments of the scaled radiance about its mean; w: samples
 };
 

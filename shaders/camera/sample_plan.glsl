@@ -1,7 +1,7 @@
 // Adaptive sampling: which pixels a dispatch renders, and how many samples each of them shall have
 // (gpu/picture/sample_plan.py).
 #if ADAPTIVE
-// counts by area and class of rows; areas as x, y << 16
+// The plan's counts, by area and class of rows; areas are x, y << 16.
 layout(std430, binding = SLOT_SAMPLE_PLAN) readonly buffer sample_plan_buffer { uvec4 sample_plan_counts[]; };
 layout(std430, binding = SLOT_PLANNED_AREAS) readonly buffer planned_area_buffer { uint sample_plan_areas[]; };
 

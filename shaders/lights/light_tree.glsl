@@ -1,6 +1,6 @@
-// Picks one of many bounded lights by a walk down a binary tree. At each pair of nodes the chances follow bounds on
-// what the lights of either can contribute at most at the shaded point [Conty Estevez & Kulla 2018; Pharr, Jakob,
-// Humphreys 2023, section 12.6.3]. gpu/accel/light_tree.py makes the tree.
+// Picks one of many bounded lights by a walk down a binary tree. At each pair of nodes the
+// probabilities follow bounds on the contribution of either's lights at the shaded point [Conty Estevez & Kulla 2018;
+// Pharr, Jakob, Humphreys 2023, section 12.6.3]. gpu/accel/light_tree.py makes the tree.
 
 // A point for which lights are sampled.
 struct LightContext {

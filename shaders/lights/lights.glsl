@@ -1,7 +1,7 @@
 // Picks a light and a direction towards it, and gives the density with which a direction would have been picked.
 struct LightSample {
     vec3 wi;       // towards the light, in world space
-    float t;       // the distance; INFINITY_T for what lies at infinity
+    float t;       // the distance; INFINITY_T for a light at infinity
     vec3 radiance; // arriving, not divided by pdf; of a point light divided by d^2; while a shape's sample is made, the
                    // share of its emission that leaves the shape itself
     float pdf;     // per solid angle, with the chance of picking the light; 0: there is no sample

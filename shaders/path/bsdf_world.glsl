@@ -1,4 +1,4 @@
-// The BSDF in world space, with what normal maps fold (path/normal_map.glsl), sampled as the estimator wants it.
+// The BSDF in world space, folded by normal maps (path/normal_map.glsl), and sampled as the estimator requires.
 
 Scatter bsdf_eval_world(Surface s, Interaction here, vec3 wi_w) {
 #if HAS_NORMAL_MAPS

@@ -9,7 +9,7 @@ struct Interaction {
     bool mapped;   // a normal map bends the normal of the base or of the coat
     vec3 coat;     // the coat's own normal, as the viewer sees it; only with HAS_COAT_NORMALS
     bool transmits;
-    Medium beyond; // what lies on the other side
+    Medium beyond; // the medium on the other side
 };
 
 // Finds the bodies on both sides of the surface.

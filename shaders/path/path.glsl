@@ -1,5 +1,5 @@
-// The estimator: the light that reaches the camera along one path. path/path_trace.glsl follows a ray to what it meets and
-// adds what shines there, path/interaction.glsl says what that is, path/direct.glsl adds what the lights send there,
+// The estimator: the light that reaches the camera along one path. path/path_trace.glsl traces a ray and
+// adds the emission that it finds, path/interaction.glsl describes the surface, path/direct.glsl adds direct light,
 // path/bsdf_world.glsl picks the next direction and path/path_extend.glsl turns the path there.
 #include "bsdf/bsdf.glsl"
 #include "lights/lights.glsl"
@@ -36,7 +36,7 @@ Path path_begin(vec3 o, vec3 d, Medium medium) {
     return path;
 }
 
-// Ends a path: adds what it finds at infinity, where it has left the scene. Returns its radiance and its alpha.
+// Ends a path: adds light from infinity where it has left the scene. Returns its radiance and its alpha.
 vec4 path_finish(Path path) {
     path_add_escaped(path);
     path_was_cut = !budget_lasts();

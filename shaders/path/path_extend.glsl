@@ -1,8 +1,8 @@
-// A path: the ray that it is about to follow, what that ray meets, and the step from a surface to the next ray.
+// A path: its next ray, the hit of that ray, and the step from a surface to the next ray.
 struct Path {
     vec3 o;               // the ray that comes next, or came last
     vec3 d;
-    Hit hit;              // what it meets; hit.id is NONE where it meets nothing
+    Hit hit;              // of this ray; hit.id is NONE where it hits nothing
     SurfacePoint at;      // there; before the ray is traced: where it begins
     vec3 throughput;
     vec3 radiance;        // found so far

@@ -1,10 +1,9 @@
-// Tracing a path's rays, those of the camera among them. Drivers copy the walk through the scene to each place that calls
-// it: a kernel with a tree, or with mirrors, has one such place, at the beginning of a bounce, and takes half to nine
-// tenths of the time to compile. Where the walk is short there is a second one, for the camera, and rays are followed
-// ahead, at the end of a bounce: a loop ends at its end only, and one that begins with the last ray of a vector's paths
-// would shade once more, with no lane. That is 3 to 9 % of a Cornell box's time.
+// Tracing a path's rays, camera rays included. Drivers inline the walk through the scene at each call: a kernel with a tree
+// or with mirrors calls it once, at the beginning of a bounce, and compiles in half to nine tenths of the time. Where the
+// walk is short there is a second call, for the camera, and rays are traced ahead, at the end of a bounce: llvmpipe leaves
+// a loop only at its end, so tracing first would cost one fully masked shading pass, 3 to 9 % of a Cornell box's time.
 
-// Adds the emission of the surface that the path has come to, and its ambient light.
+// Adds the emission and the ambient light of the surface that the path has reached.
 void path_add_emission(inout Path path) {
 #if HAS_EMISSION
     vec3 arriving = found_light_emission(path.at, path.d) * direct_found_weight(path) * path.eta_scale;
@@ -16,7 +15,7 @@ void path_add_emission(inout Path path) {
 #endif
 }
 
-// Follows the path's ray to what it meets, and adds what shines there.
+// Traces the path's ray, and adds the emission of the surface that it hits, or the light from infinity.
 void path_trace(Sampler rng, inout Path path) {
     path.hit = transparency_nearest(path.o, path.d, path.at.flat_id, path.bounce, rng, path.at);
     path.alive = path.alive && budget_lasts();

@@ -1,4 +1,4 @@
-// Sides: the shading normal as the viewer sees it, and what a direction's side of a surface decides.
+// Sides: the shading normal on the viewer's side, and decisions by a direction's side of a surface.
 
 // The shading normal on the viewer's side of the surface. At a silhouette interpolation or a map can turn it away from
 // the viewer; it is then bent back until it is just in view, as black rims would lose light.

@@ -76,7 +76,7 @@ void shapes_intersect(vec3 o, vec3 d, uvec2 skip, bool any, inout Hit hit) {
 #endif
 }
 
-// The nearest hit along o + t d, t in (0, infinity); hit.id is NONE where nothing is met. `skip` is the flat_id of the
+// The nearest hit along o + t d, t in (0, infinity); hit.id is NONE where nothing is hit. `skip` is the flat_id of the
 // shape that the ray leaves.
 Hit shapes_nearest(vec3 o, vec3 d, uint skip) {
     Hit hit = Hit(INFINITY_T, NONE, vec2(0.0));

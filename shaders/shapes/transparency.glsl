@@ -1,19 +1,18 @@
-// Surfaces that a ray passes without being scattered: shapes that hide from the camera, and others by the chance that
-// their opacity leaves.
+// Surfaces that a ray passes without being scattered: shapes that are hidden from the camera, and other shapes with
+// probability 1 - opacity.
 const uint PAIR_TRANSPARENCY = 0x8000u; // the first pair, beyond those of any path; each bounce has TRANSPARENCY_MAX
-const uint TRANSPARENCY_MAX = 4096u;    // layers that a ray passes at most; it ends on the next one
+const uint TRANSPARENCY_MAX = 4096u;    // most layers that a ray passes; it ends at the next one
 
 #include "shapes/transparency_walk.glsl"
 
-// Counts a surface that the ray has come to; whether the ray may pass it.
+// Counts a layer, and returns whether the ray may pass it.
 bool transparency_counts(inout uint layer) {
     budget_left -= BUDGET_LAYER;
     return layer++ < TRANSPARENCY_MAX && budget_lasts();
 }
 
 #if HAS_OPACITY
-// Whether the ray passes the surface. Each one that it comes to takes the next number, whether it comes to them in
-// their order or not: a number that nothing else depended on makes the chance right.
+// Whether the ray passes the surface. Independent of the order of traversal, because every layer draws a fresh number.
 bool transparency_passes(SurfacePoint at, uint bounce, Sampler rng, inout uint layer) {
     float u = sobol_pair(rng, PAIR_TRANSPARENCY + bounce * TRANSPARENCY_MAX + layer).x;
     return transparency_counts(layer) && u >= transparency_opacity(at, bounce == 0u);

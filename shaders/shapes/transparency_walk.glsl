@@ -16,7 +16,7 @@ float transparency_opacity(SurfacePoint at, bool hides) {
 }
 
 #if HAS_BVH && OPACITY_WALK
-// Whether all of a shape of the tree is opaque, as far as that can be told without its texture coordinates.
+// Whether all of a shape of the tree is opaque, as far as it is known without its texture coordinates.
 bool transparency_is_opaque(Tree tree, uint kind, uint index, bool hides) {
 #if HAS_VERTEX_COLORS
     return false;
