@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -28,9 +29,14 @@ def _brighter(factor: float) -> dict[str, Any]:
     return scene
 
 
+@pytest.fixture(scope="module")
+def one(gpu: Renderer) -> Seen:
+    return Seen(gpu, _brighter(1.0))
+
+
 @pytest.mark.parametrize("row", POWERS)
-def test_brighter_light_is_only_brighter(gpu: Renderer, row: str) -> None:
-    one, other = Seen(gpu, _brighter(1.0)), Seen(gpu, _brighter(POWERS[row]))
+def test_brighter_light_is_only_brighter(gpu: Renderer, one: Seen, row: str) -> None:
+    other = Seen(gpu, _brighter(POWERS[row]))
     assert other.warnings == []
     other.color /= POWERS[row]
     assert other.alike(one, 1e-4) > 0.99
@@ -39,15 +45,18 @@ def test_brighter_light_is_only_brighter(gpu: Renderer, row: str) -> None:
         assert np.allclose(other.variance, one.variance, rtol=1e-2, atol=1e-6 * one.variance.max())
 
 
+@cache
+def _noise(gpu: Renderer, factor: float) -> float:
+    made = picture(gpu, _brighter(factor), 8)
+    noise = made.noise()
+    made.release()
+    made.scene.release()
+    return noise
+
+
 @pytest.mark.parametrize("row", POWERS)
 def test_noise_is_relative(gpu: Renderer, row: str) -> None:
-    noises = []
-    for factor in (1.0, POWERS[row]):
-        made = picture(gpu, _brighter(factor), 8)
-        noises.append(made.noise())
-        made.release()
-        made.scene.release()
-    assert noises[1] == pytest.approx(noises[0], rel=1e-3)
+    assert _noise(gpu, POWERS[row]) == pytest.approx(_noise(gpu, 1.0), rel=1e-3)
 
 
 @pytest.mark.parametrize("tone_map", TONE_MAPS)

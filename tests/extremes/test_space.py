@@ -18,6 +18,21 @@ def seen(gpu: Renderer) -> Seen:
     return Seen(gpu, everything())
 
 
+@pytest.fixture(scope="module")
+def small_balls(gpu: Renderer) -> dict[str, Seen]:
+    return {place: Seen(gpu, _with_ball(1e-5, center)) for place, center in AWAY.items()}
+
+
+@pytest.fixture(scope="module")
+def ball_of_1(gpu: Renderer) -> Seen:
+    return Seen(gpu, _with_ball(1.0, [0, 0, 0]))
+
+
+@pytest.fixture(scope="module")
+def flat(gpu: Renderer) -> Seen:
+    return Seen(gpu, _standing(FLOOR))
+
+
 SCALES = rows({"1e-4": 1e-4, "2^10": 2.0**10, "1e5": 1e5}, {"2^-13": 2.0**-13, "0.01": 0.01, "100": 100.0})
 
 
@@ -49,18 +64,21 @@ RADII = {"1e-6": 1e-6, "1e-3": 1e-3, "1": 1.0, "1e4": 1e4, "1e7": 1e7}
 AWAY = {"at 0": [0, 0, 0], "at (0.3, 0.5, -7)": [0.3, 0.5, -7]}
 
 
+def _with_ball(radius: float, center: list[float]) -> dict[str, Any]:
+    """Over a floor, where there is room beneath it."""
+    x, y, z = center
+    camera = {"position": [x, y + radius, z + 4 * radius], "target": center, "vfov": 40}
+    shapes = [ball("metal", center, radius), quad("white", (-90, -1, 90), (180, 0, 0), (0, 0, -180))]
+    return everything(shapes=shapes[: 2 if radius < 1 else 1], camera=camera, lights=[])
+
+
 @pytest.mark.parametrize("place", AWAY)
 @pytest.mark.parametrize("row", RADII)
-def test_a_ball_of_any_radius_looks_the_same(gpu: Renderer, row: str, place: str) -> None:
-    def scene(radius: float, center: list[float]) -> dict[str, Any]:
-        x, y, z = center
-        camera = {"position": [x, y + radius, z + 4 * radius], "target": center, "vfov": 40}
-        shapes = [ball("metal", center, radius), quad("white", (-90, -1, 90), (180, 0, 0), (0, 0, -180))]
-        return everything(shapes=shapes[: 2 if radius < 1 else 1], camera=camera, lights=[])
-
-    one, other = (Seen(gpu, scene(radius, AWAY[place])) for radius in (1e-5, RADII[row]))
-    if RADII[row] >= 1:  # the floor is no longer beneath it
-        one = Seen(gpu, scene(1.0, [0, 0, 0]))
+def test_a_ball_of_any_radius_looks_the_same(
+    gpu: Renderer, small_balls: dict[str, Seen], ball_of_1: Seen, row: str, place: str
+) -> None:
+    one = small_balls[place] if RADII[row] < 1 else ball_of_1
+    other = Seen(gpu, _with_ball(RADII[row], AWAY[place]))
     assert other.warnings == []
     assert other.alike(one) > 0.97
     assert other.deviation(one) < 0.1
@@ -85,9 +103,9 @@ GROUNDS = {
 
 
 @pytest.mark.parametrize("row", GROUNDS)
-def test_things_stand_on_vast_ground(gpu: Renderer, row: str) -> None:
+def test_things_stand_on_vast_ground(gpu: Renderer, flat: Seen, row: str) -> None:
     """Below the horizon a globe looks like a floor, its shadows where they belong."""
-    flat, other = Seen(gpu, _standing(FLOOR)), Seen(gpu, _standing(GROUNDS[row]))
+    other = Seen(gpu, _standing(GROUNDS[row]))
     assert other.warnings == []
     below = slice(24, None)
     assert np.mean(np.abs(flat.color - other.color)[below] < 0.01 * flat.color[below]) > 0.95

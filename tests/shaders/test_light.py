@@ -174,6 +174,7 @@ def _showcase() -> dict[str, Any]:
     return document(shapes, materials, environment=env, lights=[light])
 
 
+@pytest.mark.skipif(not LONG, reason="make extremes: tests/extremes/test_estimators.py compares them always")
 def test_all_estimators_converge_to_the_same_picture(gpu: Renderer) -> None:
     assert_estimators_agree(gpu, _showcase())
 

@@ -106,8 +106,9 @@ def bases() -> Iterator[tuple[Json, tuple[str | int, ...]]]:
     for part in ("camera", "lights", "textures", "shapes"):
         yield document(textured("principled"), ENVIRONMENTS[0], lights=LIGHTS), (part,)
     for model in MODELS:
-        for each in (material(model), material(model, emission=2), textured(model)):
+        for each in (material(model), textured(model)):
             yield document(each), ("materials", "m")
+    yield document(material("diffuse", emission=2)), ("materials", "m")
 
 
 def members(value: Any, path: tuple[str | int, ...] = ()) -> Iterator[tuple[tuple[str | int, ...], BaseModel]]:
