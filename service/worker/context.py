@@ -28,9 +28,7 @@ class WorkerContext:
     renderer: Renderer
     send: Callable[[FromRenderer], None]
     denoiser: DenoiseClient
-    spare: CompileClient | None = None  # compiles in idle time: what shows an edit meanwhile
-    soon: CompileClient | None = None  # compiles for edits to come, beside tracing
-    compiler: CompileClient | None = None  # compiles what a task waits for; None: in the task's own turn
+    compiler: CompileClient | None = None  # None: kernels are compiled in the task's own turn
     memory: Memory = field(default_factory=_unlimited)
     # Lets go of a task, by its number: the server keeps the pictures of renders and can bring them back. With it Done
     # and a Checkpoint every `checkpoint_s` seconds bring the picture of a render to the server.

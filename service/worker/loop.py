@@ -67,15 +67,11 @@ class Loop:
         self._memory = Memory(memory_limit, lambda: [*self._tasks.values(), *self._assistants.values()])
         self._scheduler = Scheduler()
         self._denoiser = DenoiseClient()
-        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline=lifeline)
-        self._soon = CompileClient(renderer.info, device, lambda: True, "soon")
-        self._spare = CompileClient(renderer.info, device, lambda: True, "spare")
+        self._compiler = CompileClient(renderer.info, device, self._crowded, lifeline)
         self._context = WorkerContext(
             renderer,
             self._send,
             self._denoiser,
-            self._spare,
-            self._soon,
             self._compiler,
             self._memory,
             self._forget,
@@ -92,14 +88,12 @@ class Loop:
     def run(self) -> None:
         """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
         busy = False
-        self._spare.prepare(kernel_keys.common_keys())
+        self._compiler.prepare(kernel_keys.common_keys(), "spare")
         while True:
             for message in coalesced(self._pending(wait=not busy)):
                 self._take(message)
             self._denoiser.hear()
             self._compiler.hear()
-            self._soon.hear()
-            self._spare.hear()
             chosen = self._scheduler.choose(self._everyone)
             if chosen is not None:
                 began = time.monotonic()
@@ -119,8 +113,8 @@ class Loop:
     def _pending(self, wait: bool) -> Iterator[ToRenderer]:
         """The messages that have come in; with `wait`, as soon as there is one, or a helper has answered."""
         if wait:
-            ends = [self._end, *self._denoiser.ends, *self._compiler.ends, *self._soon.ends, *self._spare.ends]
-            waits = [self._compiler.left_s, self._soon.left_s, self._spare.left_s, self._renderer.tidy()]
+            ends = [self._end, *self._denoiser.ends, *self._compiler.ends]
+            waits = [self._compiler.left_s, self._renderer.tidy()]
             waits.append(None if self._denoiser.late else self._denoiser.left_s)
             waits += [task.left_s for task in self._tasks.values()]
             select.select(ends, [], [], min((left_s for left_s in waits if left_s is not None), default=None))
@@ -146,16 +140,17 @@ class Loop:
         self._used_s[task.number] += seconds
 
     def _foresee(self, idle: bool) -> bool:
-        """Whether another kernel could be handed to a compiler which is free; one at a time, as others may soon have
-        something for it that is needed more."""
-        waiting = self._scenes or (self._sliders if idle else None)
-        soon = waiting.popleft() if waiting and self._soon.left_s is None else None
-        if soon is not None:
-            self._soon.prepare([soon])
-        spare = next(self._foreseen, None) if self._spare.left_s is None else None
-        if spare is not None:
-            self._spare.prepare([spare])
-        return soon is not None or spare is not None
+        """Queue a foreseen kernel for each priority that has none; whether there was one. One at a time, as tasks may
+        soon foresee what is needed more."""
+        handed = False
+        scenes = self._scenes or (self._sliders if idle else None)
+        if scenes and self._compiler.is_idle("soon"):
+            self._compiler.prepare([scenes.popleft()], "soon")
+            handed = True
+        if self._compiler.is_idle("spare") and (key := next(self._foreseen, None)) is not None:
+            self._compiler.prepare([key], "spare")
+            handed = True
+        return handed
 
     def _crowded(self) -> bool:
         return sum(each.awaited for each in self._everyone) > 1

@@ -22,8 +22,8 @@ class Updates:
         self.pending: Update | None = None
         self.stops = False  # the render ends as soon as the pending update is applied
         self.settings: RenderSettings | None = None  # of the last update that was applied
-        self.preview = FallbackPreview(number, context.send, context.renderer, context.spare)
-        self._residency, self._tracker, self._soon, self._client = residency, tracker, context.soon, client
+        self.preview = FallbackPreview(number, context.send, context.renderer, context.compiler)
+        self._residency, self._tracker, self._compiler, self._client = residency, tracker, context.compiler, client
         self._wait = KernelWait(context.compiler, client)
         # Of the pending update, once it was looked at.
         self._edited: EditedScene | None = None
@@ -88,12 +88,12 @@ class Updates:
 
     def foresee(self, settings: RenderSettings) -> None:
         """Have compiled what moving a large mesh would need, and the first touch of some sliders."""
-        if self._soon is not None and self._tracker.interactive:
+        if self._compiler is not None and self._tracker.interactive:
             arrays = self._residency.full.scene.arrays
             moved = kernel_keys.key_after_move(arrays, settings)
             first = self.preview.prepare(arrays, settings)  # with which any of them can be shown
             keys = [*first, *([moved] if moved else []), *kernel_keys.keys_after_edit(arrays, settings)]
-            self._soon.prepare(keys, self._client, self._foreseen)
+            self._compiler.prepare(keys, "soon", self._client, self._foreseen)
 
     def _foreseen(self, milliseconds: float) -> None:
         """A foreseen kernel was compiled: nobody waits for it."""

@@ -20,7 +20,7 @@ from gpu.precompile.kernel_keys import common_keys, kernel_key
 from service.ipc.messages import Done, Image, Loaded, Read, StopRule, Update, View
 from service.renderers.local.supervisor import Supervisor
 from service.worker.device.loaded_scene import LoadedScene, edited_scene, kernel_request
-from service.worker.helpers.compile_client import CompileClient, Compiled, records
+from service.worker.helpers.compile_client import CompileClient, Compiled, Priority, records
 from service.worker.helpers.compile_main import LOCKS
 from tests.serving import PATIENCE_S, wait_until
 from tests.supervisors import LINEAR, SCENES, SIZE, Ears, compile_helpers, with_supervisor
@@ -198,13 +198,18 @@ class Instant:
         return Compiled(5.0, cached=True)
 
 
+def compiling_instantly(gpu: Renderer, priority: Priority) -> tuple[CompileClient, Instant]:
+    compiler, helper = CompileClient(gpu.info, None, lambda: True), Instant()
+    compiler._lanes[priority].helper = helper  # type: ignore[assignment]
+    return compiler, helper
+
+
 def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> None:
     """What pictures are shown with, and what the noise meter and `adaptive` ask."""
     asked = []
     for _ in range(2):
-        compiler, helper = CompileClient(gpu.info, None, lambda: True, "spare"), Instant()
-        compiler._helper = helper  # type: ignore[assignment]
-        compiler.prepare(common_keys())
+        compiler, helper = compiling_instantly(gpu, "spare")
+        compiler.prepare(common_keys(), "spare")
         while compiler.left_s is not None:
             compiler.hear()
         assert all(compiler.has(key) for key in common_keys())
@@ -214,25 +219,39 @@ def test_what_any_scene_needs_is_prepared_once(gpu: Renderer, cold: Path) -> Non
 
 def test_what_a_newer_scene_needs_takes_the_place_of_the_older_one_s(gpu: Renderer, cold: Path) -> None:
     """But for the kernel that is being compiled."""
-    compiler, helper = CompileClient(gpu.info, None, lambda: True, "soon"), Instant()
-    compiler._helper = helper  # type: ignore[assignment]
+    compiler, helper = compiling_instantly(gpu, "soon")
     keys = common_keys()
     streams: list[Any] = [lambda milliseconds: None, lambda milliseconds: 0]
-    compiler.prepare(keys[:3], told=streams[0])
-    compiler.prepare(keys[3:5], told=streams[1])
-    compiler.prepare(keys[2:3] + keys[6:8], told=streams[0])
+    compiler.prepare(keys[:3], "soon", done=streams[0])
+    compiler.prepare(keys[3:5], "soon", done=streams[1])
+    compiler.prepare(keys[2:3] + keys[6:8], "soon", done=streams[0])
     while compiler.left_s is not None:
         compiler.hear()
     assert sorted(map(keys.index, helper.asked)) == [0, 2, 3, 4, 6, 7]
 
 
+def test_what_somebody_waits_for_stands_behind_nothing_foreseen(gpu: Renderer, cold: Path) -> None:
+    compiler, urgent = compiling_instantly(gpu, "now")
+    foreseen: dict[Priority, Instant] = {"soon": Instant(), "spare": Instant()}
+    for priority, helper in foreseen.items():
+        compiler._lanes[priority].helper = helper  # type: ignore[assignment]
+    keys, ended = common_keys(), list[float]()
+    compiler.prepare(keys[:3], "spare")
+    compiler.prepare(keys[3:5], "soon")
+    assert compiler.queue(keys[2], ended.append) and urgent.asked == [keys[2]]
+    while compiler.left_s is not None:
+        compiler.hear()
+    assert ended == [5.0] and not compiler.queue(keys[4], ended.append), "it was foreseen"
+    compiler.prepare(keys[:5], "spare")
+    assert foreseen["spare"].asked == keys[:3] and compiler.is_idle("spare")
+
+
 def test_clients_take_turns_at_the_compiler(gpu: Renderer, cold: Path) -> None:
-    compiler, helper = CompileClient(gpu.info, None, lambda: True), Instant()
-    compiler._helper = helper  # type: ignore[assignment]
+    compiler, helper = compiling_instantly(gpu, "now")
     keys = list(common_keys()[:7])
     of = dict(zip(keys, ["flood"] * 5 + ["other"] * 2, strict=True))
     for key, client in of.items():
-        assert compiler.waits(key, lambda ms, key=key: None, client=client)  # type: ignore[misc]
+        assert compiler.queue(key, lambda ms, key=key: None, client=client)  # type: ignore[misc]
     while compiler.left_s is not None:
         compiler.hear()
     assert [of[key] for key in helper.asked] == ["flood", "other", "flood", "other", "flood", "flood", "flood"]

@@ -1,4 +1,4 @@
-"""The renderer's side of the process that compiles: one kernel at a time, while other tasks are traced."""
+"""The renderer's side of the processes that compile kernels ahead, while other tasks are traced."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Any, Literal, get_args
 
 from service.ipc import channel
 from service.ipc.messages import driver_of
@@ -31,14 +31,14 @@ DISABLED = {"1", "true", "yes", "y", "t"}
 # time that nobody else wants, however long that takes
 Priority = Literal["now", "soon", "spare"]
 
-Told = Callable[[float], None]
+Done = Callable[[float], None]  # called with the milliseconds that a kernel took
 
 log = logging.getLogger(__name__)
 
 
 @dataclass(frozen=True)
 class Compiled:
-    """What the helper answers; `cached`: it is in the driver's disk cache."""
+    """What a helper answers; `cached`: the kernel is in the driver's disk cache."""
 
     milliseconds: float
     cached: bool
@@ -46,90 +46,123 @@ class Compiled:
 
 
 @dataclass
-class _CompileRequest:
-    key: KernelKey
-    told: dict[Told, str] = field(default_factory=dict)  # callers, and the client of each
+class _Lane:
+    """The kernels of one priority, and the process that compiles them one by one."""
+
+    helper: HelperProcess
+    limit_s: float
+    wanted: dict[KernelKey, dict[Done, str]] = field(default_factory=dict)  # whom to call, and the client of each
+    key: KernelKey | None = None  # the one under way
+    until: float = 0.0  # by the monotonic clock: when it takes too long
+    runnable: RunnableTime | None = None  # of its process since it began
+    failures: int = 0  # in a row
+    begun: int = 0
+    served: dict[str, int] = field(default_factory=dict)  # by client: the number of its last kernel
+
+    @property
+    def left_s(self) -> float | None:
+        """How many more seconds a wait for the kernel under way makes sense; None: there is none."""
+        return None if self.key is None else max(0.0, self.until - time.monotonic())
+
+    def forget(self, done: Done) -> None:
+        for key, callers in list(self.wanted.items()):
+            callers.pop(done, None)
+            if not callers and key != self.key:
+                del self.wanted[key]
+
+    def choose(self) -> KernelKey:
+        """The next kernel: of the client that was served longest ago, or that came first."""
+        served = {k: min((self.served.get(c, 0) for c in who.values()), default=0) for k, who in self.wanted.items()}
+        self.key = min(self.wanted, key=lambda key: served[key])
+        self.begun += 1
+        if len(self.served) > REMEMBERED:
+            self.served.clear()
+        self.served |= dict.fromkeys(self.wanted[self.key].values(), self.begun)
+        return self.key
+
+    def is_late(self) -> bool:
+        """Whether the kernel takes too long. The time that its process waited for a processor does not count."""
+        if self.key is None or time.monotonic() < self.until:
+            return False
+        left_s = 0.0 if self.runnable is None else self.limit_s - self.runnable.elapsed_s
+        self.until = time.monotonic() + left_s
+        return left_s <= 0
 
 
 class CompileClient:
-    """Compiles kernels in a process that starts at the first request and ends when idle for a while."""
+    """A queue of kernels with three priorities, and which kernels need not be compiled any more.
+
+    Each priority has a process of its own, which starts at the first request and ends when idle for a while. So the
+    system preempts what is foreseen where somebody waits, and nothing is lost: one process could only be killed, and
+    would begin again with up to a minute of compiling, after 0.4 s of a core for its start. Nor can a process that
+    has lowered its priority raise it again."""
 
     def __init__(
-        self,
-        info: dict[str, Any],
-        device: int | None,
-        crowded: Callable[[], bool],
-        priority: Priority = "now",
-        lifeline: int | None = None,
+        self, info: dict[str, Any], device: int | None, crowded: Callable[[], bool], lifeline: int | None = None
     ) -> None:
-        """`info` is the renderer's; `crowded`: somebody would be stalled by compiling in the loop; `lifeline`: its
-        process ends with the server, and when the renderer is killed goes on with what it compiles, for the next
-        one."""
+        """`info` is the renderer's; `crowded`: compiling in the loop would stall somebody. `lifeline`: the process
+        for "now" ends with the server; where only the renderer is killed it finishes its kernel, for the next one."""
         self._driver = driver_of(info)
         self._crowded = crowded
-        given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
-        given += ["--priority", priority]
-        self._helper = HelperProcess("service.worker.helpers.compile_main", *given, lifeline=lifeline)
-        self._limit_s = LIMIT_S if priority == "now" else SPARE_LIMIT_S
         self._able = _has_cache()
         self._records = records()
-        self._known: set[KernelKey] = set()  # kernels that need no helper any more, or that it could not compile
-        self._met: set[KernelKey] = set()
-        self._orders: list[_CompileRequest] = []  # the first is under way
-        self._served: dict[str, int] = {}  # by client: the number of its last kernel
-        self._begun = 0
-        self._until = 0.0
-        self._runnable: RunnableTime | None = None  # of the order under way
-        self._failures = 0
+        self._known: set[KernelKey] = set()  # kernels that are compiled, or that no helper could compile
+        self._met: set[KernelKey] = set()  # those of them that the renderer has loaded
+        self._lanes = dict[Priority, _Lane]()
+        given = ["--driver", self._driver, *([] if device is None else ["--device", str(device)])]
+        for each in get_args(Priority):
+            line = lifeline if each == "now" else None
+            helper = HelperProcess("service.worker.helpers.compile_main", *given, "--priority", each, lifeline=line)
+            self._lanes[each] = _Lane(helper, LIMIT_S if each == "now" else SPARE_LIMIT_S)
 
     @property
     def ends(self) -> list[socket.socket]:
         """The sockets to wait on."""
-        return self._helper.ends
+        return [end for lane in self._lanes.values() for end in lane.helper.ends]
 
     @property
     def left_s(self) -> float | None:
-        """How many more seconds a wait for the kernel under way makes sense."""
-        return max(0.0, self._until - time.monotonic()) if self._orders else None
+        """In how many seconds `hear` has to look whether a kernel takes too long; None: there is none under way."""
+        return min((left for lane in self._lanes.values() if (left := lane.left_s) is not None), default=None)
+
+    def is_idle(self, priority: Priority) -> bool:
+        return self._lanes[priority].key is None
 
     def knows(self, key: KernelKey) -> bool:
         """Whether nobody needs to wait for this kernel any more."""
         return key in self._known
 
-    def waits(self, key: KernelKey, told: Told, alone: bool = False, client: str = "") -> bool:
-        """Whether `told` will be called (from `hear`, with the ms it took) when the kernel should be asked for again:
-        it is being compiled. False: it loads at once, or there is no better way than to compile it in the loop, as
-        where nobody else is there, unless there is something to do meanwhile (`alone`). Turns go round the clients.
-        """
-        self.forget(told)
-        return self._enlist(key, told, alone, client)
+    def has(self, key: KernelKey) -> bool:
+        """Whether the kernel loads at once, from the driver's disk cache."""
+        return key in self._met or self._is_recorded(key)
 
-    def _enlist(self, key: KernelKey, told: Told, alone: bool, client: str) -> bool:
-        if self.knows(key):
-            return False
-        order = next((order for order in self._orders if order.key == key), None)
-        if order is None:
-            if not self._able or not (alone or self._crowded()):
-                return False
-            if self._is_recorded(key):
-                self._known.add(key)
-                return False
-            order = _CompileRequest(key, {told: client})
-            self._orders.append(order)
-            if len(self._orders) == 1:
-                self._begin()
-        if order not in self._orders:  # the helper cannot be started
-            return False
-        order.told[told] = client
-        return True
+    def queue(self, key: KernelKey, done: Done, alone: bool = False, client: str = "") -> bool:
+        """Queue a kernel that a task waits for, in the place of what `done` waited for; whether `hear` will call
+        `done`. Turns go round the clients.
 
-    def prepare(self, keys: list[KernelKey], client: str = "", told: Told | None = None) -> None:
-        """Compile those of the kernels that no renderer here has had yet, although nobody waits for them. With `told`
-        they take the place of those that were prepared with it before."""
-        if told is not None:
-            self.forget(told)
+        False: use it now. It is compiled already, or compiling it in the loop stalls nobody; `alone`: not even then,
+        as there is something to show meanwhile."""
+        lane = self._lanes["now"]
+        lane.forget(done)
+        if key in self._known:
+            return False
+        if key not in lane.wanted and (not (alone or self._crowded()) or self._is_compiled(key)):
+            return False
+        return self._add(lane, key, done, client)
+
+    def prepare(self, keys: list[KernelKey], priority: Priority, client: str = "", done: Done | None = None) -> None:
+        """Queue the kernels that are not compiled, although nobody waits for them. With `done` they take the place of
+        those that were prepared with it before."""
+        lane = self._lanes[priority]
+        if done is not None:
+            lane.forget(done)
         for key in keys:
-            self._enlist(key, told or _nobody, False, client)
+            if not self._is_compiled(key):
+                self._add(lane, key, done or _nobody, client)
+
+    def forget(self, done: Done) -> None:
+        """Drop one caller's wait; a kernel that nobody waits for is not begun."""
+        self._lanes["now"].forget(done)
 
     def met(self, key: KernelKey) -> None:
         """Note that the renderer has this kernel, and so has the driver's disk cache."""
@@ -143,9 +176,29 @@ class CompileClient:
         self._met.add(key)
         self._record(key)
 
-    def has(self, key: KernelKey) -> bool:
-        """Whether the kernel loads at once, from the driver's disk cache."""
-        return key in self._met or self._is_recorded(key)
+    def hear(self) -> None:
+        """Call those whose kernels are compiled, and begin the next ones."""
+        for lane in self._lanes.values():
+            self._hear(lane)
+
+    def close(self) -> None:
+        for lane in self._lanes.values():
+            lane.helper.close()
+
+    def _add(self, lane: _Lane, key: KernelKey, done: Done, client: str) -> bool:
+        """Queue a kernel or join who waits for it. False: no helper can be started."""
+        if key in lane.wanted:
+            lane.wanted[key][done] = client
+        elif self._able:
+            lane.wanted[key] = {done: client}
+            if lane.key is None:
+                self._begin(lane)
+        return key in lane.wanted
+
+    def _is_compiled(self, key: KernelKey) -> bool:
+        if key not in self._known and self._is_recorded(key):
+            self._known.add(key)
+        return key in self._known
 
     def _is_recorded(self, key: KernelKey) -> bool:
         return self._able and os.path.exists(self._records / key.digest(self._driver))
@@ -159,24 +212,33 @@ class CompileClient:
             except OSError as error:
                 log.info("could not record a compiled kernel", {"error": error})
 
-    def forget(self, told: Told) -> None:
-        """Drop one caller's wait; a kernel that nobody waits for is not begun."""
-        for order in self._orders:
-            order.told.pop(told, None)
-        self._orders[1:] = [order for order in self._orders[1:] if order.told]
-
-    def hear(self) -> None:
-        """Pass answers on to the callers that wait, and begin the next kernel."""
+    def _begin(self, lane: _Lane) -> None:
+        """Send the next request; where the process cannot be started, all callers compile for themselves."""
         try:
-            answer: Compiled = self._helper.hear()
-        except BlockingIOError:
-            if not self._orders or time.monotonic() < self._until or self._is_starved():
+            if self._able and lane.failures < TRIES:
+                lane.helper.ask(lane.choose())
+                lane.until = time.monotonic() + lane.limit_s
+                lane.runnable = None if lane.helper.process_id is None else RunnableTime(lane.helper.process_id)
                 return
-            self._ended(f"it took more than {self._limit_s:.0f} s")
+        except (channel.Closed, OSError) as error:  # it can't be started
+            log.info("could not start the compiler", {"error": error or "it had ended"})
+            lane.helper.close()
+        self._able = False
+        log.warning("gave up compiling ahead: kernels are compiled in the loop")
+        for key in list(lane.wanted):
+            self._end(lane, key, 0.0)
+
+    def _hear(self, lane: _Lane) -> None:
+        try:
+            answer: Compiled = lane.helper.hear()
+        except BlockingIOError:
+            if lane.is_late():
+                self._give_up(lane, f"it took more than {lane.limit_s:.0f} s")
         except channel.Closed:
-            self._ended("the compiler's process ended unexpectedly")
+            self._give_up(lane, "the compiler's process ended unexpectedly")
         else:
-            self._failures = 0 if answer.cached else self._failures + 1
+            assert lane.key is not None
+            lane.failures = 0 if answer.cached else lane.failures + 1
             if not answer.cached:
                 log.warning("compiled ahead in vain: the driver has no disk cache to write to")
             if answer.detail:
@@ -184,61 +246,24 @@ class CompileClient:
             else:
                 log.debug("compiled ahead", {"ms": round(answer.milliseconds)})
             if answer.cached and not answer.detail:
-                self._record(self._orders[0].key)
-            self._tell(answer.milliseconds)
-        if self._orders:
-            self._begin()
+                self._record(lane.key)
+            self._end(lane, lane.key, answer.milliseconds)
+        if lane.key is None and lane.wanted:
+            self._begin(lane)
 
-    def _is_starved(self) -> bool:
-        """Whether the process lacked a processor for some of its time; its limit grows by that much."""
-        left_s = 0.0 if self._runnable is None else self._limit_s - self._runnable.elapsed_s
-        self._until = time.monotonic() + left_s
-        return left_s > 0
-
-    def close(self) -> None:
-        self._helper.close()
-
-    def _ended(self, detail: str) -> None:
-        self.close()
-        if self._orders:
-            self._failures += 1
+    def _give_up(self, lane: _Lane, detail: str) -> None:
+        """End the process, and have the kernel under way compiled in the loop."""
+        lane.helper.close()
+        if lane.key is not None:
+            lane.failures += 1
             log.warning("left a kernel to be compiled in the loop", {"reason": detail})
-            self._tell(0.0)
+            self._end(lane, lane.key, 0.0)
 
-    def _tell(self, milliseconds: float) -> None:
-        order = self._orders.pop(0)
-        self._known.add(order.key)
-        for told in order.told:
-            told(milliseconds)
-
-    def _begin(self) -> None:
-        """Send the next request; where the process cannot be started, all callers are told to compile themselves."""
-        self._choose()
-        try:
-            if self._failures < TRIES:
-                self._helper.ask(self._orders[0].key)
-                self._until = time.monotonic() + self._limit_s
-                self._runnable = None if self._helper.process_id is None else RunnableTime(self._helper.process_id)
-                return
-        except (channel.Closed, OSError) as error:  # it can't be started
-            log.info("could not start the compiler", {"error": error or "it had ended"})
-            self.close()
-        self._able = False
-        log.warning("gave up compiling ahead: kernels are compiled in the loop")
-        while self._orders:
-            self._tell(0.0)
-
-    def _choose(self) -> None:
-        """Put the order first whose client was served longest ago; equal ones keep their order."""
-        first = min(
-            self._orders, key=lambda order: min((self._served.get(c, 0) for c in order.told.values()), default=0)
-        )
-        self._orders.remove(first)
-        self._orders.insert(0, first)
-        self._begun += 1
-        if len(self._served) > REMEMBERED:
-            self._served.clear()
-        self._served |= dict.fromkeys(first.told.values(), self._begun)
+    def _end(self, lane: _Lane, key: KernelKey, milliseconds: float) -> None:
+        lane.key = None
+        self._known.add(key)
+        for done in lane.wanted.pop(key):
+            done(milliseconds)
 
 
 def _nobody(milliseconds: float) -> None:

@@ -22,7 +22,7 @@ class KernelWait:
 
     def begin(self, key: KernelKey, shown: bool = False) -> bool:
         """Whether that kernel is now being compiled; `shown`: with something to look at meanwhile."""
-        self.compiling = self.compiler is not None and self.compiler.waits(key, self._hear, shown, self._client)
+        self.compiling = self.compiler is not None and self.compiler.queue(key, self._hear, shown, self._client)
         return self.compiling
 
     def stop(self) -> None:

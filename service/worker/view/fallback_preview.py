@@ -50,12 +50,12 @@ class FallbackPreview:
     the kernel for many scenes."""
 
     def __init__(
-        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, spare: CompileClient | None
+        self, number: int, send: Callable[[FromRenderer], None], renderer: Renderer, compiler: CompileClient | None
     ) -> None:
-        """`spare` compiles in idle time; without it there is never a preview."""
+        """Without a `compiler` there is never a preview."""
         self.generation = 0
         self.scale: float | None = None  # of what there is to see
-        self._number, self._send, self._renderer, self._spare = number, send, renderer, spare
+        self._number, self._send, self._renderer, self._compiler = number, send, renderer, compiler
         self._superset: frozenset[str] | None = None  # of the scene that is being edited
         self._scene: Scene | None = None
         self._raised: frozenset[str] | None = None  # flags of `_scene`; None: those of the kernel for many scenes
@@ -83,8 +83,8 @@ class FallbackPreview:
         """The keys of the superset kernels, which edits of these arrays may need soon. Has the kernel for many scenes
         compiled in idle time."""
         general = fallback.kernel_key(arrays, settings)
-        if general is not None and self._spare is not None:
-            self._spare.prepare([general])
+        if general is not None and self._compiler is not None:
+            self._compiler.prepare([general], "spare")
         self._superset = fallback.superset(arrays)
         return fallback.superset_keys(arrays, settings, self._superset)
 
@@ -98,14 +98,14 @@ class FallbackPreview:
         """The kernel that shows such a picture soonest, of those that are compiled."""
         for raised in (None,) if self._superset is None else (self._superset, None):
             key = fallback.kernel_key(wanted.arrays, wanted.settings, raised)
-            if key is not None and self._spare is not None and self._spare.has(key):
+            if key is not None and self._compiler is not None and self._compiler.has(key):
                 return _Compiled(key, raised)
         return None
 
     def begin(self, wanted: KernelRequest, generation: int) -> None:
         """Begin to show what `can` be shown; where loading fails, nothing is shown."""
         settings, kernel = fallback.settings_for(wanted.settings), self._compiled(wanted)
-        assert settings is not None and kernel is not None and self._spare is not None
+        assert settings is not None and kernel is not None and self._compiler is not None
         self.generation, self.scale, self._began, self._spent_s = generation, None, time.monotonic(), 0.0
         self._meter = NoiseReading()
         try:
@@ -121,7 +121,7 @@ class FallbackPreview:
             self._ladder = ResolutionLadder(self._renderer, scene, settings, full=False)
             self._next = self._fitting(self._ladder, FIRST_S)
             self._ladder.picture(self._next)
-            self._spare.met(kernel.key)
+            self._compiler.met(kernel.key)
         except GpuError as error:
             log.info("could not show a preview by the fallback kernel", {"error": error})
             self.release()
