@@ -10,7 +10,8 @@ import pytest
 from service.ipc import channel
 from service.ipc.messages import Failed, Loaded, StopRule, Update
 from service.ipc.orders import Settle
-from service.renderers.replay_log import STATES, ReplayLog
+from service.renderers.replay_log import ReplayLog
+from service.renderers.working_states import MOST
 
 
 @pytest.fixture
@@ -48,7 +49,7 @@ def test_of_many_scenes_that_wait_the_one_that_works_and_the_newest_stay(log: Re
     works(log, 1)
     for generation in range(2, 10):
         send_scene(log, generation)
-    assert generations(log) == [1, *range(10 - (STATES - 1), 10)]
+    assert generations(log) == [1, *range(10 - (MOST - 1), 10)]
     log.heard(Failed(1, 9, "too large", fallback=1))
     assert generations(log) == [1]
 
