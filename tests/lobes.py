@@ -7,14 +7,14 @@ import math
 import numpy as np
 import pytest
 
-from gpu.layout import MaterialModel
+from gpu.layout.models import NUMBERS
 from tests import stats
 from tests.probing import materials
 
-D, METAL_ROUGH, BLINN_PHONG = MaterialModel.DISNEY, MaterialModel.METAL_ROUGH, MaterialModel.BLINN_PHONG
-PHONG = MaterialModel.PHONG
+D, METAL_ROUGH, BLINN_PHONG = NUMBERS["disney"], NUMBERS["metal_rough"], NUMBERS["blinn_phong"]
+PHONG = NUMBERS["phong"]
 ROWS = {
-    "diffuse": materials(model=MaterialModel.DIFFUSE, base_color=(0.8, 0.5, 0.1)),
+    "diffuse": materials(model=NUMBERS["diffuse"], base_color=(0.8, 0.5, 0.1)),
     "disney default": materials(model=D),
     "retro-reflective": materials(model=D, roughness=1, specular=0, base_color=(0.9, 0.2, 0.4)),
     "subsurface": materials(model=D, subsurface=1, roughness=0.8),
@@ -43,7 +43,7 @@ ROWS = {
     "phong dull": materials(model=PHONG, base_color=0.2, phong_specular=1, shininess=2.5),
     "phong mirror": materials(model=PHONG, base_color=0, phong_specular=1, shininess=1e6),
 }  # fmt: skip
-P = MaterialModel.PRINCIPLED
+P = NUMBERS["principled"]
 GLASS = {"model": P, "transmission": 1, "base_color": (1, 0.8, 0.6)}
 PRINCIPLED = {
     "plastic": materials(model=P, roughness=0.3),

@@ -179,7 +179,7 @@ class BsdfEvaluator:
         contexts.use(self._context)
         bare = own.bare(material)
         flags = features.evaluating(bare)
-        if "HAS_PRINCIPLED" in flags and not self._tables:
+        if features.needs_tables(flags) and not self._tables:
             self._tables = upload_tables(self._context)
         kernel = self._kernels.get(entry, own.defines(bare, flags, entry))
         work = _Dispatch(self._context, self._kernels, kernel, self._tables, uniforms)

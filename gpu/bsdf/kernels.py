@@ -14,8 +14,7 @@ from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.bsdf import lobes
 from gpu.kernels import features
-from gpu.layout import MaterialModel
-from gpu.layout.microfacet_records import Microfacet
+from gpu.layout.models import MODELS
 
 VALUES, ALBEDO, TERMS = "bsdf_values.comp", "bsdf_albedo.comp", "bsdf_terms.comp"
 ENTRIES = {"values": VALUES, "albedo": ALBEDO, "terms": TERMS}  # the kernel for each question about a material
@@ -44,10 +43,10 @@ def defines(arrays: SceneArrays, raised: frozenset[str], entry: str) -> dict[str
 
 def samples() -> Iterator[tuple[SceneArrays, frozenset[str]]]:
     """A bare material of each model with the flags of each kernel that evaluates one of that model."""
-    for model in MaterialModel:
+    for model in MODELS:
         material = np.zeros(1, layout.Material.dtype)
-        material["model"] = model
-        terms = Microfacet.words // 4 if model == MaterialModel.MICROFACET else 0
+        material["model"] = model.number
+        terms = model.record.words // 4 if model.record else 0
         arrays = bare(SceneArrays(NOWHERE, material, microfacets=np.zeros((terms, 4), np.uint32)))
         raised = features.evaluating(arrays)
         yield from ((arrays, flags) for flags in (raised, *features.touched(raised, anywhere=False)))

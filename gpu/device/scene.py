@@ -97,7 +97,7 @@ class Scene:
             for thing in (*self._buffers.values(), *self._details.values()):
                 thing.release()
             raise
-        self._tables = upload_tables(context) if "HAS_PRINCIPLED_LOBES" in self._raised else {}
+        self._tables = upload_tables(context) if features.needs_tables(self._raised) else {}
         count = sum(len(getattr(arrays, n)) for n in ("spheres", "quads", "boxes", "ellipsoids", "triangles"))
         log.info("loaded scene", {"shapes": count, "lights": len(arrays.lights), "materials": len(arrays.materials)})
 
@@ -213,7 +213,7 @@ class Scene:
             self._buffers[Slot.MATERIALS].write(np.ascontiguousarray(self._materials()).view(np.uint8))
         self._looped = features.looped(arrays)
         self._raised = self._flags() if flags is None else flags
-        if "HAS_PRINCIPLED_LOBES" in self._raised and not self._tables:
+        if features.needs_tables(self._raised) and not self._tables:
             self._tables = upload_tables(self._context)
 
     def bind(self) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from itertools import combinations
 
 import numpy as np
@@ -12,6 +12,7 @@ from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
 from gpu.kernels.flag_table import ANYWHERE, FLAGS, SHAPES, beside, looped_count
 from gpu.layout import ShapeKind
+from gpu.layout.models import MODELS
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
@@ -66,6 +67,11 @@ def evaluating(material: SceneArrays) -> frozenset[str]:
     """The flags of kernels that evaluate the only material of a scene, while its sliders and menus are moved."""
     raised = grown(frozenset(), material)
     return raised | {flag.name for flag in FLAGS.values() if beside(flag.evaluated_with, raised)}
+
+
+def needs_tables(raised: Container[str]) -> bool:
+    """Whether kernels with these flags look up the tables of what microfacets lose."""
+    return any(model.lobes_flag in raised for model in MODELS if model.needs_tables)
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no

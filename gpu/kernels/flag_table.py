@@ -5,15 +5,17 @@ A flag only removes code that the scene cannot reach; choices that change pixels
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 
 from gpu import layout
 from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
-from gpu.layout import LightKind, MaterialModel, ShapeKind, microfacet_records, texture_records
+from gpu.layout import LightKind, ShapeKind, microfacet_records, texture_records
+from gpu.layout.models import COATED, DELTA, FLAGGED, NUMBERS, TRANSMITTING, Model, of, with_optional
 
 Asks = Callable[[SceneArrays], bool]
 ANYWHERE = ("any scene",)  # in place of the names of flags
@@ -84,20 +86,19 @@ def _hidden(s: SceneArrays) -> bool:
     return any(bool((shapes & np.uint32(layout.HIDDEN)).any()) for shapes in records)
 
 
-def _model(model: MaterialModel) -> Asks:
-    return lambda s: bool((s.materials["model"] == model).any())
+def _any_of(models: Iterable[Model]) -> Asks:
+    return lambda s: bool(of(s.materials, models).any())
 
 
-def _disney(member: str) -> Asks:
-    models = (MaterialModel.DISNEY, MaterialModel.PRINCIPLED)
-    return lambda s: bool((np.isin(s.materials["model"], models) & (s.materials[member] > 0)).any())
+def _optional(member: str) -> Asks:
+    return lambda s: bool((of(s.materials, with_optional(member)) & (s.materials[member] > 0)).any())
 
 
 def _microfacets(s: SceneArrays) -> np.ndarray:
     """The records of the materials of that model."""
     words = s.microfacets.reshape(-1)[: len(s.materials) * microfacet_records.Microfacet.words]
     records: np.ndarray = np.ascontiguousarray(words).view(microfacet_records.Microfacet.dtype)
-    found: np.ndarray = records[s.materials["model"][: len(records)] == MaterialModel.MICROFACET]
+    found: np.ndarray = records[s.materials["model"][: len(records)] == NUMBERS["microfacet"]]
     return found
 
 
@@ -107,7 +108,7 @@ def _term(kind: str, value: int) -> Asks:
 
 def _transmits(materials: np.ndarray) -> np.ndarray:
     m = materials
-    out: np.ndarray = (m["model"] == MaterialModel.PRINCIPLED) & (m["transmission"] > 0) & (m["metallic"] < 1)
+    out: np.ndarray = of(m, TRANSMITTING) & (m["transmission"] > 0) & (m["metallic"] < 1)
     return out
 
 
@@ -116,17 +117,15 @@ def _mirrors(materials: np.ndarray) -> np.ndarray:
     m = materials
     whole = (m["metallic"] >= 1) | (m["transmission"] >= 1)
     bare = (m["clearcoat"] <= 0) & (m["sheen"] <= 0)
-    out: np.ndarray = (
-        (m["model"] == MaterialModel.PRINCIPLED) & (m["roughness"] < layout.LEAST_ROUGHNESS) & whole & bare
-    )
+    out: np.ndarray = of(m, DELTA) & (m["roughness"] < layout.LEAST_ROUGHNESS) & whole & bare
     return out
 
 
-def _spreads(s: SceneArrays) -> bool:
-    """Whether kernels need the lobes of `principled`: not where all such materials only mirror or refract, and among
-    them is clear glass, whose paths then take the short loop of path/delta_chain.glsl."""
+def _spreads(s: SceneArrays, model: Model) -> bool:
+    """Whether kernels need the lobes of a model: not where all such materials only mirror or refract, and there is
+    clear glass, so that their paths take the short loop of path/delta_chain.glsl."""
     m = s.materials
-    given = m["model"] == MaterialModel.PRINCIPLED
+    given = of(m, (model,))
     sure = _mirrors(m) & (m["roughness"] != np.float32(layout.TEXTURED))
     spared = (sure & _transmits(m)).any() and not _normal_mapped(s)
     return bool(given.any() and (not spared or (given & ~sure).any()))
@@ -164,7 +163,7 @@ def _coat_apart(s: SceneArrays) -> bool:
         for n in texture_records.NORMALS
         if n in names
     ]
-    coated = (s.materials["model"] == MaterialModel.PRINCIPLED) & (s.materials["clearcoat"] > 0)
+    coated = of(s.materials, COATED) & (s.materials["clearcoat"] > 0)
     return bool((np.any(mapped, axis=0) & coated).any())
 
 
@@ -201,6 +200,18 @@ def _term_flags() -> Iterator[Flag]:
                 yield _of_microfacet(f"HAS_MICROFACET_{kind.upper()}_{term.name}", _term(kind, term))
 
 
+def _model_flags() -> Iterator[Flag]:
+    """A flag for each model but the first, and one for its lobes where scenes can do without them."""
+    for model in FLAGGED:
+        yield Flag(model.flag, _any_of((model,)), in_general=model.in_general)
+        if model.lobes_flag != model.flag:
+            yield Flag(model.lobes_flag, partial(_spreads, model=model), raised_with=(model.flag,))
+
+
+def _flags_of(models: Iterable[Model]) -> tuple[str, ...]:
+    return tuple(model.flag for model in models)
+
+
 def _of_microfacet(name: str, asks: Asks) -> Flag:
     """A flag of the model `microfacet`, whose terms are rare and would cost the pictures of all other scenes time."""
     return Flag(name, asks, evaluated_with=("HAS_MICROFACET",), in_general=False)
@@ -211,8 +222,7 @@ def _of_textures(name: str, asks: Asks, previewed: Asks = Flag.previewed) -> Fla
     return Flag(name, asks, previewed=previewed, in_general=False)
 
 
-_OPAQUE = ("HAS_DISNEY", "HAS_PRINCIPLED")
-_PHONG = ("HAS_BLINN_PHONG", "HAS_PHONG")
+_STRETCHED = with_optional("anisotropic")
 _ROWS = (
     Flag("HAS_SPHERES", _linear(ShapeKind.SPHERE)),
     Flag("HAS_VAST_SPHERES", lambda s: bool((s.spheres["power"] < layout.NOT_VAST).any())),
@@ -269,24 +279,31 @@ _ROWS = (
     # Without an aperture its code costs less than 2 % of a sample's time (cornell-boxes, sphere-on-floor,
     # point-lights).
     Flag("HAS_APERTURE", lambda s: bool(s.camera["aperture_radius"] > 0), raised_with=ANYWHERE, of_camera=True),
-    Flag("HAS_DISNEY", _model(MaterialModel.DISNEY)),
-    Flag("HAS_SUBSURFACE", _disney("subsurface"), raised_with=_OPAQUE),
-    Flag("HAS_SHEEN", _disney("sheen"), raised_with=_OPAQUE),
-    # It doubles the time of a sample of `principled`.
-    Flag("HAS_ANISOTROPIC", _disney("anisotropic"), raised_with=("HAS_DISNEY",), compiled_with=("HAS_PRINCIPLED",)),
-    Flag("HAS_CLEARCOAT", _disney("clearcoat"), raised_with=_OPAQUE),
-    Flag("HAS_METAL_ROUGH", _model(MaterialModel.METAL_ROUGH)),
-    Flag("HAS_BLINN_PHONG", _model(MaterialModel.BLINN_PHONG)),
-    Flag("HAS_PHONG", _model(MaterialModel.PHONG)),
-    Flag("HAS_AMBIENT", lambda s: bool((s.materials["ambient"] > 0).any()), raised_with=_PHONG),
-    _of_microfacet("HAS_MICROFACET", _model(MaterialModel.MICROFACET)),
+    *_model_flags(),
+    Flag("HAS_SUBSURFACE", _optional("subsurface"), raised_with=_flags_of(with_optional("subsurface"))),
+    Flag("HAS_SHEEN", _optional("sheen"), raised_with=_flags_of(with_optional("sheen"))),
+    # It doubles the time of a sample where the tables of stretched lobes are looked up.
+    Flag(
+        "HAS_ANISOTROPIC",
+        _optional("anisotropic"),
+        raised_with=_flags_of(model for model in _STRETCHED if not model.needs_tables),
+        compiled_with=_flags_of(model for model in _STRETCHED if model.needs_tables),
+    ),
+    Flag("HAS_CLEARCOAT", _optional("clearcoat"), raised_with=_flags_of(with_optional("clearcoat"))),
+    Flag(
+        "HAS_AMBIENT",
+        lambda s: bool((s.materials["ambient"] > 0).any()),
+        raised_with=_flags_of(with_optional("ambient")),
+    ),
     *_term_flags(),
     _of_microfacet("HAS_MICROFACET_TABLES", lambda s: bool((_microfacets(s)["rows"] > 0).any())),
-    Flag("HAS_PRINCIPLED", _model(MaterialModel.PRINCIPLED)),
-    Flag("HAS_PRINCIPLED_LOBES", _spreads, raised_with=("HAS_PRINCIPLED",)),
     # It adds a fifth to the time of a sample of `principled`.
-    Flag("HAS_TRANSMISSION", lambda s: bool(_transmits(s.materials).any()), compiled_with=("HAS_PRINCIPLED",)),
+    Flag(
+        "HAS_TRANSMISSION",
+        lambda s: bool(_transmits(s.materials).any()),
+        compiled_with=_flags_of(TRANSMITTING),
+    ),
     Flag("HAS_MIRRORS", lambda s: bool((_transmits(s.materials) & _mirrors(s.materials)).any()), spares=True),
-    Flag("HAS_ATTENUATION", _attenuates, previewed=_where("HAS_PRINCIPLED")),
+    Flag("HAS_ATTENUATION", _attenuates, previewed=_any_of(TRANSMITTING)),
 )
 FLAGS = {flag.name: flag for flag in _ROWS}

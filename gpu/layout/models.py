@@ -7,10 +7,14 @@ for its name.
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 from enum import IntEnum
 
 import numpy as np
+
+from gpu.layout.microfacet_records import Microfacet
+from gpu.layout.record import Record
 
 
 class Lobe(IntEnum):
@@ -42,6 +46,9 @@ class Model:
     has_terms: bool = False  # it has a distribution, a geometry and a Fresnel term
     has_coat_normals: bool = False  # its coat may have a normal of its own
     has_members: bool = False  # Surface has members for it alone, in shaders/bsdf/models/NAME_members.glsl
+    optional: tuple[str, ...] = ()  # members of `layout.Material` that raise a flag where they are above 0
+    record: type[Record] | None = None  # what it has besides `layout.Material`
+    in_general: bool = True  # the kernel for many scenes has it; a rare one would cost all other scenes time
 
     @property
     def flag(self) -> str:
@@ -56,15 +63,16 @@ class Model:
 
 
 _PLAIN = (Lobe.DIFFUSE, Lobe.SPECULAR)
+_LAYERS = ("subsurface", "sheen", "anisotropic", "clearcoat")
 
 # The first has no flag: it is in every kernel. Kernels ask for the others in this order.
 MODELS = (
     Model("diffuse", 0, (Lobe.DIFFUSE,)),
-    Model("disney", 1, (Lobe.DIFFUSE, Lobe.SPECULAR, Lobe.SHEEN, Lobe.CLEARCOAT), has_terms=True),
+    Model("disney", 1, (Lobe.DIFFUSE, Lobe.SPECULAR, Lobe.SHEEN, Lobe.CLEARCOAT), has_terms=True, optional=_LAYERS),
     Model("metal_rough", 3, _PLAIN, has_terms=True),
-    Model("blinn_phong", 4, _PLAIN),
-    Model("phong", 6, _PLAIN),
-    Model("microfacet", 5, _PLAIN, has_terms=True, has_members=True),
+    Model("blinn_phong", 4, _PLAIN, optional=("ambient",)),
+    Model("phong", 6, _PLAIN, optional=("ambient",)),
+    Model("microfacet", 5, _PLAIN, has_terms=True, has_members=True, record=Microfacet, in_general=False),
     Model(
         "principled",
         2,
@@ -76,6 +84,7 @@ MODELS = (
         has_terms=True,
         has_coat_normals=True,
         has_members=True,
+        optional=_LAYERS,
     ),
 )
 FLAGGED = MODELS[1:]
@@ -83,12 +92,17 @@ NUMBERS = {model.name: model.number for model in MODELS}
 BY_NUMBER = {model.number: model for model in MODELS}
 
 
-def numbers(trait: str) -> np.ndarray:
-    """The numbers of the models with a trait, by its name."""
-    return np.array([model.number for model in MODELS if getattr(model, trait)], np.uint32)
-
-
-def able(materials: np.ndarray, trait: str) -> np.ndarray:
-    """Whether the model of each `layout.Material` record has a trait, by its name."""
-    out: np.ndarray = np.isin(materials["model"], numbers(trait))
+def of(materials: np.ndarray, models: Iterable[Model]) -> np.ndarray:
+    """Whether each `layout.Material` record is of one of these models."""
+    out: np.ndarray = np.isin(materials["model"], [model.number for model in models])
     return out
+
+
+TRANSMITTING = tuple(model for model in MODELS if model.transmits)
+DELTA = tuple(model for model in MODELS if model.may_be_delta)
+COATED = tuple(model for model in MODELS if model.has_coat_normals)
+
+
+def with_optional(member: str) -> tuple[Model, ...]:
+    """The models with an optional member of `layout.Material`."""
+    return tuple(model for model in MODELS if member in model.optional)

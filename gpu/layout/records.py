@@ -51,23 +51,13 @@ class LightKind(IntEnum):
     ELLIPSOID = 7
 
 
-class MaterialModel(IntEnum):
-    DIFFUSE = 0
-    DISNEY = 1
-    PRINCIPLED = 2
-    METAL_ROUGH = 3
-    BLINN_PHONG = 4
-    MICROFACET = 5
-    PHONG = 6
-
-
 class Material(Record):
     slot = Slot.MATERIALS
     base_color: vec3  # linear Rec.709 reflectance, each channel in [0, 1]; diffuse's albedo
     roughness: f32  # perceptual, [0, 1]
     emission: vec3  # radiance, W / (m^2 sr) per channel
     metallic: f32
-    model: u32  # Model
+    model: u32  # models.Model.number
     subsurface: f32
     specular: f32
     specular_tint: f32

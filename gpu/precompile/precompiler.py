@@ -12,6 +12,7 @@ from gpu import context as contexts
 from gpu.device.scene import upload_tables
 from gpu.device.textures import BYTES
 from gpu.errors import CompileError
+from gpu.kernels import features
 from gpu.layout import bindings
 from gpu.picture import accumulators
 from gpu.precompile.kernel_keys import KernelKey
@@ -62,7 +63,7 @@ class Precompiler:
         """Compile to machine code by running over no pixel. Returns the processor time that it took (s)."""
         text = wanted.text
         textures = [self._texture(*kind) for kind in wanted.textures]
-        if dict(wanted.defines).get("HAS_PRINCIPLED_LOBES"):
+        if features.needs_tables({name for name, value in wanted.defines if value}):
             for unit, table in self._energy().items():
                 table.use(unit)
         start = time.process_time()

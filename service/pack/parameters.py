@@ -7,10 +7,12 @@ import math
 import numpy as np
 
 from gpu import layout
+from gpu.layout import models
 from service.scene import Scene
 from service.scene.camera import Camera
 from service.scene.environment import Environment, SkyEnvironment
-from service.scene.material import Material, MicrofacetMaterial
+from service.scene.material import Material
+from service.scene.material.surface import SolidSurface
 from service.scene.numbers import Vec3
 from service.scene.texture import ColorTexture, ScalarTexture
 
@@ -50,7 +52,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
     records = np.zeros(len(scene.materials), layout.Material.dtype)
     records["number"] = np.arange(len(records))
     for record, material in zip(records, scene.materials.values(), strict=True):
-        record["model"] = layout.MaterialModel[material.type.upper()]
+        record["model"] = models.NUMBERS[material.type]
         for name in type(material).model_fields:
             if name == "emission_sides":
                 record[name] = SIDES[material.emission_sides]
@@ -62,7 +64,7 @@ def pack_materials(scene: Scene) -> np.ndarray:
                     value = np.where(np.greater(value.factor, 0), layout.TEXTURED, 0)
                 record[member] = layout.ABSENT if value is None else value
         record["opacity"] = opacity(material)
-        if isinstance(material, MicrofacetMaterial):
+        if isinstance(material, SolidSurface):
             record["cutoff"] = layout.ABSENT
         elif isinstance(material.alpha, float) and isinstance(material.alpha_cutoff, float) and material.alpha > 0:
             record["cutoff"] /= material.alpha  # the opacity is 1 or 0 already, and a vertex's alpha a share of that
@@ -74,10 +76,15 @@ def member_of(material: Material, name: str) -> str:
     return RENAMED_IN.get(material.type, {}).get(name, RENAMED.get(name, name))
 
 
+def has_terms(model: str) -> bool:
+    """Whether a model, by its name, has a distribution, a geometry and a Fresnel term."""
+    return models.BY_NUMBER[models.NUMBERS[model]].has_terms
+
+
 def opacity(material: Material) -> float:
     """The chance that a ray meets the surface."""
-    if isinstance(material, MicrofacetMaterial):
-        return 1.0  # its parameter `alpha` is a roughness
+    if isinstance(material, SolidSurface):
+        return 1.0
     if isinstance(material.alpha, ScalarTexture):
         return layout.TEXTURED
     if material.alpha_cutoff is None or isinstance(material.alpha_cutoff, ScalarTexture):

@@ -10,9 +10,11 @@ import numpy as np
 from pydantic import Field, TypeAdapter
 
 from service.ipc.messages import BsdfQuestion
+from service.pack.parameters import has_terms
 from service.problems import FieldError, InvalidDocument, TooLarge
 from service.scene import ColorTexture, Material, NormalTexture, ScalarTexture, load_json
 from service.scene.base import Model
+from service.scene.material import MODELS
 from service.scene.number_arrays import QuestionDirections
 from service.scene.numbers import Cosine
 from service.scene.validation import validated
@@ -20,8 +22,7 @@ from service.scene.validation import validated
 MOST_PAIRS = 1 << 16  # of one question
 MOST_SAMPLES = 1 << 20  # of one direction
 MOST_WORK = 1 << 24  # samples of one question, some seconds of two cores
-# Models of microfacets; see shaders/bsdf_terms.comp.
-WITH_TERMS = ("disney", "metal_rough", "principled", "microfacet")
+WITH_TERMS = tuple(filter(has_terms, MODELS))  # models of microfacets
 
 
 class BsdfBody(Model):

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from gpu.layout import MaterialModel
 from gpu.layout.bindings import Slot
+from gpu.layout.models import NUMBERS
 from tests import baseline, disney
 from tests.probing import DISNEY_FLAGS, PRINCIPLED_FLAGS, Prober, materials, prober_of
 
-D, P, G, B = MaterialModel.DISNEY, MaterialModel.PRINCIPLED, MaterialModel.METAL_ROUGH, MaterialModel.BLINN_PHONG
+D, P, G, B = NUMBERS["disney"], NUMBERS["principled"], NUMBERS["metal_rough"], NUMBERS["blinn_phong"]
 GLASS = {"model": P, "transmission": 1, "base_color": 1}
 ROUGHNESSES = (0, 1e-4, 0.0099, 0.01, 0.0101, 1)
 ROWS = {

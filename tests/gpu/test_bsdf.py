@@ -11,7 +11,8 @@ import pytest
 
 from gpu import BsdfAlbedo, BsdfTerms, BsdfValues, Renderer, SceneArrays, Steps
 from gpu.bsdf import kernels
-from gpu.layout import MaterialModel, models
+from gpu.layout import models
+from gpu.layout.models import NUMBERS
 from gpu.precompile import kernel_keys
 from service.pack import pack_material
 from service.scene.material.microfacet import MicrofacetMaterial
@@ -19,7 +20,7 @@ from tests import baseline, disney, microfacets
 from tests.lobes import PRINCIPLED, ROWS
 from tests.probing import materials
 
-P = MaterialModel.PRINCIPLED
+P = NUMBERS["principled"]
 GLASS = {"model": P, "transmission": 1, "base_color": (1, 0.8, 0.6)}
 SPECULAR = {
     "varnish": materials(model=P, roughness=0, base_color=(0.8, 0.2, 0.1)),
@@ -95,8 +96,8 @@ def test_values_are_the_formulas(gpu: Renderer, row: str) -> None:
     material = ROWS[row]
     wi = sphere(np.random.default_rng(1), 2000).astype(np.float32).astype(float)
     above = wi[:, 2] > 0
-    formulas = {MaterialModel.METAL_ROUGH: baseline.metal_rough, MaterialModel.BLINN_PHONG: baseline.blinn_phong}
-    formulas[MaterialModel.PHONG] = baseline.phong
+    formulas = {NUMBERS["metal_rough"]: baseline.metal_rough, NUMBERS["blinn_phong"]: baseline.blinn_phong}
+    formulas[NUMBERS["phong"]] = baseline.phong
     for angle in ANGLES:
         wo = direction(angle).astype(np.float32).astype(float)
         found = values(gpu, material, wo, wi)
@@ -138,7 +139,7 @@ def test_each_lobe_is_its_own_part(gpu: Renderer) -> None:
         "diffuse": above, "specular": above, "multiscatter": both, "sheen": above, "clearcoat": above,
         "transmission": below,
     }  # fmt: skip
-    matte = {"model": MaterialModel.DISNEY, "base_color": (0.8, 0.4, 0.2), "specular": 0}
+    matte = {"model": NUMBERS["disney"], "base_color": (0.8, 0.4, 0.2), "specular": 0}
     whole = values(gpu, materials(**matte), wo, wi).f[0, 0]
     with_coat = materials(**matte, clearcoat=1, clearcoat_gloss=1)
     found = Steps(gpu.bsdf.values(lone(with_coat), wo[None], np.array(wi), lobes=True)).finish()

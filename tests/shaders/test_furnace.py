@@ -10,8 +10,9 @@ import pytest
 from scipy.stats import qmc
 
 from gpu import ESTIMATORS, Renderer
-from gpu.layout import ABSENT, MaterialModel
+from gpu.layout import ABSENT
 from gpu.layout.bindings import Slot
+from gpu.layout.models import NUMBERS
 from tests.extremes.scenes import LONG
 from tests.probing import PRINCIPLED_FLAGS, Prober, materials, prober_of
 from tests.rendering import document, picture, render
@@ -36,7 +37,7 @@ def prober(gpu: Renderer) -> Prober:
 def _materials(u: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Records and directions from numbers 0..1, in the order of NAMES."""
     d = dict(zip(NAMES, u.T, strict=True))
-    m = np.repeat(materials(model=MaterialModel.PRINCIPLED), len(u))
+    m = np.repeat(materials(model=NUMBERS["principled"]), len(u))
     for name in FRACTIONS:
         m[name] = d[name]
     m["ior"] = np.where(d["ior"] < 0.5, ABSENT, 1 + 3 * (2 * d["ior"] - 1) ** 2)
@@ -94,7 +95,7 @@ def test_white_metal_and_clear_glass_lose_nothing(prober: Prober, roughness: flo
     cosines = np.concatenate([np.linspace(GRAZING, 0.15, 6), np.linspace(0.15, 1, 10)])
     glass = {"transmission": 1}
     for given in ({"metallic": 1}, glass, {**glass, "ior": 1.2}, {**glass, "ior": 1.33}, {**glass, "ior": 2.4}):
-        m = np.repeat(materials(model=MaterialModel.PRINCIPLED, base_color=1, roughness=roughness, **given), 16)
+        m = np.repeat(materials(model=NUMBERS["principled"], base_color=1, roughness=roughness, **given), 16)
         asks = np.stack([cosines, cosines, np.full(16, inside), 0 * cosines], 1).astype(np.float32)
         albedo, error = _albedo(prober, m, asks, 1 << 14)
         assert (albedo - 4 * error < 1.003).all(), (given, albedo)
@@ -106,7 +107,7 @@ def test_stretched_lobes_lose_little(prober: Prober, anisotropic: float) -> None
     """Of any index, from 1.1 on, but in few directions; nearer to 1 they may lose more. They never gain."""
     u = qmc.Sobol(4, seed=2).random(512)
     for given in ({"metallic": 1}, {"transmission": 1}):
-        m = np.repeat(materials(model=MaterialModel.PRINCIPLED, base_color=1, anisotropic=anisotropic, **given), 512)
+        m = np.repeat(materials(model=NUMBERS["principled"], base_color=1, anisotropic=anisotropic, **given), 512)
         m["roughness"] = u[:, 0]
         m["ior"] = 1 + 3 * u[:, 3] ** 2
         inside = np.arange(512) % 2 * given.get("transmission", 0)

@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 
 from gpu import Renderer, layout
-from gpu.kernels import features
-from gpu.layout import MaterialModel
+from gpu.kernels import flag_table
 from gpu.layout.bindings import Slot
+from gpu.layout.models import NUMBERS
 from service.scene.material.principled import index_of_specular, roughness_of_gloss
 from tests.probing import PRINCIPLED_FLAGS, materials, prober_of
 
@@ -19,7 +19,7 @@ from tests.probing import PRINCIPLED_FLAGS, materials, prober_of
 def records_of(cases: list[dict[str, Any]]) -> np.ndarray:
     out = np.zeros(len(cases), layout.Material.dtype)
     for i, case in enumerate(cases):
-        out[i] = materials(model=MaterialModel.PRINCIPLED)[0]
+        out[i] = materials(model=NUMBERS["principled"])[0]
         for name, value in case.items():
             out[name][i] = value
     return out
@@ -35,7 +35,7 @@ def test_flags_are_raised_by_what_the_shaders_ask(gpu: Renderer) -> None:
     """Else glass between the two would meet a kernel without its lobes."""
     least = np.float32(layout.LEAST_ROUGHNESS)
     edges = {
-        "model": (MaterialModel.PRINCIPLED, MaterialModel.DISNEY),
+        "model": (NUMBERS["principled"], NUMBERS["disney"]),
         "metallic": (0.0, 0.5, 1.0),
         "transmission": (0.0, 0.5, 1.0),
         "roughness": (0.0, np.nextafter(least, np.float32(0)), least, np.nextafter(least, np.float32(1))),
@@ -45,8 +45,8 @@ def test_flags_are_raised_by_what_the_shaders_ask(gpu: Renderer) -> None:
     cases = list(itertools.product(*edges.values()))
     records = records_of([dict(zip(edges, case, strict=True)) for case in cases])
     found = echoed(gpu, records)
-    assert np.array_equal(found[:, 0], features._transmits(records))
-    assert np.array_equal(found[:, 1], features._mirrors(records))
+    assert np.array_equal(found[:, 0], flag_table._transmits(records))
+    assert np.array_equal(found[:, 1], flag_table._mirrors(records))
     assert 0 < found[:, 0].sum() < len(cases) and 0 < found[:, 1].sum() < len(cases)
 
 
