@@ -23,8 +23,8 @@ LEAF_SIZE_LARGE = 8  # the size of leaves, wherever counts allow, in scenes whos
 LARGE = 6_000_000
 MAX_PRIMITIVES = LEAF_FIRST_MASK + 1
 OCTANTS = 8
-WHOLE = 4096  # nodes; a smaller tree has no treelets and takes half a megabyte in eight orders
-WORTH_THREADS = 32_768  # boxes; below it starting threads costs more than they save
+WHOLE = 4096  # nodes; a smaller tree has no treelets, and takes at most half a megabyte in eight orders
+WORTH_THREADS = 32_768  # boxes; with fewer, starting threads costs more than they save
 
 Vec3 = tuple[float, float, float]
 
@@ -55,7 +55,7 @@ def _grid(lower: np.ndarray, upper: np.ndarray) -> np.ndarray:
     extent = high - low
     extent = np.maximum(extent, extent.max() / 64)
     step = np.maximum(extent / 65530, np.maximum(abs(low), abs(high)).max() * 2.0**-21)
-    step = np.maximum(step, 1e-30).astype(np.float32).astype(np.float64)  # a point at 0: not denormal, either
+    step = np.maximum(step, 1e-30).astype(np.float32).astype(np.float64)  # above 0 for a point at 0, and not denormal
     return np.stack([(low - 2 * step).astype(np.float32).astype(np.float64), step])
 
 

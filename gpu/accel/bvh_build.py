@@ -34,7 +34,7 @@ NODE_COST = 1.0  # of one step through the tree, in units of one primitive's tes
 
 @jit
 def _write_box(row: np.ndarray, box: np.ndarray, grid: np.ndarray) -> None:
-    """The box on the grid, a whole step larger on each side than need be, for the shader's rounding."""
+    """The box on the grid, one step larger on each side, which covers the shader's rounding."""
     for k in range(3):
         lower = max(np.floor((box[k] - grid[0, k]) / grid[1, k]) - 1.0, 0.0)
         upper = min(np.ceil((box[k + 3] - grid[0, k]) / grid[1, k]) + 1.0, 65535.0)
@@ -103,7 +103,7 @@ def grow(
             continue
         rows[at, LINK] = free
         rows[at, AXIS] = max(axis, 0)
-        left_first = cut - a > b - cut  # goes into the stack first, so that the smaller one comes off it next
+        left_first = cut - a > b - cut  # pushed first, so that the smaller one is popped next
         for turn in range(2):
             if (turn == 0) == left_first:
                 stack[depth, 0], stack[depth, 1], stack[depth, 2] = free, a, cut
@@ -116,7 +116,7 @@ def grow(
 
 @jit
 def measure(rows: np.ndarray, first: int, last: int, root: int) -> None:
-    """Fill in the sizes of the inner nodes of slots [first, last), then of `root`; the sizes below them are known."""
+    """Fill in the sizes of the inner nodes in slots [first, last), then of `root`; sizes below them are filled in."""
     for k in range(last - first + 1):
         at = last - 1 - k if k < last - first else root
         if not rows[at, LINK] & np.uint32(LEAF_BIT):

@@ -84,7 +84,7 @@ def thread_octant(
 
     `sizes` are those of `top_sizes`, `treelets` is the `place` of `lay_treelets`.
     """
-    place = np.empty(len(rows), np.uint32)  # of each slot in this order; only the rows in use are touched
+    place = np.empty(len(rows), np.uint32)  # of each slot in this order; only rows in use are written
     place[0] = 0
     for slot in top:
         at = place[slot]

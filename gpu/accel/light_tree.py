@@ -1,7 +1,7 @@
-"""Bounded lights -> a tree of `layout.LightNode` records, by which they are picked where they matter. Without GL.
+"""Bounded lights -> a tree of `layout.LightNode` records, by which they are picked by importance. Runs without GL.
 
 [Conty Estevez & Kulla 2018; Pharr, Jakob, Humphreys 2023, section 12.6.3]. A node holds the place, the directions
-and the intensity of its lights; its importance at a point bounds what it may give there. Random numbers go down the
+and the intensity of its lights; its importance at a point bounds its contribution there. Random numbers go down the
 tree as an interval of whole numbers that each pair cuts in two, so that a light is picked exactly as often as its
 probability says.
 
@@ -17,12 +17,12 @@ from gpu.accel import light_tree_build, light_tree_clusters
 from gpu.accel.light_tree_build import AXIS, BEYOND, INTENSITY, NORMALS, RADIUS, WIDTH
 from gpu.layout import LightNode, LightTreeHead
 
-# Of the picks this share, or down to half of it, is spread evenly over the tree's lights: the tree does not know
-# about walls, and a light that it takes for unimportant must still be picked.
+# The share of picks, or down to half of it, that is spread evenly over the tree's lights: the tree does not know
+# about walls, and must still pick lights of low importance.
 EVEN = 0.05
 STEPS = 65535  # of the grid that nodes' places are on
 PIECE = 1 << 14  # pairs packed at once, which fit into the processor's cache
-WIDEST = 2.0**27  # the largest radius of a node that its 8 bits can say, in steps
+WIDEST = 2.0**27  # the largest radius of a node that its 8 bits can represent, in steps
 FARTHEST = 2.0**38  # steps from one end of the scene to the other: squares times intensities stay inside float32
 
 
@@ -41,7 +41,7 @@ def build(
     """
     n = len(low)
     if n < 2:
-        raise ValueError(f"{n} lights: a tree is of two or more")  # compiled loops would write past their arrays
+        raise ValueError(f"{n} lights: a tree is of two or more")  # else compiled loops would write past their arrays
     lights = np.empty((n, WIDTH), np.float64)
     lights[:, 0:3], lights[:, 3:6], lights[:, AXIS : AXIS + 3] = low, high, axis
     lights[:, NORMALS], lights[:, BEYOND], lights[:, RADIUS] = normals, beyond, radius
@@ -77,7 +77,7 @@ def with_share(words: np.ndarray, n: int, share: float) -> tuple[np.ndarray, flo
 
 
 def _deal(head: np.ndarray, n: int, share: float) -> float:
-    """Deal the numbers out: fill in the head, and return the even part of each light's probability."""
+    """Distribute the random numbers: fill in the head, and return the even part of each light's probability."""
     near = layout.LIGHT_CODES if share >= 1 else round(share * layout.LIGHT_CODES)
     shift = max(int(np.floor(np.log2(EVEN * near / n))), 0)
     head["near"], head["even"], head["even_shift"], head["far_first"] = near, n << shift, shift, n

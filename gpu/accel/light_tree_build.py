@@ -10,7 +10,7 @@ import numpy as np
 from gpu.jit import jit
 
 BINS = 12
-DEPTH = 32  # levels of pairs at most, as the bits of one word say how to reach a light
+DEPTH = 32  # most levels of pairs: the bits of one word are the path to a light
 # Columns of a node's bounds: box, axis, cosine of the half angle of the normals' cone, of how far beyond it light
 # leaves, intensity, radius of a ball around all of it
 BOX, AXIS, NORMALS, BEYOND, INTENSITY, RADIUS, WIDTH = 0, 6, 9, 10, 11, 12, 13
@@ -154,7 +154,7 @@ def grow(lights: np.ndarray, order: np.ndarray, children: np.ndarray, trails: np
 def _cone(node: np.ndarray, a: np.ndarray, b: np.ndarray) -> None:
     """Write the cone of normals around two others into `node` [Conty Estevez & Kulla 2018, algorithm 1]."""
     if b[NORMALS] < a[NORMALS]:
-        a, b = b, a  # the wider first
+        a, b = b, a  # the wider one first
     node[NORMALS] = a[NORMALS]
     for k in range(3):
         node[AXIS + k] = a[AXIS + k]
@@ -193,7 +193,7 @@ def _around(node: np.ndarray, child: np.ndarray) -> float:
 
 @jit
 def bound(lights: np.ndarray, children: np.ndarray, bounds: np.ndarray) -> None:
-    """Fill `bounds` (n - 1, 2, WIDTH) with those of each pair's children."""
+    """Fill `bounds` (n - 1, 2, WIDTH) with the bounds of each pair's children."""
     node = np.empty(WIDTH, np.float64)
     for i in range(len(children) - 1, -1, -1):
         for side in range(2):

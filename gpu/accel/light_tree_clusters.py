@@ -1,4 +1,4 @@
-"""Clusters of the lights' tree: nodes whose lights matter by intensity alone from far away, so that walks end there.
+"""Clusters of the lights' tree: nodes whose lights are drawn by intensity alone from far away, where walks end.
 
 Each has an alias table over its lights. Some nest in others, so that there is one for most distances.
 """
@@ -75,7 +75,7 @@ def _tabulate(share: np.ndarray, threshold: np.ndarray, alias: np.ndarray) -> No
     light, heavy = _next(share, 0, False), _next(share, 0, True)
     if heavy == n:
         return
-    left = share[heavy]  # of the heavy one
+    left = share[heavy]  # the rest of the heavy one
     while True:
         after = _next(share, heavy + 1, True)
         if light < n and (left > 1.0 or after == n):
@@ -128,7 +128,7 @@ def gather(
     entries = np.zeros(int(sizes.sum()), LightClusterEntry.dtype)
     own, other = np.empty(len(entries), np.int64), np.empty(len(entries), np.int64)
     threshold, totals = np.empty(len(entries), np.float64), np.zeros(pairs, np.float64)
-    intensity = lights[:, INTENSITY].astype(np.float32).astype(np.float64)  # as the shader has it
+    intensity = lights[:, INTENSITY].astype(np.float32).astype(np.float64)  # as in the shader
     _fill(order, intensity, first, count, starts, totals, own, other, threshold)
     entries["light"], entries["alias"], entries["threshold"] = own, other, threshold
     clusters = np.zeros(pairs, LightCluster.dtype)

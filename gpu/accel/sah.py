@@ -1,4 +1,4 @@
-"""Where to split a range of boxes: the surface area heuristic over bins of centroids.
+"""The split of a range of boxes, by the surface area heuristic over bins of centroids.
 
 [Wald 2007, "On fast Construction of SAH-based Bounding Volume Hierarchies"]
 """
@@ -27,7 +27,7 @@ class Split(IntEnum):
 INSTANCE = int(ShapeKind.INSTANCE)
 OBJECT_MEDIAN = int(Split.OBJECT_MEDIAN)
 BINS = 16
-FEW = 24  # boxes below which half the bins suffice: most nodes are small, and their time went into empty bins
+FEW = 24  # with fewer boxes half the bins suffice: most nodes are small, and would spend their time on empty bins
 
 
 @jit

@@ -1,4 +1,4 @@
-"""Tables of the albedos of `principled`'s lobes, for the terms that put back the energy that they lose.
+"""Tables of the albedos of `principled`'s lobes, for the terms that compensate the energy that they lose.
 
 `gpu.tables.build.energy_tables` computes them into `energy.npz`. Runs without GL. The kernels' side is
 `shaders/bsdf/energy.glsl`.
@@ -86,7 +86,7 @@ def _summed(table: np.ndarray) -> np.ndarray:
 
 @lru_cache(maxsize=1)
 def tables() -> Tables:
-    """The tables that travel with the package."""
+    """The tables in the package."""
     with np.load(FILE) as kept:
         found = {n: _summed(v) if n == "stretched" else v for n, v in kept.items()}
     found = {n: v if v.dtype == np.float32 else v / np.float32(65535) for n, v in found.items()}

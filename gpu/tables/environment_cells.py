@@ -1,4 +1,4 @@
-"""A map of weights -> cells that are drawn with equal chances: how directions are drawn from an environment.
+"""A map of weights -> cells of equal probability, from which directions of an environment are drawn.
 
 An alias table draws texels exactly by weight but scatters neighbouring numbers over the whole map, which loses the
 gain of a stratified sampler. Here the cells follow Morton's curve, so that near numbers draw near places: 16 samples
@@ -15,7 +15,7 @@ from gpu.layout import EnvironmentCell
 
 CELLS_A_TEXEL = 4  # a block's probability is a whole number of cells: with 4 its error is some percent
 FEWEST_CELLS, MOST_CELLS = 1 << 14, 1 << 20  # bounds; large maps have more texels than a pixel gets samples
-FINEST = 1 << 22  # blocks at most; a larger map is not halved down to its texels
+FINEST = 1 << 22  # most blocks; a larger map is not halved down to its texels
 CONTRAST = 4.0  # a block with a texel this many times its mean is halved ...
 FAINT = 1 / 64  # ... unless its whole weight is less than this share of a cell's
 
@@ -32,7 +32,8 @@ def draw_cells(
     lie in the order of the maps, those of a map along Morton's curve. Texels of weight above 0 can all be drawn.
     """
     total = sum(float(m.max()) for m in maps)
-    scaled = [np.asarray(m, np.float64) / total for m in maps]  # first, or the sum of tiny weights would be denormal
+    # Scaled first, or the sum of tiny weights would be denormal
+    scaled = [np.asarray(m, np.float64) / total for m in maps]
     wanted = min(max(CELLS_A_TEXEL * sum(m.size for m in maps), FEWEST_CELLS), MOST_CELLS)
     cell = sum(float(m.sum()) for m in scaled) / wanted  # the weight of a cell
     blocks = [_blocks(m, cell) for m in scaled]
@@ -67,7 +68,8 @@ def _blocks(weights: np.ndarray, cell: float) -> _Blocks:
     height, width = weights.shape
     levels = _levels(weights)
     base = next(depth for depth, (sums, _, _) in enumerate(levels) if sums.size <= FINEST)
-    wanted = np.ones(levels[-1][0].shape, bool)  # which blocks of a level are part of none that is kept whole
+    # The blocks of a level that are part of no larger block of the result
+    wanted = np.ones(levels[-1][0].shape, bool)
     out = []
     for depth in range(len(levels) - 1, base - 1, -1):
         sums, peaks, (step_y, step_x) = levels[depth]
@@ -115,7 +117,7 @@ def _morton(x: np.ndarray, y: np.ndarray) -> np.ndarray:
 def _painted(shape: tuple[int, ...], blocks: _Blocks, values: np.ndarray) -> np.ndarray:
     """A map with each block's value in its texels, 0 elsewhere."""
     out = np.zeros(shape)
-    out[blocks.y, blocks.x] = values  # which is all for most blocks
+    out[blocks.y, blocks.x] = values  # enough for blocks of one texel, which most are
     size = blocks.width << 16 | blocks.height
     larger = np.flatnonzero(size != (1 << 16 | 1))
     for both in np.unique(size[larger]).tolist():

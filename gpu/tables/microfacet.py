@@ -13,9 +13,9 @@ import numpy as np
 
 from gpu.layout.microfacet_records import Distribution
 
-INTERVALS = 32  # of the axis of directions, each with a cubic
-# Rows of a table for all alphas, at equal steps of log(alpha + ROW_OFFSETS). They are many because with a gamma of 10
-# gtr turns about within a small change of alpha at 1.
+INTERVALS = 32  # on the axis of directions, each with a cubic
+# Rows of a table for all alphas, at equal steps of log(alpha + ROW_OFFSETS): many, because with a gamma of 10 gtr
+# changes greatly within a small change of alpha near 1.
 ROWS, ROWS_GTR = 192, 400
 ROW_OFFSETS = {Distribution.PHONG: 2.0}  # 0 for the others
 CLOSED_FACTOR = (Distribution.PHONG, Distribution.BECKMANN, Distribution.GGX, Distribution.GTR)
