@@ -1,6 +1,7 @@
 """Built-in scenes, materials and environments: JSON documents, and the assets that our own code makes for them.
 
-A file's `title` is for menus, its `source` says where numbers were measured; neither is part of the document.
+A file's `title` is for menus, its `kind` (of a material) for their parts, its `source` says where numbers were
+measured; none of them is part of the document.
 `"builtin:NAME"` in it stands for an asset of `generated`.
 
 generated      the assets that presets use
@@ -39,9 +40,13 @@ COMPUTED: dict[tuple[str, str], Callable[[], dict[str, Any]]] = {
 
 
 def names(kind: str) -> list[dict[str, str]]:
-    """`[{name, title}]` in the order of the titles. Raises NotFound."""
-    titled = [{"name": name, "title": _titled(kind, name)["title"]} for name in _known(kind)]
+    """`[{name, title}]`, of materials with their `kind`, in the order of the titles. Raises NotFound."""
+    titled = [{"name": name} | _heading(_titled(kind, name)) for name in _known(kind)]
     return sorted(titled, key=lambda entry: entry["title"])
+
+
+def _heading(stored: dict[str, Any]) -> dict[str, str]:
+    return {key: stored[key] for key in ("title", "kind") if key in stored}
 
 
 def get(kind: str, name: str) -> dict[str, Any]:
@@ -82,5 +87,5 @@ def _titled(kind: str, name: str) -> dict[str, Any]:
 
 @cache
 def _text(kind: str, name: str) -> str:
-    document = {key: value for key, value in _titled(kind, name).items() if key not in ("title", "source")}
+    document = {key: value for key, value in _titled(kind, name).items() if key not in ("title", "kind", "source")}
     return re.sub(r'"builtin:([a-z-]+)"', lambda match: f'"{asset_id(match[1])}"', json.dumps(document))

@@ -49,6 +49,7 @@ class Problem(BaseModel):
 class Named(BaseModel):
     name: str
     title: str
+    kind: str | None = Field(None, description="Of a material: metal, plastic, glass, stone, cloth, organic, light.")
 
 
 class RendererPlace(BaseModel):
