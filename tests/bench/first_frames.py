@@ -99,12 +99,12 @@ def _thumbnails() -> list[Row]:
     rows = list[Row]()
     with tempfile.TemporaryDirectory(prefix="sunbox-bench-") as folder, latency.server(folder) as (port, _):
         for name in (entry["name"] for entry in presets.names("materials")):
-            scene = thumbnails.scene(presets.get("materials", name))
+            scene = thumbnails.scene("materials", name)
             first_ms, again_ms = (_render_ms(port, scene, seed) for seed in (1, 2))
             rows.append({"name": name, "first_ms": first_ms, "again_ms": again_ms})
         _wait_for_quiet(Path(folder, "sunbox", "kernels"))
         for row in rows:
-            scene = thumbnails.scene(presets.get("materials", row["name"]))
+            scene = thumbnails.scene("materials", row["name"])
             row["left_alone_ms"] = _render_ms(port, scene, seed=3)
     return rows
 

@@ -114,16 +114,19 @@ STATES: dict[str, tuple[tuple[int, int], str, list[tuple[str, str, str]]]] = {
     ),
     "editor-lobe": (
         (1280, 800), "dark",
-        [("click", "#material-presets [data-name=velvet]", ""), ("key", "b", ""), ("key", "c", ""),
+        [("click", "#library [data-value=velvet]", ""), ("key", "b", ""), ("key", "c", ""),
          ("select", "#comparison [aria-label^=Turn]", "disney"), ("click", "#lobe [data-value=polar]", ""),
          ("click", "#lobe >> text=By lobe", "")],
     ),
-    "editor-scene": ((1280, 800), "light", [("click", "#tab-scene", ""), ("key", "h", ""), ("key", "4", "")]),
+    "editor-scene": ((1280, 800), "light", [
+        ("click", "#outline-list [data-thing='/environment']", ""), ("key", "h", ""), ("key", "4", ""),
+    ]),
     "editor-render": (
         (1280, 800), "light",
-        [("click", "#tab-render", ""), ("select", "#layer", "normal")],
+        [("click", "#tab-render", ""), ("click", "#view", ""), ("select", "#layer", "normal"),
+         ("key", "Escape", "")],
     ),
-    "editor-phone": ((390, 844), "dark", [("click", "#material-presets [data-name=copper]", "")]),
+    "editor-phone": ((390, 844), "dark", [("click", "#library [data-value=copper]", "")]),
     "editor-lost": (  # the last: it ends the server
         (1280, 800), "dark",
         [("fill", "#panel [data-field=roughness] input.number", "7"), ("lose", "", "")],

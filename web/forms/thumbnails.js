@@ -2,6 +2,7 @@
 // asked for when the main picture is at rest, one at a time, and kept in the browser.
 
 import { fetchPreset, renderPicture } from "../server/api.js";
+import { HEX, hex, linear } from "../lib/color.js";
 import { recall, remember } from "../lib/browser-storage.js";
 
 const SIDE = 96;
@@ -25,6 +26,31 @@ const hash = async (document) => {
   return [...new Uint8Array(digest.slice(0, 12))].map((byte) => byte.toString(16).padStart(2, "0")).join("");
 };
 
+const GREY = 0.4;
+const isColor = (value) => HEX.test(value) || (Array.isArray(value) && value.length === 3);
+
+function show(image, blob) {
+  const url = URL.createObjectURL(blob);
+  image.src = url;
+  image.addEventListener("load", () => URL.revokeObjectURL(url), { once: true });
+}
+
+// A ball of a colour, lit from above.
+function ball(color) {
+  const canvas = new OffscreenCanvas(SIDE, SIDE);
+  const context = canvas.getContext("2d");
+  const [middle, radius] = [SIDE / 2, 0.42 * SIDE];
+  const shade = context.createRadialGradient(0.8 * middle, 0.6 * middle, 2, middle, middle, 1.1 * radius);
+  const tint = linear(color);
+  shade.addColorStop(0, hex(tint.map((x) => x + 0.35 * (1 - x))));
+  shade.addColorStop(0.35, hex(tint));
+  shade.addColorStop(1, hex(tint.map((x) => 0.08 * x)));
+  context.fillStyle = shade;
+  context.arc(middle, middle, radius, 0, 2 * Math.PI);
+  context.fill();
+  return canvas.convertToBlob();
+}
+
 export class Thumbnails {
   #queue = [];
   #working = null;
@@ -36,18 +62,45 @@ export class Thumbnails {
     this.isIdle = isIdle;
   }
 
-  // The picture of a preset, or of what `get` gives where there is none.
+  // The picture of a material preset, or of what `get` gives where there is none.
   async preset(image, name, get) {
-    this.#index ??= fetch(beside("index.json"))
-      .then((answer) => answer.json())
-      .catch(() => ({}));
-    if ((await this.#index)[name]) image.src = beside(`${encodeURIComponent(name)}.webp`).href;
+    if (await this.#has("materials", name)) image.src = beside(`${encodeURIComponent(name)}.webp`).href;
     else this.#queue.push({ image, get });
   }
 
-  own(image, material) {
-    this.#queue.push({ image, get: async () => material });
+  // The picture of a scene or an environment, of which only presets have one.
+  async place(image, kind, name) {
+    if (await this.#has(kind, name)) image.src = beside(`${kind}/${encodeURIComponent(name)}.webp`).href;
+  }
+
+  // A plain ball of a colour.
+  async plain(image, color) {
+    show(image, await ball(color));
+  }
+
+  async #has(kind, name) {
+    this.#index ??= fetch(beside("index.json"))
+      .then((answer) => answer.json())
+      .catch(() => ({}));
+    return (await this.#index)[kind]?.[name] !== undefined;
+  }
+
+  // The picture of what `get` gives, once there is time for it; an older wish for the same image is dropped.
+  later(image, get) {
+    if (!image.src) this.plain(image, GREY);
+    this.#queue = this.#queue.filter((each) => each.image !== image);
+    this.#queue.push({ image, get });
     this.work();
+  }
+
+  // The picture of a material of the scene: a ball of its colour, when that is new, until the service has rendered it.
+  async own(image, material) {
+    const tint = Object.values(material).find(isColor) ?? GREY;
+    if (image.dataset.tint !== String(tint)) {
+      image.dataset.tint = String(tint);
+      await this.plain(image, tint);
+    }
+    this.later(image, async () => material);
   }
 
   // Call when the picture came to rest.
@@ -75,7 +128,6 @@ export class Thumbnails {
       blob = await renderPicture(staged(this.#scene, plain), SETTINGS);
       remember(name, blob);
     }
-    image.src = URL.createObjectURL(blob);
-    image.addEventListener("load", () => URL.revokeObjectURL(image.src), { once: true });
+    show(image, blob);
   }
 }
