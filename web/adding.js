@@ -26,7 +26,7 @@ export class Adder {
     Object.assign(this, { acts, controller });
   }
 
-  // One of `additions` in outliner.js.
+  // One of `additions`.
   async add({ kind, title, make }) {
     const { acts } = this;
     const { materials } = acts.state.scene;

@@ -1,8 +1,5 @@
 // The commands of the buttons and the keys: what each one does, and which keys give it.
 
-import * as exporting from "./picture/export.js";
-import { saveAs } from "./lib/files.js";
-
 // The copied material: the browser's clipboard where the page may read it, else one of the page's own.
 class Clipboard {
   #own = null;
@@ -23,8 +20,7 @@ class Clipboard {
   }
 }
 
-// {does, canPaste}: the commands by name. `find(id)` elements; `page` is the PageState, `madeFrom` as pictureRecipes has
-// it; `complain(error)`, `say(text)`; `refresh()` shows what has changed, `push()` tells the streams.
+// {does, canPaste}: the commands by name. `find(id)` elements; `page` is the PageState; `complain(error)`, `say(text)`; `refresh()` shows what has changed, `push()` tells the streams.
 export function makeCommands({
   find,
   page,
@@ -34,8 +30,8 @@ export function makeCommands({
   controller,
   panel,
   importer,
-  savePage,
-  madeFrom,
+  sceneMenu,
+  exportMenu,
   complain,
   say,
   refresh,
@@ -60,7 +56,7 @@ export function makeCommands({
       else stream.resume();
       const button = find("pause");
       button.classList.toggle("paused", page.isPaused);
-      button.querySelector("span").textContent = page.isPaused ? "Resume" : "Pause";
+      button.setAttribute("aria-label", page.isPaused ? "Resume" : "Pause");
       push();
     },
     toggleTheme: () =>
@@ -92,21 +88,13 @@ export function makeCommands({
     resetMaterial: () => editor.putMaterial({ type: editor.material.type }),
     openFiles: () => importer.browse("open"),
     addFiles: () => importer.browse("add"),
-    snapshot: () => savePage.snapshot(),
+    snapshot: () => sceneMenu.snapshot(),
     frame: () => controller.frame(),
     resetView: () => editor.resetView(),
     showKeys: () => find("keys-dialog").showModal(),
-    async download() {
-      const button = find("download");
-      button.disabled = true;
-      try {
-        const { blob, header } = await exporting.png(stream, 8, madeFrom);
-        saveAs(blob, `sunbox-${editor.state.chosen.scene || "scene"}-${header.samples}.png`);
-      } catch (error) {
-        complain(error);
-      }
-      button.disabled = false;
-    },
+    toggleOutline: () => find("toggle-outline").click(),
+    openRender: () => ui.set({ tab: "render" }),
+    download: () => exportMenu.png(),
   };
   return {
     does,
@@ -119,15 +107,13 @@ export function makeCommands({
 // The command of each button, by the button's id.
 const BUTTONS = {
   pause: "togglePause",
-  download: "download",
+  render: "openRender",
   compare: "toggleCompare",
   help: "showKeys",
   undo: "undo",
   redo: "redo",
   frame: "frame",
   "reset-view": "resetView",
-  "open-file": "openFiles",
-  "add-file": "addFiles",
   theme: "toggleTheme",
   "copy-material": "copyMaterial",
   "paste-material": "pasteMaterial",
@@ -173,6 +159,7 @@ export function keyTable(does) {
       says,
       group: "Tools",
     })),
+    { keys: ["t"], does: does.toggleOutline, says: "show or fold the outline", group: "View" },
     { keys: ["f"], does: does.frame, says: "frame the selection", group: "View" },
     { keys: ["home"], does: does.resetView, says: "back to the first view", group: "View" },
     { keys: ["escape"], does: () => pickTool("orbit"), says: "put the tool away", group: "Tools" },

@@ -61,7 +61,7 @@ export class Importer {
   // Whether a scene was opened.
   async #take(file, at, way) {
     const kind = kindOf(file);
-    if (!kind) throw new Error(`Sunbox reads ${[...new Set(Object.keys(ENDINGS))].join(", ")}.`);
+    if (!kind) throw new Error(`Sunbox reads ${ACCEPT.replaceAll(",", ", ")}.`);
     if (kind === "json") return this.#takeJson(JSON.parse(await file.text()), file, way);
     const recipe = way === "add" ? null : await readRecipe(file); // what is added is an image like any other
     if (recipe) {
@@ -141,8 +141,8 @@ export class Importer {
     this.acts.openScene(document, stem(file), exposure);
     const taken =
       exposure === undefined ? [] : [`The view's exposure is ${exposure} stops now, which suits the model's lights.`];
-    const action = isUnderNoSky(document) && { label: "Add the studio", does: () => this.#addStudio(exposure) };
-    this.#tell(file, [...taken, ...warnings], "good to know.", action);
+    const studioToo = { label: "Add the studio", does: () => this.#addStudio(exposure) };
+    this.#tell(file, [...taken, ...warnings], "good to know.", isUnderNoSky(document) ? studioToo : null);
     return true;
   }
 

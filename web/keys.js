@@ -66,6 +66,7 @@ export function watchKeys(move, acts) {
     const key = event.key.toLowerCase();
     const ctrl = event.ctrlKey || event.metaKey;
     if (event.altKey || document.querySelector("dialog[open]")) return;
+    if (key === "escape" && document.querySelector(":popover-open")) return; // closes what is open
     const act = acts.find(
       (each) =>
         each.keys.includes(key) &&

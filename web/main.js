@@ -6,22 +6,25 @@ import { keyTable, makeCommands, watchButtons } from "./commands.js";
 import { Comparison } from "./picture/compare.js";
 import { DisplayControls } from "./panels/display-controls.js";
 import { Editor } from "./document/editor.js";
-import * as exporting from "./picture/export.js";
 import { learnNames, sentence } from "./lib/format-text.js";
+import { Frame } from "./panels/frame.js";
 import { Importer, watchDrops } from "./importer.js";
+import { makeHeader } from "./header.js";
 import { askForKey } from "./server/key.js";
 import { fillSheet, watchKeys } from "./keys.js";
 import { LobePanel } from "./lobe/panel.js";
 import { Announcer, Messages } from "./panels/messages.js";
+import { Outliner } from "./panels/outliner.js";
 import { Output, forecastSize } from "./panels/output.js";
 import { PageState, namesOf } from "./document/page-state.js";
 import { Panel } from "./panels/panel.js";
 import { pictureRecipes } from "./picture/picture-recipe.js";
 import { Preparing } from "./panels/preparing.js";
 import { detailWords, fieldTitles, problemText } from "./server/problem-text.js";
-import { SavePage } from "./panels/save-page.js";
+import { SavedMaterials } from "./panels/saved-materials.js";
 import { blackMaterial, materialModels, modelNames } from "./server/schema.js";
-import { essence, linkTo, revived } from "./document/share.js";
+import { essence } from "./document/share.js";
+import { Shelf } from "./panels/shelf.js";
 import { Status } from "./panels/status.js";
 import { Stream } from "./server/stream.js";
 import { textureActs } from "./forms/texture-slot.js";
@@ -79,6 +82,9 @@ const recipes = pictureRecipes({
   view: () => page.view,
   viewDefaults: page.viewDefaults,
 });
+
+// The name of a scene in words.
+const titleOf = ({ scene: own }) => library.scenes.find(({ name: each }) => each === own)?.title ?? own;
 
 // --- the picture ---
 
@@ -155,8 +161,7 @@ const preparing = new Preparing({
   subject() {
     const { home, chosen } = editor.state;
     const isOther = home !== page.paintedHome;
-    const title = library.scenes.find(({ name: each }) => each === chosen.scene)?.title ?? chosen.scene;
-    return { isOther, name: isOther ? title || "the scene" : "the change" };
+    return { isOther, name: isOther ? titleOf(chosen) || "the scene" : "the change" };
   },
 });
 
@@ -195,45 +200,51 @@ const importer = new Importer({
   reopen: recipes.reopen,
   thumbnails: textureThumbnails,
 });
-const panel = new Panel(find("panel"), {
+const panel = new Panel(find, {
   schema,
   library,
   acts: editor,
   stage: {
     frame: (thing) => controller.frame(thing),
-    add: (offer) => adder.add(offer),
     duplicate: (thing) => adder.duplicate(thing),
     takeTexture: (place, file) => importer.texture(place, file),
   },
-  paint: (image, preset, fetch) => thumbnails.preset(image, preset, fetch),
+  paint: (image, material) => thumbnails.own(image, material),
   say,
   textureActs: textureActs({ editor, importer, thumbnails: textureThumbnails }),
 });
+const outliner = new Outliner(find, { schema: schema.scene, acts: editor, add: (offer) => adder.add(offer) });
+const frame = new Frame(find, ui);
 
-const savePage = new SavePage(find("page-save"), {
-  hasDocuments: Object.keys(calls).some((path) => path.startsWith("/v1/documents")),
-  acts: {
-    document: (kind) => (kind === "scenes" ? editor.state.scene : editor.material),
-    open: (kind, document, title) =>
-      kind === "scenes" ? editor.openScene(document, title) : editor.putMaterial(document),
-    state: () => essence(editor.state),
-    restore: (kept) => editor.change(revived(kept)),
-    async snapshot() {
-      const { bytes, header } = await stream.capture({ format: "jpeg", quality: 85, aov: "color" });
-      return { blob: new Blob([bytes], { type: header.mime }), note: `${header.samples} samples` };
-    },
-    link: () => linkTo(editor.state),
-    command: () =>
-      exporting.curl(
-        editor.state.scene,
-        exporting.exactSettings(page.settings, page.header?.samples ?? 1),
-        page.view,
-      ),
-    png: (bits) => exporting.png(stream, bits, recipes.madeFrom),
-    exr: () => exporting.exr(stream, page.layers, recipes.madeFrom),
-    complain,
-    announce: say,
-  },
+// --- the shelf ---
+
+const hasDocuments = Object.keys(calls).some((path) => path.startsWith("/v1/documents"));
+const saved = hasDocuments ? new SavedMaterials({ acts: editor, say, changed: () => shelf?.refresh() }) : null;
+const shelf = new Shelf(find, {
+  library,
+  acts: editor,
+  thumbnails,
+  saved,
+  shapeAt: (x, y) => controller.shapeAt(x, y),
+  rename: (material) => panel.materialPanel.rename(material),
+  remove: (material) => panel.materialPanel.remove(material),
+});
+find("save-material").hidden = !saved;
+find("save-material").addEventListener("click", () => saved.save());
+
+const { sceneMenu, exportMenu } = makeHeader({
+  find,
+  page,
+  editor,
+  stream,
+  recipes,
+  messages,
+  hasDocuments,
+  titleOf,
+  openFiles: () => commands.does.openFiles(),
+  addFiles: () => commands.does.addFiles(),
+  complain,
+  say,
 });
 
 const lobe = new LobePanel(find("lobe"), {
@@ -252,6 +263,7 @@ const output = new Output(find("output"), {
   acts: editor,
   order: () => ({ scene: editor.state.scene, settings: editor.state.settings }),
   view: () => page.view,
+  head: find("render-size"),
   complain,
   say,
 });
@@ -265,8 +277,8 @@ const commands = makeCommands({
   controller,
   panel,
   importer,
-  savePage,
-  madeFrom: recipes.madeFrom,
+  sceneMenu,
+  exportMenu,
   complain,
   say,
   refresh,
@@ -315,6 +327,9 @@ let saving = 0;
 function refresh() {
   page.resolve();
   panel.show(editor.state, page.knobs);
+  outliner.show(editor.state);
+  shelf.show(editor.state);
+  find("scene-title").textContent = titleOf(editor.state.chosen) || "Your own scene";
   if (page.info) showPrices();
   find("undo").disabled = !editor.canUndo;
   find("redo").disabled = !editor.canRedo;
@@ -329,6 +344,7 @@ function refresh() {
 
 function showUi() {
   display.show();
+  frame.show();
   find("lobe").hidden = !ui.state.lobe || !lobe.isPossible;
   find("show-lobe").setAttribute("aria-pressed", String(ui.state.lobe));
   lobe.refresh();

@@ -22,6 +22,7 @@ from tests.serving import Server
 
 # The headless shell is the same engine without the window around it, and opens a page at half the cost.
 CHROMIUM = shutil.which("chromium-headless-shell") or shutil.which("chromium")
+MENUS = {"save": ("#scene-menu", "#page-save"), "view": ("#view", "#view-menu")}
 PATIENCE_S = 180.0  # a bound against hanging: whoever uses the machine meanwhile may take most of it
 
 
@@ -193,7 +194,56 @@ class Editor:
         self.wait("other pixels", lambda: self.differs(before, least))
 
     def tab(self, name: str) -> None:
-        self.page.click(f"#tab-{name}")
+        """Bring a part of the page to hand: the "material" in the inspector, the outline of the "scene", the camera's
+        "film", the sheet "render", or what opens under a button: "save" under the scene's name, "view"."""
+        page = self.page
+        camera = "#outline-list [data-thing='/camera']"
+        size = page.viewport_size or {"width": 0, "height": 0}
+        if name not in MENUS and page.locator(":popover-open").count():
+            page.keyboard.press("Escape")
+        lies_over = size["width"] < size["height"] or size["width"] <= 896
+        if name == "scene" or (name == "film" and page.is_hidden(camera)):
+            self.outline(shown=True)
+        elif lies_over:
+            self.outline(shown=False)
+        if name == "render":
+            page.click("#tab-render")
+        elif name in MENUS:
+            button, menu = MENUS[name]
+            if not page.is_visible(menu):
+                page.click(button)
+        elif name == "film":
+            page.click(camera)
+            page.click("#tab-properties")
+        elif name != "scene" or not lies_over:
+            page.click("#tab-properties")
+            if name == "material" and page.is_hidden("#material-part"):
+                self.pick("materials", self.chosen("materials"))
+
+    def outline(self, shown: bool) -> None:
+        if (self.page.get_attribute("body", "data-outline") == "shown") != shown:
+            self.page.click("#toggle-outline")
+
+    def act(self, id: str) -> None:
+        """Press an item of the menu for the material in hand."""
+        if not self.page.is_visible(f"#{id}"):
+            self.page.click("#material-more")
+        self.page.click(f"#{id}")
+
+    def unfold(self) -> None:
+        """Open all parts of the material."""
+        shut = "details.fold:not([open]) > summary"
+        self.page.eval_on_selector_all(shut, "all => all.forEach((each) => each.click())")
+
+    def pick(self, shelf: str, value: str) -> None:
+        """Choose a picture on the shelf: of the scene's "materials", the "library", "environments" or "scenes"."""
+        self.page.click(f"#tab-{'materials' if shelf == 'library' else shelf}")
+        self.page.click(f"#{shelf} [data-value='{value}']")
+
+    def chosen(self, shelf: str) -> str:
+        """What is chosen there."""
+        script = "(id) => document.querySelector(`#${id} [aria-selected=true]`)?.dataset.value ?? ''"
+        return str(self.page.evaluate(script, shelf))
 
     def drop(self, selector: str, files: dict[str, bytes]) -> None:
         """As when files are let go over an element, in its middle."""
@@ -217,7 +267,9 @@ class Editor:
         )
 
     def shot(self, click: str) -> bytes:
-        """The file that a click hands out."""
+        """The file that a click hands out, on an item of the menu Export or elsewhere."""
+        if not self.page.is_visible(click):
+            self.page.click("#export")
         with self.page.expect_download() as waiting:
             self.page.click(click)
         return waiting.value.path().read_bytes()

@@ -71,5 +71,4 @@ def halves(left: tuple[int, int, int] = (0, 220, 0)) -> bytes:
 
 def document(editor: Editor) -> Any:
     """The scene as the page would save it."""
-    editor.tab("save")
-    return json.loads(editor.shot("text=Scene as JSON"))
+    return json.loads(editor.shot("#download-scene"))

@@ -51,12 +51,12 @@ def test_nothing_is_lost_before_there_is_a_picture(context: BrowserContext, serv
     page.keyboard.press("1")
     editor.drop("#stage", {"halves.png": halves()})
     editor.wait("the texture", lambda: page.is_visible("#material-form .texture"))
-    assert page.input_value("#material") == "floor"
+    assert editor.chosen("materials") == "floor"
     assert "halves.png is on Floor." in editor.text("#messages")
 
     slow.passing = "previews"
     page.keyboard.press("ArrowLeft")
-    editor.click_until("the ball, found in a preview", lambda: page.input_value("#material") == "subject")
+    editor.click_until("the ball, found in a preview", lambda: editor.chosen("materials") == "subject")
 
 
 def test_an_image_that_comes_with_a_mesh_is_for_the_mesh(editor: Editor) -> None:
@@ -64,5 +64,5 @@ def test_an_image_that_comes_with_a_mesh_is_for_the_mesh(editor: Editor) -> None
     triangle = b"v -1 0 0\nv 1 0 0\nv 0 2 0\nvt 0 0\nvt 1 0\nvt .5 1\nf 1/1 2/2 3/3\n"
     editor.drop("#stage", {"halves.png": halves(), "sail.obj": triangle})  # the ball is where they fall
     editor.wait("the texture", lambda: page.is_visible("#material-form .texture"))
-    assert page.input_value("#material") == "sail"
+    assert editor.chosen("materials") == "sail"
     assert "halves" not in editor.text("#messages")

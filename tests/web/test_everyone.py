@@ -34,9 +34,15 @@ def findings(editor: Editor) -> list[str]:
 def test_axe_finds_nothing_serious(browser: Browser, server: Server, scheme: Any) -> None:
     editor = Editor(browser.new_page(viewport={"width": 1280, "height": 800}, color_scheme=scheme))
     editor.open(server.url)
-    for tab in ("scene", "render", "save", "material"):
+    for tab in ("scene", "film", "render", "view", "save", "material"):
         editor.tab(tab)
         assert findings(editor) == [], tab
+    for button in ("#export", "#material-more", "#readings-button", "#tab-environments", "#tab-scenes"):
+        editor.page.click(button)
+        assert findings(editor) == [], button
+        editor.page.keyboard.press("Escape")
+    editor.unfold()
+    assert findings(editor) == [], "all that a material has"
     editor.page.click("[data-field=roughness] .image")
     assert findings(editor) == [], "what is offered as an image"
     editor.page.keyboard.press("Escape")
@@ -55,10 +61,10 @@ def test_nothing_is_cut_off(browser: Browser, server: Server, size: tuple[int, i
     """Among them a phone both ways, and a laptop at 200 %."""
     editor = Editor(browser.new_page(viewport={"width": size[0], "height": size[1]}))
     editor.open(server.url)
-    for tab in ("scene", "render", "save", "material"):
+    for tab in ("film", "scene", "render", "save", "material"):
         editor.tab(tab)
         script = """() => [...document.querySelectorAll("button, input, select, [role=option]")]
-            .filter((each) => each.checkVisibility() && !each.closest(".presets, .outline, .unseen"))
+            .filter((each) => each.checkVisibility() && !each.closest(".drawer, .outline, .unseen"))
             .filter((each) => {
                 const box = each.getBoundingClientRect();
                 return box.left < -1 || box.right > innerWidth + 1 || box.width < 8;
@@ -102,8 +108,9 @@ def test_letters_can_be_read_and_fingers_hit(browser: Browser, server: Server, s
     page.goto(server.url + "/")
     page.wait_for_selector("#material-form [data-field]")
     page.click("#compare")
-    for tab in ("scene", "render", "save", "material"):
-        page.click(f"#tab-{tab}")
+    editor = Editor(page)
+    for tab in ("film", "scene", "render", "view", "save", "material"):
+        editor.tab(tab)
         assert page.evaluate(SMALL) == [], tab
     page.close()
 
@@ -115,9 +122,11 @@ def test_the_keyboard_reaches_everything(editor: Editor) -> None:
     assert editor.page.locator("#keys dt").count() > 20
     editor.page.keyboard.press("Escape")
     assert editor.page.is_hidden("#keys-dialog")
-    editor.page.locator("#tab-material").focus()
+    editor.page.locator("#tab-properties").focus()
     editor.page.keyboard.press("ArrowRight")
-    assert editor.page.is_visible("#page-scene")
+    assert editor.page.is_visible("#page-render")
+    editor.page.keyboard.press("ArrowRight")
+    assert editor.page.is_visible("#page-properties")
     editor.page.locator("#outline-list").focus()
     editor.page.keyboard.press("Home")
     assert editor.text("#thing-title") == "Camera"
@@ -138,7 +147,8 @@ def test_live_regions_do_not_chatter(editor: Editor) -> None:
     editor.settled()
     editor.page.evaluate("""() => {
         window.spoken = 0;
-        for (const region of document.querySelectorAll("[role=status], [role=alert], [aria-live]")) {
+        const said = ":is([role=status], [role=alert], [aria-live]):not([aria-live=off])";
+        for (const region of document.querySelectorAll(said)) {
             new MutationObserver(() => { window.spoken += 1; }).observe(region, { childList: true, subtree: true });
         }
     }""")

@@ -48,7 +48,7 @@ def at(browser: Browser, server: Server, request: pytest.FixtureRequest) -> Iter
 
 def paste(editor: Editor, document: dict[str, Any]) -> None:
     editor.page.evaluate(PASTE, json.dumps(document))
-    editor.page.click("#paste-material")
+    editor.act("paste-material")
 
 
 @pytest.mark.parametrize("at", SIZES, indirect=True)
@@ -58,12 +58,12 @@ def test_values_fit_into_their_boxes(at: Editor) -> None:
     hexes = f"{at.field('base_color', 'text')}"
     at.wait("the scene", lambda: page.input_value(hexes) == "#ca4b36")
     assert page.evaluate(CUT) == []
-    at.tab("scene")
     shown: set[str] = set()
     for thing in page.locator("#outline-list [role=option]").all():
+        at.tab("scene")
         thing.click()
-        assert page.evaluate(CUT) == [], thing.inner_text()
-        shown |= set(page.evaluate("[...document.querySelectorAll('#page-scene input.entry')].map((e) => e.value)"))
+        assert page.evaluate(CUT) == [], thing.text_content()
+        shown |= set(page.evaluate("[...document.querySelectorAll('#thing-form input.entry')].map((e) => e.value)"))
     assert {"2.417", "49.56", "15.53", "-49.56", "-115.5"} <= shown
 
 
@@ -71,6 +71,7 @@ def test_values_fit_into_their_boxes(at: Editor) -> None:
 def test_an_unset_slider_stands_where_the_value_is_that_holds(at: Editor) -> None:
     page = at.page
     paste(at, {"type": "principled", "base_color": 0.5})
+    at.unfold()
     slider, box = at.field("ior"), at.field("ior", "number")
     at.wait("the material", lambda: page.input_value(slider) == "1.5")
     assert page.input_value(box) == "" and page.get_attribute(box, "placeholder") == "1.5"
@@ -88,10 +89,10 @@ def test_an_unset_slider_stands_where_the_value_is_that_holds(at: Editor) -> Non
 )
 def test_narrow_bars_clip_no_word(at: Editor) -> None:
     page = at.page
-    past = """() => ["top", "bar", "readings"].map((name) => document.querySelector(`.${name}`))
+    past = """() => ["top", "pill", "picture-state"].map((name) => document.querySelector(`.${name}`))
         .filter((each) => each.scrollWidth > each.clientWidth).map((each) => each.className)"""
     longest = """() => {
-        const words = { samples: "256 / 256", noise: "0.29 %", left: "13 min", state: "Rendering" };
+        const words = { samples: "256 / 256", noise: "0.29 % noise", left: "13 min left", state: "Converging" };
         for (const [id, text] of Object.entries(words)) {
             document.getElementById(id).textContent = text;
         }
@@ -128,6 +129,7 @@ def test_a_phone_gives_its_picture_room_and_lists_gestures_first(at: Editor) -> 
 
 @pytest.mark.parametrize("at", SIZES[:1], indirect=True)
 def test_rows_without_an_image_keep_the_columns(at: Editor) -> None:
+    at.unfold()
     edges = """() => ["emission_sides", "alpha"].map((name) =>
         document.querySelector(`[data-field=${name}] :is(select, .slider)`).getBoundingClientRect().left)"""
     sides, alpha = at.page.evaluate(edges)

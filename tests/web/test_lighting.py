@@ -6,6 +6,7 @@ import json
 
 import numpy as np
 
+from tests import gltf_files
 from tests.gltf_lights import BLENDER_LAMP, start_up
 from tests.web.conftest import Editor
 
@@ -16,7 +17,7 @@ def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.page.click("dialog[open] [value=open]")
     editor.wait("what there is to know", lambda: "lit.glb: good to know" in editor.text("#messages"))
     assert "exposure is -10 stops now" in editor.text("#messages") and "no sky" in editor.text("#messages")
-    editor.tab("render")
+    editor.tab("film")
     exposure = editor.page.locator(editor.field("exposure", "number"))
     assert exposure.input_value() == "-10"
     before = editor.settled()
@@ -25,14 +26,11 @@ def test_a_model_lit_by_blender(editor: Editor) -> None:
     editor.page.click("text=Add the studio")
     editor.wait_for_change(before)
     assert editor.text("#messages") == "" and 60 < max(editor.settled()) < 250
-    editor.tab("save")
-    scene = json.loads(editor.shot("text=Scene as JSON"))
+    scene = json.loads(editor.shot("#download-scene"))
     assert scene["environment"]["scale"] == 2**10 and scene["lights"][0]["intensity"][0] > 54_000
 
     # The exposure was that model's: another scene is seen as ever.
-    editor.tab("scene")
-    editor.page.select_option("#scene", "cornell-boxes")
-    editor.tab("render")
+    editor.pick("scenes", "cornell-boxes")
     editor.wait("the exposure of before", lambda: exposure.input_value() == "0")
 
 
@@ -40,14 +38,13 @@ def test_an_exposure_of_ones_own_stays(editor: Editor) -> None:
     editor.settled()
     editor.drop("#stage", {"lit.glb": start_up(BLENDER_LAMP).glb()})
     editor.page.click("dialog[open] [value=open]")
-    editor.tab("render")
+    editor.tab("film")
     exposure = editor.page.locator(editor.field("exposure", "number"))
     editor.wait("the exposure of the model", lambda: exposure.input_value() == "-10")
     exposure.fill("-9")
     exposure.press("Enter")
-    editor.tab("scene")
-    editor.page.select_option("#scene", "cornell-boxes")
-    editor.wait("the scene", lambda: editor.page.input_value("#scene") == "cornell-boxes")
+    editor.pick("scenes", "cornell-boxes")
+    editor.wait("the scene", lambda: editor.chosen("scenes") == "cornell-boxes")
     editor.tab("render")
     assert exposure.input_value() == "-9"
 
@@ -65,6 +62,15 @@ def test_what_is_said_of_a_file_is_in_words(editor: Editor) -> None:
     assert "Animations are not played; the file's own pose is shown" in said, said
     assert "Material 2: the occlusion texture is not used; occlusion is traced" in said, said
     assert all(line[0].isupper() for line in said), said
+
+    plain = gltf_files.Gltf()
+    plain.node(mesh=plain.mesh())
+    plain.tree["animations"] = [{"channels": [], "samplers": []}]
+    editor.drop("#stage", {"plain.glb": plain.glb()})
+    editor.page.click("dialog[open] [value=open]")
+    editor.wait("what there is to know", lambda: "plain.glb: good to know" in editor.text("#messages"))
+    assert editor.page.locator("#messages button").count() == 1, "nothing to do about it but to close it"
+    assert "false" not in editor.text("#messages")
 
     file.tree["materials"][1]["alphaMode"] = "HALF"
     editor.drop("#stage", {"bad.glb": file.glb()})

@@ -28,7 +28,7 @@ IS_DONE = "document.getElementById('lobe').getAttribute('aria-busy') === 'false'
 
 def paste(editor: Editor, material: dict[str, Any]) -> None:
     editor.page.evaluate(PASTE, json.dumps(material))
-    editor.page.click("#paste-material")
+    editor.act("paste-material")
     editor.wait("the model", lambda: editor.page.input_value("#model") == material["type"])
 
 

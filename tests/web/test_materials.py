@@ -13,19 +13,16 @@ def test_what_is_new_shares_no_material(editor: Editor) -> None:
     page.select_option("#add", label="Sphere")
     editor.tab("material")
     assert editor.text(users) == "Sphere 2 is made of it."
-    page.click("#material-presets [data-name=copper]")
-    editor.wait(
-        "copper", lambda: page.get_attribute("#material-presets [data-name=copper]", "aria-pressed") == "true"
-    )
+    page.click("#library [data-value=copper]")
+    editor.wait("copper", lambda: page.get_attribute("#library [data-value=copper]", "aria-selected") == "true")
     editor.drop("#stage", {"wing.obj": TRIANGLE})
     editor.wait("the mesh", lambda: editor.text(users) == "Mesh is made of it.")
-    page.click("#material-presets [data-name=chalk]")
+    page.click("#library [data-value=chalk]")
 
-    editor.tab("scene")
     page.click("#thing-acts >> text=Duplicate")
     editor.tab("material")
     assert editor.text(users) == "Mesh and Mesh 2 are made of it.", "sharing is told"
-    page.click("#own-material")
+    editor.act("own-material")
     assert editor.text(users) == "Mesh 2 is made of it." and page.is_hidden("#own-material")
     page.click("#new-material")
     scene = document(editor)
@@ -48,16 +45,16 @@ def test_a_material_is_renamed(editor: Editor) -> None:
     page.fill(name, "type")  # in patches the word means something
     page.keyboard.press("Enter")
     editor.wait("the end of the question", lambda: page.locator("dialog[open]").count() == 0)
-    editor.wait("the new name", lambda: page.input_value("#material") == "type")
+    editor.wait("the new name", lambda: editor.chosen("materials") == "type")
     before = editor.settled()
-    page.click("#material-presets [data-name=gold]")
+    page.click("#library [data-value=gold]")
     editor.wait_for_change(before)
     assert editor.text("#messages") == ""
     scene = document(editor)
     assert set(scene["materials"]) == {"type", "floor"} and scene["shapes"][0]["material"] == "type"
 
     # Over there the new name came last: layers number the materials so.
-    editor.tab("render")
+    editor.tab("view")
     page.select_option("#layer", "material_id")
     editor.wait("the legend", lambda: page.is_visible("#legend"))
     page.keyboard.press("Control+z")
@@ -84,17 +81,16 @@ def test_a_material_in_use_is_deleted_for_another(editor: Editor) -> None:
     page.click("#delete-material")
     page.click("dialog[open] .primary")
     editor.wait_for_change(before)
-    assert page.input_value("#material") == "floor" and page.is_disabled("#delete-material")
+    assert editor.chosen("materials") == "floor" and page.is_disabled("#delete-material")
     assert editor.text("#material-users") == "Sphere and Quad are made of it."
     page.click("#duplicate-material")
-    page.select_option("#material", "floor-2")
-    editor.tab("scene")
-    page.select_option("#thing-material", label="Floor")
+    editor.pick("materials", "floor-2")
+    page.select_option("#thing-material", label="floor")
     editor.tab("material")
-    page.select_option("#material", "floor-2")
+    editor.pick("materials", "floor-2")
     assert editor.text("#material-users") == "Nothing is made of it yet."
     page.click("#delete-material")  # nobody has to be asked
-    assert page.locator("dialog[open]").count() == 0 and page.input_value("#material") == "floor"
+    assert page.locator("dialog[open]").count() == 0 and editor.chosen("materials") == "floor"
     for _ in range(4):
         page.keyboard.press("Control+z")
     editor.wait("the ball's material", lambda: not editor.differs(before, 8))

@@ -17,7 +17,7 @@ def test_refusals_are_short_and_go_with_the_next_change(editor: Editor) -> None:
     page = editor.page
     editor.settled()
     page.evaluate(PASTE, json.dumps({"type": "principled", "shine": 1, "roughness": 3}))
-    page.click("#paste-material")
+    editor.act("paste-material")
     editor.wait("the refusal", lambda: editor.text("#messages"))
     said = page.inner_text("#messages strong")
     assert said == "Roughness of material Subject must be at most 1, not 3. Another value is wrong, too."
@@ -26,11 +26,11 @@ def test_refusals_are_short_and_go_with_the_next_change(editor: Editor) -> None:
         return text.left < stage.right && text.top < stage.bottom;
     }""")
     assert not covered, "the picture is not covered"
-    page.click("#material-presets [data-name=gold]")
+    page.click("#library [data-value=gold]")
     editor.wait("its end", lambda: editor.text("#messages") == "")
 
     page.evaluate(PASTE, json.dumps({"type": "principled", "shine": 1}))
-    page.click("#paste-material")
+    editor.act("paste-material")
     editor.wait("the refusal", lambda: editor.text("#messages"))
     said = page.inner_text("#messages strong")
     assert said.startswith("“shine” of material Subject is not known here") and len(said) < 80
@@ -41,14 +41,13 @@ def test_no_answer_is_told_in_words(editor: Editor) -> None:
         route.abort()
 
     editor.page.route("**/v1/presets/scenes/*", fail)
-    editor.tab("scene")
-    before = editor.page.input_value("#scene")
-    editor.page.select_option("#scene", "cornell-boxes")
+    before = editor.chosen("scenes")
+    editor.pick("scenes", "cornell-boxes")
     editor.wait("the words", lambda: editor.text("#messages"))
     assert editor.page.inner_text("#messages strong") == "The server does not answer. Your work is safe here."
-    assert editor.page.input_value("#scene") == before
+    assert editor.chosen("scenes") == before
     editor.page.unroute("**/v1/presets/scenes/*")
-    editor.page.select_option("#scene", "cornell-boxes")
+    editor.pick("scenes", "cornell-boxes")
     editor.wait("the end of the words", lambda: editor.text("#messages") == "")
 
 
@@ -73,9 +72,8 @@ def test_the_old_scene_is_not_taken_for_the_new_one(context: BrowserContext, ser
     editor.open(server.url)
     assert page.is_hidden("#preparing")
     held = []
-    editor.tab("scene")
-    page.select_option("#scene", "cornell-boxes")
-    title = page.eval_on_selector("#scene", "(select) => select.selectedOptions[0].text")
+    editor.pick("scenes", "cornell-boxes")
+    title = page.get_attribute("#scenes [aria-selected=true]", "aria-label")
     editor.wait("the words", lambda: page.is_visible("#preparing"))
     assert page.inner_text("#preparing").startswith(f"Preparing {title}…")
     dark = "getComputedStyle(document.getElementById('sheet')).filter"

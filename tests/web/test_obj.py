@@ -21,15 +21,14 @@ def test_a_zip_becomes_a_scene_with_its_materials(editor: Editor) -> None:
     editor.page.click("dialog[open] [value=open]")
     editor.wait_for_change(before)
     editor.settled()
-    editor.tab("save")
-    scene = json.loads(editor.shot("text=Scene as JSON"))
+    scene = json.loads(editor.shot("#download-scene"))
     assert [shape["type"] for shape in scene["shapes"]] == ["mesh", "mesh"]
     made = {shape["material"]: scene["materials"][shape["material"]] for shape in scene["shapes"]}
     assert set(made) == {"m", "shiny"}
     assert made["shiny"]["base_color"] == [0.8, 0.1, 0.1]
     assert scene["textures"][made["m"]["albedo"]["texture"]]["asset"].startswith("sha256:")
     editor.tab("material")
-    assert {"M", "Shiny"} <= set(editor.page.locator("#material option").all_text_contents())
+    assert {"m", "shiny"} <= set(editor.page.locator("#materials [role=option]").all_text_contents())
     assert editor.complaints == []
 
 

@@ -40,7 +40,7 @@ def test_a_picture_of_any_size_is_rendered_and_saved(editor: Editor) -> None:
     page.select_option(f"{OUTPUT} select", "free")
     write(editor, "height", 48)
     assert (side(editor, "width"), side(editor, "height")) == (64, 48)
-    page.click(f"{OUTPUT} >> text=Render 64")
+    page.click(f"{OUTPUT} >> text=Render picture")
     editor.wait("the picture", lambda: page.is_visible(f"{OUTPUT} .result img"))
     saved = editor.shot(f"{OUTPUT} >> text=Save as PNG")
     made = read_metadata(saved)

@@ -26,15 +26,20 @@ def read_exr(path: Path) -> tuple[list[str], np.ndarray]:
     return list(image.spec().channelnames), np.asarray(pixels)
 
 
+def save_material(editor: Editor, name: str) -> None:
+    editor.act("save-material")
+    editor.page.fill("dialog[open] .entry", name)
+    editor.page.keyboard.press("Enter")
+
+
 def test_files_hold_the_picture(editor: Editor, tmp_path: Path) -> None:
     finish(editor, 6)
-    editor.tab("save")
-    flat = np.asarray(Image.open(io.BytesIO(editor.shot("text=PNG >> nth=1"))).convert("RGB"), int)
-    deep = editor.shot("text=PNG, 16 bit")
+    flat = np.asarray(Image.open(io.BytesIO(editor.shot("#download"))).convert("RGB"), int)
+    deep = editor.shot("#download-16")
     assert deep[24] == 16
     assert np.abs(np.asarray(Image.open(io.BytesIO(deep)).convert("RGB"), int) - flat).max() <= 1
     path = tmp_path / "layers.exr"
-    path.write_bytes(editor.shot("text=EXR, all layers"))
+    path.write_bytes(editor.shot("#download-exr"))
     names, pixels = read_exr(path)
     assert {"R", "A", "albedo.R", "normal.X", "depth.Z", "variance.G"} <= set(names)
     assert pixels.shape[:2] == flat.shape[:2]
@@ -45,6 +50,7 @@ def test_files_hold_the_picture(editor: Editor, tmp_path: Path) -> None:
     assert middle[names.index("normal.Z")] > 0.9 and middle[names.index("R")] > 2 * middle[names.index("B")]
 
     # The command makes the same picture, byte for byte.
+    editor.page.click("#export")
     editor.page.click("#copy-curl")
     editor.wait("the command", lambda: editor.page.input_value(".command").startswith("curl"))
     command = shlex.split(editor.page.input_value(".command"))
@@ -55,10 +61,9 @@ def test_files_hold_the_picture(editor: Editor, tmp_path: Path) -> None:
 
 
 def test_a_picture_carries_its_document_and_brings_it_back(editor: Editor, server: Server) -> None:
-    editor.page.click("#material-presets [data-name=gold]")
+    editor.page.click("#library [data-value=gold]")
     finish(editor, 5)
     gold = editor.settled()
-    editor.tab("save")
     own = editor.shot("#download")
     made = read_metadata(own)
     assert made is not None and made["samples"] == 5 and made["view"]["bits"] == 8
@@ -66,12 +71,12 @@ def test_a_picture_carries_its_document_and_brings_it_back(editor: Editor, serve
     assert read_metadata(answer.content) == made, "the same metadata as the server's"
     with Image.open(io.BytesIO(own)) as mine, Image.open(io.BytesIO(answer.content)) as theirs:
         assert mine.tobytes() == theirs.tobytes()
-    layers = editor.shot("text=EXR, all layers")
+    layers = editor.shot("#download-exr")
     assert (read_metadata(layers) or {})["view"]["aov"] == "all"
 
     for name, data in {"mine.png": own, "curl.png": answer.content, "layers.exr": layers}.items():
         editor.tab("material")
-        editor.page.click("#material-presets [data-name=chalk]")
+        editor.page.click("#library [data-value=chalk]")
         editor.wait_for_change(gold)
         editor.drop("#stage", {name: data})
         editor.wait("gold", lambda: not editor.differs(gold, 8))
@@ -85,13 +90,12 @@ def test_a_picture_carries_its_document_and_brings_it_back(editor: Editor, serve
 
 def test_a_link_and_the_browser_bring_the_view_back(editor: Editor, context: BrowserContext) -> None:
     before = editor.settled()
-    editor.page.click("#material-presets [data-name=gold]")
+    editor.page.click("#library [data-value=gold]")
     editor.page.keyboard.press("ArrowLeft")
     editor.page.keyboard.press("ArrowLeft")
     editor.wait_for_change(before)
     shown = editor.settled()
-    editor.tab("save")
-    editor.page.click("#copy-link")
+    editor.page.click("#share")
     editor.wait("the link", lambda: "#v=" in editor.page.input_value(".command"))
     link = editor.page.input_value(".command")
 
@@ -116,55 +120,60 @@ def test_snapshots_and_names(editor: Editor, server: Server) -> None:
     editor.tab("save")
     editor.page.click("text=Take a snapshot")
     editor.wait("a snapshot", lambda: editor.page.locator(".snapshot img").count() == 1)
-    editor.page.fill("#page-save .entry >> nth=1", "my red")
-    editor.page.click("#page-save .group:nth-of-type(2) >> text=Save")
-    editor.wait("its name", lambda: "my red" in editor.text("#page-save"))
+    save_material(editor, "my red")
+    mine = editor.page.locator("#library [role=option][aria-label='my red']")
+    editor.wait("its name", lambda: mine.count() == 1)
     assert server.http.get("/v1/documents/materials/my%20red").json()["type"] == "principled"
-    editor.tab("material")
-    editor.page.click("#material-presets [data-name=gold]")
+    editor.page.click("#library [data-value=gold]")
     editor.wait_for_change(before)
-    editor.tab("save")
-    editor.page.click("#page-save .kept .open >> text=my red")
+    editor.page.click("#kinds [data-kind=saved]")
+    mine.click()
     editor.wait("red again", lambda: not editor.differs(before, 8))
-    editor.page.click("[aria-label='Delete my red']")
+    editor.page.click("#forget-saved")
     assert editor.page.is_visible("text=Delete “my red”?"), "it is everybody's, and gone for good"
     editor.page.keyboard.press("Escape")
-    assert "my red" in editor.text("#page-save")
-    editor.page.click("[aria-label='Delete my red']")
+    assert mine.count() == 1
+    mine.focus()
+    editor.page.keyboard.press("Delete")
     editor.page.click("dialog[open] button:text-is('Delete')")
-    editor.wait("its end", lambda: "my red" not in editor.text("#page-save"))
+    editor.wait("its end", lambda: mine.count() == 0)
     editor.page.keyboard.press("Control+z")
     editor.wait_for_change(before)
+    editor.tab("save")
     editor.page.click(".snapshot .open")
     editor.wait("the snapshot's view", lambda: not editor.differs(before, 8))
 
 
 def test_any_name_can_be_saved_and_is_not_lost_by_accident(editor: Editor, server: Server) -> None:
     page = editor.page
-    editor.tab("save")
+    page.click("#kinds [data-kind=saved]")
     names = ["My first scene / \u00e4", "..", "50% grey?#1", "m" * 64]
     for name in names:
-        page.fill("#page-save .entry >> nth=1", name)
-        page.keyboard.press("Enter")
-        opener = page.locator("#page-save .kept .open", has_text=name)
+        save_material(editor, name)
+        opener = page.locator("#library [role=option]", has_text=name)
         editor.wait("the name", lambda opener=opener: opener.count() == 1)
         assert editor.text("#messages") == ""
-        assert opener.inner_text() == name
+        assert opener.get_attribute("aria-label") == name
     assert {each["title"] for each in server.http.get("/v1/documents/materials").json()} == set(names)
     for name in names[:2]:
-        page.locator("#page-save .kept .open", has_text=name).click()
+        page.locator("#library [role=option]", has_text=name).click()
         editor.wait("the material", lambda: editor.text("#messages") == "")
+    # The same of scenes, in their menu.
+    editor.tab("save")
+    page.fill("#page-save .entry", names[3])
+    page.keyboard.press("Enter")
+    cross = page.locator(f"[aria-label='Delete {names[3]}']")
+    editor.wait("the scene's name", lambda: cross.count() == 1)
+    assert editor.text("#scene-title") == names[3]
     assert page.evaluate("(p => p.scrollWidth - p.clientWidth)(document.getElementById('page-save'))") == 0
-    cross = page.locator(f"[aria-label='Delete {names[3]}']").bounding_box()
-    assert cross is not None and cross["x"] + cross["width"] <= 800, "a long name leaves room for its cross"
+    menu, box = page.locator("#page-save").bounding_box(), cross.bounding_box()
+    assert menu and box and box["x"] + box["width"] <= menu["x"] + menu["width"], "a long name leaves it room"
+    page.keyboard.press("Escape")
 
     before = server.http.get("/v1/documents/materials/50%25%20grey%3F%231").json()
-    editor.tab("material")
     page.select_option("#model", "diffuse")
-    editor.tab("save")
     for answer in ("Cancel", "Replace"):
-        page.fill("#page-save .entry >> nth=1", names[2])
-        page.keyboard.press("Enter")
+        save_material(editor, names[2])
         page.click(f"dialog[open] button:text-is('{answer}')")
         editor.wait("the answer", lambda: page.locator("dialog[open]").count() == 0)
         if answer == "Cancel":
@@ -208,8 +217,7 @@ def test_two_tabs_keep_two_works(editor: Editor, context: BrowserContext, server
 
 def test_json_leaves_and_comes_back(editor: Editor) -> None:
     before = editor.settled()
-    editor.tab("save")
-    scene = editor.shot("text=Scene as JSON")
+    scene = editor.shot("#download-scene")
     document = json.loads(scene)
     document["materials"]["subject"] = {"type": "diffuse", "albedo": [0, 0.6, 0]}
     editor.drop("#stage", {"green.json": json.dumps(document).encode()})
@@ -220,6 +228,7 @@ def test_json_leaves_and_comes_back(editor: Editor) -> None:
     editor.wait("the old scene", lambda: not editor.differs(before, 8))
     editor.drop("#stage", {"note.txt": b"hello"})
     editor.wait("a refusal", lambda: "note.txt was not taken" in editor.text("#messages"))
+    assert "Sunbox reads .gltf, .glb, " in editor.text("#messages"), "what would be right is said"
 
 
 def test_dropped_files_find_their_places(editor: Editor) -> None:

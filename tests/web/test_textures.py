@@ -50,8 +50,7 @@ def test_a_texture_is_placed_read_and_taken_away(editor: Editor) -> None:
     editor.wait_for_change(before)
     editor.settled()
     assert editor.text("#messages") == ""
-    editor.tab("save")
-    document = json.loads(editor.shot("text=Scene as JSON"))
+    document = json.loads(editor.shot("#download-scene"))
     assert document["materials"]["subject"]["base_color"] == {"texture": "halves", "factor": [0.5, 0.5, 0.5]}
     lies = {key: value for key, value in document["textures"]["halves"].items() if key != "asset"}
     assert lies == {"wrap": "mirror", "color_space": "linear", "rotation": 30, "scale": [3, 1]}
@@ -85,8 +84,7 @@ def test_another_image_is_read_and_lies_as_the_one_before(editor: Editor) -> Non
     editor.wait_for_change(before, 8)  # the first has no red
     assert page.is_hidden(shared), "nothing else shows the other image"
     assert float(turn.input_value()) == 30
-    editor.tab("save")
-    document = json.loads(editor.shot("text=Scene as JSON"))
+    document = json.loads(editor.shot("#download-scene"))
     coat, textures = document["materials"]["subject"], document["textures"]
     assert coat["base_color"] == {"texture": "other", "channel": "r", "factor": [0.5, 0.5, 0.5]}
     assert coat["roughness"] == {"texture": "halves"}
@@ -160,8 +158,7 @@ def test_textures_are_used_again_and_checkers_made(editor: Editor) -> None:
     page.click("dialog[open] .tile[value='texture:checker']")
     editor.wait("the server's picture of it", lambda: page.get_attribute("#stage", "aria-busy") == "false")
     assert page.locator(".message.refusal").count() == 0
-    editor.tab("save")
-    document = json.loads(editor.shot("text=Scene as JSON"))
+    document = json.loads(editor.shot("#download-scene"))
     coat = document["materials"]["subject"]
     assert [coat[name]["texture"] for name in ("base_color", "roughness", "metallic")] == [
         "halves",

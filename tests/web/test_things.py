@@ -29,6 +29,10 @@ def test_imported_parts_are_moved_turned_and_scaled(editor: Editor) -> None:
 
     things.nth(0).click()
     assert entries(editor, "translate") == [0.5, 1, 0]
+    labels = "all => all.map((each) => each.getAttribute('aria-label'))"
+    for name, title in {"translate": "Move", "scale": "Scale"}.items():
+        said = editor.page.eval_on_selector_all(f"#thing-form [data-field={name}] input", labels)
+        assert said == [f"{title}, {axis}" for axis in "XYZ"], "axes are no colours"
     assert entries(editor, "rotate") == [0, 0, 90]
     assert entries(editor, "scale") == [2, 1, 1]
     turn = editor.page.locator("#thing-form [data-field=rotate] input").nth(1)
@@ -81,7 +85,9 @@ def test_what_is_added_or_copied_stands_beside_the_others(editor: Editor) -> Non
 def test_a_light_is_selected_by_its_mark(editor: Editor) -> None:
     page, mark = editor.page, "#markers .mark[data-thing='/lights/0']"
     editor.tab("scene")
+    page.click("#outline-list [data-thing='/camera']")
     assert page.locator("#markers .mark").count() == 1, "the camera's target"
+    editor.tab("scene")
     page.select_option("#add", label="Point light")
     box, stage = page.locator(mark).bounding_box(), page.locator("#stage").bounding_box()
     assert box and stage and box["y"] < stage["y"] + 60, "above, at the edge while it is selected"
@@ -137,12 +143,14 @@ def test_a_model_is_added_or_opened(editor: Editor) -> None:
 
     editor.tab("scene")
     with page.expect_file_chooser() as asked:
+        editor.tab("save")
         page.click("#open-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
     editor.wait("the model alone", lambda: things.count() == 1)
     editor.wait("what is said of it", lambda: "sky" in editor.text("#messages"))
     assert "wide" not in editor.text("#messages"), "the picture is as wide as the window in any case"
     with page.expect_file_chooser() as asked:
+        editor.tab("save")
         page.click("#add-file")
     asked.value.set_files({"name": "sail.glb", "mimeType": "model/gltf-binary", "buffer": model()})
     editor.wait("another one", lambda: things.count() == 2)

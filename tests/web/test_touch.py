@@ -41,9 +41,9 @@ def test_a_finger_that_scrolls_the_panel_moves_no_slider(phone: tuple[Editor, Sw
     editor, swipe = phone
     page, slider = editor.page, editor.field("roughness")
     page.locator(slider).scroll_into_view_if_needed()
-    before, at = page.input_value(slider), page.evaluate("document.querySelector('#page-material').scrollTop")
+    before, at = page.input_value(slider), page.evaluate("document.querySelector('#page-properties').scrollTop")
     swipe(slider, 3, -100)
-    assert page.evaluate("document.querySelector('#page-material').scrollTop") > at + 50, "the panel scrolled"
+    assert page.evaluate("document.querySelector('#page-properties').scrollTop") > at + 50, "the panel scrolled"
     swipe(slider, 0, 60)
     assert page.input_value(slider) == before
     assert page.is_disabled("#undo"), "nothing was changed"

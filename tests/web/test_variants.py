@@ -63,7 +63,6 @@ def test_what_is_measured_are_the_pixels(editor: Editor) -> None:
     both = ["A · Principled · 4 samples", "B · Diffuse · 4 samples"]
     editor.wait("both", lambda: labels.all_text_contents() == both)
     editor.wait("the end", lambda: editor.text("#state") == "Done" and metric(editor) > 0)
-    editor.tab("save")
     saved = np.asarray(Image.open(io.BytesIO(editor.shot("#download"))).convert("RGB"), int)
     a, b = (overlay(editor, canvas)[..., :3].astype(int) for canvas in ("picture", "picture-b"))
     assert np.array_equal(a, saved), "no JPEG lies between"
@@ -96,13 +95,13 @@ def test_every_model_is_taken(editor: Editor) -> None:
 
 def test_materials_are_copied_and_pasted(editor: Editor) -> None:
     before = editor.settled()
-    editor.page.click("#material-presets [data-name=gold]")
+    editor.page.click("#library [data-value=gold]")
     editor.wait_for_change(before)
     gold = editor.settled()
-    editor.page.click("#copy-material")
+    editor.act("copy-material")
     editor.page.keyboard.press("Control+z")
     editor.wait("the first material", lambda: editor.page.input_value(editor.field("metallic", "number")) == "0")
-    editor.page.click("#paste-material")
+    editor.act("paste-material")
     editor.wait("gold again", lambda: editor.page.input_value(editor.field("metallic", "number")) == "1")
     editor.settled()
     assert not editor.differs(gold, 8)
@@ -110,7 +109,7 @@ def test_materials_are_copied_and_pasted(editor: Editor) -> None:
 
 def test_presets_are_pictures_taken_by_the_service(editor: Editor) -> None:
     editor.settled()
-    script = """() => [...document.querySelectorAll("#material-presets img")].map((image) => {
+    script = """() => [...document.querySelectorAll("#library img")].map((image) => {
         const small = new OffscreenCanvas(1, 1).getContext("2d");
         small.drawImage(image, 0, 0, 1, 1);
         return [image.naturalWidth, ...small.getImageData(0, 0, 1, 1).data];

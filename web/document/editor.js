@@ -168,9 +168,14 @@ export class Editor extends Store {
     return at(this.state, this.materialPlace);
   }
 
+  // With the first thing that is made of it, unless one is selected already; alone where nothing is.
   pickMaterial(material) {
-    const shape = this.state.scene.shapes.findIndex((each) => each.material === material);
-    const thing = shape < 0 ? this.state.chosen.thing : pointer("shapes", shape);
+    const { scene, chosen } = this.state;
+    const isOf = ({ material: each }) => each === material;
+    const shape = scene.shapes.findIndex(isOf);
+    const isSelected = chosen.thing.startsWith("/shapes/") && isOf(at(scene, chosen.thing) ?? {});
+    const first = shape < 0 ? pointer("materials", material) : pointer("shapes", shape);
+    const thing = isSelected ? chosen.thing : first;
     this.amend({ chosen: { ...this.state.chosen, material, thing } });
   }
 
@@ -253,7 +258,7 @@ export class Editor extends Store {
 
   // --- things of the scene ---
 
-  // `thing`: /camera, /environment, /lights/0, /shapes/0.
+  // `thing`: /camera, /environment, /lights/0, /shapes/0; a material that no thing is made of, /materials/gold.
   select(thing) {
     const shape = thing.startsWith("/shapes/") ? at(this.state.scene, thing) : null;
     const { chosen } = this.state;

@@ -98,7 +98,8 @@ export class PageState {
     if (!this.isConnected) return "Offline";
     if (this.isPaused) return "Paused";
     if (this.isDone) return "Done";
-    return isPreparing || !this.header ? "Preparing" : "Rendering";
+    if (isPreparing || !this.header) return "Preparing";
+    return this.header.scale < 1 ? "Preview" : "Converging";
   }
 }
 

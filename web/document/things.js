@@ -28,7 +28,7 @@ export function things({ environment, lights = [], shapes }) {
       thing: pointer("shapes", i),
       icon: type,
       title: title(type),
-      note: inWords(material),
+      note: material,
     })),
   ];
 }

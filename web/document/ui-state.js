@@ -1,8 +1,8 @@
 // The state of the interface, as opposed to the document: the active tool, the overlays of the picture, the open tab.
-// It is neither undone nor shared; the tab, the theme and whether the lobe is shown outlive the page.
+// It is neither undone nor shared; how the page is laid out outlives it.
 
 const STORED = "sunbox.ui";
-const LASTING = ["tab", "theme", "lobe"];
+const LASTING = ["drawer", "theme", "lobe", "outline", "inspector"];
 
 export class UiState {
   #listeners = [];
@@ -13,14 +13,18 @@ export class UiState {
     clipping: false,
     checker: null,
     guides: false,
-    tab: "material",
+    tab: "properties",
+    drawer: "materials",
     theme: null,
     lobe: false,
+    outline: null, // shown or folded; null: as there is room
+    inspector: null, // its width in CSS pixels; null: as there is room
   };
 
   constructor() {
     try {
-      Object.assign(this.state, JSON.parse(localStorage.getItem(STORED) ?? "{}"));
+      const stored = JSON.parse(localStorage.getItem(STORED) ?? "{}");
+      for (const name of LASTING) if (stored[name] !== undefined) this.state[name] = stored[name];
     } catch {
       // There is no storage, or it holds something else: the defaults stay.
     }

@@ -73,6 +73,11 @@ function numberEntry(field, id, { input, commit, refuse, restore }) {
     latest = value ?? null;
     scale = span(ends, field.step, Boolean(field.ranges));
     box.placeholder = effective === undefined ? (field.absent ?? UNSET) : compact(effective);
+    const holds = latest ?? effective;
+    if (typeof holds === "number") {
+      box.setAttribute("role", "spinbutton");
+      box.setAttribute("aria-valuenow", String(holds));
+    } else ["role", "aria-valuenow"].forEach((name) => box.removeAttribute(name));
     if (isBeingEdited(box)) return;
     box.value = latest === null ? "" : compact(latest);
     box.title = latest === null || box.value === String(latest) ? "" : String(latest);
@@ -110,7 +115,7 @@ function track(field, id, { input, commit }) {
     range.classList.toggle("ghost", (value ?? null) === null);
     range.classList.toggle("unset", known === null);
     range.value = String(known === null ? min : scale.isLog ? scale.toShare(known) : known);
-    range.style.setProperty("--fill", String((range.valueAsNumber - min) / (max - min)));
+    range.style.setProperty("--share", String((range.valueAsNumber - min) / (max - min)));
     const number = known === null ? (field.absent ?? "") : `${compact(known)} ${unitText(field.unit)}`.trim();
     const words = (value ?? null) !== null ? number : ["not set", number].filter(Boolean).join(", ");
     range.setAttribute("aria-valuetext", words);
@@ -183,7 +188,18 @@ function vector(field, id, { input, commit, refuse, restore }) {
     return entry;
   });
   return {
-    element: element("div", { class: "vector" }, ...entries.map((entry) => entry.element)),
+    element: element(
+      "div",
+      { class: "vector" },
+      ...entries.map((entry, i) =>
+        element(
+          "span",
+          { class: "axis", "data-axis": names[i] },
+          element("i", { "aria-hidden": "true" }, names[i].charAt(0).toUpperCase()),
+          entry.element,
+        ),
+      ),
+    ),
     show(value) {
       const known = value ?? (field.isPerChannel ? null : 0);
       latest = Array.isArray(known) || known === null ? known : names.map(() => known);

@@ -2,7 +2,7 @@
 
 import { element } from "../lib/dom.js";
 import { watchChoice } from "../lib/tabs.js";
-import { count, duration, inWords, percent } from "../lib/format-text.js";
+import { amount, duration, inWords, percent } from "../lib/format-text.js";
 
 const TRUSTED = 4; // samples before a forecast is worth something
 const UNSEEN = 0.0005; // a share of the light that nobody misses
@@ -29,7 +29,7 @@ const share = (light) => (light < UNSEEN ? `under ${percent(UNSEEN)}` : percent(
 
 // What a preset takes, and what light lies beyond its bounces.
 export function taken({ max_samples, max_bounces, cost }) {
-  const text = `${count(max_samples)} samples, ${max_bounces} bounces`;
+  const text = `${amount(max_samples, "sample")}, ${amount(max_bounces, "bounce")}`;
   if (!cost) return text;
   const { missing_light: usual, worst_missing_light: worst } = cost;
   const listed =

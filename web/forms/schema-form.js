@@ -4,6 +4,7 @@
 import { linear } from "../lib/color.js";
 import { control } from "./controls.js";
 import { element, freshId } from "../lib/dom.js";
+import { folds } from "./folds.js";
 import { acceptFiles } from "../lib/files.js";
 import { equal, isObject } from "../lib/patch.js";
 import { followed } from "../server/schema.js";
@@ -29,6 +30,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
     }
   };
   let latest;
+  let isChanged = false;
   const widget = control(field, id, {
     input: (value) => {
       mark(null);
@@ -77,6 +79,7 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
   return {
     element: node,
     mark,
+    isChanged: () => isChanged,
     // `effective`: what holds where neither the document nor the schema has a value; `ends`: of a slider whose range
     // depends on another field.
     show(value, initial = field.initial, effective = undefined, ends = undefined) {
@@ -88,7 +91,8 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
         under?.show(latest);
       }
       if (trouble.hidden && !textured) widget.show(latest, effective, ends); // else what was refused stays in sight
-      reset.hidden = textured || field.required || value === undefined || isSame(field, value, initial);
+      isChanged = value !== undefined && !isSame(field, value, initial);
+      reset.hidden = textured || field.required || !isChanged;
     },
   };
 }
@@ -99,8 +103,10 @@ function row(field, { change, commit, forgive, takeFile, slot, beneath }) {
 // and `beneath(field)` {element, show} for what it has to say of its image.
 export function schemaForm(fields, acts) {
   const rows = new Map(fields.map((field) => [field.name, row(field, acts)]));
+  const parts = fields.some(({ group }) => group) ? folds(rows, fields) : null;
   return {
-    element: element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
+    element: parts?.element ?? element("div", { class: "form" }, ...[...rows.values()].map((each) => each.element)),
+    filter: (text) => parts?.filter(text),
     // `initials` stand in for the schema's defaults where these depend on something else.
     show(values, initials = {}) {
       for (const [name, each] of rows) {
@@ -113,10 +119,12 @@ export function schemaForm(fields, acts) {
           Boolean(field.used) && !field.used.values.includes(valueOf(field.used.field)),
         );
       }
+      parts?.show(values);
     },
     // Says at a field what is wrong with it; false where this form has no such field.
     mark(name, text) {
       rows.get(name)?.mark(text);
+      if (text) parts?.reveal(name);
       return rows.has(name);
     },
     forgive() {

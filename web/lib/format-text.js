@@ -51,5 +51,8 @@ export const percent = (ratio) => `${Number((100 * ratio).toPrecision(2))}\u00a0
 // What the server says of a thing, as a sentence of its own.
 export const sentence = (text) => text.charAt(0).toUpperCase() + text.slice(1);
 
+// "1 sample", "4 samples".
+export const amount = (n, thing) => `${count(n)} ${thing}${n === 1 ? "" : "s"}`;
+
 // 16777216 -> "16 777 216", with spaces that do not break.
 export const count = (n) => n.toLocaleString("en").replaceAll(",", "\u202f");

@@ -23,8 +23,8 @@ export function watchTabs(list, chosen, choose) {
   return show;
 }
 
-// A row of buttons of which one is chosen: arrows move among them.
-export function watchChoice(root, selector, pick) {
+// A row of buttons of which one is chosen: arrows move among them. `state` is the attribute that says which.
+export function watchChoice(root, selector, pick, state = "aria-checked") {
   root.addEventListener("click", ({ target }) => {
     const button = target.closest(selector);
     if (button) pick(button);
@@ -42,8 +42,26 @@ export function watchChoice(root, selector, pick) {
   return (isChosen) => {
     for (const button of root.querySelectorAll(selector)) {
       const on = isChosen(button);
-      button.setAttribute("aria-checked", String(on));
+      button.setAttribute(state, String(on));
       button.tabIndex = on ? 0 : -1;
     }
   };
+}
+
+// Buttons that are one stop of the Tab key together: arrows move among those that can be pressed.
+export function watchToolbar(root, selector = "button") {
+  const all = () => [...root.querySelectorAll(selector)].filter((each) => !each.disabled && each.checkVisibility());
+  const stop = (at) => {
+    for (const each of root.querySelectorAll(selector)) each.tabIndex = each === at ? 0 : -1;
+  };
+  root.addEventListener("focusin", ({ target }) => stop(target.closest(selector)));
+  root.addEventListener("keydown", (event) => {
+    const step = { ArrowRight: 1, ArrowDown: 1, ArrowLeft: -1, ArrowUp: -1 }[event.key];
+    const buttons = all();
+    const at = buttons.indexOf(document.activeElement);
+    if (!step || at < 0) return;
+    event.preventDefault();
+    buttons[(at + step + buttons.length) % buttons.length].focus();
+  });
+  stop(root.querySelector(selector));
 }

@@ -266,7 +266,7 @@ export class LobePanel {
     this.markView(({ dataset }) => dataset.value === view);
     this.angleRow.hidden = !this.#view.hasIncidence;
     this.angle.value = String(incidence);
-    this.angle.style.setProperty("--fill", String(incidence / Number(this.angle.max)));
+    this.angle.style.setProperty("--share", String(incidence / Number(this.angle.max)));
     this.angle.setAttribute("aria-valuetext", `${incidence}°`);
     this.degrees.textContent = `${incidence}°`;
     this.log.row.hidden = !this.#view.hasLog;

@@ -1,7 +1,8 @@
-// The controls of the interface's state: tabs, the layer, the overlays of the picture.
+// The controls of the interface's state: tabs and drawers, the layer, the overlays of the picture.
 
 import { element } from "../lib/dom.js";
 import { inWords } from "../lib/format-text.js";
+import { watchMenu } from "../lib/menu.js";
 import { watchTabs } from "../lib/tabs.js";
 
 const OVERLAYS = {
@@ -16,6 +17,8 @@ export class DisplayControls {
   constructor({ find, page, ui, does }) {
     Object.assign(this, { find, page, ui });
     this.showTab = watchTabs(find("tabs"), ui.state.tab, (tab) => ui.set({ tab }));
+    this.showDrawer = watchTabs(find("drawers"), ui.state.drawer, (drawer) => ui.set({ drawer }));
+    watchMenu(find("view"), find("view-menu"));
     this.layer = find("layer");
     this.layer.append(...page.layers.map((each) => element("option", { value: each }, inWords(each))));
     this.layer.addEventListener("change", () => ui.set({ layer: this.layer.value }));
@@ -37,8 +40,9 @@ export class DisplayControls {
   }
 
   show() {
-    const { tab, theme, layer, ...members } = this.ui.state;
+    const { tab, drawer, theme, layer, ...members } = this.ui.state;
     this.showTab(tab);
+    this.showDrawer(drawer);
     this.layer.value = layer;
     const isOn = { ...members, checker: this.page.isCheckered };
     for (const member of Object.keys(OVERLAYS)) this.find(`show-${member}`).checked = isOn[member];

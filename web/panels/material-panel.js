@@ -3,27 +3,31 @@
 import { askName, askWhich } from "../lib/ask.js";
 import * as materials from "../document/materials.js";
 import { things } from "../document/things.js";
+import { watchMenu } from "../lib/menu.js";
 import { pointer } from "../lib/patch.js";
-import { inWords, sentence } from "../lib/format-text.js";
+import { watchToolbar } from "../lib/tabs.js";
+import { sentence } from "../lib/format-text.js";
 
 const MOST_NAMED = 2; // things that are named; more are counted
 
-// `acts` is the editor, `say(text)` reads out.
+// `find(id)` elements, `acts` the editor, `say(text)` reads out, `paint(image, material)` puts in its picture.
 export class MaterialPanel {
-  constructor(root, { acts, say }) {
-    Object.assign(this, { root, acts, say });
+  #painted = null;
+
+  constructor(find, { acts, say, paint }) {
+    Object.assign(this, { find, acts, say, paint });
     const clicks = {
       "new-material": () => this.#add((state) => materials.added(state, "material", acts.plainMaterial)),
       "duplicate-material": () => this.#copy(),
       "own-material": () => this.#copy(),
-      "rename-material": () => this.#rename(),
-      "delete-material": () => this.#remove(),
+      "rename-material": () => this.rename(this.#name),
+      "delete-material": () => this.remove(this.#name),
     };
-    for (const [id, does] of Object.entries(clicks)) this.#find(id).addEventListener("click", does);
-  }
-
-  #find(id) {
-    return this.root.querySelector(`#${id}`);
+    for (const [id, does] of Object.entries(clicks)) find(id).addEventListener("click", does);
+    find("material-name").addEventListener("dblclick", () => this.rename(this.#name));
+    watchToolbar(find("material-acts"));
+    watchToolbar(find("material-tools"));
+    watchMenu(find("material-more"), find("material-menu"));
   }
 
   get #name() {
@@ -32,15 +36,14 @@ export class MaterialPanel {
 
   #add(make) {
     this.acts.change(make(this.acts.state));
-    this.say(`${inWords(this.#name)}: ${this.#users()}`);
+    this.say(`${this.#name}: ${this.#users()}`);
   }
 
   #copy() {
     this.#add((state) => materials.copied(state, this.acts.material));
   }
 
-  async #rename() {
-    const from = this.#name;
+  async rename(from) {
     const to = await askName({
       title: "Rename the material",
       label: "Name",
@@ -51,19 +54,19 @@ export class MaterialPanel {
     if (to !== null && to !== from) this.acts.change(materials.renamed(this.acts.state, from, to));
   }
 
-  async #remove() {
-    const name = this.#name;
+  async remove(name) {
     const { scene } = this.acts.state;
+    if (Object.keys(scene.materials).length < 2) return;
     const others = Object.keys(scene.materials).filter((each) => each !== name);
     const count = materials.users(scene, name).length;
     const instead =
       count === 0
         ? others[0]
         : await askWhich({
-            title: `Delete ${inWords(name)}?`,
+            title: `Delete ${name}?`,
             detail: count === 1 ? "One thing is made of it." : `${count} things are made of it.`,
             label: count === 1 ? "It gets" : "They get",
-            options: others.map((value) => ({ value, title: inWords(value) })),
+            options: others.map((value) => ({ value, title: value })),
             action: "Delete",
           });
     if (instead !== null) this.acts.change(materials.removed(this.acts.state, name, instead));
@@ -80,9 +83,13 @@ export class MaterialPanel {
   }
 
   show({ scene, chosen }) {
-    this.#find("material-users").textContent = `${sentence(this.#users())}.`;
-    const isShared = materials.isShared({ scene }, chosen.thing);
-    this.#find("own-material").hidden = !isShared;
-    this.#find("delete-material").disabled = Object.keys(scene.materials).length < 2;
+    this.find("material-name").textContent = this.#name;
+    this.find("material-users").textContent = `${sentence(this.#users())}.`;
+    this.find("own-material").hidden = !materials.isShared({ scene }, chosen.thing);
+    this.find("delete-material").disabled = Object.keys(scene.materials).length < 2;
+    const { material } = this.acts;
+    if (material === this.#painted) return;
+    this.#painted = material;
+    this.paint(this.find("material-picture"), material);
   }
 }

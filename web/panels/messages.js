@@ -14,8 +14,8 @@ export class Messages {
   }
 
   // `action` is {label, does}; a message without `lasting` can be closed by hand; `list` are lines under it.
-  // With `progress` it shows a bar, and what is returned sets it, 0..1.
-  show(kind, { title, detail = "", list = [], action = null, lasting = false, progress = false }) {
+  // `below` is an element under it. With `progress` it shows a bar, and what is returned sets it, 0..1.
+  show(kind, { title, detail = "", list = [], below = null, action = null, lasting = false, progress = false }) {
     this.hide(kind);
     const button = action && element("button", { type: "button", onclick: action.does }, action.label);
     const close = lasting
@@ -32,6 +32,7 @@ export class Messages {
         );
     const text = element("div", {}, element("strong", {}, title), detail ? ` ${detail}` : "");
     if (list.length) text.append(element("ul", {}, ...list.map((line) => element("li", {}, line))));
+    if (below) text.append(below);
     const bar = progress ? element("progress", { max: "1", value: "0", "aria-label": title }) : null;
     const node = element("div", { class: `message ${kind}` }, text, bar, button, close);
     this.#shown.set(kind, { node, about: lasting ? [] : this.about(kind) });

@@ -7,7 +7,7 @@ import { saveAs } from "../lib/files.js";
 import { detailWords } from "../server/problem-text.js";
 import { fields } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
-import { duration, sentence } from "../lib/format-text.js";
+import { amount, duration, sentence } from "../lib/format-text.js";
 
 const WINDOW = "window";
 const FREE = "free";
@@ -32,9 +32,10 @@ export class Output {
   #job = null; // {id, width, height, samples}
   #turn = 0; // rises with each job: answers for an older one are dropped
 
-  // `acts` is the editor; `order()` gives {scene, settings} to render, `view()` how it is displayed; `complain`, `say`.
-  constructor(root, { schema, acts, order, view, complain, say }) {
-    Object.assign(this, { acts, order, view, complain, say });
+  // `acts` is the editor; `order()` gives {scene, settings} to render, `view()` how it is displayed; `head` is
+  // where the button that leads here says the size; `complain`, `say`.
+  constructor(root, { schema, acts, order, view, head, complain, say }) {
+    Object.assign(this, { acts, order, view, head, complain, say });
     const id = freshId("shape");
     this.shape = element(
       "select",
@@ -52,7 +53,11 @@ export class Output {
       },
     );
     this.note = element("p", { class: "note" });
-    this.button = element("button", { type: "button", class: "button primary", onclick: () => this.render() });
+    this.button = element(
+      "button",
+      { type: "button", class: "button primary", onclick: () => this.render() },
+      "Render picture",
+    );
     this.cancel = element(
       "button",
       { type: "button", class: "button", hidden: true, onclick: () => this.#stop() },
@@ -119,7 +124,7 @@ export class Output {
     ];
     const text = words.filter(Boolean).join(" ");
     if (this.note.textContent !== text) this.note.textContent = text;
-    this.button.textContent = `Render ${times(size.width, size.height)}`;
+    this.head.textContent = `${size.width}×${size.height}`;
     this.size = size;
   }
 
@@ -181,7 +186,7 @@ export class Output {
     this.bar.value = eta_s === null ? 0 : elapsed_s / (elapsed_s + eta_s || 1);
     const left = eta_s === null ? "" : `, ${duration(eta_s)} left`;
     if (state === "running")
-      this.told.textContent = `${Math.round(100 * this.bar.value)} %, ${samples} samples${left}`;
+      this.told.textContent = `${Math.round(100 * this.bar.value)} %, ${amount(samples, "sample")}${left}`;
   }
 
   #rest(text) {
@@ -205,7 +210,7 @@ export class Output {
     const { id, width, height } = this.#job;
     if (state === "failed") return this.#rest(`The render failed. ${sentence(reason ?? "")}`.trim());
     if (!samples) return this.#rest("Cancelled before the first sample");
-    const done = `${times(width, height)}, ${samples} samples`;
+    const done = `${times(width, height)}, ${amount(samples, "sample")}`;
     this.#rest(state === "done" ? `Done: ${done}` : `Cancelled: ${done} so far`);
     if (warnings?.length) this.told.title = warnings.map((each) => each.detail ?? each).join("\n");
     const file = (label, query, ending) =>

@@ -1,13 +1,10 @@
-// The panel at the side: forms and pickers made from the server's schema and presets. It shows a state and
-// turns what the hand does into edits; it keeps nothing itself.
+// The inspector: forms made from the server's schema, of what is selected and of the render. It shows a state and turns
+// what the hand does into edits; it keeps nothing itself.
 
-import { element } from "../lib/dom.js";
-import { OWN } from "../document/editor.js";
 import { DISPLAY } from "../document/picture-view.js";
-import { fillPicker, materialButtons } from "../forms/library.js";
+import { fillPicker } from "../forms/library.js";
 import { MaterialPanel } from "./material-panel.js";
-import { Outliner, additions } from "./outliner.js";
-import { equal } from "../lib/patch.js";
+import { ThingPart } from "./thing-part.js";
 import { fields, materialModels } from "../server/schema.js";
 import { schemaForm } from "../forms/schema-form.js";
 import { qualityChoice } from "../forms/quality.js";
@@ -19,21 +16,18 @@ import { inWords } from "../lib/format-text.js";
 const MAIN_SETTINGS = ["max_samples", "target_noise", "time_limit", "adaptive", "denoise"];
 const NOT_SETTINGS = ["width", "height", "quality"];
 
-const NONE = "(none)";
-
 export class Panel {
   #forms = {};
-  #shape = {}; // what the exchangeable forms were made for
+  #made = null; // what the material's form was made for
+  #qualities;
 
-  // `acts` is the editor; `stage` has frame(thing), add(offer), duplicate(thing) and takeTexture(place, file). `paint`
-  // as materialButtons wants it, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants them.
-  constructor(root, { schema, library, acts, stage, paint, say, textureActs }) {
-    this.root = root;
-    this.stage = stage;
-    this.textureActs = textureActs;
-    this.acts = acts;
+  // `find(id)` elements; `acts` is the editor; `stage` has frame(thing), duplicate(thing) and takeTexture(place, file);
+  // `paint(image, material)` puts in a picture, `say(text)` reads out; `textureActs(place, field)` as TextureSlot wants
+  // them.
+  constructor(find, { schema, library, acts, stage, paint, say, textureActs }) {
+    Object.assign(this, { find, stage, textureActs, acts, schema });
+    this.root = find("panel");
     this.materials = materialModels(schema.scene);
-    this.schema = schema;
     const view = fields(schema.view, schema.view);
     const settings = fields(schema.settings, schema.settings).filter(({ name }) => !NOT_SETTINGS.includes(name));
     this.#forms.view = this.#mount(
@@ -48,48 +42,12 @@ export class Panel {
       settings.filter((field) => !main.includes(field)),
       "/settings",
     );
-    this.outliner = new Outliner(root, schema, acts, stage);
-    this.materialPanel = new MaterialPanel(root, { acts, say });
-    this.#qualities = qualityChoice(this.#find("qualities"), (name) => acts.edit("/settings/quality", name));
-    this.#pickers(library, paint);
-    this.#additions(schema.scene);
-  }
-
-  #qualities;
-
-  #find(id) {
-    return this.root.querySelector(`#${id}`);
-  }
-
-  #pickers(library, paint) {
-    const { acts } = this;
-    fillPicker(
-      this.#find("scene"),
-      [{ name: "", title: "Your own" }, ...library.scenes],
-      (name) => name && acts.pickScene(name),
-    );
-    this.#find("scene").options[0].hidden = true;
-    const environments = [{ name: OWN, title: "" }, { name: NONE, title: "None (black)" }, ...library.environments];
-    fillPicker(this.#find("environment"), environments, (name) => acts.pickEnvironment(name === NONE ? null : name));
-    fillPicker(this.#find("material"), [], (name) => acts.pickMaterial(name));
+    this.thingPart = new ThingPart(find, { schema: schema.scene, acts, stage, environments: library.environments });
+    this.materialPanel = new MaterialPanel(find, { acts, say, paint });
+    this.#qualities = qualityChoice(find("qualities"), (name) => acts.edit("/settings/quality", name));
     const models = Object.keys(this.materials).map((name) => ({ name, title: inWords(name) }));
-    fillPicker(this.#find("model"), models, (name) => acts.pickModel(name));
-    this.presets = materialButtons(this.#find("material-presets"), library.materials, {
-      pick: (material) => acts.putMaterial(material),
-      fail: acts.complain,
-      paint,
-    });
-  }
-
-  #additions(schema) {
-    const add = this.#find("add");
-    const offers = additions(schema);
-    add.append(...offers.map(({ title }, i) => element("option", { value: String(i) }, title)));
-    add.addEventListener("change", () => {
-      const offer = offers[Number(add.value)];
-      add.value = "";
-      this.stage.add(offer);
-    });
+    fillPicker(find("model"), models, (name) => acts.pickModel(name));
+    find("filter").addEventListener("input", () => this.#forms.material.filter(find("filter").value));
   }
 
   // Puts a form for some fields of the place in the document into the panel.
@@ -112,7 +70,7 @@ export class Panel {
         return made;
       },
     });
-    this.#find(`${id}-form`).replaceChildren(form.element);
+    this.find(`${id}-form`).replaceChildren(form.element);
     return { place, textures, ...form };
   }
 
@@ -126,36 +84,24 @@ export class Panel {
 
   // `knobs`: what the chosen quality makes of the settings that are not given.
   show(state, knobs) {
-    const { scene, settings, view, chosen, home } = state;
-    this.#find("scene").value = chosen.scene;
-    if (this.#find("scene").selectedIndex < 0) this.#find("scene").value = "";
-    this.#find("environment").value = chosen.environment ?? NONE;
-    this.#find("environment").options[0].text = home.environment ? "The scene's own" : "The scene's own: none";
-    this.#showMaterial(scene, chosen);
+    const { settings, view } = state;
+    this.#showMaterial();
     this.materialPanel.show(state);
-    this.outliner.show(state);
+    this.thingPart.show(state);
     this.#forms.view.show(view);
     this.#forms.settings.show(settings, knobs);
     this.#forms.more.show(settings, knobs);
   }
 
-  #showMaterial(scene, chosen) {
-    const names = Object.keys(scene.materials);
-    if (!equal(names, this.#shape.names)) {
-      this.#shape.names = names;
-      this.#find("material").replaceChildren(
-        ...names.map((name) => element("option", { value: name }, inWords(name))),
-      );
-    }
-    this.#find("material").value = chosen.material;
+  #showMaterial() {
     const { material, materialPlace: place } = this.acts;
     if (!material) return;
-    if (this.#shape.material !== material.type + place) {
-      this.#shape.material = material.type + place;
+    if (this.#made !== material.type + place) {
+      this.#made = material.type + place;
+      this.find("filter").value = "";
       this.#forms.material = this.#mount("material", fields(this.schema.scene, this.materials[material.type]), place);
     }
-    this.#find("model").value = material.type;
-    this.presets.show(material);
+    this.find("model").value = material.type;
     this.#forms.material.show(material);
   }
 
@@ -177,7 +123,7 @@ export class Panel {
       const [name] = wrong.slice(place.length + 1).split("/");
       if (mark(name, text)) return `${place}/${name}`;
     }
-    return this.outliner.mark(wrong, text);
+    return this.thingPart.mark(wrong, text);
   }
 
   // Whether such words are in sight.
@@ -188,6 +134,6 @@ export class Panel {
   // Takes all such words away.
   forgive() {
     for (const form of this.#places()) form.forgive();
-    this.outliner.forgive();
+    this.thingPart.forgive();
   }
 }

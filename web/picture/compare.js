@@ -199,7 +199,11 @@ export class Comparison {
     const types = [scene.materials[compare.material]?.type, compare.document.type];
     ["a", "b"].forEach((side, i) => {
       const words = [side.toUpperCase(), types[i] && inWords(types[i]), headers[i] && String(headers[i].samples)];
-      const unit = element("span", { class: "unit" }, headers[i] ? " samples" : "");
+      const unit = element(
+        "span",
+        { class: "unit" },
+        headers[i] ? ` sample${headers[i].samples === 1 ? "" : "s"}` : "",
+      );
       this.stage.querySelector(`.variant.${side}`).replaceChildren(words.filter(Boolean).join(" · "), unit);
     });
   }

@@ -8,7 +8,7 @@ import { Markers } from "./markers.js";
 import { drawClipping, drawHistogram, fitGuides, showClipped, showLegend } from "./overlays.js";
 import { Picker, drawOutline } from "../document/picking.js";
 import { NotReady } from "../server/stream.js";
-import { watchChoice } from "../lib/tabs.js";
+import { watchToolbar } from "../lib/tabs.js";
 import { at, pointer } from "../lib/patch.js";
 import { dot } from "../lib/vector.js";
 import { inWords } from "../lib/format-text.js";
@@ -16,8 +16,7 @@ import { inWords } from "../lib/format-text.js";
 // A click before there is a picture.
 const EARLY = {
   focus: "Nothing can be focused on yet: the picture is still being prepared. Click again once it is there.",
-  select:
-    "Nothing can be selected in the picture yet: it is still being prepared. The outline in the Scene tab has everything.",
+  select: "Nothing can be selected in the picture yet: it is still being prepared. The outline has everything.",
 };
 
 const OUTLINE_MS = 900;
@@ -65,7 +64,11 @@ export class ViewportController {
           : acts.moves.pan(right, down),
     };
     watchGestures(this.root, this.move, () => ui.state.tool);
-    this.markTool = watchChoice(find("tools"), "[data-tool]", ({ dataset }) => ui.set({ tool: dataset.tool }));
+    watchToolbar(find("tools"));
+    find("tools").addEventListener("click", ({ target }) => {
+      const tool = target.closest("[data-tool]")?.dataset.tool;
+      if (tool) ui.set({ tool });
+    });
   }
 
   get aspect() {
@@ -82,7 +85,8 @@ export class ViewportController {
 
   showUi({ tool, guides, clipping, histogram }) {
     this.root.dataset.tool = tool;
-    this.markTool(({ dataset }) => dataset.tool === tool);
+    for (const button of this.find("tools").querySelectorAll("[data-tool]"))
+      button.setAttribute("aria-pressed", String(button.dataset.tool === tool));
     this.inspector.toggle(tool === "inspect");
     this.find("guides").hidden = !guides;
     this.find("clipping").hidden = !clipping;
@@ -99,10 +103,10 @@ export class ViewportController {
     this.mark();
   }
 
-  // Where lights and the camera's target are, while the scene is arranged.
+  // Where lights and the camera's target are, while one of these is selected and no material is looked at.
   mark() {
-    const { tab, tool } = this.ui.state;
-    const isOn = tab === "scene" && tool !== "inspect";
+    const { thing } = this.acts.state.chosen;
+    const isOn = /^\/(camera|environment|lights)/.test(thing) && this.ui.state.tool !== "inspect";
     if (isOn) fitGuides(this.find("markers"), this.root, this.viewport.canvas);
     this.markers.show(isOn, this.aspect);
   }

@@ -133,7 +133,8 @@ function field(schema, name, raw, required) {
     ranges: bound(nodes, "x-ranges"),
     used: bound(nodes, "x-used"),
     example: bound(nodes, "examples")?.[0],
-    isPerChannel: Boolean(vector) && bound(nodes, "x-widget") === "number",
+    // What a material has three of is one for each channel; anywhere else three numbers go along the axes.
+    isPerChannel: Boolean(vector && numeric && bound(nodes, "x-group")),
   };
 }
 

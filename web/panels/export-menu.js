@@ -1,0 +1,69 @@
+// What leaves the page as a file or a command: the items of the menu "Export".
+
+import { element } from "../lib/dom.js";
+import { jsonBlob, saveAs } from "../lib/files.js";
+
+export class ExportMenu {
+  // `acts`: name() of the scene for files, scene(), material(), png(bits) and exr() -> {blob, header}, command(),
+  // complain(error), announce(text).
+  constructor(root, acts) {
+    this.acts = acts;
+    const picture = (make, ending) => () =>
+      this.#try(async () => {
+        const { blob, header } = await make();
+        saveAs(blob, `sunbox-${acts.name()}-${header.samples}.${ending}`);
+      });
+    this.png = picture(() => acts.png(8), "png");
+    const json = (kind) => () => saveAs(jsonBlob(acts[kind]()), `sunbox-${acts.name()}-${kind}.json`);
+    const items = [
+      ["PNG", "8 bit, as it is on screen", "download", this.png],
+      ["PNG, 16 bit", "", "download-16", picture(() => acts.png(16), "png")],
+      ["EXR", "all layers, linear", "download-exr", picture(() => acts.exr(), "exr")],
+      null,
+      ["JSON, scene", "", "download-scene", json("scene")],
+      ["JSON, material", "", "download-material", json("material")],
+      null,
+      ["curl", "copies a command that makes this picture", "copy-curl", () => this.#command()],
+    ];
+    root.replaceChildren(
+      ...items.map((item) => {
+        if (!item) return element("hr");
+        const [title, note, id, does] = item;
+        return element(
+          "button",
+          { type: "button", role: "menuitem", id, "aria-label": title, title: note, onclick: does },
+          title,
+          element("span", { class: "dim" }, note),
+        );
+      }),
+    );
+  }
+
+  async #try(work) {
+    try {
+      await work();
+    } catch (error) {
+      this.acts.complain(error);
+    }
+  }
+
+  #command() {
+    return this.#try(() => handOut(this.acts.command(), "The command", this.acts));
+  }
+}
+
+// Puts text where it can be pasted from: into the clipboard, else on the page to be copied by hand.
+export async function handOut(text, what, { announce, show }) {
+  const isCopied = await navigator.clipboard?.writeText(text).then(
+    () => true,
+    () => false,
+  );
+  const field = element(
+    "textarea",
+    { class: "command", readonly: true, spellcheck: "false", "aria-label": what },
+    text,
+  );
+  show(isCopied ? `${what} is copied.` : `${what}, to be copied by hand.`, field);
+  if (isCopied) announce(`${what} is copied.`);
+  else field.select();
+}

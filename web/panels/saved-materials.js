@@ -1,0 +1,64 @@
+// Materials that users have saved on the server.
+
+import * as api from "../server/api.js";
+import { ask, askName } from "../lib/ask.js";
+import { WHOSE } from "./scene-menu.js";
+
+export class SavedMaterials {
+  entries = []; // {name, title}
+
+  // `acts` the editor, `changed()` is called when there are others, `say(text)` reads out.
+  constructor({ acts, changed, say }) {
+    Object.assign(this, { acts, changed, say });
+    this.refresh();
+  }
+
+  async #try(work) {
+    try {
+      return await work();
+    } catch (problem) {
+      this.acts.complain(problem);
+      return null;
+    }
+  }
+
+  refresh() {
+    return this.#try(async () => {
+      this.entries = (await api.listSaved("materials")).map(({ name, title = name }) => ({ name, title }));
+      this.changed();
+    });
+  }
+
+  fetch(name) {
+    return api.fetchSaved("materials", name);
+  }
+
+  // Asks for a name, and saves the material in hand.
+  save() {
+    return this.#try(async () => {
+      const { material, state } = this.acts;
+      const wanted = await askName({
+        title: "Save the material on the server",
+        label: "Name",
+        value: state.chosen.material,
+        action: "Save",
+        problem: (name) => (name ? null : "A material needs a name."),
+      });
+      if (wanted === null) return;
+      const isTaken = this.entries.some(({ title }) => title === wanted);
+      if (isTaken && !(await ask({ title: `Replace “${wanted}”?`, detail: WHOSE, yes: "Replace" }))) return;
+      await api.save("materials", wanted, material);
+      this.say(`Saved ${wanted}.`);
+      await this.refresh();
+    });
+  }
+
+  forget(name) {
+    return this.#try(async () => {
+      const { title } = this.entries.find((each) => each.name === name);
+      if (!(await ask({ title: `Delete “${title}”?`, detail: WHOSE, yes: "Delete" }))) return;
+      await api.forget("materials", name);
+      await this.refresh();
+    });
+  }
+}

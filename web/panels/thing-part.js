@@ -1,0 +1,149 @@
+// The selected thing: which fields it has, where it stands, and what can be done with it.
+
+import { element } from "../lib/dom.js";
+import { added } from "../document/materials.js";
+import { at } from "../lib/patch.js";
+import { environmentModels, fields, lightModels, model, shapeModels, transformModel } from "../server/schema.js";
+import { schemaForm } from "../forms/schema-form.js";
+import * as transforms from "../document/transforms.js";
+import { things } from "../document/things.js";
+
+export class ThingPart {
+  #made = null; // what the form was made for
+  #forms = [];
+  #newMaterial = element("option", {}, "New material");
+
+  // `find(id)` elements; `schema` of the scene; `acts` the editor; `stage` what Panel has; `environments` the presets.
+  constructor(find, { schema, acts, stage, environments }) {
+    Object.assign(this, { schema, acts, stage, environments });
+    this.#find = find;
+    find("thing-material").addEventListener("change", ({ target }) => {
+      if (target.selectedOptions[0] === this.#newMaterial)
+        return acts.change(added(acts.state, "material", acts.plainMaterial));
+      acts.edit(`/scene${this.thing}/material`, target.value);
+      acts.select(this.thing);
+    });
+  }
+
+  #find;
+
+  // `thing` is what is selected; the material of none that is a shape stands alone.
+  show({ scene, chosen }) {
+    const all = things(scene);
+    const isMaterial = chosen.thing.startsWith("/materials/");
+    this.thing = isMaterial || all.some(({ thing }) => thing === chosen.thing) ? chosen.thing : "/camera";
+    const own = all.find(({ thing }) => thing === this.thing);
+    this.#find("thing-part").hidden = !own;
+    this.#find("film-part").hidden = this.thing !== "/camera";
+    this.#find("material-part").hidden = Boolean(own) && !this.thing.startsWith("/shapes/");
+    if (own) this.#showThing(scene, own);
+    else this.#made = null;
+    const { environment } = chosen;
+    const name = this.environments.find((each) => each.name === environment)?.title;
+    this.#find("environment-name").textContent = name ?? (environment === null ? "" : "The scene's own");
+  }
+
+  #model(document) {
+    if (this.thing === "/camera") return model(this.schema, this.schema, "camera");
+    const models = { environment: environmentModels, lights: lightModels, shapes: shapeModels }[
+      this.thing.split("/")[1]
+    ];
+    return models(this.schema)[document?.type];
+  }
+
+  #showThing(scene, { title }) {
+    const document = at(scene, this.thing);
+    const isShape = this.thing.startsWith("/shapes/");
+    this.#find("thing-title").textContent = title;
+    this.#find("environment-name").hidden = this.thing !== "/environment";
+    this.#find("reset-view").hidden = this.thing !== "/camera";
+    this.#find("thing-material-row").hidden = !isShape;
+    if (isShape) {
+      const names = Object.keys(scene.materials);
+      this.#find("thing-material").replaceChildren(
+        ...names.map((name) => element("option", { value: name }, name)),
+        element("hr"),
+        this.#newMaterial,
+      );
+      this.#find("thing-material").value = document.material;
+    }
+    const marks = [
+      transforms.isSkewed(document?.transform) && "skewed",
+      this.acts.removable(this.thing) && "removable",
+    ].filter(Boolean);
+    const kind = [this.thing, document?.type, ...marks].join(" ");
+    if (kind !== this.#made) this.#make(kind, document, isShape);
+    for (const { place, form, read } of this.#forms) form.show(read(at(scene, place)));
+  }
+
+  #make(kind, document, isShape) {
+    this.#made = kind;
+    const own = this.#model(document);
+    const parts = own
+      ? [
+          {
+            place: this.thing,
+            fields: fields(this.schema, own),
+            read: (values) => values ?? {},
+            change: (name, value) => this.acts.edit(`/scene${this.thing}/${name}`, value),
+          },
+        ]
+      : [];
+    if (isShape) parts.push(this.#transform(document));
+    this.#forms = parts.map(({ fields: chosen, change, ...part }) => ({
+      ...part,
+      form: schemaForm(chosen, { change, commit: () => this.acts.rest(), forgive: () => this.acts.forgive() }),
+    }));
+    const removable = this.acts.removable(this.thing);
+    const button = (label, does) =>
+      element("button", { type: "button", class: "button small", onclick: does }, label);
+    const thing = this.thing;
+    this.#find("thing-acts").replaceChildren(
+      ...[
+        isShape ? button("Frame", () => this.stage.frame(thing)) : null,
+        /^\/(shapes|lights)\//.test(thing) ? button("Duplicate", () => this.stage.duplicate(thing)) : null,
+        removable ? button("Delete", () => this.acts.remove(thing)) : null,
+      ].filter(Boolean),
+    );
+    this.#find("thing-form").replaceChildren(
+      ...this.#forms.flatMap(({ title, note, form }) =>
+        [title && element("h3", {}, title), note && element("p", { class: "note" }, note), form.element].filter(
+          Boolean,
+        ),
+      ),
+    );
+  }
+
+  // Imported parts stand by a matrix: the form shows it as a move, a turn and a scale, which an edit makes of it.
+  #transform({ transform }) {
+    const place = `${this.thing}/transform`;
+    const isSkewed = transforms.isSkewed(transform);
+    return {
+      title: "Transform",
+      place,
+      read: transforms.shown,
+      note: isSkewed ? "This part is skewed in its file: it can be moved, but not turned or scaled." : "",
+      fields: fields(this.schema, transformModel(this.schema)).filter(
+        ({ name }) => !isSkewed || name === "translate",
+      ),
+      change: (name, value) => {
+        const now = at(this.acts.state.scene, place);
+        this.acts.edit(`/scene${place}`, transforms.changed(now, name, value), `/scene${place}/${name}`);
+      },
+    };
+  }
+
+  // As Panel.mark: the control's place, or null.
+  mark(wrong, text) {
+    for (const { place, form } of this.#forms) {
+      if (!wrong.startsWith(`/scene${place}/`)) continue;
+      const [name] = wrong.slice(place.length + 7).split("/");
+      if (form.mark(name, text)) return `/scene${place}/${name}`;
+    }
+    return null;
+  }
+
+  forgive() {
+    for (const { form } of this.#forms) form.forgive();
+  }
+}
