@@ -121,6 +121,7 @@ def test_every_place_for_an_image_is_reached_by_keyboard(editor: Editor) -> None
     schema = page.request.get(page.url + "v1/schema").json()["scene"]["$defs"]
     principled = next(m for m in schema.values() if "sheen_roughness" in m["properties"])["properties"]
     takes = {name for name, field in principled.items() if "Texture" in json.dumps(field)}
+    editor.unfold()
     offered = page.eval_on_selector_all("#material-form .pictured", "all => all.map((row) => row.dataset.field)")
     assert set(offered) == takes and len(takes) > 20
 
