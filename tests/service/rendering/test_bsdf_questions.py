@@ -39,9 +39,12 @@ EVALUATOR = """
 import numpy as np
 from gpu import Renderer, Steps
 from gpu.bsdf import kernels
+RAISES = {"HAS_ANISOTROPIC": "anisotropic", "HAS_TRANSMISSION": "transmission"}
 up = np.array([[0.0, 0.0, 1.0]])
 with Renderer() as renderer:
-    for material in kernels.samples():
+    for material, flags in kernels.samples():
+        for flag, member in RAISES.items():
+            material.materials[member] = 0.5 if flag in flags else 0.0
         Steps(renderer.bsdf.values(material, up, up)).finish()
         Steps(renderer.bsdf.albedo(material, up, 64)).finish()
         Steps(renderer.bsdf.terms(material, up, up)).finish()
