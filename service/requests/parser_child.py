@@ -6,20 +6,16 @@ waits, and what takes too much memory or time is ended. It ends with its parent,
 
 from __future__ import annotations
 
-import fcntl
 import gc
-import json
-import os
 import socket
-import sys
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from typing import Any
 
 from service.config import Config
 from service.ipc import channel
 from service.problems import ServiceError, TooLarge
 from service.requests.request_parser import PARSERS, Kind
-from service.system.confined import bound, confine, renounce, unbind
+from service.system.confined import begin, bounded
 from service.system.shared_memory import trim
 
 NICENESS = 10  # as the renderer has, whose share of the processors large bodies would take otherwise
@@ -44,8 +40,7 @@ class Failed:
 
 
 def main() -> None:
-    end = socket.socket(fileno=int(sys.argv[1]))
-    end.sendmsg([json.dumps(asdict(renounce(confine(NICENESS)))).encode()])
+    end = begin(NICENESS)
     gc.disable()  # it would go through all values again and again, and find nothing to free
     gc.freeze()
     end.settimeout(IDLE_S)
@@ -62,20 +57,14 @@ def main() -> None:
 
 def _answer(work: Work, end: socket.socket) -> Any:
     try:
-        bound(BASE_BYTES + TIMES * work.memory, work.seconds)
-        # A signal when the parent hangs up, whose default is to end: also in the middle of the scanner's loop.
-        fcntl.fcntl(end, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) | os.O_ASYNC)
-        return PARSERS[work.kind](work.config, work.body)
+        with bounded(end, BASE_BYTES + TIMES * work.memory, work.seconds):
+            return PARSERS[work.kind](work.config, work.body)
     except ServiceError as error:
         return error
     except MemoryError:
         return TooLarge("Reading this body takes more memory than allowed (SUNBOX_MAX_JSON_MEMORY).")
     except Exception as error:
         return Failed(f"{type(error).__name__}: {error}"[:2000])
-    finally:
-        fcntl.fcntl(end, fcntl.F_SETFL, fcntl.fcntl(end, fcntl.F_GETFL) & ~os.O_ASYNC)
-        unbind()
 
 
 if __name__ == "__main__":

@@ -6,14 +6,10 @@ the first file it gives up all rights that it does not need, and sends the paren
 """
 
 import errno
-import fcntl
-import importlib
 import json
 import mmap
 import os
 import socket
-import sys
-from dataclasses import asdict
 from typing import Any
 
 import numpy as np
@@ -21,7 +17,7 @@ import numpy as np
 from service.assets.errors import ParseError
 from service.assets.sandbox.wire import Pieces, publish, receive, send
 from service.assets.types import AssetLimits, ImageData, MeshData, SceneFile
-from service.system.confined import bound, cap, confine, renounce, unbind
+from service.system.confined import begin, bounded, cap
 from service.system.garbage import collector_paused
 from service.system.shared_memory import trim
 
@@ -31,10 +27,7 @@ EARLY = ("PIL.Image", "PIL.PngImagePlugin", "PIL.JpegImagePlugin", "PIL.WebPImag
 
 
 def main() -> None:
-    link = socket.socket(fileno=int(sys.argv[1]))
-    for name in EARLY:  # while it may open files
-        importlib.import_module(name)
-    link.sendmsg([json.dumps(asdict(renounce(confine(NICENESS)))).encode()])
+    link = begin(NICENESS, EARLY)
     is_capped = False
     while True:
         try:
@@ -61,15 +54,12 @@ def main() -> None:
 def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[dict[str, Any], int]:
     limits = AssetLimits(**request["limits"])
     try:
-        bound(request["memory"], limits.seconds)
-        # A signal when the parent hangs up, which ends the process by default, even inside a library's loop.
-        fcntl.fcntl(link, fcntl.F_SETOWN, os.getpid())
-        fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) | os.O_ASYNC)
-        parsed = _parse(request["format"], source, limits, request["whole"])
-        arrays, facts = _arrays(parsed)
-        del parsed
-        fd, table = publish(arrays)
-        return {"arrays": table, **facts}, fd
+        with bounded(link, request["memory"], limits.seconds):
+            parsed = _parse(request["format"], source, limits, request["whole"])
+            arrays, facts = _arrays(parsed)
+            del parsed
+            fd, table = publish(arrays)
+            return {"arrays": table, **facts}, fd
     except ParseError as error:
         return {"error": error.detail[:2000], "pointer": error.pointer[:1000]}, -1
     except Exception as error:
@@ -79,9 +69,6 @@ def _answer(request: dict[str, Any], source: int, link: socket.socket) -> tuple[
         plain = isinstance(error, OSError | ValueError) and str(error)
         said = str(error) if plain else f"{type(error).__name__}: {error}"
         return {"error": f"it can't be read as {request['format'].upper()} ({said[:300]})"}, -1
-    finally:
-        fcntl.fcntl(link, fcntl.F_SETFL, fcntl.fcntl(link, fcntl.F_GETFL) & ~os.O_ASYNC)
-        unbind()
 
 
 def _parse(format: str, source: int, limits: AssetLimits, whole: bool) -> MeshData | ImageData | SceneFile:
