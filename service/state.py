@@ -74,6 +74,7 @@ class AppState:
         self.memory = self.reader.budget
         self.memory.cache("assets", lambda: self.assets.loader.bytes, self.assets.loader.shrink)
         self.memory.cache("pictures", lambda: 0, self.render_queue.shrink)  # renders count themselves
+        self.memory.cache("scenes", lambda: self.render_queue.packed.bytes, self.render_queue.packed.shrink)
         self.bodies = Bodies(self.config, self.memory)
         most = max(self.config.max_bodies, 4 * self.config.max_body)
         self.uploads = Shares(most, "uploads (SUNBOX_MAX_BODIES)")
@@ -115,7 +116,8 @@ class AppState:
     def job(self, order: Order, document: bytes, packed: Packed, setup_s: float) -> Job:
         """A new render. Raises TooLarge for one that never fits into the memory."""
         outcome = Outcome(setup_s=setup_s, warnings=list(packed.warnings))
-        return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory)
+        waiting = self.render_queue.packed
+        return Job(self.renderers, order, self._pack, document, packed, outcome, self.memory, waiting)
 
     def _resumed(self, stored: StoredRender) -> Job:
         return Job(self.renderers, stored.order, self._pack, outcome=stored.outcome, budget=self.memory)

@@ -12,7 +12,7 @@ from service.renderers.protocol import Renderers
 from service.renders.life import Life, PictureAt
 from service.renders.ordered import Ordered
 from service.renders.rendering import Rendering
-from service.renders.scene import Load, RenderScene
+from service.renders.scene import Load, PackedScenes, RenderScene
 from service.renders.status import status
 from service.renders.store.record import Order, Outcome
 from service.renders.viewer import PictureViewer
@@ -34,10 +34,13 @@ class Job(Ordered):
         packed: Packed | None = None,
         outcome: Outcome | None = None,
         budget: MemoryBudget | None = None,
+        waiting: PackedScenes | None = None,
+        patch: bytes | None = None,
+        base: int | None = None,
     ) -> None:
-        """The folded `document` may be left out where there is a recorder. Raises TooLarge for a render that never
-        fits into the `budget`."""
-        scene = RenderScene(order.settings, load, document, packed, budget)
+        """The folded `document`, and the `patch` to it, may be left out where there is a recorder; for the others see
+        RenderScene. Raises TooLarge for a render that never fits into the `budget`."""
+        scene = RenderScene(order.settings, load, document, packed, budget, waiting, patch, base)
         super().__init__(renderers, order, Life(outcome or Outcome()), scene)
         self.viewer = PictureViewer(self)
         self.rendering = Rendering(self, self.viewer)
@@ -64,7 +67,7 @@ class Job(Ordered):
     def cancel(self) -> None:
         """Stop at once; the image so far stays."""
         if not self.rendering.ends:
-            self.set_aside()
+            self.scene.forget()
             self.rendering.cancel()
 
     async def recorded(self) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+from functools import partial
 from typing import Any
 
 from service.problems import ServiceError, Unavailable
@@ -12,6 +13,8 @@ from service.renders.life import Life
 from service.renders.recorder import Recorder
 from service.renders.scene import RenderScene
 from service.renders.store.record import Order, Outcome, State
+from service.requests.request_parser import patched
+from service.system.executors import packing
 
 log = logging.getLogger(__name__)
 
@@ -76,13 +79,14 @@ class Ordered:
         return self.scene.lacks
 
     def set_aside(self) -> None:
-        """Forget the packed scene, which is packed again when its turn comes."""
+        """It has to wait: its scene is packed again when its turn comes, where that takes too much memory."""
         self.scene.set_aside()
 
     async def document(self) -> bytes:
         """The folded document. Raises Unavailable, Internal."""
-        if self.scene.document is not None:
-            return self.scene.document
+        document, patch = self.scene.document, self.scene.patch
+        if document is not None:
+            return document if patch is None else await packing(partial(patched, document, patch))
         assert self.recorder is not None
         return await self.recorder.store.document(self.recorder.number)
 

@@ -22,6 +22,7 @@ from service.renders.job import Job
 from service.renders.life import PictureAt
 from service.renders.recorder import Recorder
 from service.renders.retention import KeptRenders, Retention
+from service.renders.scene import PackedScenes
 from service.renders.slots import Slots
 from service.renders.store.record import ENDED, IdempotencyKey, State, StoredRender
 from service.renders.store.rows import REMEMBERED
@@ -76,6 +77,7 @@ class RenderQueue:
         self._number = 0  # of the last one
         self._slots = Slots(self._limits.running, self._ran, clock)
         self._waiting = self._slots.waiting
+        self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are
         self._documents = WaitingDocuments(self._limits.disk_bytes)
         self._kept: KeptRenders[Job] = KeptRenders(self._limits.retention)
@@ -123,7 +125,7 @@ class RenderQueue:
         if listed and self.store is not None:
             job.number = await self._stored(job, uses, key)
             job.recorder = Recorder(self.store, job.number, job.id, renderers=job.renderers, owner=job.owner)
-            job.scene.document = None
+            job.scene.document = job.scene.patch = None
         if listed:
             self._number = job.number = max(job.number, self._number + 1)
             self._jobs[job.id] = job
@@ -252,7 +254,11 @@ class RenderQueue:
     async def _insert(self, job: Job, uses: Collection[str], key: IdempotencyKey | None) -> int:
         """Where there is no room, ended renders make some, and at last there is a reserve for owners of few bytes."""
         assert self.store is not None
-        insert = partial(self.store.insert, job.order, job.outcome, await job.document(), uses, key)
+        scene = job.scene
+        assert scene.document is not None
+        insert = partial(
+            self.store.insert, job.order, job.outcome, scene.document, uses, key, patch=scene.patch, base=scene.base
+        )
         missing = job.order.bytes
         while True:
             try:

@@ -260,6 +260,6 @@ class Rendering(Listener):
 
     def _forget(self, error: ServiceError) -> None:
         """There is no picture: not because the render failed, or not any more."""
-        self._render.scene.set_aside()
+        self._render.scene.forget()
         self._render.scene.memory.release()
         self._viewer.refuse(error)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import threading
 from collections.abc import Awaitable, Callable
 
 from service.ipc.messages import Update
@@ -16,8 +17,45 @@ from service.system.memory import MemoryBudget
 Load = Callable[[bytes, Callable[[int], None]], Awaitable[Packed]]
 
 
+WAITING_BYTES = 256 << 20
+
+
+class PackedScenes:
+    """The packed scenes of renders that wait, up to a number of bytes: these need not be packed again. For any
+    thread."""
+
+    def __init__(self, most: int = WAITING_BYTES) -> None:
+        self.bytes = 0
+        self._most = most
+        self._scenes: dict[RenderScene, int] = {}  # in the order of arrival, which is about that of their turns
+        self._lock = threading.Lock()
+
+    def keep(self, scene: RenderScene, size: int) -> bool:
+        """Whether there is room for it."""
+        with self._lock:
+            if self.bytes + size > self._most:
+                return False
+            self.bytes += size - self._scenes.pop(scene, 0)
+            self._scenes[scene] = size
+            return True
+
+    def remove(self, scene: RenderScene) -> None:
+        with self._lock:
+            self.bytes -= self._scenes.pop(scene, 0)
+
+    def shrink(self, size: int) -> None:
+        """Free that many bytes, as far as there are any: those of the last ones, which wait longest."""
+        with self._lock:
+            scenes = list(reversed(self._scenes.items()))
+        for scene, bytes in scenes:
+            if size <= 0:
+                break
+            scene.forget()
+            size -= bytes
+
+
 class RenderScene:
-    """For the event loop."""
+    """For the event loop, but for `forget`."""
 
     def __init__(
         self,
@@ -26,19 +64,34 @@ class RenderScene:
         document: bytes | None,
         packed: Packed | None,
         budget: MemoryBudget | None,
+        waiting: PackedScenes | None = None,
+        patch: bytes | None = None,
+        base: int | None = None,
     ) -> None:
-        """`document` is folded; None: it is stored. Raises TooLarge for a render that never fits into `budget`."""
-        self.document = document
+        """The scene is `document` with the merge patch `patch`, both folded; None: they are stored. `base`: the
+        number of a render that brought the same document to the store. While it waits, the scene stays packed where
+        there is room in `waiting`. Raises TooLarge for a render that never fits into `budget`."""
+        self.document, self.patch, self.base = document, patch, base
         self.memory = RenderMemory(settings, budget)
         self._settings, self._load = settings, load
         self._packed = packed
+        self._waiting = waiting
         if packed is not None:
             self.memory.packed(packed)
             self.memory.check()
 
     def set_aside(self) -> None:
-        """Forget the packed scene: it waits as a document, and is packed again when its turn comes."""
+        """It waits: without room for the packed scene it waits as a document, and is packed again at its turn."""
+        if self._packed is not None and (
+            self._waiting is None or not self._waiting.keep(self, self.memory.scene_bytes)
+        ):
+            self._packed = None
+
+    def forget(self) -> None:
+        """Forget the packed scene. For any thread."""
         self._packed = None
+        if self._waiting is not None:
+            self._waiting.remove(self)
 
     def reserve(self) -> None:
         """Count the memory that the render is known to need. Raises Unavailable where there is too little."""
@@ -54,7 +107,8 @@ class RenderScene:
 
     async def load(self, document: Callable[[], Awaitable[bytes]]) -> Packed:
         """The packed scene, its memory counted. Raises what reading it raises, and Unavailable."""
-        packed, self._packed = self._packed, None
+        packed = self._packed
+        self.forget()
         self.memory.hold(reads=packed is None)
         if packed is None:
             packed = await self._load(await document(), self.memory.read)

@@ -16,7 +16,7 @@ from service.problems import FieldError, InvalidDocument
 from service.quality import ResolvedSettings, resolve
 from service.requests.bsdf_request import parse_albedo, parse_terms, parse_values
 from service.requests.conversion_request import parse_conversion
-from service.scene import Scene, load_json, parse_scene, parse_settings, references
+from service.scene import Scene, load_json, merge_patch, parse_scene, parse_settings, references
 from service.scene.base import Model
 from service.scene.document import Parsed
 from service.scene.validation import validated
@@ -104,6 +104,11 @@ class RequestParser:
 def folded(document: Any) -> bytes:
     """The JSON (ASCII) of a document, compressed: it is seldom read and may contain a mesh."""
     return zlib.compress(json.dumps(document, separators=(",", ":")).encode(), 1)
+
+
+def patched(document: bytes, patch: bytes) -> bytes:
+    """The folded document with a folded merge patch [RFC 7396]."""
+    return folded(merge_patch(json.loads(unfolded(document)), json.loads(unfolded(patch))))
 
 
 def unfolded(data: bytes) -> str:

@@ -1,4 +1,4 @@
-"""A request for a render becomes a render in the queue: read, validated, packed once, and stored."""
+"""A request for a render becomes a render in the queue: read, validated, packed and stored."""
 
 from __future__ import annotations
 
@@ -81,7 +81,8 @@ async def _submitted(
 
 
 async def _packed(state: AppState, parsed: ParsedRequest, owner: str, began: float) -> Job:
-    """Packing is the last test that a scene has to pass; a render that has to wait is packed again at its turn."""
+    """Packing is the last test that a scene has to pass. If it has to wait, what was packed waits with it, or where
+    that is too much, it is packed again at its turn."""
     packed = await packing(partial(state.reader.pack, parsed.scene, owner=owner))
     id, document = secrets.token_hex(ID_BYTES), parsed.document
     order = Order(id, owner, parsed.settings, parsed.label, parsed.priority, time.time(), len(document))

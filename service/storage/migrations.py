@@ -116,5 +116,15 @@ MIGRATIONS = (
         "renders that use an asset are found at once",
         ("CREATE INDEX render_uses_by_asset ON render_uses (asset)",),
     ),
+    Migration(
+        "documents that several renders stand on, each with a merge patch of its own",
+        (
+            # A document has the number of the render that brought it; `base` is the number of a render's document.
+            "ALTER TABLE renders ADD COLUMN base INTEGER",
+            "ALTER TABLE renders ADD COLUMN patch BLOB",
+            "UPDATE renders SET base = number WHERE NOT gone",
+            "CREATE INDEX renders_by_base ON renders (base)",
+        ),
+    ),
 )
 VERSION = len(MIGRATIONS)

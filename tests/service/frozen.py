@@ -37,6 +37,7 @@ MADE_BY = {
     "4": "6643dc0",
     "5": "4213a40",
     "6": "5250b9c",
+    "7": "2bdc3dd",
 }
 NAMES = sorted(MADE_BY)
 PARTS = ("assets", "renders")

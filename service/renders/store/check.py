@@ -11,7 +11,7 @@ from pathlib import Path
 from service.problems import ServiceError
 from service.renders.store.pictures import KINDS, PART, SUFFIXES, DamagedPicture, PictureFiles
 from service.renders.store.record import StoredRender
-from service.renders.store.rows import stored_renders
+from service.renders.store.rows import DOCUMENT, stored_renders
 from service.scene import load_json
 from service.storage.data_check import Report, is_here, reading
 from service.storage.database import FILE
@@ -71,14 +71,14 @@ def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, ren
     if render.unfit is not None:
         yield f"its row cannot be read: {render.unfit}"
         return
-    row = database.execute("SELECT body FROM render_documents WHERE number = ?", (render.number,)).fetchone()
+    row = database.execute(_document(database), (render.number,)).fetchone()
     if row is None:
         yield "its document is not there"
-    else:
+    for name, body in zip(("document", "patch"), row or (), strict=False):
         try:
-            load_json(zlib.decompress(row[0]))
+            load_json(zlib.decompress(body)) if body is not None else None
         except (zlib.error, ServiceError) as error:
-            yield f"its document is damaged: {error}"
+            yield f"its {name} is damaged: {error}"
     uses = database.execute("SELECT asset FROM render_uses WHERE number = ? ORDER BY asset", (render.number,))
     for (asset,) in uses.fetchall():
         if not is_here(folder, asset):
@@ -98,6 +98,12 @@ def _faults(folder: Path, database: sqlite3.Connection, files: PictureFiles, ren
             found = True
     if not found and render.outcome.state == "done" and render.outcome.progress.samples:
         yield "its picture is not there"
+
+
+def _document(database: sqlite3.Connection) -> str:
+    """The query for a render's document; an earlier version, whose file is not migrated yet, has one for each."""
+    shared = any(column[1] == "base" for column in database.execute("PRAGMA table_info(renders)"))
+    return DOCUMENT if shared else "SELECT body FROM render_documents WHERE number = ?"
 
 
 def _is_kept(folder: Path, render: StoredRender) -> bool:

@@ -28,7 +28,7 @@ class Order:
     label: str | None = None
     priority: int = 0  # among the owner's renders, higher ones start first
     created_at: float = 0.0  # s since 1970
-    bytes: int = 0  # of its document
+    bytes: int = 0  # that it adds to the store: its document, or its patch where another render brings the document
 
 
 @dataclass(frozen=True)

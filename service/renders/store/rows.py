@@ -22,6 +22,10 @@ KEY_S = 24 * 3600.0  # of the contract: how long an idempotency key counts
 MOST_KEYS = 10_000  # of one owner; the oldest go first
 REMEMBERED = 10_000  # ids that are answered with "gone" and not with "unknown"
 
+# Of a render by its number: the document that it stands on, and its patch.
+DOCUMENT = (
+    "SELECT body, patch FROM renders JOIN render_documents ON render_documents.number = base WHERE renders.number = ?"
+)
 _COLUMNS = "number, id, owner, label, priority, created_at, settings, bytes, state, ended_at, outcome, gone"
 
 
@@ -45,20 +49,35 @@ class RenderRows:
         self._held.close()
 
     def insert(
-        self, order: Order, outcome: Outcome, document: bytes, uses: Collection[str], key: IdempotencyKey | None
+        self,
+        order: Order,
+        outcome: Outcome,
+        document: bytes,
+        uses: Collection[str],
+        key: IdempotencyKey | None,
+        patch: bytes | None = None,
+        base: int | None = None,
     ) -> int:
-        """Store a render that waits; its number. `uses`: the ids of the assets that it refers to."""
+        """Store a render that waits; its number. `uses`: the ids of the assets that it refers to.
+
+        Its scene is the `document` with `patch` merged in. `base`: the number of a render that brought the same
+        document, which is not stored again while it is there.
+        """
         settings = settings_json(order.settings)
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
             values = (order.id, order.owner, order.label, order.priority, order.created_at, settings, order.bytes)
             number = database.execute(
-                "INSERT INTO renders (id, owner, label, priority, created_at, settings, bytes, state, outcome) "
-                "VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
-                (*values, outcome.state, outcome.json()),
+                "INSERT INTO renders (id, owner, label, priority, created_at, settings, bytes, state, outcome, "
+                "patch, base) VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, "
+                "(SELECT number FROM render_documents WHERE number = ?))",
+                (*values, outcome.state, outcome.json(), patch, base),
             ).lastrowid
             assert number is not None
-            database.execute("INSERT INTO render_documents VALUES (?, ?)", (number, document))
+            if database.execute(
+                "UPDATE renders SET base = number WHERE number = ? AND base IS NULL", (number,)
+            ).rowcount:
+                database.execute("INSERT INTO render_documents VALUES (?, ?)", (number, document))
             database.executemany(
                 "INSERT OR IGNORE INTO render_uses VALUES (?, ?)", [(asset, number) for asset in uses]
             )
@@ -77,13 +96,13 @@ class RenderRows:
         with self._database.open() as database, database:
             database.execute("UPDATE renders SET state = ?, ended_at = ?, outcome = ? WHERE number = ?", values)
 
-    def document(self, number: int) -> bytes:
-        """The folded document of a render. Raises Internal where there is none."""
+    def document(self, number: int) -> tuple[bytes, bytes | None]:
+        """The document that a render stands on, and its patch, both folded. Raises Internal where there is none."""
         with self._database.open() as database:
-            row = database.execute("SELECT body FROM render_documents WHERE number = ?", (number,)).fetchone()
+            row = database.execute(DOCUMENT, (number,)).fetchone()
         if row is None:
             raise Internal("The document of this render is not stored any more.")
-        return bytes(row[0])
+        return row[0], row[1]
 
     def all(self) -> list[StoredRender]:
         """Every render, in the order of arrival; those that are gone as far as their ids are remembered."""
@@ -112,8 +131,15 @@ class RenderRows:
         with self._database.open() as database, database:
             database.execute("BEGIN IMMEDIATE")
             ids = [(number,) for number in numbers]
-            database.executemany("UPDATE renders SET gone = 1, settings = '{}', outcome = '{}' WHERE number = ?", ids)
-            database.executemany("DELETE FROM render_documents WHERE number = ?", ids)
+            database.executemany(
+                "UPDATE renders SET gone = 1, settings = '{}', outcome = '{}', patch = NULL WHERE number = ?", ids
+            )
+            database.executemany(
+                "DELETE FROM render_documents WHERE number = (SELECT base FROM renders WHERE number = ?) "
+                "AND NOT EXISTS (SELECT 1 FROM renders WHERE base = render_documents.number AND NOT gone)",
+                ids,
+            )
+            database.executemany("UPDATE renders SET base = NULL WHERE number = ?", ids)
             database.executemany("DELETE FROM render_uses WHERE number = ?", ids)
             database.execute("DELETE FROM render_keys WHERE taken_at <= ?", (time.time() - KEY_S,))
             database.execute(

@@ -22,11 +22,13 @@ from service.problems import ServiceError, Unavailable
 from service.renders.store.pictures import KINDS, DamagedPicture, Kind, PictureFiles
 from service.renders.store.record import ENDED, IdempotencyKey, Order, Outcome, StoredRender
 from service.renders.store.rows import RenderRows
+from service.requests.request_parser import patched
 from service.storage.database import Database
 from service.storage.stores import RENDERS
 from service.system.disk_usage import Usage, expected
 from service.system.executors import (
     Pool,
+    packing,
     reading_large_pictures,
     recording,
     saving_large_pictures,
@@ -138,12 +140,15 @@ class RenderStore:
         uses: Collection[str],
         key: IdempotencyKey | None = None,
         reserved: bool = False,
+        patch: bytes | None = None,
+        base: int | None = None,
     ) -> int:
-        """The number of a render that waits from now on, and is on the disk."""
+        """The number of a render that waits from now on, and is on the disk: of `document` with `patch` merged in,
+        both of them folded. `base`: the number of a render that brought this document, which is stored once."""
 
         def insert() -> int:
-            with (self._reserved if reserved else self._room)(expected([len(document)])):
-                return self._rows.insert(order, outcome, document, uses, key)
+            with (self._reserved if reserved else self._room)(expected([order.bytes])):
+                return self._rows.insert(order, outcome, document, uses, key, patch, base)
 
         return await recording(insert)
 
@@ -151,8 +156,9 @@ class RenderStore:
         await recording(partial(self._rows.update, number, outcome))
 
     async def document(self, number: int) -> bytes:
-        """The folded document."""
-        return await recording(partial(self._rows.document, number))
+        """The folded document, patched where the render has a patch."""
+        document, patch = await recording(partial(self._rows.document, number))
+        return document if patch is None else await packing(partial(patched, document, patch))
 
     async def keyed(self, owner: str, key: str) -> tuple[str, StoredRender] | None:
         """The digest and the render of a key that was taken lately, also where the render is gone."""

@@ -8,7 +8,7 @@ from typing import Any
 
 from service.config import Config
 from service.ipc import channel
-from service.ipc.messages import Ready, Restore, SavedPicture, Unable, Update
+from service.ipc.messages import Done, Progress, Ready, Restore, SavedPicture, Unable, Update
 from service.pack import Packed, pack
 from service.problems import Unavailable
 from service.quality import resolve
@@ -48,6 +48,23 @@ class Renderers:
 
     async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
         self.sent.append((update, restore))
+
+
+class Quick(Renderers):
+    """Ends each render as soon as it has the scene."""
+
+    def __init__(self) -> None:
+        super().__init__()
+        self.listeners = dict[int, Any]()
+
+    def open(self, listener: Any, kind: str, client: str) -> int:
+        task = super().open(listener, kind, client)
+        self.listeners[task] = listener
+        return task
+
+    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
+        done = Done(update.task, 1, "max_samples", Progress(8, None, 1.0), [], None)
+        asyncio.get_running_loop().call_later(0.01, self.listeners[update.task].heard, done)
 
 
 async def load(document: bytes, count: Callable[[int], None]) -> Packed:

@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from gpu import Renderer
-from service.ipc.messages import Done, Progress, Restore, SavedPicture, Update, View
+from service.ipc.messages import Done, Progress, SavedPicture, View
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, Packed
 from service.quality import ResolvedSettings
 from service.renderers.local.process import Options
@@ -28,24 +28,7 @@ from service.renders.store.store import RenderStore
 from service.requests.request_reader import weight
 from service.system.memory import MemoryBudget
 from tests.queues import LIMITS
-from tests.service.rendering.fakes import PACKED, SETTINGS, Renderers, until
-
-
-class Quick(Renderers):
-    """Ends each render as soon as it has the scene."""
-
-    def __init__(self) -> None:
-        super().__init__()
-        self.listeners = dict[int, Any]()
-
-    def open(self, listener: Any, kind: str, client: str) -> int:
-        task = super().open(listener, kind, client)
-        self.listeners[task] = listener
-        return task
-
-    async def send_scene(self, update: Update, restore: Restore | None = None) -> None:
-        done = Done(update.task, 1, "max_samples", Progress(8, None, 1.0), [], None)
-        asyncio.get_running_loop().call_later(0.01, self.listeners[update.task].heard, done)
+from tests.service.rendering.fakes import PACKED, SETTINGS, Quick, Renderers, until
 
 
 @pytest.fixture
