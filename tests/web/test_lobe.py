@@ -243,7 +243,7 @@ def test_means_are_of_the_values_and_not_of_a_small_picture(lobe: Editor, server
     """Of bright values, of alpha, and of a pattern that a small picture in sRGB would make too dark."""
     script = """async ([asset, reads]) => {
         const { TextureThumbnails } = await import(new URL("forms/texture-thumbnails.js", location));
-        return new TextureThumbnails().mean({ asset }, reads);
+        return new TextureThumbnails({ type: "diffuse", albedo: 0 }).mean({ asset }, reads);
     }"""
     pixels = np.random.default_rng(1).random((37, 53, 4)).astype(np.float32) * [40, 4, 0.4, 1]
     path = tmp_path / "bright.exr"
