@@ -49,6 +49,9 @@ class Problem(BaseModel):
 class Named(BaseModel):
     name: str
     title: str
+
+
+class NamedPreset(Named):
     kind: str | None = Field(None, description="Of a material: metal, plastic, glass, stone, cloth, organic, light.")
 
 

@@ -13,8 +13,8 @@ router = APIRouter(prefix="/v1/presets", tags=["presets"])
 
 
 @router.get("/{kind}", summary="Names and titles", response_model_exclude_none=True, responses=answers.problems(404))
-def names(kind: answers.PresetKind) -> list[answers.Named]:
-    return [answers.Named(**entry) for entry in presets.names(kind)]
+def names(kind: answers.PresetKind) -> list[answers.NamedPreset]:
+    return [answers.NamedPreset(**entry) for entry in presets.names(kind)]
 
 
 @router.get(

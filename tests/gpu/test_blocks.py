@@ -12,7 +12,8 @@ import pytest
 
 from gpu import Band, GpuError, OutOfMemory, Picture, Renderer, border_after
 from gpu import context as contexts
-from gpu.picture import accumulators, noise_meter, passes
+from gpu.layout.pixel_layers import ACCUMULATORS
+from gpu.picture import noise_meter, passes
 from gpu.picture.blocks import FIRST, Sums, is_stop, merged, stop_after
 from tests.gpu.bits import assert_same, beside, saved, seen, slice_of
 from tests.gpu.conftest import SCENE, SETTINGS
@@ -111,7 +112,7 @@ def test_the_device_merges_as_numpy_does(gpu: Renderer, radiance: float) -> None
     one = picture(gpu, document(shapes, environment=lit), 60, sampler="independent")
     one.trace(600.0, 63)
     sums, count = one._sums, 32 * 32
-    slice_of_block = [one._sums.block[slot].read() for slot in accumulators.SLOTS]
+    slice_of_block = [one._sums.block[slot].read() for slot in ACCUMULATORS]
     expected = sums.read(0, count)
     sums.merge(0, count)
     found = [np.frombuffer(buffer.read(), np.float32).reshape(count, 4) for buffer in sums.total.values()]

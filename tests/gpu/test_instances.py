@@ -145,7 +145,7 @@ def test_kernels_of_other_scenes_have_nothing_of_it() -> None:
     code = re.sub("//.*", "", declared)
     names = set(re.findall(r"\w*instance\w*", code, re.IGNORECASE)) - {"HAS_INSTANCES"}
     assert {"Instance", "instance_load", "instance_texels", "instance_rows", "INSTANCED"} <= names
-    names |= {rf"frame\.{member}" for member in instances_glsl.FRAME}
+    names |= {rf"uniforms\.{member}" for member in instances_glsl.UNIFORMS}
     reads = re.compile(rf"\b({'|'.join(names)})\b")
     flags = features.everything() - {"HAS_INSTANCES"}
     for entry in ("pathtrace.comp", "guides.comp"):

@@ -8,7 +8,7 @@ from pathlib import Path
 import pytest
 
 from gpu import CompileError, Renderer
-from gpu.kernels import features, source
+from gpu.kernels import features, models_glsl, source
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS, KernelSource
 
@@ -66,6 +66,7 @@ def test_the_drivers_errors_name_file_and_line(gpu: Renderer, tmp_path: Path) ->
 
 def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
     text = "\n".join(p.read_text() for p in SHADERS.rglob("*") if p.suffix in (".glsl", ".comp"))
+    text += models_glsl.text()
     assert [flag for flag in features.everything() if flag not in text] == []
     everything = features.defines(features.everything())
     for entry in ("pathtrace.comp", "guides.comp"):
