@@ -16,6 +16,7 @@ COPY requirements.serve.lock requirements.ray.lock requirements.build.lock ./
 ARG LOCK=serve
 RUN /opt/sunbox/bin/pip install --require-hashes --only-binary :all: -r "requirements.${LOCK}.lock"
 COPY pyproject.toml README.md ./
+COPY client client
 COPY gpu gpu
 COPY service service
 COPY shaders shaders
@@ -23,6 +24,7 @@ COPY web web
 RUN python -m venv /opt/build \
     && /opt/build/bin/pip install --require-hashes --only-binary :all: -r requirements.build.lock \
     && /opt/build/bin/python -m hatchling build -t wheel -d /tmp/wheel \
+    && (cd client && /opt/build/bin/python -m hatchling build -t wheel -d /tmp/wheel) \
     && /opt/sunbox/bin/pip install --no-deps /tmp/wheel/*.whl \
     && /opt/sunbox/bin/pip uninstall -y pip \
     && /opt/sunbox/bin/python -m compileall -q /opt/sunbox/lib

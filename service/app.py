@@ -98,7 +98,7 @@ def create_app(config: Config) -> FastAPI:
     )
     app = FastAPI(
         title="Sunbox",
-        version=metadata.version("sunbox"),
+        version=metadata.version("sunbox-server"),
         description="A progressive path-tracing render service: JSON scenes in, converging pictures out.",
         lifespan=_lifespan,
         docs_url=None,
@@ -217,7 +217,7 @@ class _Server(uvicorn.Server):
             self.refused = self.should_exit = True
             return
         await super().startup(sockets)
-        log.info("started", {"address": self._state.address, "version": metadata.version("sunbox")})
+        log.info("started", {"address": self._state.address, "version": metadata.version("sunbox-server")})
         _announce(self._state.address)
 
     async def shutdown(self, sockets: list[socket.socket] | None = None) -> None:

@@ -91,7 +91,7 @@ class AppState:
         except Unavailable:
             renderer = None
         return {
-            "version": metadata.version("sunbox"),
+            "version": metadata.version("sunbox-server"),
             "renderer": renderer,
             "renderers": [_told(each) for each in self.renderers.members],
             "sandbox": asdict(await asyncio.to_thread(self.assets.rights)),

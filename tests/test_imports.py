@@ -21,7 +21,8 @@ SHADERS = sorted(path for path in ROOT.glob("shaders/**/*") if path.suffix in {"
 COMPOSERS = {"lights", "light_tree", "shapes", "traverse", "transparency", "transparency_walk", "budget"}
 KINDS = ("bsdf/lobes/**", "bsdf/models", "lights", "shapes", "tonemap")
 LEAVES = sorted(p for kind in KINDS for p in ROOT.glob(f"shaders/{kind}/*.glsl") if p.stem not in COMPOSERS)
-SOURCES = sorted((*MODULES, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROOT.glob("web/**/*.js")))
+CLIENT = sorted(path for path in ROOT.glob("client/**/*.py") if path.name != "document.py")  # that is generated
+SOURCES = sorted((*MODULES, *CLIENT, *SHADERS, *ROOT.glob("tests/**/*.py"), *ROOT.glob("web/**/*.js")))
 MOST_LINES = 400
 MOST_METHODS, MOST_ATTRIBUTES = 30, 18  # of a class, its bases included
 # Classes whose fields are a format, a document or a row, and not state that methods share.
@@ -203,6 +204,13 @@ def test_module_keeps_to_its_room(path: Path) -> None:
             assert layer(imported) <= layer(module), f"{said}: that arrow points up"
         if top == "gpu" and within(module, "gpu") and module != "gpu":
             assert layer(imported, GPU_LAYERS) <= layer(module, GPU_LAYERS), f"{said}: that arrow points up"
+
+
+@pytest.mark.parametrize("path", CLIENT, ids=lambda path: path.stem)
+def test_client_talks_to_the_server_by_its_interface_alone(path: Path) -> None:
+    """But for renders in the same process, and for what writes its types from the schema."""
+    tops = {imported.split(".")[0] for imported in imports_of(path)}
+    assert path.stem in ("local", "generate") or not tops & {"service", "gpu"}
 
 
 def test_every_module_has_its_place() -> None:

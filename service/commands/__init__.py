@@ -19,6 +19,7 @@ files          files that are read, and written whole or not at all
 models         models with the files that they refer to
 progress       how far a render is, on stderr
 tracing        one render in this process
+local          renders in a Python program's own process: `sunbox.render`
 """
 
 from __future__ import annotations

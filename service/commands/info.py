@@ -41,7 +41,7 @@ def run(arguments: argparse.Namespace) -> int:
                 _print(kernel(renderer, packed))
             if packed is not None and arguments.measure:
                 _print(measured(renderer, packed))
-            rows = [("sunbox", metadata.version("sunbox"))]
+            rows = [("sunbox", metadata.version("sunbox-server"))]
             rows += [(name, str(renderer.info[name])) for name in ("renderer", "version", "vendor")]
     except GpuError as error:
         raise Failed(str(error)) from None

@@ -52,7 +52,7 @@ def write(
 ) -> dict[str, Any]:
     """The metadata of a picture of `samples` samples. `scene` refers to assets by id alone."""
     written: dict[str, Any] = {
-        "sunbox": metadata.version("sunbox"),
+        "sunbox": metadata.version("sunbox-server"),
         "scene": scene,
         "settings": settings.again(samples),
         "samples": samples,

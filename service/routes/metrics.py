@@ -69,7 +69,7 @@ def _about(renderer: Mapping[str, Any]) -> Iterator[Metric]:
     from prometheus_client.core import GaugeMetricFamily
 
     about = GaugeMetricFamily("sunbox_info", "Version and renderer.", labels=("version", "renderer"))
-    about.add_metric((metadata.version("sunbox"), str(renderer.get("renderer", ""))), 1)
+    about.add_metric((metadata.version("sunbox-server"), str(renderer.get("renderer", ""))), 1)
     yield about
     yield _gauge("renderer_up", "Whether any renderer renders.", float(bool(renderer)))
     yield _gauge(

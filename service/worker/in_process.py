@@ -104,6 +104,8 @@ class InProcessRender:
         return image.pixels
 
     def close(self) -> None:
+        """Free what it takes on the GPU."""
+        self._task.release()
         self._denoiser.close()
 
     def _receive(self, message: Any) -> None:

@@ -1,0 +1,78 @@
+"""Sunbox for programs: scenes in, pictures out, over HTTP and WebSocket.
+
+client           Client, Job, Picture, Stream: calls that wait
+async_client     AsyncClient: the same calls to await; all that talks to a server is here and below
+async_job        a render on the server, and its picture
+async_stream     a scene that is edited while frames of it arrive
+transport        requests, retries, uploads; refusals as exceptions
+errors           the exceptions
+files            the files that a scene names, and arrays in it
+frames           a frame of a stream
+lobes            what a BSDF answers, as arrays
+merge            merge patches (RFC 7386)
+progress         a line while a render goes on
+background       an event loop in a thread of its own
+document         the scene's document as types, generated from a server's schema
+generate         writes `document`
+local            `render` in this process
+
+Nothing is imported before it is asked for: `import sunbox` costs a program that only may render next to nothing.
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from sunbox.async_client import AsyncClient
+    from sunbox.async_job import AsyncJob, AsyncPicture
+    from sunbox.async_stream import AsyncStream
+    from sunbox.client import Client, Job, Picture, Stream
+    from sunbox.errors import Failed, NotFound, Refused, SunboxError, Unreachable
+    from sunbox.frames import Frame
+    from sunbox.lobes import Albedo, Bsdf, SpecularLobe
+    from sunbox.local import render
+
+_PLACES = {
+    "async_client": ("AsyncClient",),
+    "async_job": ("AsyncJob", "AsyncPicture"),
+    "async_stream": ("AsyncStream",),
+    "client": ("Client", "Job", "Picture", "Stream"),
+    "errors": ("Failed", "NotFound", "Refused", "SunboxError", "Unreachable"),
+    "frames": ("Frame",),
+    "lobes": ("Albedo", "Bsdf", "SpecularLobe"),
+    "local": ("render",),
+}
+_MODULE = {name: module for module, names in _PLACES.items() for name in names}
+
+__all__ = [
+    "Albedo",
+    "AsyncClient",
+    "AsyncJob",
+    "AsyncPicture",
+    "AsyncStream",
+    "Bsdf",
+    "Client",
+    "Failed",
+    "Frame",
+    "Job",
+    "NotFound",
+    "Picture",
+    "Refused",
+    "SpecularLobe",
+    "Stream",
+    "SunboxError",
+    "Unreachable",
+    "render",
+]
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULE:
+        raise AttributeError(f"module 'sunbox' has no attribute {name!r}")
+    return getattr(import_module(f"sunbox.{_MODULE[name]}"), name)
+
+
+def __dir__() -> list[str]:
+    return sorted(__all__)

@@ -1,0 +1,157 @@
+"""A server to `await`: scenes in, pictures out."""
+
+from __future__ import annotations
+
+import asyncio
+import uuid
+from collections.abc import AsyncIterator
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+from urllib.parse import quote, urlencode
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from sunbox import files, lobes
+from sunbox.async_job import AsyncJob, AsyncPicture
+from sunbox.async_stream import AsyncStream
+from sunbox.transport import Transport
+
+PAGE = 200
+
+
+class AsyncClient:
+    """`url` and `key` come from SUNBOX_URL and SUNBOX_API_KEY, the address else is http://127.0.0.1:8000. `timeout`:
+    seconds without a byte. `retries`: how often a request is sent again where the server is full, restarts or cannot
+    be reached.
+
+    A scene is a dict as the service's documentation has it, or a path to its JSON file. Numpy arrays may stand for
+    lists; files may be named by path (in a dict relative to the working directory, in a file to its folder) and are
+    uploaded once. Every call raises SunboxError where the server refuses or cannot.
+    """
+
+    def __init__(
+        self, url: str | None = None, key: str | None = None, timeout: float = 60.0, retries: int = 5
+    ) -> None:
+        self._transport = Transport(url, key, timeout, retries)
+
+    @property
+    def url(self) -> str:
+        return self._transport.url
+
+    async def __aenter__(self) -> AsyncClient:
+        return self
+
+    async def __aexit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        await self.close()
+
+    async def close(self) -> None:
+        await self._transport.close()
+
+    async def render(self, scene: Any, progress: bool | None = None, **settings: Any) -> AsyncPicture:
+        """The picture of a scene. `settings`: width, height, max_samples, quality and the others. Cancelled, it
+        cancels the render. `progress`: None shows a line in a terminal and in a notebook."""
+        job = asyncio.ensure_future(self.submit(scene, **settings))
+        try:
+            return await (await asyncio.shield(job)).result(progress)
+        except asyncio.CancelledError:
+            if not job.done():  # the server may have it already
+                await (await job).cancel()
+            raise
+
+    async def submit(
+        self,
+        scene: Any,
+        label: str | None = None,
+        priority: int = 0,
+        idempotency_key: str | None = None,
+        **settings: Any,
+    ) -> AsyncJob:
+        """A render that goes on by itself. `label`: up to 200 characters to find it by; `priority`: -10 to 10 among
+        one's own; `idempotency_key`: the same key with the same request gives the same render within a day."""
+        document = await self._transport.uploaded(scene)
+        body = {"scene": document, "settings": settings, "priority": priority}
+        if label is not None:
+            body["label"] = label
+        key = {"idempotency-key": idempotency_key or uuid.uuid4().hex}  # so that it may be sent twice
+        return AsyncJob(self._transport, (await self._transport.json("POST", "/v1/renders", body, key))["id"])
+
+    def job(self, id: str) -> AsyncJob:
+        """A render by its id; asks nothing."""
+        return AsyncJob(self._transport, id)
+
+    async def jobs(self, label: str | None = None, state: str | None = None) -> AsyncIterator[AsyncJob]:
+        """One's own renders, the newest first."""
+        async for status in self.statuses(label, state):
+            yield AsyncJob(self._transport, status["id"])
+
+    async def statuses(
+        self, label: str | None = None, state: str | None = None, limit: int | None = None
+    ) -> AsyncIterator[dict[str, Any]]:
+        """The statuses of one's own renders, the newest first, at most `limit`."""
+        left = limit
+        query: dict[str, Any] = {}
+        query |= {name: value for name, value in (("label", label), ("state", state)) if value is not None}
+        while left is None or left > 0:
+            query["limit"] = PAGE if left is None else min(left, PAGE)
+            page = await self._transport.json("GET", f"/v1/renders?{urlencode(query)}")
+            for each in page:
+                yield each
+            if len(page) < query["limit"]:
+                return
+            query["after"] = page[-1]["id"]
+            left = None if left is None else left - len(page)
+
+    def stream(self, scene: Any, format: str = "rgba32f", **settings: Any) -> AsyncStream:
+        """A context manager and iterator of frames, each better than the one before. `format`: rgba32f, png, jpeg or
+        webp."""
+        return AsyncStream(self._transport, scene, format, settings)
+
+    async def upload(self, file: str | Path | bytes, name: str = "") -> str:
+        """The id of a file on the server, from its path or its bytes; `name` tells how bytes are to be read
+        ("chair.obj"). A content is sent once."""
+        if isinstance(file, bytes):
+            return await self._transport.upload(file, name)
+        return await self._transport.upload_file(Path(file))
+
+    async def import_scene(self, path: str | Path) -> files.Scene:
+        """A model's file (GLB, glTF with its parts inside) as a scene's document."""
+        return dict(await self._transport.json("GET", f"/v1/assets/{await self.upload(path)}/scene"))
+
+    async def bsdf(self, material: dict[str, Any], wo: ArrayLike, wi: ArrayLike) -> lobes.Bsdf:
+        """A material's BSDF for each of n directions `wo`, (n, 3), and m directions `wi`, (m, 3), in the shading
+        frame: z is the normal, x the tangent. Any number of them: more than a request takes go in several."""
+        out, into = lobes.directions(wo), lobes.directions(wi)
+        f, pdf = np.empty((len(out), len(into), 3)), np.empty((len(out), len(into)))
+        delta: list[list[lobes.SpecularLobe]] = [[] for _ in out]
+        for rows, columns in lobes.tiles(out, into):
+            body = {"material": material, "wo": out[rows], "wi": into[columns]}
+            answer = await self._transport.json("POST", "/v1/bsdf", body)
+            f[rows, columns], pdf[rows, columns] = answer["f"], answer["pdf"]
+            delta[rows] = lobes.specular(answer["delta"])
+        return lobes.Bsdf(f, pdf, delta)
+
+    async def albedo(self, material: dict[str, Any], cosines: ArrayLike, samples: int = 4096) -> lobes.Albedo:
+        """Directional albedo for each cosine in (0, 1] of the angle to the normal."""
+        body = {"material": material, "cosines": np.atleast_1d(np.asarray(cosines, float)), "samples": samples}
+        answer = await self._transport.json("POST", "/v1/bsdf/albedo", body)
+        return lobes.Albedo(np.asarray(answer["albedo"]), np.asarray(answer["error"]))
+
+    async def presets(self, kind: str) -> list[str]:
+        """The names of the built-in `scenes`, `materials` or `environments`."""
+        return [each["name"] for each in await self._transport.json("GET", f"/v1/presets/{quote(kind, safe='')}")]
+
+    async def preset(self, kind: str, name: str) -> dict[str, Any]:
+        """A built-in document."""
+        return dict(await self._transport.json("GET", f"/v1/presets/{quote(kind, safe='')}/{quote(name, safe='')}"))
+
+    async def info(self) -> dict[str, Any]:
+        """The server's version, renderers, limits and quality presets."""
+        return dict(await self._transport.json("GET", "/v1/info"))
+
+    async def schema(self) -> dict[str, Any]:
+        """The JSON schemas of `scene` and `settings`."""
+        return dict(await self._transport.json("GET", "/v1/schema"))

@@ -1,0 +1,621 @@
+"""The scene's document as types: dicts whose members an editor and a type checker know.
+
+    from sunbox.document import Camera, DiffuseMaterial, Scene, SphereShape
+
+    scene: Scene = {"version": 1, "camera": Camera(position=[0, 1, 4], target=[0, 1, 0]), ...}
+
+Written by generate.py from the service's schema; a test holds it to that.
+"""
+
+from typing import Literal, Required, TypedDict  # evaluated now: else a TypedDict does not see what is required
+
+
+class ColorTexture(TypedDict, total=False):
+    """A texture in place of a colour."""
+
+    channel: Literal["r", "g", "b", "a"]
+    """Read as a grey; without it, the colour."""
+    factor: list[float] | float | str
+    """Multiplies the decoded texture; the product keeps to the parameter's range. (0 to 1e+20, default [1.0, 1.0,
+    1.0])"""
+    texture: Required[str]
+    """The name of one of the scene's textures."""
+
+
+class NormalTexture(TypedDict, total=False):
+    """A normal map: red along growing u, green along growing v, blue outwards."""
+
+    scale: float
+    """Multiplies red and green: 0 is flat, 1 as the map has it. (0 to 1e+20, default 1.0)"""
+    texture: Required[str]
+    """The name of one of the scene's textures."""
+
+
+class ScalarTexture(TypedDict, total=False):
+    """One channel of a texture in place of a number."""
+
+    channel: Literal["r", "g", "b", "a"]
+    """Which of the texture's channels is read. (default 'r')"""
+    factor: float
+    """Multiplies the texture; the product keeps to the parameter's range. (0 to 1e+20, default 1.0)"""
+    texture: Required[str]
+    """The name of one of the scene's textures."""
+
+
+class BlinnPhongMaterial(TypedDict, total=False):
+    """The classic highlight of early rasterisers, as a baseline: it conserves no energy."""
+
+    type: Required[Literal["blinn_phong"]]
+    diffuse: Required[list[float] | float | str | ColorTexture]
+    """Share of light that is sent back equally in all directions. (0 to 1)"""
+    specular: Required[list[float] | float | str | ColorTexture]
+    """Colour of the highlight; not normalised: a sharper one sends back less light. (0 to 1)"""
+    shininess: Required[float | ScalarTexture]
+    """Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
+    ambient: list[float] | float | str | ColorTexture
+    """Radiance added wherever a path meets the surface; it is never sampled as a light. (W/(m^2 sr), 0 to 1e+20,
+    default [0.0, 0.0, 0.0])"""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class MatrixTransform(TypedDict, total=False):
+    """An affine, invertible matrix that takes the shape to the world."""
+
+    matrix: Required[list[float]]
+    """16 numbers, row by row; the last row is 0 0 0 1."""
+
+
+class Transform(TypedDict, total=False):
+    """T Rz Ry Rx S: scaled first, then turned about X, Y and Z, then moved."""
+
+    translate: list[float]
+    """Applied last. (m, default [0.0, 0.0, 0.0])"""
+    rotate: list[float]
+    """About X first, then Y, then Z; right-handed. (degrees, default [0.0, 0.0, 0.0])"""
+    scale: float | list[float]
+    """One factor, or one per axis; negative mirrors, zero is an error. (default [1.0, 1.0, 1.0])"""
+
+
+class BoxShape(TypedDict, total=False):
+    """A box along the axes; a transform turns it."""
+
+    type: Required[Literal["box"]]
+    min: Required[list[float]]
+    """The least x, y and z. (m)"""
+    max: Required[list[float]]
+    """The greatest x, y and z: each above the lower's. (m)"""
+    material: Required[str]
+    """The name of one of the scene's materials."""
+    transform: Transform | MatrixTransform
+    """Where the shape stands; without it, as written."""
+    visible_to_camera: bool
+    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+
+
+class Camera(TypedDict, total=False):
+    """Looks from `position` to `target`."""
+
+    position: Required[list[float]]
+    """Where the camera stands. (m)"""
+    target: Required[list[float]]
+    """The point in the middle of the picture. (m)"""
+    up: list[float]
+    """The direction that is upward in the picture; any but the view's own. (default [0.0, 1.0, 0.0])"""
+    vfov: float
+    """Vertical angle; 40 is a short telephoto, 75 a wide angle. (degrees, 0 to 180, default 40.0)"""
+    aperture_radius: float
+    """0 is a pinhole, sharp everywhere; larger blurs what is out of focus. (m, 0 to 1e+09, default 0.0)"""
+    focus_distance: float
+    """Along the axis to the plane that is sharp; without it, the target's. (m, 0 to 1e+09)"""
+
+
+class CheckerTexture(TypedDict, total=False):
+    """Two colours by turns: the first where floor(u scale_u) + floor(v scale_v) is even."""
+
+    type: Required[Literal["checker"]]
+    a: Required[list[float] | float | str]
+    """Of the square at u = v = 0. (0 to 1e+20)"""
+    b: Required[list[float] | float | str]
+    """Of its neighbours. (0 to 1e+20)"""
+    scale: list[float]
+    """How many squares along u and v. (default [8.0, 8.0])"""
+
+
+class ConstantEnvironment(TypedDict, total=False):
+    """The same radiance from every direction."""
+
+    type: Required[Literal["constant"]]
+    radiance: Required[list[float] | float | str]
+    """The same from everywhere: a white furnace, or the light of a closed overcast. (W/(m^2 sr), 0 to 1e+20)"""
+    rotation: float
+    """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
+    scale: float
+    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    background: bool
+    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+
+
+class CubeFaces(TypedDict, total=False):
+    """Six square images of one size, in OpenGL's layout, each named by the axis in its middle."""
+
+    px: Required[str]
+    """Image of what lies towards +X; right is -Z, up is +Y."""
+    nx: Required[str]
+    """Image of what lies towards -X; right is +Z, up is +Y."""
+    py: Required[str]
+    """Image of what lies above; right is +X, up is -Z."""
+    ny: Required[str]
+    """Image of what lies below; right is +X, up is +Z."""
+    pz: Required[str]
+    """Image of what lies towards +Z; right is +X, up is +Y."""
+    nz: Required[str]
+    """Image of what lies towards -Z; right is -X, up is +Y."""
+
+
+class CubemapEnvironment(TypedDict, total=False):
+    """Six HDR images, the faces of a cube."""
+
+    blur: float
+    """Blurs the picture by a Gaussian of this standard deviation: less noise, softer shadows, a bias. (degrees, 0 to
+    90, default 0.0)"""
+    type: Required[Literal["cubemap"]]
+    assets: Required[CubeFaces]
+    """Six square HDR images of one size."""
+    rotation: float
+    """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
+    scale: float
+    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    background: bool
+    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+
+
+class DiffuseMaterial(TypedDict, total=False):
+    """Scatters equally in all directions: f = albedo / pi."""
+
+    type: Required[Literal["diffuse"]]
+    albedo: Required[list[float] | float | str | ColorTexture]
+    """Share of light sent back: fresh snow 0.9, white paint 0.8, grass 0.25, charcoal 0.04. (0 to 1)"""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class DirectionalLight(TypedDict, total=False):
+    """Light from infinity, such as the sun's: parallel, or from a disk in the sky where it has a diameter."""
+
+    type: Required[Literal["directional"]]
+    direction: Required[list[float]]
+    """The way the light travels; any length."""
+    irradiance: Required[list[float] | float | str]
+    """On a surface that faces the light; the sun at noon gives about 1000. (W/m^2, 0 to 1e+20)"""
+    angular_diameter: float
+    """0: sharp shadows; 0.53: the sun's; more is softer, the brightness stays. (degrees, 0 to 90, default 0.0)"""
+
+
+class DisneyMaterial(TypedDict, total=False):
+    """The "principled" BRDF of Burley's 2012 course notes."""
+
+    type: Required[Literal["disney"]]
+    base_color: list[float] | float | str | ColorTexture
+    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.5, 0.5,
+    0.5])"""
+    subsurface: float | ScalarTexture
+    """Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger). (0 to 1, default 0.0)"""
+    metallic: float | ScalarTexture
+    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
+    specular: float | ScalarTexture
+    """Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5. (0 to 1, default 0.5)"""
+    specular_tint: float | ScalarTexture
+    """Tints the dielectric's reflection head-on to the base colour; grazing stays white. (0 to 1, default 0.0)"""
+    roughness: float | ScalarTexture
+    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1, default 0.5)"""
+    anisotropic: float | ScalarTexture
+    """Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1. (0 to 1, default 0.0)"""
+    sheen: float | ScalarTexture
+    """Extra light at grazing angles, for cloth. (0 to 1, default 0.0)"""
+    sheen_tint: float | ScalarTexture
+    """Tints the sheen from white to the base colour. (0 to 1, default 0.5)"""
+    clearcoat: float | ScalarTexture
+    """A second, thin layer of lacquer with an index of 1.5. (0 to 1, default 0.0)"""
+    clearcoat_gloss: float | ScalarTexture
+    """1 is a gloss lacquer, 0 a satin one. (0 to 1, default 1.0)"""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class ImageEnvironment(TypedDict, total=False):
+    """A latitude-longitude image; -Z is in its middle."""
+
+    blur: float
+    """Blurs the picture by a Gaussian of this standard deviation: less noise, softer shadows, a bias. (degrees, 0 to
+    90, default 0.0)"""
+    type: Required[Literal["image"]]
+    asset: Required[str]
+    """An HDR image of all directions: latitude-longitude, EXR or Radiance HDR."""
+    rotation: float
+    """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
+    scale: float
+    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    background: bool
+    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+
+
+class ImageTexture(TypedDict, total=False):
+    """An image file; row 0 is v = 1, texel centres lie at (i + 0.5) / n."""
+
+    asset: Required[str]
+    """PNG, JPEG, WebP, EXR or Radiance HDR."""
+    color_space: Literal["srgb", "linear"]
+    """Without it 8-bit images in colours are sRGB, all others linear; alpha always is."""
+    wrap: Literal["repeat", "clamp", "mirror"]
+    """What lies outside of the image, in both directions. (default 'repeat')"""
+    scale: list[float]
+    """Factors on u and v, applied first: 2 shows the image twice. (default [1.0, 1.0])"""
+    rotation: float
+    """Turns u and v counter-clockwise about their origin, after the scale. (degrees, default 0.0)"""
+    offset: list[float]
+    """Added to u and v last. (default [0.0, 0.0])"""
+    uv: int
+    """Of a mesh's two sets of coordinates. (0 to 1, default 0)"""
+
+
+class MeshShape(TypedDict, total=False):
+    """Triangles, from a file (`asset`) or written out (`vertices` and `faces`)."""
+
+    type: Required[Literal["mesh"]]
+    asset: str
+    """A mesh file: OBJ, PLY, STL or GLB."""
+    vertices: list[list[float]]
+    """Rows of x, y, z. (m)"""
+    faces: list[list[int]]
+    """Rows of three vertex numbers, from 0, counter-clockwise seen from outside."""
+    normals: list[list[float]]
+    """One row per vertex."""
+    uvs: list[list[float]]
+    """One row of u and v per vertex; v points up."""
+    colors: list[list[float]]
+    """One row per vertex, linear, perhaps with alpha; they multiply the material's."""
+    smooth: bool
+    """On: vertex normals; off: facets; neither: as the file says, which for STL is facets."""
+    double_sided: bool
+    """Off: from behind it is not there, for any ray. (default True)"""
+    material: Required[str]
+    """The name of one of the scene's materials."""
+    transform: Transform | MatrixTransform
+    """Where the shape stands; without it, as written."""
+    visible_to_camera: bool
+    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+
+
+class MetalRoughMaterial(TypedDict, total=False):
+    """The core BRDF of glTF 2.0: a metal or a dielectric of index 1.5, without coat."""
+
+    type: Required[Literal["metal_rough"]]
+    base_color: Required[list[float] | float | str | ColorTexture]
+    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1)"""
+    metallic: Required[float | ScalarTexture]
+    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1)"""
+    roughness: Required[float | ScalarTexture]
+    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1)"""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class MicrofacetMaterial(TypedDict, total=False):
+    """Microfacets by the terms of the literature, for comparison and teaching: may lose or gain energy."""
+
+    type: Required[Literal["microfacet"]]
+    distribution: Literal["phong", "beckmann", "ggx", "gtr", "abc", "sgd", "gaussian"]
+    """How the normals of the microfacets are spread: D, normalised. (default 'ggx')"""
+    alpha: float | ScalarTexture
+    """The distribution's parameter: a width; for phong an exponent, for abc an inverse width. (0 to 1e+06, default
+    0.25)"""
+    gamma: float
+    """How soon the tail falls off, for gtr, abc and sgd; the others do not use it. (0 to 1000, default 2.0)"""
+    geometry: Literal["implicit", "neumann", "cook_torrance", "kelemen", "schlick_ggx", "smith", "smith_correlated"]
+    """The share of the microfacets that is neither masked nor shadowed: G. (default 'smith')"""
+    fresnel: Literal["none", "schlick", "cook_torrance", "dielectric", "conductor"]
+    """The reflectance of one microfacet: F. (default 'schlick')"""
+    f0: list[float] | float | str | ColorTexture
+    """Reflectance head-on, for schlick and cook_torrance. (0 to 1, default [0.04, 0.04, 0.04])"""
+    ior: float
+    """For dielectric: water 1.33, glass 1.5, diamond 2.42. (1 to 4, default 1.5)"""
+    conductor_eta: list[float] | float
+    """For conductor: its index of refraction, per channel. (1e-30 to 1e+09)"""
+    conductor_k: list[float] | float
+    """For conductor: its extinction coefficient, per channel. (0 to 1e+09)"""
+    diffuse: list[float] | float | str | ColorTexture
+    """Albedo of the diffuse lobe, which is added to the facets. (0 to 1, default [0.0, 0.0, 0.0])"""
+    diffuse_model: Literal["lambert", "oren_nayar", "disney", "eon"]
+    """The shape of the diffuse lobe. (default 'lambert')"""
+    diffuse_roughness: float
+    """Of oren_nayar, in radians of slope, of disney and of eon; lambert does not use it. (0 to 1, default 0.0)"""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class PhongMaterial(TypedDict, total=False):
+    """The first highlight of all, about the mirrored direction; like `blinn_phong` it conserves no energy."""
+
+    type: Required[Literal["phong"]]
+    diffuse: Required[list[float] | float | str | ColorTexture]
+    """Share of light that is sent back equally in all directions. (0 to 1)"""
+    specular: Required[list[float] | float | str | ColorTexture]
+    """Colour of the highlight; not normalised: a sharper one sends back less light. (0 to 1)"""
+    shininess: Required[float | ScalarTexture]
+    """Exponent of the highlight: 10 is dull, 100 is polished, 1000 is close to a mirror. (0 to 1e+20)"""
+    ambient: list[float] | float | str | ColorTexture
+    """Radiance added wherever a path meets the surface; it is never sampled as a light. (W/(m^2 sr), 0 to 1e+20,
+    default [0.0, 0.0, 0.0])"""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class PointLight(TypedDict, total=False):
+    """Shines equally in all directions, with 1/d^2; its shadows are sharp."""
+
+    type: Required[Literal["point"]]
+    position: Required[list[float]]
+    """Where the light stands. (m)"""
+    intensity: Required[list[float] | float | str]
+    """The irradiance it gives 1 m away; an isotropic lamp of P watts has P / (4 pi). (W/sr, 0 to 1e+20)"""
+
+
+class PrincipledMaterial(TypedDict, total=False):
+    """The production model: reciprocal, never gains light, puts back what microfacets lose, and may be glass."""
+
+    type: Required[Literal["principled"]]
+    base_color: list[float] | float | str | ColorTexture
+    """Diffuse albedo, or a metal's reflectance head-on; real albedos lie in 0.03 to 0.9. (0 to 1, default [0.5, 0.5,
+    0.5])"""
+    subsurface: float | ScalarTexture
+    """Blends towards a flatter diffuse shape, as of skin or wax (Hanrahan-Krueger). (0 to 1, default 0.0)"""
+    metallic: float | ScalarTexture
+    """0 is a dielectric, 1 a metal; between is for dust or blends, not for one substance. (0 to 1, default 0.0)"""
+    specular: float | ScalarTexture
+    """Reflectance head-on of a dielectric is 0.08 of it: 0.5 is 4 %, an index of 1.5. (0 to 1, default 0.5)"""
+    specular_tint: float | ScalarTexture
+    """Tints the dielectric's reflection head-on to the base colour; grazing stays white. (0 to 1, default 0.0)"""
+    roughness: float | ScalarTexture
+    """0 is polished, 1 is matte; its square is the width of the highlight. (0 to 1, default 0.5)"""
+    anisotropic: float | ScalarTexture
+    """Stretches the highlight along the tangent, as of brushed metal; 1 is 10 to 1. (0 to 1, default 0.0)"""
+    sheen: float | ScalarTexture
+    """Extra light at grazing angles, for cloth. (0 to 1, default 0.0)"""
+    sheen_tint: float | ScalarTexture
+    """Tints the sheen from white to the base colour. (0 to 1, default 0.5)"""
+    clearcoat: float | ScalarTexture
+    """A second, thin layer of lacquer with an index of 1.5. (0 to 1, default 0.0)"""
+    clearcoat_gloss: float | ScalarTexture
+    """1 is a gloss lacquer, 0 a satin one. (0 to 1, default 1.0)"""
+    transmission: float | ScalarTexture
+    """Share of the base that is clear: 1 is solid glass, entered and left by refraction. (0 to 1, default 0.0)"""
+    ior: float | ScalarTexture
+    """Water 1.33, glass 1.5, diamond 2.42; in place of specular, which sets it otherwise. (1 to 4)"""
+    attenuation_color: list[float] | float | str | ColorTexture
+    """What is left of white light after the attenuation distance inside. (0 to 1, default [1.0, 1.0, 1.0])"""
+    attenuation_distance: float | ScalarTexture
+    """How far inside light takes the attenuation colour; without it, clear. (m, 0 to 1e+09)"""
+    specular_color: list[float] | float | str | ColorTexture
+    """Tints the dielectric's reflection head-on; grazing stays white. (0 to 1, default [1.0, 1.0, 1.0])"""
+    anisotropic_rotation: float | ScalarTexture
+    """Turns the stretch of the highlight, counter-clockwise from the tangent. (degrees, default 0.0)"""
+    sheen_color: list[float] | float | str | ColorTexture
+    """Colour of the sheen, in place of white tinted by the sheen tint. (0 to 1)"""
+    sheen_roughness: float | ScalarTexture
+    """How far the sheen reaches from grazing angles inwards; satin is low, wool high. (0 to 1, default 0.5)"""
+    clearcoat_roughness: float | ScalarTexture
+    """Roughness of the coat, in place of its gloss; 0 is a perfect varnish. (0 to 1)"""
+    clearcoat_normal_map: NormalTexture
+    """The coat's own; without it the coat is smooth over whatever is under it."""
+    emission: list[float] | float | str | ColorTexture
+    """Radiance that leaves the front side: above 0 the shape is an area light. (W/(m^2 sr), 0 to 1e+20, default [0.0,
+    0.0, 0.0])"""
+    emission_sides: Literal["front", "both"]
+    """Whether the emission leaves the outward side only, or the inward side as well. (default 'front')"""
+    alpha: float | ScalarTexture
+    """The chance that a ray meets the surface: 0 is not there, 0.5 a fine mesh. (0 to 1, default 1.0)"""
+    alpha_cutoff: float | ScalarTexture
+    """Where given, an alpha of at least this counts as 1, any other as 0. (0 to 1)"""
+    normal_map: NormalTexture
+    """Bends the surface's normal without moving the surface."""
+
+
+class QuadShape(TypedDict, total=False):
+    """A parallelogram; its front is where u, v and the normal are right-handed."""
+
+    type: Required[Literal["quad"]]
+    origin: Required[list[float]]
+    """The corner that both edges start from. (m)"""
+    u: Required[list[float]]
+    """From the corner along the first edge. (m)"""
+    v: Required[list[float]]
+    """Along the second edge; the front faces cross(u, v). (m)"""
+    material: Required[str]
+    """The name of one of the scene's materials."""
+    transform: Transform | MatrixTransform
+    """Where the shape stands; without it, as written."""
+    visible_to_camera: bool
+    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+
+
+class SkyEnvironment(TypedDict, total=False):
+    """A clear sky by day: Hosek and Wilkie's model of dome and sun, above Lambertian ground."""
+
+    type: Required[Literal["sky"]]
+    sun_elevation: Required[float]
+    """Height of the sun: 0 is at the horizon, 90 overhead. (degrees, 0 to 90)"""
+    sun_azimuth: Required[float]
+    """Where the sun stands: 0 is -Z, 90 is +X. (degrees)"""
+    turbidity: float
+    """Haze: 1 is pure air, 3 a clear day, 6 hazy, 10 murky. (1 to 10, default 3.0)"""
+    ground_albedo: float
+    """Share of light that the ground sends back, also into the sky: 0.3 is soil and grass. (0 to 1, default 0.3)"""
+    sun: bool
+    """Off: the dome alone, as if the sun itself were hidden. (default True)"""
+    rotation: float
+    """Turns the surroundings about the vertical, counter-clockwise seen from above. (degrees, default 0.0)"""
+    scale: float
+    """Factor on the radiance; twice as much is one stop. (0 to 1e+20, default 1.0)"""
+    background: bool
+    """Off: it lights the scene, but the camera sees black with alpha 0. (default True)"""
+
+
+class SphereShape(TypedDict, total=False):
+    """An exact sphere, not a mesh."""
+
+    type: Required[Literal["sphere"]]
+    center: Required[list[float]]
+    """The middle of the sphere. (m)"""
+    radius: Required[float]
+    """From the centre to the surface. (m, 0 to 1e+09)"""
+    material: Required[str]
+    """The name of one of the scene's materials."""
+    transform: Transform | MatrixTransform
+    """Where the shape stands; without it, as written."""
+    visible_to_camera: bool
+    """Off: the camera looks through it; light, shadow and reflections stay. (default True)"""
+
+
+class SpotLight(TypedDict, total=False):
+    """A point that shines into a cone: full inside the inner angle, fading to nothing at the outer."""
+
+    type: Required[Literal["spot"]]
+    position: Required[list[float]]
+    """Where the light stands. (m)"""
+    direction: Required[list[float]]
+    """Where the beam points; any length."""
+    intensity: Required[list[float] | float | str]
+    """Along the beam: the irradiance it gives 1 m away. (W/sr, 0 to 1e+20)"""
+    inner_angle: Required[float]
+    """From the beam's axis to where the light begins to fade. (degrees, 0 to 90)"""
+    outer_angle: Required[float]
+    """From the beam's axis to where nothing is left; equal to the inner: a sharp edge. (degrees, 0 to 90)"""
+
+
+Environment = ConstantEnvironment | ImageEnvironment | CubemapEnvironment | SkyEnvironment
+
+
+Light = PointLight | SpotLight | DirectionalLight
+
+
+Material = (
+    DiffuseMaterial
+    | DisneyMaterial
+    | PrincipledMaterial
+    | MetalRoughMaterial
+    | BlinnPhongMaterial
+    | PhongMaterial
+    | MicrofacetMaterial
+)
+
+
+Shape = SphereShape | QuadShape | BoxShape | MeshShape
+
+
+class Scene(TypedDict, total=False):
+    """What is to be rendered: camera, light, materials and shapes."""
+
+    version: Required[Literal[1]]
+    """Of this format."""
+    camera: Required[Camera]
+    """From where, and through what lens."""
+    environment: Environment
+    """What surrounds the scene; without one it is black."""
+    lights: list[Light]
+    """Lights that are no shapes."""
+    textures: dict[str, ImageTexture | CheckerTexture]
+    """By names of your choice."""
+    materials: Required[dict[str, Material]]
+    """By names of your choice."""
+    shapes: Required[list[Shape]]
+    """Each made of one of the materials."""
+
+
+class Settings(TypedDict, total=False):
+    """How to render. What is left out comes from the quality."""
+
+    width: int
+    """Of the picture. (pixels, at least 1, default 512)"""
+    height: int
+    """Of the picture. (pixels, at least 1, default 512)"""
+    max_samples: int
+    """Paths per pixel at which to stop; four times as many halve the noise. (1 to 1.67772e+07, default 256)"""
+    max_bounces: int
+    """Scattering events on a path: 0 shows emission only, 1 direct light, more the light between. (0 to 1024, default
+    8)"""
+    time_limit: float
+    """Stops after this time; where no samples are given, nothing else stops it. (s, 0 to 1e+09)"""
+    target_noise: float
+    """Stops when the estimated error is this share of the mean brightness; 0.01 looks clean. (0 to 1e+09)"""
+    seed: int
+    """Another one gives another noise of the same size. (0 to 4.29497e+09, default 0)"""
+    quality: Literal["draft", "preview", "balanced", "high", "reference"]
+    """Fills in samples, bounces and roulette where they are not given. (default 'balanced')"""
+    estimator: Literal["mis", "bsdf", "light", "uniform"]
+    """How light is looked for; mis weighs both ways (Veach), the others are for comparison. (default 'mis')"""
+    sampler: Literal["sobol", "independent"]
+    """sobol spreads its points evenly, and so needs fewer of them. (default 'sobol')"""
+    filter: Literal["box", "tent", "gaussian", "blackman_harris"]
+    """How far around a pixel is averaged: box .5 pixels, tent 1, gaussian 2, the last 1.5. (default
+    'blackman_harris')"""
+    roulette_depth: int
+    """Bounces before dim paths may end at random: changes noise and speed, not the mean. (0 to 1024, default 3)"""
+    resolution_scale: float
+    """Factor on width and height. (0 to 1, default 1.0)"""
+    adaptive: bool
+    """More samples where there is more noise, fewer elsewhere; the samples count their mean. (default False)"""
+    clamp: float
+    """Bounds the radiance of indirect light: removes fireflies, and some light with them. (W/(m^2 sr), 0 to 1e+20)"""
+    denoise: bool
+    """Filters noise out of the picture while there is much of it; what is shown is then biased. (default False)"""

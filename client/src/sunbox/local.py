@@ -1,0 +1,80 @@
+"""`render` in this process, where the server's package is installed: no server runs, the bits are those of the
+command line."""
+
+from __future__ import annotations
+
+import asyncio
+import weakref
+from concurrent.futures import ThreadPoolExecutor
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+from sunbox import files
+from sunbox.async_job import AsyncPicture
+from sunbox.client import Picture, run
+from sunbox.errors import SunboxError, from_problem
+
+if TYPE_CHECKING:
+    from service.commands.local import LocalRenderer
+
+
+def render(scene: Any, **settings: Any) -> Picture:
+    """The picture of a scene: a dict, or a path to its JSON file. Files are named by path. Ctrl-C ends it. Raises
+    SunboxError as `Client.render` does, and RuntimeError where the package `sunbox-server` is not installed."""
+    _service()
+    return Picture(run(_rendered(scene, settings)))
+
+
+async def _rendered(scene: Any, settings: dict[str, Any]) -> AsyncPicture:
+    from service.commands.local import stop
+    from service.commands.tracing import Interrupt
+
+    document, folder = files.read_scene(scene)
+    interrupt = Interrupt()
+    try:
+        made = await _on_gl_thread(lambda: _renderer().render(document, settings, folder, interrupt))
+    except asyncio.CancelledError:
+        stop(interrupt)
+        raise
+
+    async def fetch(format: str, view: dict[str, Any]) -> bytes:
+        encoded: bytes = await _on_gl_thread(lambda: made.encoded(format, view))
+        return encoded
+
+    picture = AsyncPicture(fetch, made.status)
+    weakref.finalize(picture, _thread().submit, made.close)
+    return picture
+
+
+async def _on_gl_thread(call: Any) -> Any:
+    from service.commands.local import as_problem
+    from service.problems import ServiceError
+
+    try:
+        return await asyncio.get_running_loop().run_in_executor(_thread(), call)
+    except ServiceError as error:
+        status, document = as_problem(error)
+        problem: SunboxError = from_problem(document, status)
+    raise problem
+
+
+@cache
+def _thread() -> ThreadPoolExecutor:
+    """The one that has the OpenGL context."""
+    return ThreadPoolExecutor(1, thread_name_prefix="sunbox-gl")
+
+
+@cache
+def _renderer() -> LocalRenderer:
+    from service.commands.local import LocalRenderer
+
+    return LocalRenderer()
+
+
+def _service() -> None:
+    try:
+        import service.commands.local  # noqa: F401
+    except ImportError as error:
+        raise RuntimeError(
+            "sunbox.render needs the package sunbox-server (pip install 'sunbox[local]'); sunbox.Client does not."
+        ) from error

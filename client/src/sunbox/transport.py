@@ -1,0 +1,164 @@
+"""Requests to a server: its address, its key, when to ask again, and uploads."""
+
+from __future__ import annotations
+
+import asyncio
+import email.utils
+import hashlib
+import json
+import os
+import random
+import time
+from collections.abc import AsyncIterator, Mapping
+from contextlib import asynccontextmanager
+from pathlib import Path
+from typing import Any
+from urllib.parse import quote, urlsplit
+
+import httpx2
+
+from sunbox import files
+from sunbox.errors import NotFound, SunboxError, Unreachable, from_problem
+
+ADDRESS = "http://127.0.0.1:8000"
+AGAIN = {429, 503}  # the server is full, or starting: it says when to come again
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 30.0
+
+
+class Transport:
+    """A server by the address that all its paths begin with. `url` and `key` come from SUNBOX_URL and SUNBOX_API_KEY
+    where they are None; `timeout` is in seconds without a byte. Raises ValueError for what is no address."""
+
+    def __init__(self, url: str | None, key: str | None, timeout: float, retries: int) -> None:
+        self.url = (url or os.environ.get("SUNBOX_URL") or ADDRESS).rstrip("/")
+        self.key = key if key is not None else (os.environ.get("SUNBOX_API_KEY") or "").split(",")[0].strip() or None
+        self.timeout, self.retries = timeout, retries
+        if urlsplit(self.url).scheme not in ("http", "https") or not urlsplit(self.url).netloc:
+            raise ValueError(f"url={self.url!r} is not an address such as {ADDRESS}")
+        headers = {"authorization": f"Bearer {self.key}"} if self.key else {}
+        self._http = httpx2.AsyncClient(headers=headers, timeout=timeout)
+        self._uploaded: set[str] = set()
+
+    async def close(self) -> None:
+        await self._http.aclose()
+
+    async def json(self, method: str, path: str, body: Any = None, headers: Mapping[str, str] | None = None) -> Any:
+        """The answer's document; None where it has none. Raises SunboxError."""
+        data = None if body is None else files.text(body).encode()
+        answer = await self.request(method, path, data, {"content-type": "application/json", **(headers or {})})
+        return answer.json() if answer.content else None
+
+    async def request(
+        self, method: str, path: str, data: bytes | None = None, headers: Mapping[str, str] | None = None
+    ) -> httpx2.Response:
+        """A request that may be sent twice: every one that this package makes. Raises SunboxError."""
+        for attempt in range(self.retries + 1):
+            is_last = attempt == self.retries
+            try:
+                answer = await self._http.request(method, self.url + path, content=data, headers=headers)
+            except httpx2.TransportError as error:
+                if is_last:
+                    raise self._unreachable(error) from None
+                await asyncio.sleep(_pause(attempt))
+                continue
+            if answer.status_code in AGAIN and not is_last:
+                await asyncio.sleep(_pause(attempt, answer.headers.get("retry-after")))
+                continue
+            if answer.is_error:
+                raise from_problem(_document(answer.content), answer.status_code)
+            return answer
+        raise AssertionError("the last attempt returns or raises")
+
+    async def events(self, path: str, last: str) -> AsyncIterator[tuple[str, Any]]:
+        """The name and the document of each event up to the one named `last`. An answer that ends before it, because
+        the connection broke or the server is restarted, is asked for again; the count of `retries` begins anew with
+        each event."""
+        attempt = 0
+        while True:
+            pause = None
+            error: SunboxError = Unreachable(f"{self.url} ended the events before the last one.")
+            try:
+                async with self._stream("GET", path) as answer:
+                    name = ""
+                    async for line in answer.aiter_lines():
+                        field, _, value = line.partition(": ")
+                        if field == "event":
+                            name = value
+                        elif field == "data":
+                            attempt = 0
+                            yield name, json.loads(value)
+                            if name == last:
+                                return
+            except httpx2.TransportError as broken:
+                error = self._unreachable(broken)
+            except _Busy as busy:
+                error, pause = busy.error, busy.retry_after
+            if attempt >= self.retries:
+                raise error
+            await asyncio.sleep(_pause(attempt, pause))
+            attempt += 1
+
+    async def upload(self, data: bytes, name: str) -> str:
+        """The id of a file's content, which is sent only where the server does not have it; `name` says how to read
+        it. Raises SunboxError."""
+        id = f"sha256:{await asyncio.to_thread(lambda: hashlib.sha256(data).hexdigest())}"
+        if id not in self._uploaded and not await self._has(id):
+            kind = {"content-type": "application/octet-stream"}
+            id = str((await self.request("POST", f"/v1/assets?filename={quote(name)}", data, kind)).json()["id"])
+        self._uploaded.add(id)
+        return id
+
+    async def upload_file(self, path: Path) -> str:
+        """As `upload`. Raises OSError, SunboxError."""
+        return await self.upload(await asyncio.to_thread(path.read_bytes), path.name)
+
+    async def uploaded(self, scene: Any) -> files.Scene:
+        """A scene's document for the server: the files that it names by path are there. Raises OSError,
+        SunboxError."""
+        document, folder = files.read_scene(scene)
+        paths = sorted(files.references(document))
+        ids = [await self.upload_file(folder / path) for path in paths]
+        return files.with_ids(document, dict(zip(paths, ids, strict=True)))
+
+    async def _has(self, id: str) -> bool:
+        try:
+            await self.request("HEAD", f"/v1/assets/{id}")
+        except NotFound:
+            return False
+        return True
+
+    @asynccontextmanager
+    async def _stream(self, method: str, path: str) -> AsyncIterator[httpx2.Response]:
+        async with self._http.stream(method, self.url + path) as answer:
+            if answer.is_error:
+                error = from_problem(_document(await answer.aread()), answer.status_code)
+                if answer.status_code in AGAIN:
+                    raise _Busy(error, answer.headers.get("retry-after"))
+                raise error
+            yield answer
+
+    def _unreachable(self, error: Exception) -> Unreachable:
+        return Unreachable(f"No answer came from {self.url}: {error or type(error).__name__}.")
+
+
+class _Busy(Exception):
+    def __init__(self, error: SunboxError, retry_after: str | None) -> None:
+        super().__init__()
+        self.error, self.retry_after = error, retry_after
+
+
+def _document(content: bytes) -> Any:
+    try:
+        return json.loads(content)
+    except ValueError:  # a proxy's page
+        return None
+
+
+def _pause(attempt: int, retry_after: str | None = None) -> float:
+    """Seconds until the next attempt: as the server says, else twice as long each time, not all clients at once."""
+    if retry_after is not None:
+        if retry_after.isdecimal():
+            return min(float(retry_after), LONGEST_PAUSE_S)
+        when = email.utils.parsedate_to_datetime(retry_after).timestamp()
+        return min(max(when - time.time(), 0.0), LONGEST_PAUSE_S)
+    return min(FIRST_PAUSE_S * 2.0**attempt, LONGEST_PAUSE_S) * random.uniform(0.5, 1.0)

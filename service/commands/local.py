@@ -1,0 +1,118 @@
+"""Renders in a Python program's own process, with the bits of `sunbox render`: what `sunbox.render` calls.
+
+All calls come from one thread, which has the OpenGL context.
+"""
+
+from __future__ import annotations
+
+import signal
+import time
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from pydantic import TypeAdapter
+
+from gpu import GpuError
+from service import images
+from service.commands.documents import Source, source_assets
+from service.commands.tracing import Interrupt, Tracing
+from service.config import Config, load_config
+from service.images.recipe import PictureView, write
+from service.ipc.messages import View
+from service.pack import pack
+from service.problems import FieldError, Internal, InvalidDocument, ServiceError, problem
+from service.quality import resolve
+from service.scene import parse_scene, parse_settings
+from service.scene.validation import validated
+from service.views import AOVS, FileFormat
+from service.worker.in_process import InProcessRenderer
+
+_VIEW: TypeAdapter[PictureView] = TypeAdapter(PictureView)
+
+
+class LocalRenderer:
+    """A renderer of this process. Raises ServiceError, which `as_problem` turns into what a server would answer."""
+
+    def __init__(self) -> None:
+        self._config: Config = load_config()
+        try:
+            self._renderer = InProcessRenderer(self._config.device)
+        except GpuError as error:
+            raise Internal(str(error)) from None
+
+    def render(
+        self, document: Any, settings: Mapping[str, Any], folder: Path, interrupt: Interrupt | None = None
+    ) -> LocalPicture:
+        """A picture of a scene's document; it names files by paths relative to `folder`. Raises InvalidDocument with
+        pointers as `POST /v1/renders` has them."""
+        began, errors = time.perf_counter(), []
+        try:
+            scene = parse_scene(document, "/scene", self._config)
+        except InvalidDocument as error:
+            errors += error.errors
+        try:
+            chosen = parse_settings(dict(settings), "/settings", self._config)
+        except InvalidDocument as error:
+            errors += error.errors
+        if errors:
+            raise InvalidDocument(errors)
+        source = Source(folder / "scene", document, scene)
+        with source_assets(source, [], self._config) as assets:
+            try:
+                packed = pack(scene, assets, limits=self._config)
+            except InvalidDocument as error:
+                raise error.under("/scene") from None
+            identified, names = assets.by_id(document)
+            assets.keep(document)  # so that pictures, which name files by id, can be made again
+        try:
+            tracing = Tracing(self._renderer, packed, resolve(chosen))
+            setup_s = time.perf_counter() - began
+            tracing.run(interrupt or Interrupt())
+        except GpuError as error:
+            raise Internal(str(error)) from None
+        return LocalPicture(tracing, tracing.status(setup_s), identified, names)
+
+
+class LocalPicture:
+    """A picture whose samples lie on the GPU until `close`. `status` as `GET /v1/renders/{id}` would answer."""
+
+    def __init__(self, tracing: Tracing, status: dict[str, Any], document: Any, names: dict[str, str]) -> None:
+        self._tracing, self._document, self._names = tracing, document, names
+        self.status = status
+
+    def encoded(self, format: FileFormat, view: Mapping[str, Any]) -> bytes:
+        """A file; `view`: aov, bits, exposure, tone_map. Raises InvalidDocument."""
+        row = images.FORMATS.get(format)
+        if row is None:
+            raise InvalidDocument(
+                [FieldError("/format", f"must be one of {', '.join(images.FORMATS)}, not {format!r}")]
+            )
+        look = validated(_VIEW, dict(view), "")
+        made_from = None
+        if row.has_metadata:
+            made_from = write(
+                self._document, self._tracing.settings, self._tracing.progress.samples, look, self._names
+            )
+        if look.aov == "all":
+            if format != "exr":
+                raise InvalidDocument([FieldError("/aov", "all is for exr alone")])
+            layers: dict[str, Any] = {aov: self._tracing.pixels(View(aov, encoding="linear")) for aov in AOVS}
+            return images.encode_layers(layers, made_from)
+        pixels = self._tracing.pixels(View(look.aov, look.exposure, look.tone_map, row.encoding(look.bits)))
+        return images.encode(pixels, format, bits=look.bits, metadata=made_from)
+
+    def close(self) -> None:
+        """Free its memory on the GPU."""
+        self._tracing.close()
+
+
+def stop(interrupt: Interrupt) -> None:
+    """End the render that watches `interrupt`; may be called from any thread."""
+    interrupt.signal = signal.SIGINT
+
+
+def as_problem(error: ServiceError) -> tuple[int, Any]:
+    """The status and the document that a server would answer."""
+    document = problem(error)
+    return int(document["status"]), document

@@ -1,0 +1,127 @@
+"""A server that is full, restarts, or is away."""
+
+from __future__ import annotations
+
+import json
+import threading
+from collections.abc import Iterator
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from typing import Any, ClassVar
+
+import pytest
+
+import sunbox
+
+STATUS = {"id": "a", "state": "done", "samples": 1, "noise": None, "warnings": [], "settings": {"max_samples": 1}}
+PROBLEM = {"title": "Full", "status": 503, "detail": "Too much is waiting.", "errors": []}
+
+
+class Scripted(BaseHTTPRequestHandler):
+    """Answers the n-th request by the n-th of `script`: a status and a document; None breaks the connection."""
+
+    protocol_version = "HTTP/1.1"
+    script: ClassVar[list[Any]] = []
+    asked: ClassVar[list[tuple[str, str, dict[str, str]]]] = []
+
+    def do_GET(self) -> None:
+        body = self.rfile.read(int(self.headers.get("content-length", 0)))
+        self.asked.append(
+            (self.command, self.path, {k.lower(): v for k, v in self.headers.items()} | {"body": body.decode()})
+        )
+        step = self.script.pop(0)
+        if step is None:
+            self.close_connection = True
+            return
+        status, answer, kind = step
+        data = answer if isinstance(answer, bytes) else json.dumps(answer).encode()
+        self.send_response(status)
+        self.send_header("content-type", kind)
+        self.send_header("content-length", str(len(data)))
+        if status == 503:
+            self.send_header("retry-after", "0")
+        self.end_headers()
+        self.wfile.write(data)
+
+    do_POST = do_DELETE = do_GET
+
+    def log_message(self, *ignored: Any) -> None:
+        pass
+
+
+@pytest.fixture
+def scripted() -> Iterator[tuple[sunbox.Client, list[Any], list[Any]]]:
+    Scripted.script, Scripted.asked = [], []
+    with ThreadingHTTPServer(("127.0.0.1", 0), Scripted) as server:
+        threading.Thread(target=server.serve_forever, daemon=True).start()
+        with sunbox.Client(f"http://127.0.0.1:{server.server_address[1]}", key="k", retries=2) as client:
+            yield client, Scripted.script, Scripted.asked
+        server.shutdown()
+
+
+def json_answer(status: int, document: Any) -> tuple[int, Any, str]:
+    return status, document, "application/json"
+
+
+def test_full_server_is_asked_again(scripted: Any) -> None:
+    client, script, asked = scripted
+    script += [json_answer(503, PROBLEM), None, json_answer(202, {"id": "a"})]
+    assert client.submit({"version": 1}).id == "a"
+    assert [path for _, path, _ in asked] == ["/v1/renders"] * 3
+    keys = {headers["idempotency-key"] for _, _, headers in asked}
+    assert len(keys) == 1 and {headers["authorization"] for _, _, headers in asked} == {"Bearer k"}
+
+
+def test_full_server_gives_its_reason_at_last(scripted: Any) -> None:
+    client, script, asked = scripted
+    script += [json_answer(503, PROBLEM)] * 3
+    with pytest.raises(sunbox.Failed, match="Too much is waiting") as failed:
+        client.info()
+    assert failed.value.status == 503 and len(asked) == 3
+
+
+def test_refusal_is_not_asked_again(scripted: Any) -> None:
+    client, script, asked = scripted
+    script += [json_answer(422, {**PROBLEM, "status": 422, "errors": [{"pointer": "/a", "detail": "b"}]})]
+    with pytest.raises(sunbox.Refused) as refused:
+        client.info()
+    assert len(asked) == 1 and refused.value.errors == [("/a", "b")]
+
+
+def test_page_of_a_proxy(scripted: Any) -> None:
+    client, script, _ = scripted
+    script += [(502, b"<html>bad gateway</html>", "text/html")]
+    with pytest.raises(sunbox.Failed, match="502"):
+        client.info()
+
+
+def test_broken_events_are_taken_up_again(scripted: Any) -> None:
+    client, script, _ = scripted
+    running = f"event: progress\ndata: {json.dumps({**STATUS, 'state': 'running'})}\n\n".encode()
+    done = f"event: done\ndata: {json.dumps(STATUS)}\n\n".encode()
+    script += [json_answer(503, PROBLEM), None, (200, running + done, "text/event-stream")]
+    assert [status["state"] for status in client.job("a").events()] == ["running", "done"]
+
+
+def test_events_that_end_too_early_are_asked_for_again(scripted: Any) -> None:
+    client, script, _ = scripted
+    running = f"event: progress\ndata: {json.dumps({**STATUS, 'state': 'running'})}\n\n".encode()
+    done = f"event: done\ndata: {json.dumps(STATUS)}\n\n".encode()
+    script += [(200, running, "text/event-stream"), None, (200, done, "text/event-stream")]
+    assert [status["state"] for status in client.job("a").events()] == ["running", "done"]
+    script += [(200, running, "text/event-stream"), None, None, None]
+    with pytest.raises(sunbox.Unreachable):
+        list(client.job("a").events())
+
+
+def test_failed_render_says_why(scripted: Any) -> None:
+    client, script, _ = scripted
+    failed = {**STATUS, "state": "failed", "problem": {"detail": "Out of memory.", "status": 503}}
+    script += [(200, f"event: done\ndata: {json.dumps(failed)}\n\n".encode(), "text/event-stream")]
+    with pytest.raises(sunbox.Failed, match=r"Out of memory\."):
+        client.job("a").result()
+
+
+def test_nobody_there() -> None:
+    with sunbox.Client("http://127.0.0.1:1", retries=0) as client, pytest.raises(sunbox.Unreachable) as error:
+        client.info()
+    assert error.value.status is None and "127.0.0.1:1" in str(error.value)
