@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import re
 import threading
-from collections.abc import Iterator
 from http.server import BaseHTTPRequestHandler, HTTPServer
 from pathlib import Path
 from typing import Any
@@ -13,7 +12,6 @@ from typing import Any
 import pytest
 
 from service.cli import main
-from service.commands import Failed, renders
 from tests.serving import ENDLESS, SCENE, SMALL, Server
 
 OBJ = "v -1 -1 0\nv 1 -1 0\nv 0 1 0\nf 1 2 3\n"
@@ -74,7 +72,7 @@ def test_a_render_from_its_scene_to_its_picture(
 
 
 def test_lists_go_over_all_pages(command: Command, scene: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(renders, "PAGE", 2)
+    monkeypatch.setattr("sunbox.async_client.PAGE", 2)
     ids = [command.submitted(scene, *SHORT, "--label", "pages") for _ in range(5)]
     for id in ids:
         command("wait", id)
@@ -169,29 +167,3 @@ def test_the_first_key_is_sent(monkeypatch: pytest.MonkeyPatch, capsys: pytest.C
         assert main(["renders", "list", "--limit", "7"]) == 0
     assert heard == [("/v1/renders?limit=7", "Bearer anna")]
     capsys.readouterr()
-
-
-class Restarted:
-    """A server that ends, is away, and comes back."""
-
-    def __init__(self, away: int) -> None:
-        self._answers = [["progress"], *[None] * away, ["progress", "done"]]
-
-    def events(self, path: str) -> Iterator[tuple[str, Any]]:
-        names = self._answers.pop(0)
-        if names is None:
-            raise Failed("http://127.0.0.1: Connection refused")
-        for name in names:
-            yield name, {"state": name, "samples": 1, "noise": None, "elapsed_s": 0.1, "eta_s": None}
-
-
-def test_a_server_that_is_restarted_is_asked_again(monkeypatch: pytest.MonkeyPatch) -> None:
-    slept: list[float] = []
-    now = [0.0]
-    monkeypatch.setattr(renders.time, "sleep", lambda seconds: (slept.append(seconds), now.append(now[-1] + seconds)))
-    monkeypatch.setattr(renders.time, "monotonic", lambda: now[-1])
-    assert renders._watched(Restarted(3), "id")["state"] == "done"  # type: ignore[arg-type]
-    assert slept == [renders.AGAIN_S] * 4
-    with pytest.raises(Failed, match="refused"):
-        renders._watched(Restarted(1000), "id")  # type: ignore[arg-type]
-    assert now[-1] < 3 * renders.PATIENCE_S
