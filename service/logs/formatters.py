@@ -9,6 +9,7 @@ from __future__ import annotations
 import json
 import logging
 import re
+from abc import ABC, abstractmethod
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from contextvars import ContextVar
@@ -38,7 +39,7 @@ def bound(**fields: Any) -> Iterator[None]:
         context_fields.reset(token)
 
 
-class Redacting(logging.Formatter):
+class Redacting(logging.Formatter, ABC):
     """Removes secrets from what `written` returns, wherever they stand, tracebacks included."""
 
     def __init__(self, secrets: Iterable[str] = ()) -> None:
@@ -52,8 +53,9 @@ class Redacting(logging.Formatter):
         trace = self.formatException(record.exc_info) if record.exc_info and record.exc_info[0] else ""
         return self._secrets.sub(HIDDEN, self.written(fields, trace))
 
+    @abstractmethod
     def written(self, fields: dict[str, Any], trace: str) -> str:
-        raise NotImplementedError
+        """The line of a record."""
 
 
 class Json(Redacting):

@@ -11,6 +11,7 @@ from typing import Any, ClassVar
 import pytest
 
 import sunbox
+from sunbox.transport import FIRST_PAUSE_S, _pause
 
 STATUS = {"id": "a", "state": "done", "samples": 1, "noise": None, "warnings": [], "settings": {"max_samples": 1}}
 PROBLEM = {"title": "Full", "status": 503, "detail": "Too much is waiting.", "errors": []}
@@ -69,6 +70,15 @@ def test_full_server_is_asked_again(scripted: Any) -> None:
     assert [path for _, path, _ in asked] == ["/v1/renders"] * 3
     keys = {headers["idempotency-key"] for _, _, headers in asked}
     assert len(keys) == 1 and {headers["authorization"] for _, _, headers in asked} == {"Bearer k"}
+
+
+@pytest.mark.parametrize("said", ["soon", "", "Wed, 21 Oct 2015 07:28:00 GMT"])
+def test_odd_times_to_come_again(said: str) -> None:
+    assert 0 <= _pause(0, said) <= FIRST_PAUSE_S
+
+
+def test_servers_time_to_come_again_is_kept() -> None:
+    assert _pause(0, "75") == 75 and _pause(3, "0") == 0
 
 
 def test_full_server_gives_its_reason_at_last(scripted: Any) -> None:

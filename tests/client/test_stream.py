@@ -75,6 +75,21 @@ def test_broken_connection_is_taken_up_again(server: Server) -> None:
     assert heard[-1][0] == 1 and [generation for generation, _ in heard] == sorted(g for g, _ in heard)
 
 
+def test_view_outlives_a_broken_connection(server: Server) -> None:
+    async def watched() -> str:
+        async with sunbox.AsyncClient(server.url) as client, client.stream(SCENE, **ENDLESS) as stream:
+            await anext(stream)
+            stream._socket.transport.abort()
+            await asyncio.sleep(0.1)
+            await stream.view(format="png")
+            async for frame in stream:
+                if frame.mime == "image/png":
+                    return frame.mime
+        return ""
+
+    assert asyncio.run(asyncio.wait_for(watched(), 120)) == "image/png"
+
+
 def test_forgotten_session_begins_again(server: Server) -> None:
     async def watched() -> tuple[float, int]:
         async with sunbox.AsyncClient(server.url) as client, client.stream(SCENE, **SMALL) as stream:

@@ -16,7 +16,7 @@ from sunbox.errors import Failed, Refused, Unreachable, from_problem
 from sunbox.merge import merged
 from sunbox.transport import Transport
 
-GONE, FULL, LOST = 4404, 4429, 4500  # close codes of the server
+GONE, LOST = 4404, 4500  # close codes of the server
 REFUSED = {
     1009: "a message was too large",
     4401: "the key",
@@ -145,6 +145,8 @@ class AsyncStream:
             await self._socket.send(files.text(message))
         except ConnectionClosed as error:
             await self._taken_up(error)
+            if message["type"] in ("view", "pause", "resume"):  # updates were sent again, and frames are counted anew
+                await self._send(message)
 
     async def _receive(self) -> str | bytes:
         if self._socket is None:

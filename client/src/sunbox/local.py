@@ -42,7 +42,7 @@ async def _rendered(scene: Any, settings: dict[str, Any]) -> AsyncPicture:
         return encoded
 
     picture = AsyncPicture(fetch, made.status)
-    weakref.finalize(picture, _thread().submit, made.close)
+    weakref.finalize(picture, _thread().submit, made.close).atexit = False  # the process' end frees all of it
     return picture
 
 

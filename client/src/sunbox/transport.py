@@ -37,7 +37,6 @@ class Transport:
             raise ValueError(f"url={self.url!r} is not an address such as {ADDRESS}")
         headers = {"authorization": f"Bearer {self.key}"} if self.key else {}
         self._http = httpx2.AsyncClient(headers=headers, timeout=timeout)
-        self._uploaded: set[str] = set()
 
     async def close(self) -> None:
         await self._http.aclose()
@@ -102,10 +101,9 @@ class Transport:
         """The id of a file's content, which is sent only where the server does not have it; `name` says how to read
         it. Raises SunboxError."""
         id = f"sha256:{await asyncio.to_thread(lambda: hashlib.sha256(data).hexdigest())}"
-        if id not in self._uploaded and not await self._has(id):
+        if not await self._has(id):  # asked each time: a server gives up what was not used for long
             kind = {"content-type": "application/octet-stream"}
             id = str((await self.request("POST", f"/v1/assets?filename={quote(name)}", data, kind)).json()["id"])
-        self._uploaded.add(id)
         return id
 
     async def upload_file(self, path: Path) -> str:
@@ -156,9 +154,8 @@ def _document(content: bytes) -> Any:
 
 def _pause(attempt: int, retry_after: str | None = None) -> float:
     """Seconds until the next attempt: as the server says, else twice as long each time, not all clients at once."""
-    if retry_after is not None:
-        if retry_after.isdecimal():
-            return min(float(retry_after), LONGEST_PAUSE_S)
-        when = email.utils.parsedate_to_datetime(retry_after).timestamp()
-        return min(max(when - time.time(), 0.0), LONGEST_PAUSE_S)
+    if retry_after is not None and retry_after.isdecimal():
+        return float(retry_after)
+    if retry_after is not None and (date := email.utils.parsedate_tz(retry_after)) is not None:
+        return max(email.utils.mktime_tz(date) - time.time(), 0.0)
     return min(FIRST_PAUSE_S * 2.0**attempt, LONGEST_PAUSE_S) * random.uniform(0.5, 1.0)
