@@ -39,6 +39,8 @@ SCENE: dict[str, Any] = {
 }
 SMALL = {"width": 32, "height": 24, "max_samples": 8}
 ENDLESS = {"width": 32, "height": 24, "max_samples": 1 << 24}
+# The first line of a program that is to hear Ctrl-C: a shell's background job, and what it starts, ignores it.
+LISTENS = "import signal; signal.signal(signal.SIGINT, signal.default_int_handler)"
 
 
 def wait_until(reached: Callable[[], object], pause_s: float = 0.02) -> None:

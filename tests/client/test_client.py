@@ -18,7 +18,7 @@ from PIL import Image
 import sunbox
 from sunbox.merge import merged
 from tests.asset_files import png, read_exr
-from tests.serving import ENDLESS, SCENE, SMALL, Server, wait_until
+from tests.serving import ENDLESS, LISTENS, SCENE, SMALL, Server, wait_until
 
 GLASS = {"type": "principled", "transmission": 1, "roughness": 0}
 
@@ -144,6 +144,7 @@ def test_cancel_keeps_the_picture(client: sunbox.Client) -> None:
 
 def test_interrupt_cancels(server: Server, client: sunbox.Client) -> None:
     program = f"""
+{LISTENS}
 import sunbox
 client = sunbox.Client({server.url!r})
 job = client.submit({SCENE!r}, label="interrupted", **{ENDLESS!r})
@@ -164,8 +165,9 @@ job.result()
 def test_cancelled_task_cancels_its_render(server: Server) -> None:
     async def cancelled() -> str:
         async with sunbox.AsyncClient(server.url) as client:
+            before = {job.id async for job in client.jobs()}
             waiting = asyncio.create_task(client.render({**SCENE, "version": 1}, **ENDLESS))
-            while not (running := [job async for job in client.jobs(state="running")]):
+            while not (running := [job async for job in client.jobs(state="running") if job.id not in before]):
                 await asyncio.sleep(0.02)
             waiting.cancel()
             with pytest.raises(asyncio.CancelledError):

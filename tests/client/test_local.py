@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tests.asset_files import png
-from tests.serving import ENDLESS, SCENE, SMALL
+from tests.serving import ENDLESS, LISTENS, SCENE, SMALL
 
 PROGRAM = """
 import json, sys, numpy as np, sunbox
@@ -65,7 +65,7 @@ def test_bits_are_those_of_the_command_line(folder: Path) -> None:
 
 
 def test_interrupt_ends_it(folder: Path) -> None:
-    program = f"import sunbox; print('begins', flush=True); sunbox.render('scene.json', **{ENDLESS!r})"
+    program = f"{LISTENS}; import sunbox; print('begins', flush=True); sunbox.render('scene.json', **{ENDLESS!r})"
     environment = {**os.environ, "SUNBOX_DATA_DIR": str(folder / "data")}
     process = subprocess.Popen(
         [sys.executable, "-c", program],

@@ -81,8 +81,10 @@ def calling(folder: Path, test: Callable[[Any], Awaitable[None]], **limits: Any)
 
 def test_half_sent_uploads_refuse_nobody_else(tmp_path: Path) -> None:
     async def test(app: Any) -> None:
-        half = [Call(app, "a", "POST", "/v1/assets", bytes(MIB - 60), half=True) for _ in range(4)]
-        assert [await each.stalled() for each in half] == [True, True, False, False]
+        half: list[Call] = []
+        for received in (True, True, False, False):
+            half.append(Call(app, "a", "POST", "/v1/assets", bytes(MIB - 60), half=True))
+            assert await half[-1].stalled() is received
         assert half[3].status == 429 and b"SUNBOX_MAX_BODIES" in half[3].body
         large = OBJ + b"#" * (MIB - 60)
         for body, status in ((OBJ, 201), (large, 201)):
@@ -98,8 +100,10 @@ def test_half_sent_uploads_refuse_nobody_else(tmp_path: Path) -> None:
 def test_half_sent_json_refuses_nobody_else(tmp_path: Path, size: int) -> None:
     async def test(app: Any) -> None:
         address = "/v1/documents/materials/grey"
-        half = [Call(app, "a", "PUT", address, b" " * 4 * SMALL, half=True) for _ in range(4)]
-        assert [await each.stalled() for each in half] == [True, True, False, False]
+        half: list[Call] = []
+        for received in (True, True, False, False):
+            half.append(Call(app, "a", "PUT", address, b" " * 4 * SMALL, half=True))
+            assert await half[-1].stalled() is received
         assert half[3].status == 429 and b"SUNBOX_MAX_JSON" in half[3].body
         other = Call(app, "b", "PUT", address, GREY + b" " * size)
         assert await other.answered() == 201, other.body

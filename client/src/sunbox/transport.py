@@ -23,6 +23,7 @@ from sunbox.errors import NotFound, SunboxError, Unreachable, from_problem
 ADDRESS = "http://127.0.0.1:8000"
 AGAIN = {429, 503}  # the server is full, or starting: it says when to come again
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.25, 30.0
+FIRST_CONTACT = 3  # retries where nothing has ever answered at an address: more likely a mistake than a restart
 
 
 class Transport:
@@ -37,6 +38,7 @@ class Transport:
             raise ValueError(f"url={self.url!r} is not an address such as {ADDRESS}")
         headers = {"authorization": f"Bearer {self.key}"} if self.key else {}
         self._http = httpx2.AsyncClient(headers=headers, timeout=timeout)
+        self._has_answered = False
 
     async def close(self) -> None:
         await self._http.aclose()
@@ -56,10 +58,11 @@ class Transport:
             try:
                 answer = await self._http.request(method, self.url + path, content=data, headers=headers)
             except httpx2.TransportError as error:
-                if is_last:
+                if is_last or (not self._has_answered and attempt == FIRST_CONTACT):
                     raise self._unreachable(error) from None
                 await asyncio.sleep(_pause(attempt))
                 continue
+            self._has_answered = True
             if answer.status_code in AGAIN and not is_last:
                 await asyncio.sleep(_pause(attempt, answer.headers.get("retry-after")))
                 continue

@@ -124,6 +124,7 @@ def test_what_would_take_too_much_memory_is_not_begun() -> None:
 
 def test_what_takes_too_long_is_ended(monkeypatch: pytest.MonkeyPatch) -> None:
     pool = ParserPool(config(parse_seconds=0.01, max_json_memory=1 << 40))
+    monkeypatch.setattr(parser_pool, "SECONDS_PER_BYTE", 1e-3)
     pool.parse("request", written(REQUEST))
     monkeypatch.setattr(parser_pool, "SECONDS_PER_BYTE", 0)
     with pytest.raises(TooLarge, match="longer"):
