@@ -259,7 +259,11 @@ LASTING_RENDER_BODY = body(_RENDER | {"properties": _RENDER["properties"] | _NAM
 EVENTS: Responses = {
     200: {"description": "The events.", "content": {"text/event-stream": {"schema": {"type": "string"}}}}
 }
-DOCUMENT_BODY = body({"anyOf": [reference("Scene"), reference("Material")]}, material=MATERIAL, scene=SCENE)
+DOCUMENT_BODY = body(
+    {"anyOf": [reference("Scene"), reference("Material"), reference("SavedMaterial")]},
+    material=MATERIAL,
+    scene=SCENE,
+)
 _DIRECTIONS = {
     "type": "array",
     "minItems": 1,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import inspect
 from functools import partial
 from typing import Any
 
@@ -89,6 +90,22 @@ def _documents() -> dict[str, Any]:
         out |= schema.get("$defs", {}) | {name.capitalize(): bare}
     kinds = [name for name in out if name.endswith("Material")]
     out["Material"] = {"oneOf": [{"$ref": HERE + name} for name in sorted(kinds)]}
+    out["SavedMaterial"] = {
+        "title": "SavedMaterial",
+        "description": inspect.getdoc(scene.SavedMaterial),
+        "type": "object",
+        "required": ["materials"],
+        "additionalProperties": False,
+        "properties": {
+            "materials": {
+                "type": "object",
+                "minProperties": 1,
+                "maxProperties": 1,
+                "additionalProperties": {"$ref": HERE + "Material"},
+            },
+            "textures": out["Scene"]["properties"]["textures"],
+        },
+    }
     out |= _meshes(out["MeshShape"])
     moved: dict[str, Any] = _moved(out)
     return moved

@@ -95,7 +95,8 @@ async def document(
     "/{kind}/{name}",
     summary="Save a document",
     description="The body is the bare document, and must be valid; one's own document of the same name is replaced. "
-    "With keys a document is its key's, unless it is `shared`.",
+    "With keys a document is its key's, unless it is `shared`. A material is saved bare, or with the textures "
+    "that it shows: `{materials: {NAME: ...}, textures: {...}}`.",
     openapi_extra=answers.DOCUMENT_BODY,
     responses=answers.shaped(answers.Named, "It is new.", 201) | answers.problems(400, 412, 413, 415, 422, 429),
 )

@@ -12,6 +12,7 @@ error_location  a pointer into the document, from pydantic's
 text            JSON texts: parsed, weighed and bounded
 patch           JSON merge patches
 references      the assets that a document refers to
+saved_material  a material as users save it, with its textures
 schema          the schema that editors are made from
 """
 
@@ -38,6 +39,7 @@ from service.scene.material import (
 )
 from service.scene.numbers import Vec3
 from service.scene.patch import merge_patch
+from service.scene.saved_material import SavedMaterial, check_saved_material
 from service.scene.schema import schema
 from service.scene.settings import Limits, Settings, parse_settings
 from service.scene.shape import BoxShape, MeshShape, QuadShape, Shape, SphereShape
@@ -70,6 +72,7 @@ __all__ = [
     "PointLight",
     "PrincipledMaterial",
     "QuadShape",
+    "SavedMaterial",
     "ScalarTexture",
     "Scene",
     "Settings",
@@ -80,6 +83,7 @@ __all__ = [
     "Texture",
     "Transform",
     "Vec3",
+    "check_saved_material",
     "load_json",
     "merge_patch",
     "parse_scene",

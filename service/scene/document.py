@@ -88,7 +88,7 @@ def parse_scene(
     """
     fields = document if isinstance(document, dict) else {}
     held = {name: fields[name] for name, kind in _KINDS.items() if isinstance(fields.get(name), kind)}
-    errors = _too_many(held, limits)
+    errors = too_many(held, limits)
     if errors:  # its entries are not validated
         raise InvalidDocument(errors).under(pointer)
     # The scene's entries are validated one by one, and the rest of the scene without them.
@@ -105,7 +105,8 @@ def parse_scene(
     return scene.model_copy(update=parts)
 
 
-def _too_many(held: dict[str, Any], limits: Limits | None) -> list[FieldError]:
+def too_many(held: dict[str, Any], limits: Limits | None) -> list[FieldError]:
+    """Errors for lists and tables of a scene, by name, that have more entries than the limits allow."""
     most = {name: getattr(limits, f"max_{name}") for name in held} if limits is not None else {}
     return [
         FieldError(f"/{name}", f"has {len(held[name])} entries: at most {most[name]} (SUNBOX_MAX_{name.upper()})")
@@ -144,7 +145,7 @@ def _dangling(document: Any) -> Iterator[FieldError]:
     materials, shapes, textures = (document.get(key) for key in ("materials", "shapes", "textures"))
     if isinstance(materials, dict):
         if isinstance(textures, dict) or "textures" not in document:
-            yield from _textureless(materials, textures or {})
+            yield from textureless(materials, textures or {})
         if isinstance(shapes, list):
             yield from _immaterial(shapes, materials)
 
@@ -158,12 +159,13 @@ def _immaterial(shapes: list[Any], materials: dict[str, Any]) -> Iterator[FieldE
             )
 
 
-def _textureless(materials: dict[str, Any], textures: dict[str, Any]) -> Iterator[FieldError]:
+def textureless(materials: dict[str, Any], textures: dict[str, Any]) -> Iterator[FieldError]:
+    """Errors for references of raw materials to textures that do not exist."""
     for key, material in materials.items():
         for field, value in material.items() if isinstance(material, dict) else ():
             name = value.get("texture") if isinstance(value, dict) else None
             if isinstance(name, str) and name not in textures:
                 yield FieldError(
                     f"/materials/{escaped(key)}/{escaped(field)}/texture",
-                    f"there is no texture named {name[:80]!r}; the scene has {among(textures)}",
+                    f"there is no texture named {name[:80]!r}; there are {among(textures)}",
                 )

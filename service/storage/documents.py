@@ -13,8 +13,6 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, Literal, get_args
 
-from pydantic import TypeAdapter
-
 from service.assets import AssetStore
 from service.assets.store import unknown
 from service.problems import (
@@ -27,11 +25,10 @@ from service.problems import (
     Unavailable,
     escaped,
 )
-from service.scene import Material, parse_scene, references
+from service.scene import check_saved_material, parse_scene, references
 from service.scene.base import MOST_MISTAKES
 from service.scene.document import Limits
 from service.scene.text import dump_json
-from service.scene.validation import validated
 from service.storage.asset_access import AssetAccess
 from service.storage.database import Database
 from service.storage.quota import Quota
@@ -46,7 +43,6 @@ DAY_S = 86_400.0
 MOST_NAMES = 1000  # of one page
 KINDS: tuple[Kind, ...] = get_args(Kind)
 LONGEST_NAME = 100  # characters
-_MATERIAL: TypeAdapter[Any] = TypeAdapter(Material)
 
 
 @dataclass(frozen=True)
@@ -60,10 +56,10 @@ class CheckedDocument:
 def checked(kind: str, document: Any, limits: Limits | None = None) -> CheckedDocument:
     """Validate a document. Raises InvalidDocument with pointers from its root. A large document takes seconds."""
     if kind == "materials":
-        validated(_MATERIAL, document, "")
+        check_saved_material(document, limits)
     else:
         parse_scene(document, limits=limits)
-    places = references.places(document) if kind == "scenes" else ()
+    places = references.places(document)
     uses = [("".join(f"/{escaped(step)}" for step in place), reference) for place, reference in places]
     return CheckedDocument(dump_json(document), uses)
 
