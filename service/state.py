@@ -71,7 +71,7 @@ class AppState:
     waits: Shares = field(init=False)
 
     def __post_init__(self) -> None:
-        self.memory = self.reader.budget
+        self.memory = self.reader.memory
         self.memory.cache("assets", lambda: self.assets.loader.bytes, self.assets.loader.shrink)
         self.memory.cache("pictures", lambda: 0, self.render_queue.shrink)  # renders count themselves
         self.memory.cache("scenes", lambda: self.render_queue.packed.bytes, self.render_queue.packed.shrink)

@@ -6,6 +6,5 @@ bsdf_request    bodies -> a material and directions, checked
 conversion_request  bodies -> a material turned into another model
 parser_pool     large bodies are parsed in processes of their own, within bounds of memory and time
 parser_child    such a process: `python -m service.requests.parser_child`
-stream_memory   the bytes that the documents of streams may take together
 bodies          JSON bodies, taken in and parsed
 """

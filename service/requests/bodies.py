@@ -15,8 +15,7 @@ from service.requests.parser_pool import ParserPool
 from service.requests.request_parser import PARSERS, Kind
 from service.scene.text import most_bytes
 from service.system.executors import parsing, waiting_for_parsers
-from service.system.memory import MemoryBudget
-from service.system.shares import Shares
+from service.system.memory import Limit, MemoryBudget
 
 # The last three are the defaults of programs that set no content type (curl, urllib, fetch).
 TAKEN = {"application/json", "text/json", "application/x-www-form-urlencoded", "application/octet-stream", ""}
@@ -33,7 +32,7 @@ class Bodies:
         self._config = config
         self._memory = memory or MemoryBudget(config.memory)
         self._pool = ParserPool(config, self._memory)
-        self._shares = Shares(AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")  # bytes in memory
+        self._limit = Limit("bodies", AT_ONCE * config.max_json, "JSON bodies (SUNBOX_MAX_JSON)")
 
     async def parsed(self, kind: Kind, body: bytearray, client: str = "", counted: bool = False) -> Any:
         """The result of PARSERS[kind] for a body. Raises what that raises, and TooLarge.
@@ -53,8 +52,8 @@ class Bodies:
         self._pool.close()
 
     @asynccontextmanager
-    async def taken(self, request: Request, client: str) -> AsyncIterator[bytearray]:
-        """The body, whose bytes count as long as it is needed.
+    async def taken(self, request: Request) -> AsyncIterator[bytearray]:
+        """The body, whose bytes count within the context, as those of the caller of the work at hand.
 
         Raises UnsupportedMedia, TooLarge, TooManyRequests, Unavailable.
         """
@@ -62,19 +61,15 @@ class Bodies:
         if told not in TAKEN and not told.endswith("+json"):
             raise UnsupportedMedia(f"{told[:100]!r} is not taken here: send application/json")
         body, received = bytearray(), 0
-        try:
-            with self._shares.growing(client) as have:
-                async for chunk in request.stream():
-                    received += len(chunk)
-                    if received > self._config.max_json:  # received to its end, so that its sender reads the answer
-                        body = bytearray()
-                    else:
-                        body += chunk
-                    if received > SMALL:
-                        have(len(body))
-                        self._memory.hold("bodies", self, self._shares.total)
-                if received > self._config.max_json:
-                    raise TooLarge(f"A JSON body holds at most {self._config.max_json} bytes (SUNBOX_MAX_JSON)")
-                yield body
-        finally:
-            self._memory.hold("bodies", self, self._shares.total)
+        with self._memory.growing(self._limit) as hold:
+            async for chunk in request.stream():
+                received += len(chunk)
+                if received > self._config.max_json:  # received to its end, so that its sender reads the answer
+                    body = bytearray()
+                else:
+                    body += chunk
+                if received > SMALL:
+                    hold(len(body))
+            if received > self._config.max_json:
+                raise TooLarge(f"A JSON body holds at most {self._config.max_json} bytes (SUNBOX_MAX_JSON)")
+            yield body

@@ -84,9 +84,10 @@ class ParserPool:
 
 
 class _Room:
-    """A budget of bytes: a thread that finds too few left waits until others return theirs, in the order of arrival.
+    """Bytes for bodies that are parsed at the same time: a thread that finds too few waits, in the order of arrival.
 
-    Smaller ones that overtake it would keep a large one waiting for ever.
+    A small body that overtook a large one would keep it waiting for ever. This is no `Limit` of the `MemoryBudget`,
+    which refuses at once and knows no order.
     """
 
     def __init__(self, size: int) -> None:

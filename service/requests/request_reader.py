@@ -12,10 +12,9 @@ from service.pack import CacheBudget, PackCache, Packed, pack
 from service.problems import InvalidDocument
 from service.quality import ResolvedSettings
 from service.requests.request_parser import RequestParser
-from service.requests.stream_memory import StreamMemory
 from service.scene import Scene
 from service.storage.asset_access import AssetAccess
-from service.system.memory import MemoryBudget
+from service.system.memory import Limit, MemoryBudget
 
 ENVIRONMENTS = 4  # that renders share: the tables of a map of 512 x 256 texels take 70 ms to make
 
@@ -24,14 +23,16 @@ class RequestReader(RequestParser):
     """Raises InvalidDocument with pointers from the root of the body: /scene/..., /settings/..."""
 
     def __init__(
-        self, config: Config, assets: Assets, budget: MemoryBudget | None = None, access: AssetAccess | None = None
+        self, config: Config, assets: Assets, memory: MemoryBudget | None = None, access: AssetAccess | None = None
     ) -> None:
         """`access` says which assets an owner may use; without it each may use all."""
         super().__init__(config)
-        self.budget = budget or MemoryBudget(config.memory)
-        self.memory = StreamMemory(config.max_stream_memory, self.budget)
+        self.memory = memory or MemoryBudget(config.memory)
+        # For documents as JSON values, which merge patches could make ever larger.
+        what = "scenes of streams (SUNBOX_MAX_STREAM_MEMORY)"
+        self.stream_memory = Limit("documents", config.max_stream_memory, what)
         self.caches = CacheBudget(config.keep_packed)
-        self.budget.cache("scenes", lambda: self.caches.bytes, self.caches.shrink)
+        self.memory.cache("scenes", lambda: self.caches.bytes, self.caches.shrink)
         self._assets = assets
         self._access = access
         self._environments = PackCache(ENVIRONMENTS, self.caches)

@@ -74,7 +74,7 @@ async def terms(request: Request) -> Response:
 
 async def _answer(request: Request, kind: Kind, write: Callable[[Arrays], bytes]) -> Response:
     state = app_state(request)
-    async with state.bodies.taken(request, caller_of(request)) as body:
+    async with state.bodies.taken(request) as body:
         await state.renderers.able(STARTING_S)
         asked: BsdfRequest = await state.bodies.parsed(kind, body, caller_of(request))
     material = pack_material(asked.material)

@@ -112,7 +112,7 @@ async def put(
     if_none_match: IfNoneMatch = None,
 ) -> answers.Named:
     state = app_state(request)
-    async with state.bodies.taken(request, caller_of(request)) as body:
+    async with state.bodies.taken(request) as body:
         checked: CheckedDocument = await state.bodies.parsed(check_kind(kind), body, caller_of(request))
     condition = Condition(_tags(if_match), _tags(if_none_match))
     wanted = BY_LINK if by_link else shared

@@ -61,7 +61,7 @@ async def submitted(request: Request, key: str | None) -> Job | dict[str, Any]:
 
 async def _parsed(request: Request, kind: Any, key: str | None = None) -> ParsedRequest:
     state, owner = app_state(request), owner_of(request)
-    async with state.bodies.taken(request, caller_of(request)) as body:
+    async with state.bodies.taken(request) as body:
         store = state.render_queue.store
         if key is None or store is None or await store.keyed(owner, key) is None:  # a repetition needs no room
             state.render_queue.admit(owner)

@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
 
+from service.config import MIB
 from service.ipc.messages import Update
 from service.pack import PackCache, parameter_edit, scene_edit
-from service.problems import Conflict, FieldError, InvalidDocument, ServiceError
+from service.problems import Conflict, FieldError, InvalidDocument, ServiceError, TooLarge
 from service.quality import ResolvedSettings
 from service.renderers.working_states import WorkingStates
 from service.renders.memory import COPIES, picture_bytes
@@ -19,6 +20,8 @@ from service.scene.document import Parsed
 from service.scene.text import weigh
 from service.streams import protocol
 from service.streams.scene_diff import SceneDiff, scene_diff
+
+EACH = 8  # one scene may take an eighth of the memory of all
 
 
 @dataclass(frozen=True)
@@ -110,24 +113,28 @@ class EditSession:
         self._reader.memory.release(self)
 
     @contextmanager
-    def _held(self, document: Any, most: int) -> Iterator[None]:
+    def _counted(self, document: Any, most: int) -> Iterator[None]:
         """Counts the scene's document, which takes `most` bytes or less; as before where it is refused after all.
 
-        Raises TooLarge, Unavailable.
+        Raises TooLarge, TooManyRequests, Unavailable.
         """
-        before, memory = self._bytes, self._reader.memory
-        size = weigh(document) if most > memory.each else most
-        memory.hold(self, size)
+        before, memory, limit = self._bytes, self._reader.memory, self._reader.stream_memory
+        each = limit.most // EACH
+        size = weigh(document) if most > each else most
+        if size > each:
+            allowed = f"the {each / MIB:g} MiB of memory allowed (SUNBOX_MAX_STREAM_MEMORY)"
+            raise TooLarge(f"This scene takes more than {allowed}: big geometry goes through assets.")
+        memory.hold(limit, self, size)
         self._bytes = size
         try:
             yield
         except BaseException:
-            memory.hold(self, before)
+            memory.hold(limit, self, before)
             self._bytes = before
             raise
 
     def _started(self, message: protocol.Start) -> Version:
-        with self._held(message.scene, weigh(message.scene)):
+        with self._counted(message.scene, weigh(message.scene)):
             scene, settings = self._reader.both(message.scene, message.settings)
         return Version(message.generation, message.scene, message.settings, scene, settings)
 
@@ -138,7 +145,7 @@ class EditSession:
         new = replace(old, generation=message.generation)
         if "scene" in message.model_fields_set:
             document = merge_patch(old.scene_document, message.scene)
-            with self._held(document, self._bytes + weigh(message.scene)):
+            with self._counted(document, self._bytes + weigh(message.scene)):
                 scene = self._reader.scene(document, Parsed(old.scene_document, old.scene))
             new = replace(new, scene_document=document, scene=scene)
         if "settings" in message.model_fields_set:
@@ -157,13 +164,13 @@ class EditSession:
     @contextmanager
     def _room(self, version: Version) -> Iterator[None]:
         """Counts the version's picture; as before where it is refused after all. Raises TooLarge, Unavailable."""
-        budget, before, after = self._reader.budget, self._picture_bytes, picture_bytes(version.settings)
-        budget.hold("pictures", self, max(before, after))
+        memory, before, after = self._reader.memory, self._picture_bytes, picture_bytes(version.settings)
+        memory.hold("pictures", self, max(before, after))
         try:
             yield
             self._picture_bytes = after
         finally:
-            budget.hold("pictures", self, self._picture_bytes)
+            memory.hold("pictures", self, self._picture_bytes)
 
     def _update(self, new: Version) -> Update:
         old, update = self._given, Update(self._task, new.generation, interactive=True)
@@ -176,7 +183,7 @@ class EditSession:
         touched = None if old is None else self._diff(old, new)
         if old is None or touched is None or touched.whole:
             packed = self._reader.pack(new.scene, self._cache, self._owner)
-            self._reader.budget.hold("scenes", self, COPIES * weight(packed))
+            self._reader.memory.hold("scenes", self, COPIES * weight(packed))
             edit = None if old is None else scene_edit(self._arrays, packed.arrays)
             self._arrays = packed.arrays
             if old is None or edit is None:

@@ -1,6 +1,6 @@
-"""One budget of memory (SUNBOX_MEMORY) for all that is kept for callers: bodies, scenes, pictures, caches.
+"""One budget of memory (SUNBOX_MEMORY) for the bodies, scenes and pictures of all callers, and for caches.
 
-What the processes take when idle, and what one piece of work takes in passing, is not in it.
+It counts neither what the processes take when idle nor what one piece of work allocates for a moment.
 """
 
 from __future__ import annotations
@@ -11,13 +11,15 @@ import weakref
 from collections import Counter
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 from service.problems import TooLarge, Unavailable
+from service.system.shares import Shares
+from service.system.turns import CALLER
 
-Owner = Literal["bodies", "documents", "scenes", "pictures", "assets"]
+Category = Literal["bodies", "documents", "scenes", "pictures", "assets"]
 
 SHARE = 0.5  # of the machine's memory: the rest is for the processes themselves, the system's caches and others
 RETRY_S = 5
@@ -26,15 +28,36 @@ CGROUP = Path("/sys/fs/cgroup")
 OWN_GROUPS = Path("/proc/self/cgroup")
 
 
+@dataclass(frozen=True, eq=False)
+class Limit:
+    """At most `most` bytes of a category, which callers share by the rule of `Shares`; `what` names it in errors."""
+
+    category: Category
+    most: int
+    what: str
+
+
 @dataclass(frozen=True)
 class _Cache:
-    owner: Owner
+    category: Category
     bytes: Callable[[], int]
     shrink: Callable[[int], None]
 
 
+@dataclass
+class _Account:
+    """The bytes of one holder, by category, and the caller whose work took them."""
+
+    caller: str = field(default_factory=CALLER.get)
+    sizes: dict[Category | Limit, int] = field(default_factory=dict)
+
+
+class Holder:
+    """What bytes can be counted for where nothing else has just their lifetime."""
+
+
 class MemoryBudget:
-    """Counts bytes by what they are for. For any thread.
+    """Counts bytes by category. For any thread.
 
     Work that is refused can be asked for again; a cache gives way to work.
     """
@@ -42,26 +65,27 @@ class MemoryBudget:
     def __init__(self, limit: int | None = None) -> None:
         """`limit` in bytes; by default half of the machine's memory, or of the control group's."""
         self.limit = int(SHARE * machine_memory()) if limit is None else limit
-        self._held: weakref.WeakKeyDictionary[object, dict[Owner, int]] = weakref.WeakKeyDictionary()
+        self._accounts: weakref.WeakKeyDictionary[object, _Account] = weakref.WeakKeyDictionary()
         self._caches: list[_Cache] = []
         self._lock = threading.Lock()
 
-    def cache(self, owner: Owner, bytes: Callable[[], int], shrink: Callable[[int], None]) -> None:
-        """Count a cache: `bytes` gives what it holds, `shrink` frees as many bytes where it can."""
-        self._caches.append(_Cache(owner, bytes, shrink))
+    def cache(self, category: Category, bytes: Callable[[], int], shrink: Callable[[int], None]) -> None:
+        """Count a cache: `bytes` returns its size, `shrink` frees as many bytes as it is called with, if it can."""
+        self._caches.append(_Cache(category, bytes, shrink))
 
-    def hold(self, owner: Owner, holder: object, size: int) -> None:
-        """Count `holder` with that many bytes from now on, until it is released or gone.
+    def hold(self, category: Category | Limit, holder: object, size: int) -> None:
+        """Count `holder` with `size` bytes from now on, until it is released or garbage.
 
-        As before where it raises TooLarge, for what could never be, or Unavailable.
+        Raises Unavailable, and TooLarge for more than the budget's limit; within a `Limit` also what `Shares.take`
+        raises for the caller of the work at hand. The holder then counts as before.
         """
-        self.hold_all(holder, {owner: size})
+        self.hold_all(holder, {category: size})
 
-    def hold_all(self, holder: object, sizes: Mapping[Owner, int]) -> None:
-        """As `hold`, for several kinds of bytes: all of them are counted, or none."""
-        self.check(sum(sizes.values()))
+    def hold_all(self, holder: object, sizes: Mapping[Category | Limit, int]) -> None:
+        """As `hold`, for several categories: all of them are counted, or none."""
         over = self._take(holder, sizes)
         if over > 0:
+            self.check(sum(sizes.values()))
             for cache in self._caches:
                 cache.shrink(over)
             over = self._take(holder, sizes)
@@ -69,7 +93,7 @@ class MemoryBudget:
             raise Unavailable("There is no memory for this just now (SUNBOX_MEMORY).", RETRY_S)
 
     def lacks(self, size: int) -> int:
-        """The bytes that are missing for so many more, once caches have given way; 0 where there is room."""
+        """The bytes that are missing for `size` more, once caches have given way; 0 where there is room."""
         if (over := self._over(size)) > 0:
             for cache in self._caches:
                 cache.shrink(over)
@@ -80,52 +104,65 @@ class MemoryBudget:
             return self._used().total() + size - self.limit
 
     def check(self, size: int) -> None:
-        """Raises TooLarge for what could never be held, however much others give back."""
+        """Raises TooLarge for more bytes than the limit, which would never fit, whatever others release."""
         if size > self.limit:
             needed, most = -(-size // MIB), self.limit // MIB
             raise TooLarge(f"This takes {needed} MiB of memory; {most} MiB are allowed (SUNBOX_MEMORY).")
 
     def release(self, holder: object) -> None:
         with self._lock:
-            self._held.pop(holder, None)
+            self._accounts.pop(holder, None)
 
     @contextmanager
-    def held(self, owner: Owner, size: int) -> Iterator[None]:
-        """Count that many bytes while it lasts. Raises TooLarge, Unavailable."""
-        holder = _Holder()
-        self.hold(owner, holder, size)
-        try:
+    def held(self, category: Category, size: int) -> Iterator[None]:
+        """A context in which `size` bytes count. Raises TooLarge, Unavailable."""
+        with self.growing(category) as hold:
+            hold(size)
             yield
+
+    @contextmanager
+    def growing(self, category: Category | Limit) -> Iterator[Callable[[int], None]]:
+        """A context in which as many bytes count as its function was last called with; the function is `hold`."""
+        holder = Holder()
+        try:
+            yield lambda size: self.hold(category, holder, size)
         finally:
             self.release(holder)
 
     def used(self) -> dict[str, int]:
-        """Bytes by owner."""
+        """Bytes by category."""
         with self._lock:
             return dict(self._used())
 
-    def _take(self, holder: object, sizes: Mapping[Owner, int]) -> int:
+    def _take(self, holder: object, sizes: Mapping[Category | Limit, int]) -> int:
         """The bytes that are too many: where there are any, nothing has changed. Less than before is always fine."""
         with self._lock:
-            mine = self._held.setdefault(holder, {})
-            more = sum(size - mine.get(owner, 0) for owner, size in sizes.items())
+            account = self._accounts.setdefault(holder, _Account())
+            grown = {each: size - account.sizes.get(each, 0) for each, size in sizes.items()}
+            for each, more in grown.items():
+                if isinstance(each, Limit) and more > 0:
+                    self._shares(each).check(account.caller, more)
+            more = sum(grown.values())
             over = self._used().total() + more - self.limit
             if more > 0 and over > 0:
                 return over
-            mine.update(sizes)
+            account.sizes.update(sizes)
             return 0
 
+    def _shares(self, limit: Limit) -> Shares:
+        shares = Shares(limit.most, limit.what)
+        for account in self._accounts.values():
+            shares.count(account.caller, account.sizes.get(limit, 0))
+        return shares
+
     def _used(self) -> Counter[str]:
-        used: Counter[str] = Counter({"bodies": 0, "documents": 0, "scenes": 0, "pictures": 0, "assets": 0})
-        for sizes in self._held.values():
-            used.update(sizes)
+        used: Counter[str] = Counter(dict.fromkeys(get_args(Category), 0))
+        for account in self._accounts.values():
+            for each, size in account.sizes.items():
+                used[each.category if isinstance(each, Limit) else each] += size
         for cache in self._caches:
-            used[cache.owner] += cache.bytes()
+            used[cache.category] += cache.bytes()
         return used
-
-
-class _Holder:
-    """Something to count bytes for."""
 
 
 def machine_memory() -> int:

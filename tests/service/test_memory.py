@@ -7,6 +7,7 @@ import gc
 import os
 import time
 from collections.abc import Callable, Iterator
+from contextvars import copy_context
 from pathlib import Path
 from typing import Any
 
@@ -20,13 +21,14 @@ from service.assets.cache import ParsedCache
 from service.assets.types import AssetLimits
 from service.config import MIB, Config
 from service.pack import RENDERED_PIXEL_BYTES, SAVED_PIXEL_BYTES, CacheBudget, PackCache
-from service.problems import TooLarge, Unavailable
+from service.problems import TooLarge, TooManyRequests, Unavailable
 from service.requests.bodies import Bodies
 from service.requests.request_reader import RequestReader
 from service.streams import protocol
 from service.streams.edit_session import EditSession
 from service.system import memory
-from service.system.memory import MemoryBudget, machine_memory
+from service.system.memory import Limit, MemoryBudget, machine_memory
+from service.system.turns import CALLER
 from service.worker.device.memory import UNLIMITED, default_limit
 from tests.serving import PATIENCE_S, SCENE, Client, Server, served
 
@@ -55,6 +57,38 @@ def test_bytes_count_until_they_are_released() -> None:
     del first
     gc.collect()
     assert sum(budget.used().values()) == 0
+
+
+def test_callers_share_what_a_limit_allows() -> None:
+    """And what they use of it counts in its category, beside what is not limited."""
+    budget, limit = MemoryBudget(1000), Limit("bodies", 100, "bodies (SUNBOX_SOME)")
+    works = [Work() for _ in range(4)]
+
+    def hold(caller: str, index: int, size: int) -> None:
+        copy_context().run(lambda: (CALLER.set(caller), budget.hold(limit, works[index], size)))
+
+    hold("first", 0, 40)
+    with pytest.raises(TooManyRequests, match="SUNBOX_SOME"):
+        hold("first", 1, 11)
+    hold("second", 2, 25)
+    with pytest.raises(Unavailable, match="SUNBOX_SOME"):
+        hold("third", 3, 18)
+    with pytest.raises(TooLarge, match="SUNBOX_SOME"):
+        hold("third", 3, 51)
+    budget.hold("bodies", works[3], 100)
+    assert budget.used()["bodies"] == 165
+    hold("first", 0, 10)
+    hold("second", 0, 32)  # still the first caller's: another 22 would be more than the second one's share
+    hold("first", 0, 1)
+    hold("first", 1, 30)
+    del works[2]
+    gc.collect()
+    assert budget.used()["bodies"] == 131
+    with budget.growing(limit) as grow:
+        grow(20)
+        grow(10)
+        assert budget.used()["bodies"] == 141
+    assert budget.used()["bodies"] == 131
 
 
 def test_caches_give_way_to_work() -> None:
@@ -199,7 +233,7 @@ def test_a_body_counts(monkeypatch: pytest.MonkeyPatch) -> None:
 
     async def take(inner: bool) -> None:
         request = Request({"type": "http", "method": "POST", "headers": []}, receive)
-        async with bodies.taken(request, "client"):
+        async with bodies.taken(request):
             assert budget.used()["bodies"] >= 2 * MIB
             if inner:
                 await take(False)
