@@ -87,13 +87,9 @@ def create_app(config: Config) -> FastAPI:
     memory = MemoryBudget(config.memory)
     state = AppState(
         config,
-        stored.assets,
+        stored,
         RequestReader(config, stored.assets, memory, stored.access),
         Pool(seats(config, memory.limit)) if config.ray is None else cluster_pool(config),
-        stored.documents,
-        stored.quota,
-        stored.shares,
-        stored.access,
         RenderQueue(_limits(config), store),
     )
     app = FastAPI(
@@ -153,9 +149,7 @@ def _serve(config: Config, listener: socket.socket, most: int) -> int:
     host, port = listener.getsockname()[:2]
     app = create_app(config)
     state: AppState = app.state.sunbox
-    state.documents.prepare()
-    state.quota.clear()
-    state.shares.clear()
+    state.storage.prepare()
     state.address = f"http://{f'[{host}]' if ':' in host else host}:{port}/"
     server = _Server(server_settings(app, config, most), state)
     server.run([listener])
@@ -250,15 +244,15 @@ class _Server(uvicorn.Server):
 async def _lifespan(app: FastAPI) -> AsyncIterator[None]:
     state: AppState = app.state.sunbox
     state.renderers.start()
-    state.assets.start()
-    asking = asyncio.create_task(asyncio.to_thread(state.assets.rights))  # which logs them
+    state.storage.assets.start()
+    asking = asyncio.create_task(asyncio.to_thread(state.storage.assets.rights))  # which logs them
     await state.resume_renders()
     state.warming = asyncio.create_task(_warm(app))
     yield
     asking.cancel()
     await state.farewell()
     await state.renderers.close()
-    await asyncio.to_thread(state.assets.close)
+    await asyncio.to_thread(state.storage.assets.close)
     state.bodies.close()
     if state.render_queue.store is not None:
         await state.render_queue.store.close()

@@ -13,7 +13,6 @@ from typing import Any
 
 from starlette.requests import HTTPConnection
 
-from service.assets import AssetStore
 from service.config import Config
 from service.http.downloads import Downloads
 from service.operation.readiness import SOFTWARE, Readiness
@@ -29,10 +28,7 @@ from service.renders.store.record import Order, Outcome, StoredRender
 from service.requests.bodies import Bodies
 from service.requests.request_parser import ParsedRequest, unfolded
 from service.requests.request_reader import RequestReader
-from service.storage.asset_access import AssetAccess
-from service.storage.asset_shares import AssetShares
-from service.storage.documents import Documents
-from service.storage.quota import Quota
+from service.storage.stores import Storage
 from service.streams.sessions import Sessions
 from service.system.executors import packing
 from service.system.memory import MemoryBudget
@@ -50,13 +46,9 @@ log = logging.getLogger(__name__)
 @dataclass
 class AppState:
     config: Config
-    assets: AssetStore
+    storage: Storage
     reader: RequestReader
     renderers: Renderers
-    documents: Documents
-    quota: Quota
-    shares: AssetShares
-    access: AssetAccess
     render_queue: RenderQueue
     traffic: Traffic = field(default_factory=Traffic)
     warming: asyncio.Task[None] | None = None  # renders a first frame, and prepares for changes of scene
@@ -72,7 +64,8 @@ class AppState:
 
     def __post_init__(self) -> None:
         self.memory = self.reader.memory
-        self.memory.cache("assets", lambda: self.assets.loader.bytes, self.assets.loader.shrink)
+        loader = self.storage.assets.loader
+        self.memory.cache("assets", lambda: loader.bytes, loader.shrink)
         self.memory.cache("pictures", lambda: 0, self.render_queue.shrink)  # renders count themselves
         self.memory.cache("scenes", lambda: self.render_queue.packed.bytes, self.render_queue.packed.shrink)
         self.bodies = Bodies(self.config, self.memory)
@@ -94,7 +87,7 @@ class AppState:
             "version": metadata.version("sunbox-server"),
             "renderer": renderer,
             "renderers": [_told(each) for each in self.renderers.members],
-            "sandbox": asdict(await asyncio.to_thread(self.assets.rights)),
+            "sandbox": asdict(await asyncio.to_thread(self.storage.assets.rights)),
             "memory": {"limit": self.memory.limit, "used": self.memory.used()},
             "limits": self.config.limits | {"max_message": MESSAGE_BYTES},
             "quality": priced(),

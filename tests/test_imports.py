@@ -32,7 +32,6 @@ LARGE_CLASSES = {
     "gpu.arrays.SceneArrays": "one field for each array of a scene",
     "gpu.picture.picture.Picture": "not parted yet: the picture, and a block of it that others trace",
     "service.bench.scale_model._Simulation": "not parted yet",
-    "service.state.AppState": "not parted yet",
     "service.worker.task.Task": "not parted yet: the picture, and whose turn it is",
 }
 

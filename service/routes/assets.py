@@ -47,12 +47,13 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
             pass
         raise UnsupportedMedia("Send the file's bytes as the body, not as a form: curl --data-binary @FILE, not -F")
     state, owner, caller = app_state(request), owner_of(request), caller_of(request)
-    file = await asyncio.to_thread(state.assets.incoming)
+    storage = state.storage
+    file = await asyncio.to_thread(storage.assets.incoming)
 
     def add() -> AssetInfo:
         with file:  # closed in this thread: a cancelled request does not wait for it
-            info = state.assets.add(file, kind, filename, partial(state.shares.room, owner))
-        state.shares.uploaded(owner, state.assets.parts(info))
+            info = storage.assets.add(file, kind, filename, partial(storage.shares.room, owner))
+        storage.shares.uploaded(owner, storage.assets.parts(info))
         return info
 
     received = 0
@@ -61,7 +62,7 @@ async def upload(request: Request, filename: Annotated[str | None, Query(max_len
             received += len(chunk)
             if received > SMALL:
                 have(received)
-            await asyncio.to_thread(state.assets.receive, file, chunk)
+            await asyncio.to_thread(storage.assets.receive, file, chunk)
         info = await (storing_small if received <= SMALL_ASSET else storing)(add, caller)
     return {"warnings": []} | {name: value for name, value in asdict(info).items() if value is not None}
 
@@ -77,12 +78,12 @@ async def scene(request: Request, id: answers.AssetId) -> Response:
     here they are in headers: `Sunbox-Warnings` (as much of the list as has room, as JSON), `Sunbox-Exposure` and
     `Sunbox-Aspect-Ratio`, each only where there is something to say."""
 
-    state, owner = app_state(request), owner_of(request)
+    storage, owner = app_state(request).storage, owner_of(request)
 
     def read() -> tuple[Imported, str]:
-        state.access.check(owner, id)
-        imported = state.assets.scene(id)
-        state.shares.imported(owner, id, imported.references())
+        storage.access.check(owner, id)
+        imported = storage.assets.scene(id)
+        storage.shares.imported(owner, id, imported.references())
         return imported, dump_json(imported.scene(presets.default_environment()))
 
     imported, text = await storing(read, caller_of(request))
@@ -106,11 +107,11 @@ def _fitting(warnings: list[dict[str, Any]]) -> str:
     responses=answers.files("application/octet-stream") | answers.problems(404),
 )
 async def download(request: Request, id: answers.AssetId) -> Response:
-    state, owner = app_state(request), owner_of(request)
+    storage, owner = app_state(request).storage, owner_of(request)
 
     def find(stack: ExitStack) -> bytes | BinaryIO:
-        state.access.check(owner, id)
-        return stack.enter_context(state.assets.opened(id))
+        storage.access.check(owner, id)
+        return stack.enter_context(storage.assets.opened(id))
 
     with ExitStack() as stack:
         source = await opening(partial(find, stack), caller_of(request))

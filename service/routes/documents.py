@@ -66,7 +66,8 @@ async def names(
 ) -> list[answers.Named]:
     """Of one's own documents and of those that others share, in the order of the titles; without keys of all. Those
     that were saved `by_link` are left out. `Link` with `rel=next` leads to the next page while there is one."""
-    found, more = await saving(partial(app_state(request).documents.names, kind, owner_of(request), limit, after))
+    documents, owner = app_state(request).storage.documents, owner_of(request)
+    found, more = await saving(partial(documents.names, kind, owner, limit, after))
     if more:
         following = urlencode({"limit": limit, "after": max(each["name"] for each in found)})
         response.headers["link"] = f'<{kind}?{following}>; rel="next"'
@@ -81,7 +82,7 @@ async def document(
     state = app_state(request)
 
     def read() -> tuple[bytes, str]:
-        data = state.documents.get(kind, name, owner_of(request))
+        data = state.storage.documents.get(kind, name, owner_of(request))
         return data, etag(data)
 
     data, tag = await saving(read)
@@ -118,7 +119,7 @@ async def put(
     wanted = BY_LINK if by_link else shared
 
     def save() -> tuple[str, bool, str]:
-        kept, new = state.documents.put(kind, name, checked, title, owner_of(request), wanted, condition)
+        kept, new = state.storage.documents.put(kind, name, checked, title, owner_of(request), wanted, condition)
         return kept, new, etag(checked.body.encode())
 
     kept, new, response.headers["etag"] = await saving(save, caller_of(request))
@@ -135,7 +136,7 @@ async def put(
 )
 async def delete(request: Request, kind: answers.DocumentKind, name: Name, if_match: IfMatch = None) -> None:
     condition = Condition(_tags(if_match))
-    await saving(partial(app_state(request).documents.delete, kind, name, owner_of(request), condition))
+    await saving(partial(app_state(request).storage.documents.delete, kind, name, owner_of(request), condition))
 
 
 def _tags(header: str | None) -> tuple[str, ...] | None:

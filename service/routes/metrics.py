@@ -153,7 +153,7 @@ def _memory(state: AppState, members: Sequence[Member]) -> Iterator[Metric]:
 
 def _disk(state: AppState) -> Iterator[Metric]:
     with suppress(Unavailable, OSError):  # where the disk fails, all other metrics are still sent
-        stored = state.quota.used()
+        stored = state.storage.quota.used()
         yield _gauge("data_bytes", "Assets, documents and renders on the disk, in whole blocks.", stored.bytes)
         yield _gauge("data_files", "Files of assets, documents and renders.", stored.files)
     yield _gauge("data_quota_bytes", "What they may take.", state.config.data_quota)

@@ -74,7 +74,7 @@ async def _submitted(
     state: AppState, parsed: ParsedRequest, owner: str, began: float, key: IdempotencyKey | None = None
 ) -> Job:
     state.render_queue.admit(owner)
-    async with _pinned(state.quota, parsed.assets):  # until the store says that they are in use
+    async with _pinned(state.storage.quota, parsed.assets):  # until the store says that they are in use
         job = await _packed(state, parsed, owner, began)
         await state.render_queue.submit(job, parsed.assets, key)
     return job

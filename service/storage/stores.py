@@ -20,11 +20,19 @@ from service.system.disk_usage import Usage, usage
 
 @dataclass(frozen=True)
 class Storage:
+    """The stores of one data folder."""
+
     assets: AssetStore
     documents: Documents
     quota: Quota
     shares: AssetShares
     access: AssetAccess
+
+    def prepare(self) -> None:
+        """Migrate the database and delete a crash's leftovers, once, before a server starts. Raises DamagedFile."""
+        self.documents.prepare()
+        self.quota.clear()
+        self.shares.clear()
 
 
 RENDERS = "renders"  # the folder of the renders' pictures, in the data folder

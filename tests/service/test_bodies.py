@@ -68,12 +68,12 @@ def calling(folder: Path, test: Callable[[Any], Awaitable[None]], **limits: Any)
     async def run() -> None:
         app = create_app(Config(data_dir=folder, api_key=["a", "b"], **limits))
         state: AppState = app.state.sunbox
-        state.documents.prepare()
+        state.storage.documents.prepare()
         try:
             await test(app)
             assert state.uploads.total == 0 and state.memory.used()["bodies"] == 0, "something still counts"
         finally:
-            state.assets.close()
+            state.storage.assets.close()
             state.bodies.close()
 
     asyncio.run(run())
@@ -143,7 +143,7 @@ def test_large_uploads_hold_back_nobody_else(tmp_path: Path) -> None:
                 assert await small.answered() == 201
                 id = json.loads(small.body)["id"]
                 assert await Call(app, "b", "GET", f"/v1/assets/{id}", b"").answered() == 200
-                async with _pinned(state.quota, [id]):
+                async with _pinned(state.storage.quota, [id]):
                     pass
             assert not any(each.done() for each in large)
         finally:

@@ -123,7 +123,7 @@ def test_without_trusted_proxies_nobody_can_say_who_calls(tmp_path: Path) -> Non
     for proxies in ([], ["10.0.0.1"]):
         config = Config(data_dir=tmp_path, trusted_proxies=proxies)
         app = create_app(config)
-        app.state.sunbox.assets.close()
+        app.state.sunbox.storage.assets.close()
         settings = server_settings(app, config, 10)
         assert settings.proxy_headers is bool(proxies) and "127.0.0.1" not in settings.forwarded_allow_ips
 
