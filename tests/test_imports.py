@@ -30,7 +30,6 @@ DATA = {"BaseModel", "BaseSettings", "Model", "Record", "IntEnum", "Enum", "Prot
 # Classes that are larger, each with the reason why it is one all the same.
 LARGE_CLASSES = {
     "gpu.arrays.SceneArrays": "one field for each array of a scene",
-    "gpu.picture.picture.Picture": "not parted yet: the picture, and a block of it that others trace",
     "service.bench.scale_model._Simulation": "not parted yet",
     "service.worker.task.Task": "not parted yet: the picture, and whose turn it is",
 }

@@ -16,13 +16,12 @@ from gpu.kernels.cache import KernelCache
 from gpu.layout.pixel_layers import ACCUMULATORS, VECTOR_BYTES
 from gpu.picture import blocks, display, first_hit
 from gpu.picture.accumulators import Accumulators
-from gpu.picture.bands import BandTracer, Sharing
-from gpu.picture.blocks import Band
 from gpu.picture.dispatcher import Dispatcher
 from gpu.picture.noise_meter import NoiseMeter
 from gpu.picture.passes import Passes
 from gpu.picture.readout import Readout
 from gpu.picture.saved import NO_BLOCK, Saved
+from gpu.picture.shared_block import SharedBlock
 from gpu.settings import FIRST_HIT_AOVS, RenderSettings
 
 PIECE_BYTES = 16 << 20  # of a saved buffer that one step reads, in some milliseconds
@@ -34,7 +33,7 @@ def _bytes(size: int) -> np.ndarray:
 
 class Picture:
     """A picture of one scene at one size, made by `Renderer.picture`. Samples are added slice by slice, and between
-    two slices it can be read."""
+    two slices it can be read. By `block` several renderers trace its samples."""
 
     def __init__(
         self, context: Any, kernels: KernelCache, uniform_buffer: Any, scene: Scene, settings: RenderSettings
@@ -47,8 +46,7 @@ class Picture:
         self._sums = Accumulators(self._dispatcher, kernels)
         self._passes = Passes(self._dispatcher, kernels, self._sums, self._meter)
         self._readout = Readout(self._dispatcher, kernels, self._sums, self._meter)
-        self._sharing: Sharing | None = None
-        self._lent: BandTracer | None = None
+        self.block = SharedBlock(self._dispatcher, self._sums, self._passes)
         try:
             self._sums.allocate()
             self._meter.allocate()
@@ -70,7 +68,7 @@ class Picture:
         self._dispatcher.configure(self.settings)
         self._passes.reset()
         self._sums.reset()
-        self._sharing = self._lent = None
+        self.block.reset()
         for buffer in self._beside:
             buffer.clear()
         self._readout.first_hit.clear()
@@ -110,7 +108,7 @@ class Picture:
     def at_border(self) -> bool:
         """Whether it has 8, 16, 32, or a multiple of 64 samples, at which passes end however fast the device is, and
         no pass or shared block is under way."""
-        return blocks.is_stop(self.samples) and not self.under_way[0] and self._sharing is None
+        return blocks.is_stop(self.samples) and not self.under_way[0] and not self.block.shared
 
     @property
     def compile_ms(self) -> float:
@@ -176,7 +174,7 @@ class Picture:
     def restore(self, saved: Saved) -> None:
         """Continue from a saved picture of the same scene and settings. Raises OutOfMemory."""
         contexts.use(self.context)
-        self._sharing = self._lent = None
+        self.block.reset()
         even = [*self._sums.total.values(), *self._beside]
         more = saved.buffers[len(even) :]
         self._sums.restore_block(more if len(more) > 1 else [])
@@ -185,7 +183,7 @@ class Picture:
         self._passes.restore(saved.samples, saved.under_way)
 
     def trace(self, budget_s: float, max_samples: int, sharers: int = 1) -> float:
-        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; while it shares a block, the rows
+        """Trace for about `budget_s` seconds, never past `max_samples` per pixel; while its block is shared, the rows
         of its own, whatever `max_samples` is. Returns the seconds that it took. Raises OutOfMemory, when the second
         block begins.
 
@@ -193,116 +191,9 @@ class Picture:
         a pass, so that nobody waits long for the next. It changes no bit.
         """
         contexts.use(self.context)
-        if self._sharing is None:
-            return self._passes.trace(budget_s, max_samples, sharers)
-        return self._passes.trace_band(self._sharing.own, budget_s) if self._sharing.own else 0.0
-
-    @property
-    def sharing(self) -> bool:
-        """Whether the samples of a block are traced here and elsewhere."""
-        return self._sharing is not None
-
-    @property
-    def own_done(self) -> bool:
-        """Whether this picture's rows of the shared block are complete."""
-        return self._sharing is None or self._sharing.own_done
-
-    def allocate_block(self) -> None:
-        """Allocate the memory of the block under way if it is not, so that `share` needs none. Raises OutOfMemory."""
-        contexts.use(self.context)
-        self._sums.allocate_block()
-
-    def share(self, rows: int, end: int) -> None:
-        """Have `trace` add the samples up to `end` to rows [0, rows) only; the others come by `write_band` and
-        `trace_band`. Until `complete`, `samples` stays and nothing of them is seen, read or saved.
-
-        Raises ValueError where a pass is under way, and but for the beginning of a block; OutOfMemory.
-        """
-        contexts.use(self.context)
-        begins = self.samples == blocks.FIRST or (self.samples >= blocks.SIZE and self.samples % blocks.SIZE == 0)
-        if self.settings.adaptive or not begins or self._sums.open or self.under_way[0] or self._sharing is not None:
-            raise ValueError(f"no block begins at {self.samples} samples")
-        if not self.samples < end <= blocks.border_after(self.samples) or not 0 <= rows <= self.settings.height:
-            raise ValueError(f"{rows} rows up to {end} samples are no part of the block at {self.samples}")
-        self._sums.empty_block()
-        self._sharing, self._lent = Sharing(self.samples, end, rows), None
-
-    def complete(self) -> None:
-        """Take the shared block as the picture's: all rows have their samples. `trace` then traces the noise meter's
-        samples and merges the block, and then `samples` is its end. Raises ValueError where rows of its own lack
-        samples."""
-        sharing = self._sharing
-        if sharing is None or not sharing.own_done:
-            raise ValueError("no block is shared, or its own rows lack samples")
-        contexts.use(self.context)
-        self._sharing = self._lent = None
-        self._sums.open = True
-        self._passes.complete(sharing.end)
-
-    def unshare(self) -> None:
-        """Drop the shared block, if there is one: the picture is as it was before `share`."""
-        if self._sharing is not None:
-            self._sharing = self._lent = None
-            self._sums.close()
-
-    def trace_band(self, band: Band, budget_s: float) -> bool:
-        """Trace a band for about `budget_s` seconds, from zero unless it is that of the last call; whether all of it
-        is there. A picture without samples takes any band, one that shares a block only what is not its own of that.
-
-        Raises ValueError for another one; OutOfMemory.
-        """
-        contexts.use(self.context)
-        self._check(band)
-        if self._lent is None or self._lent.band != band:
-            self._sums.allocate_block()
-            self._sums.clear_rows(band.top, band.rows)
-            self._lent = BandTracer(band)
-        self._passes.trace_band(self._lent, budget_s)
-        return self._lent.complete
-
-    def read_band(self, band: Band) -> np.ndarray:
-        """The accumulators of a complete band: (rows, width, 4 * accumulators) float32. They are the sum, the
-        compensation, and the moments, whose last number is the count of the samples. Raises ValueError where the
-        band is not complete."""
-        contexts.use(self.context)
-        if self._lent is None or self._lent.band != band or not self._lent.complete:
-            raise ValueError(f"{band} is not complete")
-        return self._sums.read_rows(band.top, band.rows)
-
-    def take_counts(self) -> tuple[int, int]:
-        """The numbers in `warnings` since the last call, of what was traced for others; they begin at zero again."""
-        contexts.use(self.context)
-        counts, self._dispatcher.counts = self._dispatcher.counts, (0, 0)
-        return counts
-
-    def add_counts(self, counts: tuple[int, int]) -> None:
-        """Add to the numbers in `warnings` what `take_counts` gave elsewhere."""
-        if any(counts):
-            contexts.use(self.context)
-            ended, cut = self._dispatcher.counts
-            self._dispatcher.counts = ended + counts[0], cut + counts[1]
-
-    def write_band(self, band: Band, values: np.ndarray) -> None:
-        """Write a band that another picture's `read_band` returned. Raises ValueError for a band that is not of the
-        shared block, and for values of another shape."""
-        contexts.use(self.context)
-        if self._sharing is None:
-            raise ValueError("no block is shared")
-        self._check(band)
-        if values.shape != (band.rows, self.settings.width, 4 * len(ACCUMULATORS)):
-            raise ValueError(f"values of shape {values.shape} are not those of {band}")
-        lent = None if self._lent is None else self._lent.band
-        if lent is not None and lent.top < band.top + band.rows and band.top < lent.top + lent.rows:
-            self._lent = None
-        self._sums.write_rows(band.top, values)
-
-    def _check(self, band: Band) -> None:
-        if self.settings.adaptive or band.top + band.rows > self.settings.height:
-            raise ValueError(f"{band} is no part of this picture")
-        if self._sharing is not None:
-            self._sharing.check(band)
-        elif self.samples or self.under_way[0]:
-            raise ValueError("a picture with samples traces bands only of a block that it shares")
+        if self.block.shared:
+            return self.block.trace_own(budget_s)
+        return self._passes.trace(budget_s, max_samples, sharers)
 
     def _need_samples(self) -> None:
         contexts.use(self.context)

@@ -53,16 +53,16 @@ def _measured(picture: Picture, size: int, clock: Callable[[], float]) -> Costs:
     for _ in range(BLOCKS):
         first = picture.samples
         end = border_after(first)
-        picture.share(0, end)
+        picture.block.share(0, end)
         bands = [Band(first, end - first, top, min(ROWS, size - top)) for top in range(0, size, ROWS)]
         values = np.zeros((ROWS, size, 12), np.float32)
         values[..., 11] = end - first
         began = clock()
         for band in bands:
-            picture.write_band(band, values[: band.rows])
+            picture.block.write_band(band, values[: band.rows])
         write.append((clock() - began) / size**2)
         began = clock()
-        picture.complete()
+        picture.block.complete()
         while picture.samples < end:
             picture.trace(math.inf, end)
         merge.append((clock() - began) / size**2)

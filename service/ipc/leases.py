@@ -41,8 +41,8 @@ class Lease:
 
 @dataclass(frozen=True)
 class LeaseDone:
-    """From an assistant to the home: the accumulators of these rows, as `gpu.Picture.read_band` gives them, and
-    the numbers of paths that `gpu.Picture.take_counts` gives."""
+    """From an assistant to the home: the accumulators of these rows, as `gpu.Picture.block.read_band` gives them, and
+    the numbers of paths that `gpu.Picture.block.take_counts` gives."""
 
     task: int
     generation: int

@@ -10,7 +10,7 @@ import numpy as np
 from gpu import Band, RenderSettings, Saved, SceneArrays, SceneEdit
 from service.ipc.messages import SavedPicture, SceneData, Update
 
-Result = tuple[Band, np.ndarray]  # a band, and its accumulators as `gpu.Picture.read_band` gives them
+Result = tuple[Band, np.ndarray]  # a band, and its accumulators as `gpu.Picture.block.read_band` gives them
 
 
 def scene_arrays(data: SceneData) -> SceneArrays:

@@ -185,7 +185,7 @@ class Task:
             )
         budget_s = FULL_S if self.unseen else SLICE_S
         sharers = self._sharers(self.client) if tracker.interactive else 1  # nobody waits for a render's next pass
-        if picture.sharing:
+        if picture.block.shared:
             self.home.trace(budget_s)
         else:
             most = int(min(cap, self._ending.border)) if scale == 1.0 else cap

@@ -27,10 +27,10 @@ def _row(renderer: Renderer, size: tuple[int, int]) -> Row:
     picture, lender = (renderer.picture(scene, stage.settings(size)) for _ in range(2))
     width, height = size
     lent = Band(0, 1, 0, height)
-    while not lender.trace_band(lent, 1.0):
+    while not lender.block.trace_band(lent, 1.0):
         pass
-    reads = [_seconds(lambda: lender.read_band(lent)) for _ in range(1 + RUNS)]
-    values = lender.read_band(lent)
+    reads = [_seconds(lambda: lender.block.read_band(lent)) for _ in range(1 + RUNS)]
+    values = lender.block.read_band(lent)
     first = border_after(0)
     band = Band(first, border_after(first) - first, 0, height)
     runs = [_written_and_merged(picture, band, values) for _ in range(1 + RUNS)]  # the first one compiles
@@ -53,9 +53,9 @@ def _written_and_merged(picture: Picture, band: Band, values: np.ndarray) -> tup
     picture.reset()
     while picture.samples < band.first:
         picture.trace(1.0, band.first)
-    picture.share(0, band.first + band.count)
-    written = _seconds(lambda: picture.write_band(band, values))
-    picture.complete()
+    picture.block.share(0, band.first + band.count)
+    written = _seconds(lambda: picture.block.write_band(band, values))
+    picture.block.complete()
     began = time.perf_counter()
     while picture.samples < band.first + band.count:
         picture.trace(1.0, band.first + band.count)

@@ -89,10 +89,10 @@ class Assistant:
 
     def _trace(self, picture: Picture, lease: Lease) -> None:
         band = Band(lease.first, lease.count, lease.top, lease.rows)
-        if self._residency.insist(lambda: picture.trace_band(band, SLICE_S)):
+        if self._residency.insist(lambda: picture.block.trace_band(band, SLICE_S)):
             self._leases.popleft()
             self.traced += band.rows * band.count * picture.settings.width
-            values, counts = picture.read_band(band), picture.take_counts()
+            values, counts = picture.block.read_band(band), picture.block.take_counts()
             self._send(LeaseDone(self.number, lease.generation, lease.number, values, counts))
 
     def _apply(self, update: Update) -> None:

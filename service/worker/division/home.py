@@ -106,11 +106,11 @@ class Home:
         `since`: the first sample that may be shared. `progressive`: a person looks on, so that a block of which
         nobody else has anything is traced here. Raises OutOfMemory, and can be called again.
         """
-        if picture.sharing:
+        if picture.block.shared:
             current = None if self._ledger is None else self._ledger.current
             if current is not None and current.end <= end:
                 return end
-            picture.unshare()  # the render ends earlier now
+            picture.block.unshare()  # the render ends earlier now
             self.restart()
         if picture is not self._picture or generation != self._generation:
             self.resume(self._resumed)
@@ -134,14 +134,14 @@ class Home:
     def _begin(self, picture: Picture, end: int, progressive: bool) -> None:
         ledger = self._ledger
         assert ledger is not None
-        picture.allocate_block()  # before anything is taken from the ledger: the caller may try again
+        picture.block.allocate()  # before anything is taken from the ledger: the caller may try again
         parked = list(ledger.begin(picture.samples))
         if ledger.untouched and (progressive or not self._assistants):
             ledger.finished()
             self._since = end
             return
         self._window = ledger.window() if progressive else 0
-        picture.share(self._window, end)
+        picture.block.share(self._window, end)
         self._done, self._began, self._foreign = [], time.monotonic(), 0
         for band, values in parked:
             self._write(picture, band, values)
@@ -153,11 +153,11 @@ class Home:
         self._give()
         if self._window:
             picture.trace(budget_s, ledger.current.end)
-            if picture.own_done:
+            if picture.block.own_done:
                 ledger.did(self._window)
                 self._window = 0
         elif ledger.complete:
-            picture.complete()
+            picture.block.complete()
             self._since, self._done = ledger.current.end, []
             ledger.finished()
         else:
@@ -171,8 +171,8 @@ class Home:
             if not ledger.available and self.left_s == 0.0 and ledger.oldest is not None:
                 ledger.take_back(ledger.oldest[0])
             self._band = ledger.take(self._pixel_s, 1 + len(self._assistants))
-        if self._band is not None and picture.trace_band(self._band, budget_s):
-            values, check = picture.read_band(self._band), self._check
+        if self._band is not None and picture.block.trace_band(self._band, budget_s):
+            values, check = picture.block.read_band(self._band), self._check
             ledger.did(self._band.rows)
             self._done.append((self._band, values))
             self._band = self._check = None
@@ -183,7 +183,7 @@ class Home:
         """Report an assistant whose bits are wrong, and drop all that is not merged yet: more may be."""
         self._send(LeaseRefuted(self._number, self._generation, assistant))
         self._assistants = tuple(each for each in self._assistants if each != assistant)
-        picture.unshare()
+        picture.block.unshare()
         self.restart()
 
     def heard(self, done: LeaseDone) -> None:
@@ -196,14 +196,14 @@ class Home:
         if lease is not None and current is not None and random.random() < CHECKED:
             self._checks.append(_Check(lease.assistant, *current))  # it brings paths to count as well
         elif lease is not None:
-            picture.add_counts(done.counts)
+            picture.block.add_counts(done.counts)
             if current is not None:
                 self._write(picture, *current)
                 ledger.did(current[0].rows)
         self._give()
 
     def _write(self, picture: Picture, band: Band, values: np.ndarray) -> None:
-        picture.write_band(band, values)
+        picture.block.write_band(band, values)
         self._done.append((band, values))
         self._foreign += band.rows * band.count * picture.settings.width
 
@@ -227,7 +227,7 @@ class Home:
     @property
     def sharing(self) -> bool:
         """Whether the block under way is shared."""
-        return self._picture is not None and self._picture.sharing
+        return self._picture is not None and self._picture.block.shared
 
     def _give(self) -> None:
         """Lease what is free to assistants with less than EACH leases, in turn."""

@@ -35,40 +35,45 @@ class _Picture:
     """Counts the samples of each row, and complains of what would change a real picture's bits."""
 
     samples: int = FIRST
-    sharing: bool = False
+    shared: bool = False
     cost_s: float = 1e-7
     short: int = 0  # how many times there is no memory for a block
     settings: RenderSettings = field(default_factory=lambda: RenderSettings(WIDTH, HEIGHT))
 
     def __post_init__(self) -> None:
-        self.block = np.zeros(HEIGHT, int)
+        self.done = np.zeros(HEIGHT, int)
         self.own, self.end, self.at = 0, 0, 0
         self.counts = (0, 0)
         self.under_way = (0, 0, 0)  # samples: of a pass that merges
 
     @property
-    def own_done(self) -> bool:
-        return bool((self.block[: self.own] == self.end - self.samples).all())
+    def block(self) -> _Picture:
+        """It is its own shared block."""
+        return self
 
-    def allocate_block(self) -> None:
+    @property
+    def own_done(self) -> bool:
+        return bool((self.done[: self.own] == self.end - self.samples).all())
+
+    def allocate(self) -> None:
         self.short -= 1
         if self.short >= 0:
             raise OutOfMemory("the device has no 1 MiB left")
 
     def share(self, rows: int, end: int) -> None:
         assert self.short < 0, "no memory, and nobody asked for it"
-        assert border_after(self.samples - 1) == self.samples and not self.sharing and not self.under_way[0]
+        assert border_after(self.samples - 1) == self.samples and not self.shared and not self.under_way[0]
         assert self.samples < end <= border_after(self.samples)
-        self.sharing, self.own, self.end = True, rows, end
-        self.block[:] = 0
+        self.shared, self.own, self.end = True, rows, end
+        self.done[:] = 0
 
     def trace(self, budget_s: float, most: int) -> None:
         if self.under_way[0]:
             self.samples, self.under_way = self.end, (0, 0, 0)
-        elif not self.sharing:
+        elif not self.shared:
             self.samples = min(self.samples + 8, most, border_after(self.samples))
         else:
-            self.block[: self.own] = np.minimum(self.block[: self.own] + 20, self.end - self.samples)
+            self.done[: self.own] = np.minimum(self.done[: self.own] + 20, self.end - self.samples)
 
     def trace_band(self, band: Band, budget_s: float) -> bool:
         self.at += 1
@@ -79,9 +84,9 @@ class _Picture:
 
     def write_band(self, band: Band, values: Any) -> None:
         rows = slice(band.top, band.top + band.rows)
-        assert self.sharing and band.first == self.samples and band.first + band.count == self.end
-        assert (self.block[rows] == 0).all(), "written twice, or traced here as well"
-        self.block[rows] = band.count
+        assert self.shared and band.first == self.samples and band.first + band.count == self.end
+        assert (self.done[rows] == 0).all(), "written twice, or traced here as well"
+        self.done[rows] = band.count
 
     def read_band(self, band: Band) -> Any:
         return np.zeros(0)
@@ -90,11 +95,11 @@ class _Picture:
         self.counts = self.counts[0] + counts[0], self.counts[1] + counts[1]
 
     def unshare(self) -> None:
-        self.sharing = False
+        self.shared = False
 
     def complete(self) -> None:
-        assert (self.block == self.end - self.samples).all() and self.sharing
-        self.sharing, self.under_way = False, (self.end - self.samples, 0, 0)
+        assert (self.done == self.end - self.samples).all() and self.shared
+        self.shared, self.under_way = False, (self.end - self.samples, 0, 0)
 
 
 def _home(picture: _Picture, ids: tuple[int, ...]) -> tuple[Home, list[Lease]]:
@@ -106,7 +111,7 @@ def _home(picture: _Picture, ids: tuple[int, ...]) -> tuple[Home, list[Lease]]:
 
 def _turn(home: Home, picture: _Picture, end: int, progressive: bool = False) -> None:
     cap = home.cap(cast(Any, picture), end, 1, FIRST, progressive)
-    if picture.sharing:
+    if picture.block.shared:
         if not home.waiting:
             home.trace(0.01)
     else:
@@ -170,7 +175,7 @@ def test_while_somebody_looks_on_an_untouched_block_is_traced_at_once_here() -> 
     picture = _Picture(samples=SIZE)
     home, leases = _home(picture, (1,))
     _turn(home, picture, 1000, progressive=True)
-    assert not picture.sharing and picture.samples == SIZE + 8
+    assert not picture.block.shared and picture.samples == SIZE + 8
     assert {lease.first for lease in leases} == {2 * SIZE}
 
 
@@ -178,7 +183,7 @@ def test_without_assistants_nothing_is_shared() -> None:
     picture = _Picture()
     home, leases = _home(picture, ())
     assert home.cap(cast(Any, picture), 1000, 1, FIRST, False) == 1000
-    assert not picture.sharing and not leases
+    assert not picture.block.shared and not leases
 
 
 def test_what_was_leased_before_an_edit_is_dropped() -> None:
@@ -190,14 +195,14 @@ def test_what_was_leased_before_an_edit_is_dropped() -> None:
     home.cap(cast(Any, edited), 1000, 2, FIRST, False)
     home.heard(LeaseDone(1, 1, old.number, np.zeros(0)))
     home.heard(LeaseDone(1, 2, old.number, np.zeros(0)))
-    assert not edited.block.any()
+    assert not edited.done.any()
 
 
 def test_a_render_that_is_to_end_earlier_does_not_go_past_its_end() -> None:
     picture = _Picture(samples=SIZE)
     home, leases = _home(picture, (1,))
     _turn(home, picture, 1000)
-    assert picture.sharing
+    assert picture.block.shared
     old = leases[0].number
     for _ in range(100):
         _turn(home, picture, 70)
@@ -227,10 +232,10 @@ def test_what_was_done_of_a_long_block_is_saved_and_not_traced_again(
     second, _ = _home(again, ())
     second.resume(bands)
     _turn(second, again, 1000)
-    assert again.sharing
+    assert again.block.shared
     for band, _ in bands:
         if band.first == SIZE:
-            assert (again.block[band.top : band.top + band.rows] == SIZE).all()
+            assert (again.done[band.top : band.top + band.rows] == SIZE).all()
     while again.samples < 3 * SIZE:  # the picture complains where rows come twice
         _turn(second, again, 1000)
 
@@ -303,7 +308,7 @@ def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
     assert isinstance(sent[-1], LeaseDone) and not idle.bytes
 
     full = home._residency.full
-    full.unshare()
+    full.block.unshare()
     full.trace(600.0, 16)
     picture = sent_picture(Steps(full.save()).finish(), driver_of(gpu.info))
     idle, back = resting(), Task(context, 2)
