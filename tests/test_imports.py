@@ -31,7 +31,6 @@ DATA = {"BaseModel", "BaseSettings", "Model", "Record", "IntEnum", "Enum", "Prot
 LARGE_CLASSES = {
     "gpu.arrays.SceneArrays": "one field for each array of a scene",
     "service.bench.scale_model._Simulation": "not parted yet",
-    "service.worker.task.Task": "not parted yet: the picture, and whose turn it is",
 }
 
 # From the bottom to the top: a module imports from its own line and from lines above its own in this list.

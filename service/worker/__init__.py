@@ -6,7 +6,9 @@ __main__      the process: its options, its device, its end
 list_devices  a program that prints EGL's devices
 loop          takes the newest messages, chooses whose turn it is, traces a slice, publishes
 scheduler     whose turn it is
-task          one client's picture, from its first update to its end
+task          one client's task: whether it wants a turn
+task_picture  its picture, from the first update to the end
+foreseen      kernels that are compiled before anything needs them
 bsdf_task     one question about the BSDF of a material, in its turns
 updates       the update that waits to be applied, perhaps for its kernel
 ending        how a render ends, and how its picture comes to the server

@@ -91,13 +91,13 @@ class InProcessRender:
 
     def stop(self) -> None:
         """End the render at the next step."""
-        self._task.stop()
+        self._task.picture.stop()
 
     def pixels(self, view: View) -> np.ndarray | None:
         """The picture so far; None before its first sample. The AOVs of the first hit are traced, and the picture is
         denoised, when they are asked for."""
         self._image = None
-        self._task.read(Read(NUMBER, 1, view))
+        self._task.picture.frames.read(Read(NUMBER, 1, view))
         while self._image is None:
             self.step()
         image: Image = self._image

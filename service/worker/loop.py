@@ -6,11 +6,12 @@ import logging
 import select
 import socket
 import time
-from collections import defaultdict, deque
+from collections import defaultdict
 from collections.abc import Callable, Iterator
 from functools import partial
+from typing import Any
 
-from gpu import GpuError, KernelKey, OutOfMemory, Renderer, SceneTooLarge
+from gpu import GpuError, OutOfMemory, Renderer, SceneTooLarge
 from gpu.precompile import kernel_keys
 from service.ipc import channel
 from service.ipc.heartbeat import Heartbeat
@@ -31,9 +32,9 @@ from service.ipc.messages import (
 from service.ipc.orders import CheckpointStored, Drop, Hold, Pause, Resume, Settle, Stop, TakeCheckpoint
 from service.worker.bsdf_task import BsdfTask
 from service.worker.context import WorkerContext
-from service.worker.device.loaded_scene import begin_key, slider_keys
 from service.worker.device.memory import Memory
 from service.worker.division.assistant import Assistant
+from service.worker.foreseen import ForeseenKernels
 from service.worker.helpers.compile_client import CompileClient
 from service.worker.helpers.denoise_client import DenoiseClient
 from service.worker.scheduler import Scheduler
@@ -78,12 +79,11 @@ class Loop:
             checkpoint_s,
             self._scheduler.sharers,
         )
-        self._foreseen = kernel_keys.bsdf_keys()  # to be compiled when nothing else is, so that no panel has to wait
-        self._scenes = deque[KernelKey]()  # with which streams may begin; compiled after those that edits need
-        self._sliders = deque[KernelKey]()  # of those scenes; compiled while nothing is traced
+        self._foreseen = ForeseenKernels(self._compiler)
         self._used_s: dict[int, float] = defaultdict(float)  # by task, not reported yet
         self._traced = self._evicted = 0
         self._reported = 0.0
+        self.handlers = self._table()
 
     def run(self) -> None:
         """Work until the server is gone, then raise channel.Closed. Sleep on the sockets while idle."""
@@ -91,7 +91,7 @@ class Loop:
         self._compiler.prepare(kernel_keys.common_keys(), "spare")
         while True:
             for message in coalesced(self._pending(wait=not busy)):
-                self._take(message)
+                self.handlers[type(message)](message)
             self._denoiser.hear()
             self._compiler.hear()
             chosen = self._scheduler.choose(self._everyone)
@@ -104,7 +104,7 @@ class Loop:
                     self._work(task, partial(self._answer, task))
             busy = any(each.ready for each in self._everyone)
             self._account(at_once=not busy)
-            busy = self._foresee(idle=not busy) or busy
+            busy = self._foreseen.prepare(idle=not busy) or busy
 
     @property
     def _everyone(self) -> list[Turns]:
@@ -139,19 +139,6 @@ class Loop:
         self._scheduler.charge(task, seconds)
         self._used_s[task.number] += seconds
 
-    def _foresee(self, idle: bool) -> bool:
-        """Queue a foreseen kernel for each priority that has none; whether there was one. One at a time, as tasks may
-        soon foresee what is needed more."""
-        handed = False
-        scenes = self._scenes or (self._sliders if idle else None)
-        if scenes and self._compiler.is_idle("soon"):
-            self._compiler.prepare([scenes.popleft()], "soon")
-            handed = True
-        if self._compiler.is_idle("spare") and (key := next(self._foreseen, None)) is not None:
-            self._compiler.prepare([key], "spare")
-            handed = True
-        return handed
-
     def _crowded(self) -> bool:
         return sum(each.awaited for each in self._everyone) > 1
 
@@ -170,63 +157,78 @@ class Loop:
             self._evicted = evicted
             self._traced, self._reported = traced, now
 
-    def _take(self, message: ToRenderer) -> None:
-        task, assistant = self._tasks.get(message.task), self._assistants.get(message.task)
-        if isinstance(message, Assist):
-            self._assistants[message.task] = Assistant(self._context, message.task)
-        elif assistant is not None:
-            self._take_for(assistant, message)
-        elif isinstance(message, Update):
-            if task is None:
-                task = Task(self._context, message.task, message.client)
-                self._tasks[message.task] = task
-            task.update(message)
-        elif isinstance(message, Foresee):
-            self._scenes.append(begin_key(message))
-            self._sliders += slider_keys(message)
-        elif isinstance(message, EvaluateBsdf):
-            self._questions[message.task] = BsdfTask(self._context, message)
-        elif isinstance(message, Drop) and message.task in self._questions:
-            self._questions.pop(message.task).release()
-        elif task is None:
-            if isinstance(message, Read):  # evicted, and the server had not heard of it when it sent this
-                self._send(Evicted(message.task))
-        elif isinstance(message, Assistants):
-            self._work(task, lambda: task.home.assist(message.ids))
-        elif isinstance(message, LeaseDone):
-            self._work(task, lambda: task.home.heard(message))
-        elif isinstance(message, Want):
-            task.look(message)
-        elif isinstance(message, Read):
-            self._work(task, lambda: task.read(message), message)
-        elif isinstance(message, Settle):
-            self._work(task, task.settle)
-        elif isinstance(message, Restore):
-            self._work(task, lambda: task.restore(message))
-        elif isinstance(message, TakeCheckpoint):
-            task.take_checkpoint()
-        elif isinstance(message, CheckpointStored):
-            task.checkpoint_stored(message.took_s)
-        elif isinstance(message, Pause):
-            task.pause(message.away)
-        elif isinstance(message, Resume):
-            task.resume()
-        elif isinstance(message, Hold):
-            task.hold()
-        elif isinstance(message, Stop):
-            self._work(task, task.stop)
-        elif isinstance(message, Drop):
-            self._remove(task)
+    def _table(self) -> dict[type, Callable[[Any], object]]:
+        """The handler of each type of message, one for each of `ToRenderer`."""
+        note, work = self._note, self._charged
+        return {
+            Assist: self._begin_to_assist,
+            Lease: self._lease,
+            Update: self._update,
+            Drop: self._drop,
+            Foresee: self._foreseen.add,
+            EvaluateBsdf: self._evaluate,
+            Read: self._read,
+            Assistants: work(lambda task, message: task.picture.home.assist(message.ids)),
+            LeaseDone: work(lambda task, message: task.picture.home.heard(message)),
+            Restore: work(lambda task, message: task.picture.restore(message)),
+            Settle: work(lambda task, _: task.picture.settle()),
+            Stop: work(lambda task, _: task.picture.stop()),
+            Want: note(lambda task, message: task.picture.look(message)),
+            TakeCheckpoint: note(lambda task, _: task.picture.ending.checkpoints.hasten()),
+            CheckpointStored: note(lambda task, message: task.picture.ending.checkpoints.stored(message.took_s)),
+            Pause: note(lambda task, message: task.pause(message.away)),
+            Resume: note(lambda task, _: task.resume()),
+            Hold: note(lambda task, _: task.hold()),
+        }
 
-    def _take_for(self, assistant: Assistant, message: ToRenderer) -> None:
-        if isinstance(message, Update):
-            assistant.update(message)
-        elif isinstance(message, Lease):
-            assistant.lease(message)
-        elif isinstance(message, Drop):
+    def _note(self, act: Callable[[Task, Any], object]) -> Callable[[Any], object]:
+        """A handler for what takes no time; it does nothing where the message's task is gone."""
+
+        def handle(message: ToRenderer) -> None:
+            if (task := self._tasks.get(message.task)) is not None:
+                act(task, message)
+
+        return handle
+
+    def _charged(self, act: Callable[[Task, Any], object]) -> Callable[[Any], object]:
+        """A handler for what takes time, which is charged to the task's client."""
+        return self._note(lambda task, message: self._work(task, partial(act, task, message)))
+
+    def _update(self, update: Update) -> None:
+        number = update.task
+        if number in self._assistants:
+            self._assistants[number].update(update)
+            return
+        if number not in self._tasks:
+            self._tasks[number] = Task(self._context, number, update.client)
+        self._tasks[number].update(update)
+
+    def _read(self, read: Read) -> None:
+        task = self._tasks.get(read.task)
+        if task is None:  # evicted, and the server had not heard of it when it sent this
+            self._send(Evicted(read.task))
+        else:
+            self._work(task, lambda: task.picture.frames.read(read), read)
+
+    def _evaluate(self, question: EvaluateBsdf) -> None:
+        self._questions[question.task] = BsdfTask(self._context, question)
+
+    def _begin_to_assist(self, message: Assist) -> None:
+        self._assistants[message.task] = Assistant(self._context, message.task)
+
+    def _lease(self, lease: Lease) -> None:
+        if lease.task in self._assistants:
+            self._assistants[lease.task].lease(lease)
+
+    def _drop(self, message: Drop) -> None:
+        number = message.task
+        if (assistant := self._assistants.pop(number, None)) is not None:
             self._traced -= assistant.traced
-            del self._assistants[assistant.number]
             assistant.release()
+        elif (question := self._questions.pop(number, None)) is not None:
+            question.release()
+        elif number in self._tasks:
+            self._remove(self._tasks[number])
 
     def _forget(self, number: int) -> None:
         """The server has this finished picture, and brings it back when somebody asks for it."""

@@ -228,7 +228,7 @@ def test_target_noise_ends_a_render_at_the_same_samples_however_fast_it_is(
     """In turns of a slice and of many passes, and however rarely the noise is read in between."""
     found = []
     for turn_s, slice_s, pause in ((0.0, 1e-5, 0), (1.0, 0.1, 1000)):
-        monkeypatch.setattr("service.worker.task.SLICE_S", turn_s)
+        monkeypatch.setattr("service.worker.task_picture.SLICE_S", turn_s)
         monkeypatch.setattr("gpu.picture.tiles.SLICE_S", slice_s)
         monkeypatch.setattr("service.worker.progress.noise.PAUSE", pause)
         out, stats = tmp_path / f"{pause}.npy", tmp_path / f"{pause}.json"

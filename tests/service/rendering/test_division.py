@@ -293,11 +293,11 @@ def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
     allocate, idle = Accumulators.allocate_block, resting()
     home = Task(context, 1)
     home.update(begun(1))
-    home.home.assist((7,))
+    home.picture.home.assist((7,))
     monkeypatch.setattr(Accumulators, "allocate_block", scarce)
-    while not home.home.sharing and home.ready:
+    while not home.picture.home.sharing and home.ready:
         home.turn()
-    assert home.home.sharing and not idle.bytes
+    assert home.picture.home.sharing and not idle.bytes
 
     lease = next(message for message in sent if isinstance(message, Lease))
     idle, helper = resting(), Assistant(context, 1)
@@ -307,15 +307,15 @@ def test_an_idle_picture_makes_room_for_a_block_that_is_shared(
         helper.turn()
     assert isinstance(sent[-1], LeaseDone) and not idle.bytes
 
-    full = home._residency.full
+    full = home.picture.residency.full
     full.block.unshare()
     full.trace(600.0, 16)
     picture = sent_picture(Steps(full.save()).finish(), driver_of(gpu.info))
     idle, back = resting(), Task(context, 2)
     back.update(begun(2))
-    back.settle()
-    back.restore(Restore(2, 1, picture, None, Progress(16, None, 0.0, None)))
-    assert back._residency.full.samples == 16 and not idle.bytes
+    back.picture.settle()
+    back.picture.restore(Restore(2, 1, picture, None, Progress(16, None, 0.0, None)))
+    assert back.picture.residency.full.samples == 16 and not idle.bytes
     assert not any(isinstance(message, Failed) for message in sent)
     for each in (home, helper, idle, back):
         each.release()

@@ -68,7 +68,7 @@ def test_sharers_are_those_who_are_ready() -> None:
 
 def test_a_stream_among_many_takes_passes_of_one_sample(gpu: Renderer, monkeypatch: pytest.MonkeyPatch) -> None:
     """So that the next picture of each comes soon; nobody waits for the next pass of a render."""
-    monkeypatch.setattr("service.worker.task.SLICE_S", 0.0)  # a tile a turn
+    monkeypatch.setattr("service.worker.task_picture.SLICE_S", 0.0)  # a tile a turn
     context = WorkerContext(gpu, lambda _: None, DenoiseClient(), sharers=lambda client: 10**6)
     arrays = pack(parse_scene(SCENE), Shelf()).arrays
     passes = {}
@@ -78,7 +78,7 @@ def test_a_stream_among_many_takes_passes_of_one_sample(gpu: Renderer, monkeypat
         passes[interactive] = {0}
         while task.ready:
             task.turn()
-            passes[interactive].add(task._residency.full.under_way[0])
+            passes[interactive].add(task.picture.residency.full.under_way[0])
         task.release()
     assert passes[True] == {0, 1} and max(passes[False]) >= LEAST_A_PASS
 

@@ -3,18 +3,22 @@
 from __future__ import annotations
 
 import asyncio
+import os
 from collections.abc import Awaitable, Callable, Iterator
 from itertools import pairwise
 from pathlib import Path
 from types import SimpleNamespace
-from typing import Any
+from typing import Any, get_args
 
 import numpy as np
 import pytest
 
 from gpu import Renderer, RenderSettings, SceneEdit
+from service.ipc import channel, heartbeat
+from service.ipc.leases import Lease
 from service.ipc.messages import (
     Done,
+    Evicted,
     Failed,
     Frame,
     Image,
@@ -22,18 +26,19 @@ from service.ipc.messages import (
     Progressed,
     Read,
     StopRule,
+    ToRenderer,
     Update,
     View,
     Want,
 )
-from service.ipc.orders import Pause, Resume, Stop
+from service.ipc.orders import Drop, Hold, Pause, Resume, Stop
 from service.pack import pack
 from service.problems import Unavailable
 from service.renderers.local.process import Options
 from service.renderers.local.supervisor import Supervisor
 from service.scene import parse_scene
 from service.worker.device.resolution_ladder import FULL_S, NEXT_S, ResolutionLadder
-from service.worker.loop import coalesced
+from service.worker.loop import Loop, coalesced
 from service.worker.progress.noise import NoiseReading
 from service.worker.progress.stop_rules import judged_after, judged_from, late, reached
 from tests.documents import Shelf
@@ -55,6 +60,31 @@ from tests.supervisors import ENDLESS, LINEAR, Ears, settings
 )
 def test_reached(stop: StopRule, samples: int, noise: float | None, expected: str | None) -> None:
     assert reached(stop, samples, noise) == expected
+
+
+def test_every_message_has_one_handler_and_may_come_too_late(gpu: Renderer) -> None:
+    """The server may write about a task before it hears that the task is gone; it waits for the answer to a Read."""
+    mine, its = channel.pair()
+    memory = heartbeat.memory()
+    loop = Loop(its, gpu, heartbeat.Heartbeat(memory), 0, None, 1.0)
+    os.close(memory)
+    assert set(loop.handlers) == set(get_args(ToRenderer))
+    for message in (
+        Pause(1),
+        Resume(1),
+        Hold(1),
+        Stop(1),
+        Drop(1),
+        Want(1, 1, View()),
+        Lease(1, 1, 1, 0, 8, 56, 0, 8),
+    ):
+        loop.handlers[type(message)](message)
+    with pytest.raises(BlockingIOError):
+        channel.receive(mine)
+    loop.handlers[Read](Read(1, 2, View()))
+    assert channel.receive(mine) == Evicted(1)
+    mine.close()
+    its.close()
 
 
 def test_a_noise_that_was_reported_is_read_again_before_it_decides() -> None:
