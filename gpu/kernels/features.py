@@ -12,7 +12,7 @@ from gpu.arrays import SceneArrays
 from gpu.kernels import textures_glsl
 from gpu.kernels.flag_table import ANYWHERE, FLAGS, SHAPES, beside, looped_count
 from gpu.layout import ShapeKind
-from gpu.layout.models import MODELS
+from gpu.layout.models import TABULATED, TRANSMITTING
 from gpu.settings import ESTIMATORS, SAMPLERS, RenderSettings
 
 FILTER_TABLE_SIZE = 512
@@ -71,7 +71,7 @@ def evaluating(material: SceneArrays) -> frozenset[str]:
 
 def needs_tables(raised: Container[str]) -> bool:
     """Whether kernels with these flags look up the tables of what microfacets lose."""
-    return any(model.lobes_flag in raised for model in MODELS if model.needs_tables)
+    return any(model.lobes_flag in raised for model in TABULATED)
 
 
 # Numbers of records that kernels are compiled for, so that loops over them unroll and picks among them need no
@@ -122,9 +122,12 @@ def _quad_lamp(scene: SceneArrays) -> int:
 def defines(
     raised: frozenset[str], settings: RenderSettings | None = None, shapes: Mapping[str, object] | None = None
 ) -> dict[str, object]:
-    """The defines of a kernel: every flag as 0 or 1, numbers of records, and the settings that are compiled in."""
+    """The defines of a kernel: every flag as 0 or 1, numbers of records, what any of its models can do, and the
+    settings that are compiled in."""
     out: dict[str, object] = {name: int(name in raised) for name in FLAGS}
     out |= {name: 0 for name in (*COUNTS, *map(_loop, COUNTS), *FEW)}
+    out["ANY_TRANSMITS"] = int(any(model.flag in raised for model in TRANSMITTING))
+    out["ANY_NEEDS_TABLES"] = int(any(model.flag in raised for model in TABULATED))
     out |= {"QUAD_LAMP": -1} | textures_glsl.defines(None) | dict(shapes or {})
     out["PICK_MAX"] = PICK_MAX
     out["FILTER_TABLE_SIZE"] = FILTER_TABLE_SIZE

@@ -101,6 +101,7 @@ def of(materials: np.ndarray, models: Iterable[Model]) -> np.ndarray:
 TRANSMITTING = tuple(model for model in MODELS if model.transmits)
 DELTA = tuple(model for model in MODELS if model.may_be_delta)
 COATED = tuple(model for model in MODELS if model.has_coat_normals)
+TABULATED = tuple(model for model in MODELS if model.needs_tables)
 
 
 def with_optional(member: str) -> tuple[Model, ...]:

@@ -1,6 +1,6 @@
 // Tables of the lobes' albedos, which gpu/tables/build/energy_tables.py makes. The texture unit interpolates along all
 // their axes.
-#if HAS_PRINCIPLED
+#if ANY_NEEDS_TABLES
 layout(binding = ENERGY_ALBEDO_TEXTURE) uniform sampler3D energy_albedo_table; // cosine, roughness, eta
 layout(binding = ENERGY_MEAN_TEXTURE) uniform sampler3D energy_mean_table;     // roughness, round or aspect, eta
 layout(binding = ENERGY_SHEEN_TEXTURE) uniform sampler3D energy_sheen_table;   // cosine, sheen roughness

@@ -17,6 +17,13 @@ struct Surface {
     vec3 phong;       // colour of the highlight of phong and blinn_phong
     float shininess;
     vec2 tangent;     // direction in the shading frame that anisotropy stretches along
+#if ANY_TRANSMITS     // set for models that model_transmits names
+    float transmission; // share of the base that is clear
+    float eta;          // index beyond the surface over index on wo's side
+#endif
+#if HAS_COAT_NORMALS
+    Basis coat; // the coat's own frame, in the shading frame
+#endif
 #include "model_members.glsl"
 };
 

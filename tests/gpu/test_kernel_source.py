@@ -11,6 +11,7 @@ from gpu import CompileError, Renderer
 from gpu.kernels import features, models_glsl, source
 from gpu.kernels.cache import KernelCache
 from gpu.kernels.source import SHADERS, KernelSource
+from gpu.layout.models import FLAGGED, Model
 
 
 def _folder(tmp_path: Path, **files: str) -> tuple[Path, ...]:
@@ -72,6 +73,15 @@ def test_every_flag_of_the_table_is_used_and_every_used_one_defined() -> None:
     for entry in ("pathtrace.comp", "guides.comp"):
         KernelSource(entry, everything)  # raises where a name in #if is not defined
     KernelSource("resolve.comp", {**everything, "TONE_MAP": "linear_curve", "OUTPUT_FLOAT": 0, "LINE": 1024})
+
+
+@pytest.mark.parametrize("model", FLAGGED, ids=lambda model: model.name)
+def test_only_a_models_own_files_ask_for_its_flag(model: Model) -> None:
+    """All others ask what a kernel's models can do, so that a model more is a row and its own files."""
+    own = {SHADERS / f"bsdf/models/{name}.glsl" for name in (model.name, f"{model.name}_members")}
+    own |= set((SHADERS / f"bsdf/lobes/{model.name}").glob("*.glsl"))
+    asks = re.compile(rf"\b({model.flag}|{model.lobes_flag})\b")
+    assert [path for path in SHADERS.rglob("*.*") if path not in own and asks.search(path.read_text())] == []
 
 
 def taken(source: KernelSource) -> str:

@@ -1,6 +1,5 @@
 // Powers of a cosine, and directions so distributed: the highlights of `blinn_phong` and `phong`.
 
-#if HAS_BLINN_PHONG || HAS_PHONG
 // wm.z^n. Near the pole it is taken from the sine, as z itself is rounded: at n = 1e6 that would be 6 % off.
 float blinn_phong_power(vec3 wm, float n) {
     float x = dot(wm.xy, wm.xy); // sin^2
@@ -17,4 +16,3 @@ vec3 blinn_phong_lobe(float n, vec2 u) {
     float r = sqrt(sin2), phi = TWO_PI * u.x;
     return vec3(r * cos(phi), r * sin(phi), sqrt(1.0 - sin2));
 }
-#endif

@@ -1,8 +1,6 @@
 // What only `principled` needs of a Surface; `surface.glsl` puts it there.
 #if HAS_PRINCIPLED
-    float transmission;    // share of the base that is clear
     float eta_outside;     // index inside over outside
-    float eta;             // index beyond the surface over index on wo's side
     bool inside;           // wo is inside a body that transmits
     bool is_delta;         // the base is perfectly smooth
     bool index_matched;    // the index is 1: rays pass as if nothing were there
@@ -16,7 +14,4 @@
     vec4 albedo_mean;      // energy_mean
     float coat_albedo;     // the share of light from wo that the coat keeps from what is under it
     float sheen_albedo;    // the same of the sheen
-#if HAS_COAT_NORMALS
-    Basis coat;            // the coat's own frame, in the shading frame
-#endif
 #endif
