@@ -2,10 +2,10 @@
 // the shape and the material that the first of these rays hits.
 #include "layout.glsl"
 layout(local_size_x = WORK_GROUP, local_size_y = WORK_GROUP) in;
-layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: how many samples hit
+layout(std430, binding = SLOT_ALBEDO) buffer albedo_buffer { vec4 albedos[]; }; // a: the number of hits
 layout(std430, binding = SLOT_NORMAL) buffer normal_buffer { vec4 normals[]; }; // a: sum of distances
+// x and y: index + 1 of the shape and of the material, 0: none; z: the sum of angles of incidence, degrees, as a float.
 layout(std430, binding = SLOT_FIRST_HITS) buffer hit_buffer { uvec4 hits[]; };
-// a first hit: index + 1 of shape and material, 0: none; the sum of angles of incidence in degrees, as a float
 #include "math/constants.glsl"
 #include "math/sobol.glsl"
 #include "math/sampling.glsl"

@@ -107,7 +107,7 @@ def constants() -> str:
     out += [f"#define SLOT_{name} {int(slot)}" for name, slot in Slot.__members__.items()]
     out += [f"#define BLOCK_SLOT_{s.name} {int(s)}" for s in BlockSlot]
     out += [f"#define {name} {getattr(layout, name)}" for name in ("WORK_GROUP", "BSDF_GROUP")]
-    out += [f"#define UNIFORM_BLOCK {bindings.UNIFORM_BLOCK}", f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}"]
+    out.append(f"#define FILTER_BLOCK {bindings.FILTER_BLOCK}")
     for name in (
         "NONE",
         "SINGLE_SIDED",

@@ -9,8 +9,8 @@ layout(std430, binding = BLOCK_SLOT_MOMENTS) readonly buffer block_moment_buffer
 uniform uint block_stride; // 1; 0 where there is no block, and a single zero is bound in its place
 uniform float moment_scale; // second moments are of radiance times this
 
-// The sum of a pixel's samples and their number. What rounding added to the parts is left in: it is less than what rounds
-// this sum, and to read it would cost a picture that is shown twice the time.
+// The sum of a pixel's samples and their number. The rounding errors of the parts are not taken off: they are
+// less than that of this sum, and reading them would double the time that showing a picture takes.
 vec4 accumulators_sum(uint slot, out float n) {
     uint b = slot * block_stride;
     n = moments[slot].w + block_moments[b].w;

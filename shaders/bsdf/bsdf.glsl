@@ -58,6 +58,7 @@ Surface surface_make(Material m, vec2 tangent) {
     return s;
 }
 
+// The f of the models' own functions lacks the cosine.
 Scatter bsdf_eval(Surface s, vec3 wo, vec3 wi) {
 #if HAS_TRANSMISSION
     bool below = model_transmits(s.model) && wi.z < 0.0;
@@ -95,8 +96,8 @@ LobeSample bsdf_sample_uniform(Surface s, vec3 wo, float u_lobe, vec2 u) {
     return r;
 }
 
-// The perfectly specular lobes of a surface, each as bsdf_sample gives it; those that it lacks have no chance. One of
-// them at least is missing, as no surface refracts in two ways; the coat and the base may mirror into the same direction.
+// The perfectly specular lobes of a surface, each as bsdf_sample gives it; those that it lacks have the chance 0. The
+// coat and the base may mirror into the same direction.
 void bsdf_deltas(Surface s, vec3 wo, out LobeSample deltas[BSDF_DELTAS]) {
     for (int k = 0; k < BSDF_DELTAS; k++) deltas[k] = bsdf_rough_sample(vec3(0.0));
     models_deltas(s, wo, deltas);

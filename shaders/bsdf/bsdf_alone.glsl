@@ -1,6 +1,6 @@
-// One material without a scene, as the tables of its BSDF see it (bsdf_values.comp, bsdf_albedo.comp): material 0 in a
-// frame whose z is the outward normal and whose x is the tangent. wo.z < 0 is inside a body that transmits; of other
-// materials nothing is seen from there.
+// One material without a scene, as the kernels that tabulate its BSDF see it (the entries bsdf_*.comp): material 0 in
+// a frame whose z is the outward normal and whose x is the tangent. wo.z < 0 is inside a body that transmits; from
+// there nothing is seen of other materials.
 
 struct BsdfAlone {
     Surface s;

@@ -18,7 +18,7 @@ float energy_roughness(float roughness) { return pow(roughness, 2.0 / 3.0); }
 float energy_aspect(float aspect) { return clamp(log(aspect) / log(ENERGY_LEAST_ASPECT), 0.0, 1.0); }
 
 #if HAS_ANISOTROPIC
-// cosine, azimuth and in turn eta, roughness and in turn aspect
+// cosine; azimuth, all of them for each eta; roughness, all of them for each aspect
 layout(binding = ENERGY_STRETCHED_TEXTURE) uniform sampler3D energy_stretched_table;
 
 // energy_albedo of a stretched lobe; w is in the lobe's own frame.
@@ -43,8 +43,8 @@ vec4 energy_stretched(vec3 w, float roughness, float aspect, float eta) {
 }
 #endif
 
-// Four shares of the light from w, in the lobe's own frame, after one scattering by microfacets. x: it is reflected, if
-// all facets reflect everything. y: it is reflected by facets of index eta, never too low. z and w: it is lost between
+// Four shares of the light from w, in the lobe's own frame, after one scattering by microfacets. x: what is reflected
+// if all facets reflect everything. y: what facets of index eta reflect, never too low. z and w: what is lost between
 // the facets of glass, seen from outside and from inside.
 vec4 energy_albedo(vec3 w, float roughness, float aspect, float eta) {
 #if HAS_ANISOTROPIC

@@ -18,7 +18,7 @@ void camera_ray(uvec2 pixel, Sampler rng, out vec3 o, out vec3 d) {
     vec2 lens = c.aperture_radius * sampling_disk(sobol_pair(rng, PAIR_LENS));
     vec3 offset = lens.x * c.right + lens.y * c.up;
     o += offset;
-    through -= offset / c.focus_distance; // without an aperture the same bits as without this code
+    through -= offset / c.focus_distance; // minus 0 without an aperture: the bits stay as they are
 #endif
     d = normalize(through);
 }

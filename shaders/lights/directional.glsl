@@ -12,9 +12,7 @@ LightSample directional_light_sample(Light l, vec2 u) {
     vec3 wi = -l.direction;
 #if HAS_SUN_DISKS
     if (l.spread > 0.0) {
-        float h = u.x * l.spread; // 1 - cos theta
-        float r = sqrt(h * (2.0 - h)), phi = TWO_PI * u.y;
-        wi = basis_to_world(basis_make(wi), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
+        wi = basis_to_world(basis_make(wi), sampling_cone(l.spread, u));
         return LightSample(wi, INFINITY_T, l.intensity, directional_light_pdf(l), true, NONE);
     }
 #endif

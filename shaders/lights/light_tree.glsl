@@ -1,6 +1,6 @@
-// Picks one of many bounded lights by a walk down a binary tree. At each pair of nodes the
-// probabilities follow bounds on the contribution of either's lights at the shaded point [Conty Estevez & Kulla 2018;
-// Pharr, Jakob, Humphreys 2023, section 12.6.3]. gpu/accel/light_tree.py makes the tree.
+// Picks one of many bounded lights by a walk down a binary tree. At each pair of nodes the probabilities follow bounds
+// on the contribution of either's lights at the shaded point [Conty Estevez & Kulla 2018; Pharr, Jakob, Humphreys 2023,
+// section 12.6.3]. gpu/accel/light_tree.py makes the tree.
 
 // A point for which lights are sampled.
 struct LightContext {
@@ -19,11 +19,7 @@ uvec4 light_tree_fetch(uint i) {
 uvec4 light_tree_head() { return texelFetch(light_tree_words, ivec2(0), 0); }
 
 vec3 light_tree_axis(uint bits) {
-    vec2 e = vec2(bits & 0xffu, (bits >> 8u) & 0xffu) * (1.0 / 127.0) - 1.0;
-    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-    float fold = max(-n.z, 0.0);
-    n.xy -= fold * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));
-    return normalize(n);
+    return basis_octahedral(vec2(bits & 0xffu, (bits >> 8u) & 0xffu) * (1.0 / 127.0) - 1.0);
 }
 
 float light_tree_intensity(uvec4 node) { return uintBitsToFloat(((node.z >> 21u) << 19u) + (40u << 23u)); }
@@ -31,7 +27,8 @@ float light_tree_intensity(uvec4 node) { return uintBitsToFloat(((node.z >> 21u)
 // The square of a cluster's distance, in radii of its ball, beyond which its lights matter by intensity alone.
 // A thousand lamps over a floor take three quarters of the time then, for 5 % more error at equal samples.
 const float LIGHT_TREE_FAR = 6.0;
-// Numbers that lead to a cluster at least, that each of its lights gets as many as its share says.
+// The least number of codes that lead to a cluster at which a walk may end: with fewer, its lights would not get their
+// shares of them.
 const int LIGHT_TREE_LEAST = 1 << 20;
 
 // x follows the contribution of a node's lights times y, the square of their distance; z is positive where they are far.

@@ -9,9 +9,7 @@ bool sun_holds(vec3 d) {
 }
 
 vec3 sun_sample(vec2 u) {
-    float h = u.x * uniforms.environment_sun_cap;
-    float r = sqrt(h * (2.0 - h)), phi = TWO_PI * u.y;
-    return basis_to_world(basis_make(uniforms.environment_sun), vec3(r * cos(phi), r * sin(phi), 1.0 - h));
+    return basis_to_world(basis_make(uniforms.environment_sun), sampling_cone(uniforms.environment_sun_cap, u));
 }
 
 // The first of the two random numbers, stretched to all 32 bits again where the sun was not picked.

@@ -1,4 +1,4 @@
-// Predicates over a material's numbers, before it is a surface. gpu/kernels/features.py has the same over arrays.
+// Predicates over a material's numbers, before it is a surface. gpu/kernels/flag_table.py has the same over arrays.
 
 // Whether light passes through its surfaces.
 bool material_transmits(Material m) {

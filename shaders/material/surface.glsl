@@ -1,5 +1,5 @@
-// A material at a point of a surface, ready for the lobes: what several models need of it. A model that needs more has a
-// file for that, NAME_members.glsl.
+// A material at a point of a surface, ready for the lobes: what several models, or code for all of them, need of it.
+// What one model alone needs is in its NAME_members.glsl.
 #include "material/material.glsl"
 
 struct Surface {

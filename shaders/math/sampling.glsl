@@ -32,11 +32,18 @@ vec3 sampling_sphere(vec2 u) {
     return vec3(r * cos(phi), r * sin(phi), z);
 }
 
+// The cone about +z of all directions with 1 - cos below `cap`, uniformly. 1 - cos does not cancel in narrow cones.
+vec3 sampling_cone(float cap, vec2 u) {
+    float h = u.x * cap; // 1 - cos theta
+    float r = sqrt(h * (2.0 - h)), phi = TWO_PI * u.y;
+    return vec3(r * cos(phi), r * sin(phi), 1.0 - h);
+}
+
 // A triangle, uniformly: the barycentric weights of its second and third vertex [Heitz 2019, low distortion].
 vec2 sampling_triangle(vec2 u) {
     vec2 b = u * 0.5;
     float d = u.y - u.x;
-    return d > 0.0 ? vec2(b.x, b.y + d * 0.5) .xy : vec2(b.x - d * 0.5, b.y);
+    return d > 0.0 ? vec2(b.x, b.y + d * 0.5) : vec2(b.x - d * 0.5, b.y);
 }
 
 // The angle of (x, y) with y >= 0, to a relative error of 7e-7: an odd polynomial, fitted to atan on [0, 1]. It is

@@ -67,7 +67,7 @@ float sobol_unit(uint x) { return float(x >> 8u) * 5.9604645e-8; } // 2^-24: nev
 // Shifts of the first eight digits of x and y by the bits of a pixel's place: its column and row in its square of 2 x
 // 2, and those of the square in the block. They were found by a search among 2^64: they leave the least error of steps,
 // ramps and blobs on the square after blurring, at 1, 2, 4, ... 256 samples: a half after a blur of one pixel, a third
-// of two.
+// after one of two.
 const uvec2 SOBOL_COLUMN = uvec2(0xadu, 0xb6u), SOBOL_ROW = uvec2(0xf6u, 0x6du);
 const uvec2 SOBOL_QUAD_COLUMN = uvec2(0xbcu, 0xa2u), SOBOL_QUAD_ROW = uvec2(0x05u, 0xc5u);
 

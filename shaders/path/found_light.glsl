@@ -60,7 +60,7 @@ vec3 found_light_emission(SurfacePoint at, vec3 d) {
     return vec3(0.0);
 }
 
-// Ambient radiance, a constant that phong and blinn_phong add: both sides send it, and it is never sampled as a light.
+// Ambient radiance, a constant that some models add: both sides send it, and it is never sampled as a light.
 vec3 found_light_ambient(SurfacePoint at) {
 #if HAS_AMBIENT && HAS_TEXTURES
     return texture_ambient(at);

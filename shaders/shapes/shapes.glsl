@@ -93,7 +93,7 @@ bool shapes_occluded(vec3 o, vec3 d, float t_max, uvec2 skip) {
     return hit.id != NONE;
 }
 
-// What a ray that meets nothing has in place of a surface.
+// The point of a ray that hits nothing.
 SurfacePoint shapes_none(vec3 p, vec3 n) {
 #if HAS_TEXTURES
     return SurfacePoint(p, vec3(0.0), n, n, vec3(1.0, 0.0, 0.0), 0u, NONE, NONE, 0u, 1.0, vec2(0.0), vec2(0.0),

@@ -21,7 +21,7 @@ const float TRAVERSE_REACH = 0.9999847;
 
 struct Hit {
     float t;
-    uint id; // kind << 28 | index; in an instance: see instance_id
+    uint id; // kind << LEAF_KIND_SHIFT | index; in an instance: see instance_id
     vec2 uv; // barycentric, triangles only
 };
 

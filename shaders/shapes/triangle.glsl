@@ -50,13 +50,7 @@ float triangle_hit(Triangle tri, Shear s, vec3 d, float t_max, inout vec2 uv) {
     return hit ? t : t_max;
 }
 
-vec3 triangle_decode(uint bits) {
-    vec2 e = unpackSnorm2x16(bits);
-    vec3 n = vec3(e, 1.0 - abs(e.x) - abs(e.y));
-    float fold = max(-n.z, 0.0);
-    n.xy -= fold * mix(vec2(-1.0), vec2(1.0), greaterThanEqual(n.xy, vec2(0.0)));
-    return normalize(n);
-}
+vec3 triangle_decode(uint bits) { return basis_octahedral(unpackSnorm2x16(bits)); }
 
 #if HAS_UVS
 layout(binding = TEXTURE_UVS_UNIT) uniform sampler2D triangle_uvs; // three texels a triangle

@@ -23,7 +23,6 @@ float blinn_phong_pdf(Surface s, vec3 wi, vec3 wm, float cos_d) {
     return mix(half_pdf / (4.0 * max(cos_d, 1e-6)), lambert_pdf(wi), blinn_phong_diffuse_chance(s));
 }
 
-// f lacks the cosine, which bsdf_eval multiplies back.
 Scatter blinn_phong_eval(Surface s, vec3 wo, vec3 wi) {
     vec3 wm = normalize(wo + wi);
     vec3 f = INV_PI * (LOBE(LOBE_DIFFUSE, s.base_color)

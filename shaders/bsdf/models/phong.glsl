@@ -31,7 +31,6 @@ float phong_pdf(Surface s, vec3 wo, vec3 wi) {
     return mix(lobe, lambert_pdf(wi), phong_diffuse_chance(s));
 }
 
-// f lacks the cosine, which bsdf_eval multiplies back.
 Scatter phong_eval(Surface s, vec3 wo, vec3 wi) {
     vec3 f = INV_PI * (LOBE(LOBE_DIFFUSE, s.base_color)
                      + LOBE(LOBE_SPECULAR, s.phong * (phong_power(wo, wi, s.shininess) / wi.z)));

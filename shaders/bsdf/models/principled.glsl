@@ -183,7 +183,7 @@ Scatter principled_eval_below(Surface s, vec3 wo, vec3 wi, PrincipledWeights w) 
 }
 #endif
 
-// f lacks the cosine of wi, and perfectly specular lobes.
+// Without the perfectly specular lobes.
 Scatter principled_eval(Surface s, vec3 wo, vec3 wi) {
     PrincipledWeights w = principled_weights(s, wo);
     vec3 wm = normalize(wo + wi);
@@ -273,7 +273,7 @@ LobeSample principled_sample_coat(Surface s, vec3 wo, vec2 u, float weight) {
 
 LobeSample principled_sample(Surface s, vec3 wo, float u_lobe, vec2 u) {
     PrincipledWeights w = principled_weights(s, wo);
-    LobeSample r = LobeSample(sampling_cosine(u), false, Scatter(vec3(0.0), 0.0), false);
+    LobeSample r = bsdf_rough_sample(sampling_cosine(u));
     float v = u_lobe - w.diffuse;
 #if HAS_TRANSMISSION
     if (v >= 0.0) r.wi.z = -r.wi.z;

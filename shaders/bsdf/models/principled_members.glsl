@@ -13,5 +13,5 @@
     vec4 albedo;           // energy_albedo at wo
     vec4 albedo_mean;      // energy_mean
     float coat_albedo;     // the share of light from wo that the coat keeps from what is under it
-    float sheen_albedo;    // the same of the sheen
+    float sheen_albedo;    // the share that the sheen keeps from what is under it
 #endif

@@ -1,6 +1,6 @@
-// The diffuse base under a rough dielectric has the light that the boundary reflects neither on its way in nor on its
-// way out [Kulla & Conty 2017; Ashikhmin & Shirley 2000]; a flatter variant is for thin subsurface. The `albedo` are
-// the shares that the boundary reflects, at wo, at wi and on average.
+// The diffuse base under a rough dielectric scatters the light that the boundary reflects neither on its way in nor on
+// its way out [Kulla & Conty 2017; Ashikhmin & Shirley 2000]; a flatter variant is for thin subsurface. Each `albedo`
+// is the share that the boundary reflects: at wo, at wi, or on average.
 #if HAS_PRINCIPLED
 
 // The albedo of the density 1 / (2 (c + c')) over c' [Seeliger 1888]: 1 - c ln(1 + 1 / c).

@@ -1,6 +1,6 @@
 // Light that leaves the microfacets after more than one of them [Kulla & Conty 2017, "Revisiting physically based
 // shading at Imageworks"]: on each side the share that single scattering loses at wo times the share that it loses at
-// wi. The `albedo` are energy_albedo's four shares at wo (in s), at wi and on average. The diffuse lobes above and
+// wi. Each `albedo` is energy_albedo's four shares: at wo (in s), at wi, or on average. The diffuse lobes above and
 // below the surface sample this light.
 #if HAS_PRINCIPLED
 // The least mean loss to divide by: below it the steps of the tables would show, and there is nothing to see.
