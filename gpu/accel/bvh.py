@@ -148,5 +148,5 @@ def thread(tree: Tree, treelet: int | None = None) -> tuple[np.ndarray, int]:
     )
     for o in range(OCTANTS):
         order = nodes[o * count : (o + 1) * count]
-        thread_octant(tree.rows, top, tree.ranks, sizes, most, place, o, o * count, order)
+        thread_octant(tree.rows, top, tree.ranks, sizes, place, o, o * count, order)
     return nodes[: OCTANTS * count + used].reshape(-1).view(Node.dtype), count

@@ -77,8 +77,8 @@ def _leaf(link: int, ranks: np.ndarray) -> int:
 
 @jit
 def thread_octant(
-    rows: np.ndarray, top: np.ndarray, ranks: np.ndarray, sizes: np.ndarray, most: int, treelets: np.ndarray,
-    octant: int, base: int, nodes: np.ndarray,
+    rows: np.ndarray, top: np.ndarray, ranks: np.ndarray, sizes: np.ndarray, treelets: np.ndarray, octant: int,
+    base: int, nodes: np.ndarray,
 ) -> None:  # fmt: skip
     """Fill `nodes` (count, 4) with the rows `top`. `base` is the place of nodes[0] in the array that links count in.
 

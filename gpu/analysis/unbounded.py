@@ -20,7 +20,7 @@ class UnboundedRenderer(Renderer):
     Raises ContextError.
     """
 
-    def __init__(self, device: int | None = None) -> None:
+    def __init__(self) -> None:
         self._folder = TemporaryDirectory(prefix="sunbox-shaders-")
         try:
             text, count = _TURNS.subn(str(MOST), (SHADERS / _FILE).read_text())
@@ -28,7 +28,7 @@ class UnboundedRenderer(Renderer):
             path = Path(self._folder.name) / _FILE
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_text(text)
-            super().__init__(device, (Path(self._folder.name), SHADERS))
+            super().__init__(None, (Path(self._folder.name), SHADERS))
         except BaseException:
             self._folder.cleanup()
             raise

@@ -92,7 +92,7 @@ class FallbackScene(Scene):
     """A scene whose pictures are made with such a kernel. Made by `Renderer.load_fallback`."""
 
     def __init__(
-        self, context: Any, arrays: SceneArrays, texels: TextureCache, raised: frozenset[str] | None = None
+        self, context: Any, arrays: SceneArrays, texels: TextureCache, raised: frozenset[str] | None
     ) -> None:
         self._superset = raised
         super().__init__(context, arrays, False, texels)

@@ -64,7 +64,7 @@ def eta_nodes(count: int = ETA_COUNT) -> np.ndarray:
     return eta_at(np.linspace(0, 1, count))
 
 
-def sheen_nodes(count: int = SHEEN_SHAPE[0]) -> np.ndarray:
+def sheen_nodes(count: int) -> np.ndarray:
     return np.linspace(LEAST_SHEEN_ROUGHNESS, 1, count)
 
 

@@ -97,7 +97,7 @@ def _above_horizon(elevation: float) -> float:
     return float(np.maximum(height, 0.0).mean())
 
 
-def map_directions(width: int = WIDTH, height: int = HEIGHT) -> np.ndarray:
+def map_directions(width: int, height: int) -> np.ndarray:
     """(h, w, 3): middles of the texels of a latitude-longitude map, -Z in its middle."""
     polar = ((np.arange(height) + 0.5) / height * np.pi)[:, None]
     azimuth = ((np.arange(width) + 0.5) / width - 0.5) * 2 * np.pi

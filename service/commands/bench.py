@@ -83,8 +83,8 @@ def _tradeoff(arguments: argparse.Namespace) -> int:
 
 def _seeds(arguments: argparse.Namespace) -> int:
     refuse_quick_publishing(arguments)
-    if arguments.publish and find_spec("matplotlib") is None:
-        raise BadInput("--publish: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+    if arguments.publish:
+        need_matplotlib("--publish")
     output = output_path(arguments.output)
     from gpu import GpuError
     from service.bench.seeds import page, report, run
@@ -106,8 +106,8 @@ def _scale(arguments: argparse.Namespace) -> int:
         raise BadInput(f"--simulate {most}: from 1 to 1024 renderers can be simulated")
     if arguments.publish and (most is None or arguments.quick):
         raise BadInput("--publish: needs --simulate N, and not --quick, whose figures mean nothing")
-    if arguments.publish and find_spec("matplotlib") is None:
-        raise BadInput("--publish: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+    if arguments.publish:
+        need_matplotlib("--publish")
     output = output_path(arguments.output)
     from gpu import GpuError
     from service.bench import scale, scale_report
@@ -129,6 +129,12 @@ def _scale(arguments: argparse.Namespace) -> int:
 def refuse_quick_publishing(arguments: argparse.Namespace) -> None:
     if arguments.publish and arguments.quick:
         raise BadInput("--publish --quick: figures that mean nothing are not for publishing")
+
+
+def need_matplotlib(option: str) -> None:
+    """Raises BadInput where it is not installed."""
+    if find_spec("matplotlib") is None:
+        raise BadInput(f"{option}: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
 
 
 def progress(line: str) -> None:

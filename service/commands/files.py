@@ -7,6 +7,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from service.commands import BadInput, Failed
+from service.views import LOSSLESS_FORMATS, LosslessFormat
 
 
 def read(path: Path) -> bytes:
@@ -30,6 +31,14 @@ def writable(path: Path) -> Path:
     if not os.access(target.parent, os.W_OK):
         raise BadInput(f"{str(path)!r}: its folder cannot be written to")
     return target
+
+
+def picture_format(output: str) -> LosslessFormat:
+    """The format that the ending of `-o` names. Raises BadInput for any other ending."""
+    format = next((name for name in LOSSLESS_FORMATS if Path(output).suffix.lower() == "." + name), None)
+    if format is None:
+        raise BadInput(f"-o {output!r}: must end in one of {', '.join('.' + f for f in LOSSLESS_FORMATS)}")
+    return format
 
 
 def write(path: Path, data: bytes, lasting: bool = True) -> None:

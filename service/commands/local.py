@@ -8,6 +8,7 @@ from __future__ import annotations
 import signal
 import time
 from collections.abc import Mapping
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -24,7 +25,7 @@ from service.pack import pack
 from service.problems import FieldError, Internal, InvalidDocument, ServiceError, problem
 from service.quality import resolve
 from service.scene import parse_scene, parse_settings
-from service.scene.validation import validated
+from service.scene.validation import both, validated
 from service.views import AOVS, FileFormat
 from service.worker.in_process import InProcessRenderer
 
@@ -46,17 +47,11 @@ class LocalRenderer:
     ) -> LocalPicture:
         """A picture of a scene's document; it names files by paths relative to `folder`. Raises InvalidDocument with
         pointers as `POST /v1/renders` has them."""
-        began, errors = time.perf_counter(), []
-        try:
-            scene = parse_scene(document, "/scene", self._config)
-        except InvalidDocument as error:
-            errors += error.errors
-        try:
-            chosen = parse_settings(dict(settings), "/settings", self._config)
-        except InvalidDocument as error:
-            errors += error.errors
-        if errors:
-            raise InvalidDocument(errors)
+        began = time.perf_counter()
+        scene, chosen = both(
+            partial(parse_scene, document, "/scene", self._config),
+            partial(parse_settings, dict(settings), "/settings", self._config),
+        )
         source = Source(folder / "scene", document, scene)
         with source_assets(source, [], self._config) as assets:
             try:

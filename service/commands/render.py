@@ -25,7 +25,7 @@ from service.commands.documents import (
     refusals,
     source_assets,
 )
-from service.views import AOVS, LEAST_EXPOSURE, LOSSLESS_FORMATS, MOST_EXPOSURE, TONE_MAPS, LosslessFormat
+from service.views import AOVS, LEAST_EXPOSURE, MOST_EXPOSURE, TONE_MAPS, LosslessFormat
 
 if TYPE_CHECKING:
     from service.commands.tracing import Tracing
@@ -95,9 +95,7 @@ def run(arguments: argparse.Namespace) -> int:
 def _arguments(arguments: argparse.Namespace) -> tuple[Path, LosslessFormat, float | None]:
     """The path, the format, and the exposure where one is given."""
     path = Path(arguments.output)
-    format = next((name for name in LOSSLESS_FORMATS if path.suffix.lower() == "." + name), None)
-    if format is None:
-        raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join('.' + f for f in LOSSLESS_FORMATS)}")
+    format = files.picture_format(arguments.output)
     if arguments.aov is not None:
         _choose("--aov", arguments.aov, (*AOVS, "all"))
     if arguments.aov == "all" and format != "exr":

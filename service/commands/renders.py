@@ -13,7 +13,6 @@ from typing import TYPE_CHECKING, Any
 
 from service.commands import BadInput, Failed, files
 from service.commands.api import server
-from service.views import LOSSLESS_FORMATS
 
 if TYPE_CHECKING:
     from sunbox import Client
@@ -104,9 +103,7 @@ def _followed(client: Client, id: str) -> dict[str, Any]:
 def _fetch(client: Client, arguments: argparse.Namespace) -> int:
     """The image so far."""
     path = Path(arguments.output)
-    format = next((name for name in LOSSLESS_FORMATS if path.suffix.lower() == "." + name), None)
-    if format is None:
-        raise BadInput(f"-o {arguments.output!r}: must end in one of {', '.join('.' + f for f in LOSSLESS_FORMATS)}")
+    format = files.picture_format(arguments.output)
     output = files.writable(path)
     asked = {"aov": arguments.aov, "exposure": arguments.exposure, "tone_map": arguments.tone_map}
     view = {name: value for name, value in asked.items() if value is not None}

@@ -62,12 +62,7 @@ class Page:
 class RenderQueue:
     """The renders of all owners. An owner is a text that the caller chooses; nobody else learns of its renders."""
 
-    def __init__(
-        self,
-        limits: QueueLimits,
-        store: RenderStore | None = None,
-        clock: Callable[[], float] = time.monotonic,
-    ) -> None:
+    def __init__(self, limits: QueueLimits, store: RenderStore | None = None) -> None:
         """With a `store` renders outlive the server."""
         self._limits = limits
         self.store = store
@@ -75,7 +70,7 @@ class RenderQueue:
         self._followers = Followers[Job]()
         self._gone: OrderedDict[str, tuple[str, int]] = OrderedDict()  # owners and numbers of forgotten ones
         self._number = 0  # of the last one
-        self._slots = Slots(self._limits.running, self._ran, clock)
+        self._slots = Slots(self._limits.running, self._ran)
         self._waiting = self._slots.waiting
         self.packed = PackedScenes()  # of those that wait
         self._storing: Counter[str] = Counter()  # by owner: they are being stored, and wait as soon as they are

@@ -1,19 +1,9 @@
-"""Waiting for events of asyncio."""
+"""Waiting for an event of asyncio, for a time."""
 
 from __future__ import annotations
 
 import asyncio
 from contextlib import suppress
-
-
-async def first_of(*events: asyncio.Event) -> None:
-    """Return when one of the events is set."""
-    waits = [asyncio.create_task(event.wait()) for event in events]
-    try:
-        await asyncio.wait(waits, return_when=asyncio.FIRST_COMPLETED)
-    finally:
-        for wait in waits:
-            wait.cancel()
 
 
 async def within(event: asyncio.Event, seconds: float) -> None:

@@ -128,10 +128,10 @@ def _length(document: Any, name: str) -> int:
     return len(found) if isinstance(found, list) else 0
 
 
-def parse_material(document: Any, pointer: str = "") -> Material:
-    """A material without textures. Raises InvalidDocument, with pointers to it from `pointer` up."""
-    material: Material = validated(_MATERIAL, document, pointer)
-    _without_textures(material, pointer)
+def parse_material(document: Any) -> Material:
+    """A material without textures. Raises InvalidDocument."""
+    material: Material = validated(_MATERIAL, document, "")
+    _without_textures(material, "")
     return material
 
 

@@ -7,6 +7,7 @@ import json
 import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import partial
 from typing import Annotated, Any, Literal
 
 from pydantic import Field, TypeAdapter
@@ -19,7 +20,7 @@ from service.requests.conversion_request import parse_conversion
 from service.scene import Scene, load_json, merge_patch, parse_scene, parse_settings, references
 from service.scene.base import Model
 from service.scene.document import Parsed
-from service.scene.validation import validated
+from service.scene.validation import both, validated
 from service.storage.documents import checked
 
 LONGEST_LABEL = 200  # characters
@@ -76,16 +77,7 @@ class RequestParser:
 
     def both(self, scene: Any, settings: Any) -> tuple[Scene, ResolvedSettings]:
         """The scene and the settings. Raises InvalidDocument with the mistakes of both."""
-        errors: list[FieldError] = []
-        understood: list[Any] = []
-        for parse, document in ((self.scene, scene), (self.settings, settings)):
-            try:
-                understood.append(parse(document))
-            except InvalidDocument as error:
-                errors += error.errors
-        if errors:
-            raise InvalidDocument(errors)
-        return understood[0], understood[1]
+        return both(partial(self.scene, scene), partial(self.settings, settings))
 
     def scene(self, document: Any, before: Parsed | None = None) -> Scene:
         """The scene of a document; with the one `before`, only what an edit changed is validated."""

@@ -120,12 +120,6 @@ def _type(validate: Callable[[Any], np.ndarray], row: dict[str, Any]) -> Any:
 
 
 _INDEX_ROW = {"type": "array", "items": {"type": "integer", "minimum": 0}, "minItems": 3, "maxItems": 3}
-_UV_ROW = {
-    "type": "array",
-    "items": {"type": "number", "minimum": -LARGEST, "maximum": LARGEST},
-    "minItems": 2,
-    "maxItems": 2,
-}
 _COLOR_ROW = {"type": "array", "items": {"type": "number", "minimum": 0, "maximum": 1}, "minItems": 3, "maxItems": 4}
 
 Points = _type(_points, vector_schema())
@@ -133,5 +127,5 @@ Directions = _type(_directions, vector_schema())
 # The directions of a question, written by hand: an error has the pointer of the number.
 QuestionDirections = _type(partial(_directions, to_number=True), vector_schema())
 Triangles = _type(_indices, _INDEX_ROW)
-Coordinates = _type(_coordinates, _UV_ROW)
+Coordinates = _type(_coordinates, vector_schema(size=2))
 Colors = _type(_colors, _COLOR_ROW)

@@ -87,12 +87,12 @@ def vector(low: float = -LARGEST, high: float = LARGEST, example: str = "[0, 1, 
     return validate
 
 
-def vector_schema(low: float = -LARGEST, high: float = LARGEST) -> dict[str, Any]:
+def vector_schema(low: float = -LARGEST, high: float = LARGEST, size: int = 3) -> dict[str, Any]:
     return {
         "type": "array",
         "items": {"type": "number", "minimum": low, "maximum": high},
-        "minItems": 3,
-        "maxItems": 3,
+        "minItems": size,
+        "maxItems": size,
     }
 
 

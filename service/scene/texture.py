@@ -17,6 +17,7 @@ from service.scene.numbers import (
     RefractiveIndex,
     check_number,
     described,
+    vector_schema,
 )
 
 Vec2 = tuple[float, float]
@@ -31,13 +32,7 @@ def _pair(value: Any) -> Vec2:
     return check_number(value[0], -LARGEST, LARGEST, "u"), check_number(value[1], -LARGEST, LARGEST, "v")
 
 
-_PAIR = {
-    "type": "array",
-    "items": {"type": "number", "minimum": -LARGEST, "maximum": LARGEST},
-    "minItems": 2,
-    "maxItems": 2,
-}
-Pair = Annotated[Vec2, PlainValidator(_pair), WithJsonSchema(_PAIR)]
+Pair = Annotated[Vec2, PlainValidator(_pair), WithJsonSchema(vector_schema(size=2))]
 
 
 class ImageTexture(Model):

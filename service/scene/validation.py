@@ -15,6 +15,7 @@ from service.scene.error_location import ErrorLocation, locate
 from service.scene.numbers import described
 
 T = TypeVar("T")
+U = TypeVar("U")
 
 
 _WRONG_KIND = ("union_tag_invalid", "union_tag_not_found", "literal_error", "missing")
@@ -27,6 +28,20 @@ def validated(adapter: TypeAdapter[T], document: Any, pointer: str) -> T:
     except ValidationError as error:
         # The adapter's type has no public name; the error alone does not tell tags from fields.
         raise InvalidDocument(mistakes(error, adapter._type)).under(pointer) from None
+
+
+def both(first: Callable[[], T], second: Callable[[], U]) -> tuple[T, U]:
+    """What both return. Raises InvalidDocument with the mistakes of both."""
+    errors: list[FieldError] = []
+    found: list[Any] = []
+    for parse in (first, second):
+        try:
+            found.append(parse())
+        except InvalidDocument as error:
+            errors += error.errors
+    if errors:
+        raise InvalidDocument(errors)
+    return found[0], found[1]
 
 
 def validated_entries(

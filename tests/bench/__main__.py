@@ -7,14 +7,13 @@ import subprocess
 import sys
 from collections.abc import Sequence
 from contextlib import ExitStack
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from service import presets
 from service.cli import exit_code
 from service.commands import BadInput, Failed
-from service.commands.bench import output_path, progress, refuse_quick_publishing, write_figures
+from service.commands.bench import need_matplotlib, output_path, progress, refuse_quick_publishing, write_figures
 from service.commands.configuration import configuration
 from service.commands.documents import read_source, source_assets
 from tests.bench import gallery, soak, soak_restarts
@@ -128,8 +127,8 @@ def _hemisphere(arguments: argparse.Namespace) -> int:
     output, figure = output_path(arguments.output), output_path(arguments.figure)
     if figure and figure.suffix.lower() not in (".png", ".svg"):
         raise BadInput(f"--figure {arguments.figure!r}: must end in .png or .svg")
-    if figure and find_spec("matplotlib") is None:
-        raise BadInput("--figure: needs matplotlib, which `pip install 'sunbox[bench]'` brings")
+    if figure:
+        need_matplotlib("--figure")
     from gpu import GpuError
     from tests.bench import hemisphere
 

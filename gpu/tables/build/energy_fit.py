@@ -19,7 +19,7 @@ _WEIGHT = 100.0  # weight of errors below the margin
 _STEPS = 40  # twice as many change the error's root mean square by 0.1 %
 
 
-def _sides(rank: int, axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
+def _sides(axis: int) -> tuple[tuple[slice, ...], tuple[slice, ...]]:
     before = (slice(None),) * axis
     return (*before, slice(0, -1)), (*before, slice(1, None))
 
@@ -28,7 +28,7 @@ def between(nodes: np.ndarray, f: np.ndarray) -> np.ndarray:
     """`nodes` interpolated at the fractions `f` of every cell."""
     for axis, x in enumerate(f):
         if x > 0:
-            low, high = _sides(nodes.ndim, axis)
+            low, high = _sides(axis)
             nodes = nodes[low] * nodes.dtype.type(1 - x) + nodes[high] * nodes.dtype.type(x)
     return nodes
 
@@ -37,7 +37,7 @@ def _spread(values: np.ndarray, f: np.ndarray, largest: bool = False) -> np.ndar
     """For each node the sum of `values` with the weights that `between` gives it, or the largest value around it."""
     for axis, x in enumerate(f):
         if x > 0:
-            low, high = _sides(values.ndim, axis)
+            low, high = _sides(axis)
             shape = [n + (k == axis) for k, n in enumerate(values.shape)]
             out = np.zeros(shape, values.dtype)
             if largest:

@@ -14,6 +14,7 @@ from gpu import Picture, Renderer, RenderSettings, SceneArrays
 from service.assets import Assets
 from service.bench import timing
 from service.bench.scenes import BenchAssets
+from service.colorimetry import encode_srgb
 from service.pack import pack
 from service.scene import parse_scene
 
@@ -88,8 +89,7 @@ class Stage:
 
 def shown(pixels: np.ndarray, exposure: float = 0.0) -> np.ndarray:
     """Radiance -> sRGB bytes, clipped [IEC 61966-2-1]."""
-    x = np.clip(pixels * 2.0**exposure, 0.0, 1.0)
-    encoded = np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.maximum(x, 0.0031308) ** (1 / 2.4) - 0.055)
+    encoded = encode_srgb(np.clip(pixels * 2.0**exposure, 0.0, 1.0))
     return np.asarray(np.rint(255 * encoded).astype(np.uint8))
 
 
