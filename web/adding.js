@@ -1,23 +1,23 @@
 // Things that come into the scene: made here, copied, or from files. They stand beside what is there, and in sight.
 
 import { box, remember, together } from "./document/bounds.js";
-import { axes, isInSight } from "./document/camera.js";
+import { axes, halfHeight, isInSight } from "./document/camera.js";
 import { fresh } from "./document/materials.js";
 import { adapted } from "./document/merging.js";
 import { at, pointer } from "./lib/patch.js";
 import { ballOf, solids, union, wayOut } from "./document/placing.js";
 import { moved } from "./document/transforms.js";
-import { add, cross, length, normalize, scale, subtract, turn } from "./lib/vector.js";
+import { add, cross, normalize, scale, turn } from "./lib/vector.js";
 
 const COMPANION = 4; // times a new thing's size: a larger neighbour does not get into the picture with it
 const SUNS_APART = Math.PI / 6; // a copied sun shines from another side
 
 // The box around a scene: by its shapes, else by what its camera has in view.
-function sizeOf({ shapes }, { position, target, vfov }) {
+function sizeOf({ shapes }, camera) {
   const known = shapes.filter(({ type }) => type !== "quad").map(box);
   if (known.length && known.every(Boolean)) return union(known);
-  const reach = length(subtract(position, target)) * Math.tan((vfov * Math.PI) / 360);
-  return { low: target.map((x) => x - reach), high: target.map((x) => x + reach) };
+  const reach = halfHeight(camera, axes(camera).distance);
+  return { low: camera.target.map((x) => x - reach), high: camera.target.map((x) => x + reach) };
 }
 
 export class Adder {

@@ -49,13 +49,17 @@ export class Importer {
       try {
         if (await this.#take(file, place, next)) next = "add"; // the others of these files belong to it
       } catch (problem) {
-        this.messages.show("refusal", {
-          title: `${file.name} was not taken.`,
-          detail: problemText(problem, {}, fileValueWords),
-        });
+        this.#refuse(file, problem);
       }
       this.messages.hide("upload");
     }
+  }
+
+  #refuse(file, problem) {
+    this.messages.show("refusal", {
+      title: `${file.name} was not taken.`,
+      detail: problemText(problem, {}, fileValueWords),
+    });
   }
 
   // Whether a scene was opened.
@@ -206,10 +210,7 @@ export class Importer {
     try {
       await this.#paint(place, await this.upload(file), file);
     } catch (problem) {
-      this.messages.show("refusal", {
-        title: `${file.name} was not taken.`,
-        detail: problemText(problem, {}, fileValueWords),
-      });
+      this.#refuse(file, problem);
     }
     this.messages.hide("upload");
   }

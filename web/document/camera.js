@@ -35,10 +35,14 @@ export function axes({ position, target, up }) {
   return { right, up: cross(right, forward), forward, distance: length(view) };
 }
 
+// Half the height of what the picture shows at a distance from the eye, in metres.
+export const halfHeight = ({ vfov }, distance) => distance * Math.tan(radians(vfov) / 2);
+
 // Eye and target slide; the plane through the target follows the hand. In heights of the picture.
-export function pan({ position, target, up, vfov }, right, down) {
-  const frame = axes({ position, target, up });
-  const height = 2 * frame.distance * Math.tan(radians(vfov) / 2);
+export function pan(camera, right, down) {
+  const { position, target } = camera;
+  const frame = axes(camera);
+  const height = 2 * halfHeight(camera, frame.distance);
   const shift = add(scale(frame.right, -right * height), scale(frame.up, down * height));
   return { position: tidy(add(position, shift)), target: tidy(add(target, shift)) };
 }
@@ -57,8 +61,9 @@ export const zoom = ({ position, target }, factor) => ({
 });
 
 // From the same side, so far that a ball fills `share` of the picture's shorter side.
-export function frame({ position, target, vfov }, { center, radius }, aspect, share = 0.8) {
-  const half = Math.atan(Math.tan(radians(vfov) / 2) * Math.min(1, aspect));
+export function frame(camera, { center, radius }, aspect, share = 0.8) {
+  const { position, target } = camera;
+  const half = Math.atan(halfHeight(camera, 1) * Math.min(1, aspect));
   const distance = radius / Math.sin(Math.max(half * share, 1e-3));
   const back = normalize(subtract(position, target));
   return { position: tidy(add(center, scale(back, distance))), target: tidy(center) };
@@ -70,7 +75,7 @@ export function project(camera, point, aspect) {
   const { right, up, forward } = axes(camera);
   const way = subtract(point, camera.position);
   const z = dot(way, forward);
-  const tall = Math.tan(radians(camera.vfov) / 2) * z;
+  const tall = halfHeight(camera, z);
   return { x: (dot(way, right) / (tall * aspect) + 1) / 2, y: (1 - dot(way, up) / tall) / 2, z };
 }
 
@@ -85,7 +90,7 @@ export function isInSight(camera, aspect, { low, high }) {
 // The unit direction of the ray through a place in the picture: x to the right and y down, both 0..1.
 export function ray(camera, x, y, aspect) {
   const { right, up, forward } = axes(camera);
-  const tall = Math.tan(radians(camera.vfov) / 2);
+  const tall = halfHeight(camera, 1);
   const across = add(scale(right, (2 * x - 1) * tall * aspect), scale(up, (1 - 2 * y) * tall));
   return normalize(add(forward, across));
 }

@@ -21,7 +21,7 @@ function open(row, text) {
   bubble.style.setProperty("top", `${below ? box.bottom + 4 : box.top - bubble.offsetHeight - 4}px`);
 }
 
-export function closeTooltip() {
+function closeTooltip() {
   clearTimeout(timer);
   bubble.hidden = true;
 }

@@ -1,7 +1,7 @@
 // The directional albedo over the angle of the view, and its mean under uniform light, the number of a white furnace.
 
 import { chart, line, niceCeiling, text } from "./plot.js";
-import { CHANNELS, column, curves, isGrey, luminance } from "./values.js";
+import { CHANNELS, column, curves, isGrey, luminance, RGB } from "./values.js";
 
 const ANGLES = [...Array.from({ length: 18 }, (_, i) => 5 * i), 87, 88.5, 89.5];
 const cosines = ANGLES.map((angle) => Math.cos((angle * Math.PI) / 180));
@@ -85,8 +85,6 @@ function note(data) {
     .join(" ")
     .concat(" That is the share of uniform light that comes back.");
 }
-
-const RGB = ["r", "g", "b"];
 
 function table(data) {
   const sides = Object.keys(data);

@@ -6,7 +6,7 @@ import { isObject } from "../lib/patch.js";
 
 const CHANNELS = { r: 0, g: 1, b: 2, a: 3 };
 
-export const isTextured = (value) => isObject(value) && value.texture !== undefined;
+const isTextured = (value) => isObject(value) && value.texture !== undefined;
 
 // What a field reads of its texture: "color", or a channel, "r", "g", "b" or "a".
 const readOf = ({ channel = "r" }, { widget }) => (widget === "color" ? "color" : channel);

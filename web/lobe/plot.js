@@ -24,7 +24,7 @@ export const figure = (width, height, label, ...children) =>
 const STEPS = [1, 2, 5, 10];
 
 // A step of 1, 2 or 5 times a power of ten that parts a range into `parts` or a few more or less.
-export function niceStep(range, parts) {
+function niceStep(range, parts) {
   const rough = range / parts;
   const power = 10 ** Math.floor(Math.log10(rough));
   return power * STEPS.find((step) => step * power >= rough * 0.8);

@@ -2,7 +2,7 @@
 // Fresnel reflectance F. The server refuses a model that has none.
 
 import { chart, decades, niceCeiling, svg } from "./plot.js";
-import { CHANNELS, channelClass, column } from "./values.js";
+import { CHANNELS, channelClass, column, RGB } from "./values.js";
 
 const fine = Array.from({ length: 40 }, (_, i) => 0.02 * 1.13 ** i).filter((angle) => angle < 3); // where D of a polished surface falls
 const ANGLES = [0, ...fine, ...Array.from({ length: 87 }, (_, i) => i + 3), 89.5];
@@ -93,8 +93,6 @@ function note(data) {
     ? "A perfect mirror has no distribution and no geometry term."
     : `G is for light from ${Object.values(data)[0].incidence}°.`;
 }
-
-const RGB = ["r", "g", "b"];
 
 function table(data) {
   const sides = Object.keys(data);

@@ -59,7 +59,7 @@ export const curves = (data, channels, of) =>
 // The name of a column: "f_r", and with two variants "A_f_r".
 export const column = (data, side, name) => (Object.keys(data).length > 1 ? `${side.toUpperCase()}_${name}` : name);
 
-const RGB = ["r", "g", "b"];
+export const RGB = ["r", "g", "b"];
 
 // Columns and rows for a table of colours over something: `of(own)` gives the colours of a variant.
 export function colorTable(data, first, at, of, name) {

@@ -5,7 +5,7 @@ import { readKey } from "./key.js";
 
 const root = new URL("v1/", document.baseURI);
 
-export const PROTOCOL = "sunbox.v1";
+const PROTOCOL = "sunbox.v1";
 
 // What the service refused, as RFC 9457 tells it: `detail`, `status` and `errors` [{pointer, detail}].
 export class Problem extends Error {

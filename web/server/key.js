@@ -3,7 +3,7 @@
 const PLACE = "sunbox.key";
 
 export const readKey = () => sessionStorage.getItem(PLACE);
-export const writeKey = (key) => sessionStorage.setItem(PLACE, key);
+const writeKey = (key) => sessionStorage.setItem(PLACE, key);
 
 // Asks for the key in a dialog of the page: resolves once something was entered.
 export function askForKey(dialog, wasWrong) {

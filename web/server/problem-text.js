@@ -37,7 +37,7 @@ const OWNERS = {
 const SINGLES = { camera: "the camera", environment: "the environment" };
 
 // "/scene/materials/a/roughness" -> "Roughness of material A".
-export function placeWords(pointer, titles = {}) {
+function placeWords(pointer, titles = {}) {
   const parts = pointer
     .split("/")
     .slice(1)
@@ -69,7 +69,7 @@ const IN_FILE = {
 };
 
 // "/materials/3/normalTexture" -> "Material 4": the place in a model file, or "" where its details say enough alone.
-export function filePlaceWords(pointer) {
+function filePlaceWords(pointer) {
   const parts = pointer.split("/").slice(1);
   const at = parts[0] === "extensions" ? 2 : 0;
   const [kind, index] = parts.slice(at);
