@@ -72,7 +72,7 @@ export function makeCommands({
       if (editor.removable(editor.state.chosen.thing)) editor.remove(editor.state.chosen.thing);
     },
     copyMaterial() {
-      clipboard.write(editor.material);
+      clipboard.write(editor.materialSet);
       say("Material copied");
       refresh();
     },

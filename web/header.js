@@ -45,7 +45,7 @@ export function makeHeader({
   const exportMenu = new ExportMenu(find("export-menu"), {
     name: () => editor.state.chosen.scene.replaceAll(/[^\w-]+/g, "-") || "scene",
     scene: () => editor.state.scene,
-    material: () => editor.material,
+    material: () => editor.materialSet,
     png: (bits) => exporting.png(stream, bits, recipes.madeFrom),
     exr: () => exporting.exr(stream, page.layers, recipes.madeFrom),
     command: () =>

@@ -6,6 +6,7 @@ import { question } from "./lib/ask.js";
 import { measure, remember } from "./document/bounds.js";
 import { accepted, browse, kindOf } from "./lib/files.js";
 import { isUnderNoSky, studio } from "./document/lighting.js";
+import { unpacked } from "./document/material-set.js";
 import { pointer } from "./lib/patch.js";
 import { fileValueWords, problemText, warningText } from "./server/problem-text.js";
 import { readRecipe } from "./document/recipe.js";
@@ -134,7 +135,7 @@ export class Importer {
   openDocument(document, name) {
     if (document?.scene?.shapes) this.acts.change(revived(document));
     else if (document?.shapes) this.acts.openScene(document, name);
-    else if (materialModels(this.schema)[document?.type]) this.acts.putMaterial(document);
+    else if (materialModels(this.schema)[unpacked(document)[0]?.material?.type]) this.acts.putMaterial(document);
     else throw new Error("It holds neither a scene nor a material.");
   }
 

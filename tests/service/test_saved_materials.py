@@ -42,6 +42,7 @@ def test_a_material_is_saved_with_its_textures(server: Server) -> None:
     # One of before, whose images stayed in the scene that it was made in.
     bare = {"type": "diffuse", "albedo": {"texture": "somewhere"}}
     assert http.put(address, json=bare).status_code == 200 and http.get(address).json() == bare
+    http.delete(address)
 
 
 def test_a_saved_material_s_images_stay(tmp_path: Path) -> None:

@@ -108,6 +108,15 @@ def browser() -> Iterator[Browser]:
         launched.close()
 
 
+@pytest.fixture(scope="module")
+def page(browser: Browser, server: Server) -> Iterator[Page]:
+    """A page in which functions of the modules are called by themselves."""
+    opened = browser.new_page()
+    opened.goto(server.url + "/icon.svg")  # any page of the same origin: the editor itself need not run
+    yield opened
+    opened.close()
+
+
 class Editor:
     """The page, and what a test asks of it."""
 

@@ -3,22 +3,12 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Page
 
-from tests.serving import Server
 from tests.web.modules import call
-
-
-@pytest.fixture(scope="module")
-def page(browser: Browser, server: Server) -> Iterator[Page]:
-    opened = browser.new_page()
-    opened.goto(server.url + "/icon.svg")  # any page of the same origin
-    yield opened
-    opened.close()
 
 
 def test_textures_are_replaced_by_their_mean_times_the_factor(page: Page) -> None:

@@ -4,24 +4,14 @@ from __future__ import annotations
 
 import math
 import random
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
 import pytest
-from playwright.sync_api import Browser, Page
+from playwright.sync_api import Page
 
 from service.scene.transform import Transform
-from tests.serving import Server
 from tests.web.modules import call
-
-
-@pytest.fixture(scope="module")
-def page(browser: Browser, server: Server) -> Iterator[Page]:
-    opened = browser.new_page()
-    opened.goto(server.url + "/icon.svg")  # any page of the same origin: the editor itself need not run
-    yield opened
-    opened.close()
 
 
 def document(chance: random.Random, depth: int = 3) -> Any:

@@ -129,9 +129,13 @@ def test_parameters_are_in_folds(editor: Editor) -> None:
     assert [each.get_attribute("data-field") for each in seen.all()] == ["sheen_roughness"]
     find.fill("")
     assert not fold("Sheen").evaluate(is_open) and not fold("Coat").evaluate(is_open)
-    # What is wrong is shown, wherever it is.
-    page.evaluate("navigator.clipboard.readText = async () => JSON.stringify({ type: 'principled', sheen: 7 })")
-    editor.act("paste-material")
+    # What is wrong is shown, also where its fold was shut meanwhile.
+    page.evaluate("""() => {
+        const entry = document.querySelector("[data-field=sheen] input.number");
+        entry.value = "7";
+        entry.dispatchEvent(new Event("change"));
+        entry.closest("details").open = false;
+    }""")
     editor.wait("the words", lambda: page.is_visible("[data-field=sheen] .trouble"))
 
 

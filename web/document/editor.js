@@ -5,6 +5,7 @@ import { fetchPreset } from "../server/api.js";
 import * as moving from "./camera.js";
 import { Conversions, Origins } from "./conversion.js";
 import { exposed } from "./lighting.js";
+import { carried, missingWords, received, unpacked, withTextures, withdrawn } from "./material-set.js";
 import { at, pointer, put } from "../lib/patch.js";
 import { defaults, environmentModels, fields, model, newMaterial } from "../server/schema.js";
 import { Store } from "./store.js";
@@ -38,6 +39,7 @@ export class Editor extends Store {
   #turns = 0; // of materials into other models
   #turning = 0; // the number of the one that waits for the server, or 0
   #origins = new Origins();
+  #arrival = null; // the material that was put somewhere last, and what was there before
   conversions = new Conversions();
 
   // `complain(problem)` shows what was refused, `forgive()` takes it away; `waits()` hears that `isWaiting` is true.
@@ -179,8 +181,21 @@ export class Editor extends Store {
     this.amend({ chosen: { ...this.state.chosen, material, thing } });
   }
 
-  putMaterial(material) {
-    this.change(put(this.state, this.materialPlace, material));
+  // The material in hand, with the textures that it shows.
+  get materialSet() {
+    const { scene, chosen } = this.state;
+    return carried(chosen.material, this.material, scene);
+  }
+
+  // Another material in the place of the one in hand, bare or with its textures. It comes whole or, if the server
+  // refuses any of it, not at all.
+  putMaterial(document) {
+    const place = this.materialPlace;
+    const { material, textures, added, lost } = received(this.state.scene, unpacked(document)[0]);
+    this.#arrival = { place, before: this.material, material, added };
+    const { scene } = this.state;
+    this.change(put({ ...this.state, scene: withTextures(scene, textures) }, place, material));
+    if (lost.length) this.complain(new Error(missingWords(lost)));
   }
 
   pickModel(type) {
@@ -290,8 +305,18 @@ export class Editor extends Store {
   }
 
   // What was refused goes back to what the server has; `mark(pointer, detail)` shows it at its control and
-  // says which place the control is for (null: none has it). These places come back.
+  // says which place the control is for (null: none has it). These places come back. A whole material goes as it came.
   takeBack({ errors }, valid, mark) {
+    const arrival = this.#arrival;
+    const isArrivals = ({ pointer: wrong }) =>
+      [arrival.place, ...arrival.added.map((name) => pointer("scene", "textures", name))].some(
+        (place) => wrong === place || wrong.startsWith(`${place}/`),
+      );
+    if (arrival && at(this.state, arrival.place) === arrival.material && errors.some(isArrivals)) {
+      this.#arrival = null;
+      this.amend(withdrawn(this.state, arrival));
+      return [null];
+    }
     const places = errors
       .filter(({ pointer: wrong }) => /^\/(scene|settings)(\/|$)/.test(wrong))
       .map(({ pointer: wrong, detail }) => mark(wrong, detail));

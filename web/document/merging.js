@@ -1,7 +1,7 @@
 // A scene that is added to another: its materials, textures and shapes under names that are free there.
 
 import { fresh } from "./materials.js";
-import { isObject } from "../lib/patch.js";
+import { retextured } from "./material-set.js";
 
 // Old names to new ones, none of which is taken.
 function names(documents, taken) {
@@ -22,13 +22,8 @@ const under = (documents, given) =>
 export function adapted(other, scene) {
   const images = names(other.textures ?? {}, scene.textures ?? {});
   const given = names(other.materials, scene.materials);
-  const reads = (value) =>
-    isObject(value) && images[value.texture] ? { ...value, texture: images[value.texture] } : value;
   const materials = Object.fromEntries(
-    Object.entries(other.materials).map(([name, material]) => [
-      name,
-      Object.fromEntries(Object.entries(material).map(([key, value]) => [key, reads(value)])),
-    ]),
+    Object.entries(other.materials).map(([name, material]) => [name, retextured(material, images)]),
   );
   return {
     textures: under(other.textures ?? {}, images),

@@ -4,6 +4,7 @@
 import { fetchPreset, renderPicture } from "../server/api.js";
 import { HEX, hex, linear } from "../lib/color.js";
 import { recall, remember } from "../lib/browser-storage.js";
+import { received, unpacked, withTextures } from "../document/material-set.js";
 
 const SIDE = 96;
 const SETTINGS = { width: SIDE, height: SIDE, max_samples: 32, max_bounces: 6, seed: 1 };
@@ -17,7 +18,11 @@ export async function studio() {
   return { ...set, environment };
 }
 
-export const staged = (scene, material) => ({ ...scene, materials: { ...scene.materials, subject: material } });
+// With a material on its subject, bare or with its textures.
+export function staged(scene, document) {
+  const { material, textures } = received(scene, unpacked(document)[0]);
+  return withTextures({ ...scene, materials: { ...scene.materials, subject: material } }, textures);
+}
 
 const beside = (name) => new URL(`thumbnails/${name}`, document.baseURI);
 
@@ -93,14 +98,15 @@ export class Thumbnails {
     this.work();
   }
 
-  // The picture of a material of the scene: a ball of its colour, when that is new, until the service has rendered it.
-  async own(image, material) {
-    const tint = Object.values(material).find(isColor) ?? GREY;
+  // The picture of a material of the scene, bare or with its textures: a ball of its colour, when that is new, until the
+  // service has rendered it.
+  async own(image, document) {
+    const tint = Object.values(unpacked(document)[0].material).find(isColor) ?? GREY;
     if (image.dataset.tint !== String(tint)) {
       image.dataset.tint = String(tint);
       await this.plain(image, tint);
     }
-    this.later(image, async () => material);
+    this.later(image, async () => document);
   }
 
   // Call when the picture came to rest.
@@ -118,14 +124,12 @@ export class Thumbnails {
   }
 
   async #make({ image, get }) {
-    const material = await get();
-    const name = `thumbnail ${self.crypto.subtle ? await hash(material) : JSON.stringify(material)}`;
+    const document = await get();
+    const name = `thumbnail ${self.crypto.subtle ? await hash(document) : JSON.stringify(document)}`;
     let blob = await recall(name);
     if (!blob) {
       this.#scene ??= await studio();
-      // Textures belong to a scene: a thumbnail shows the material without them.
-      const plain = Object.fromEntries(Object.entries(material).filter(([, value]) => !value?.texture));
-      blob = await renderPicture(staged(this.#scene, plain), SETTINGS);
+      blob = await renderPicture(staged(this.#scene, document), SETTINGS);
       remember(name, blob);
     }
     show(image, blob);

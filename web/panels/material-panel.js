@@ -1,6 +1,7 @@
 // The buttons around the list of the scene's materials, and the line that says what is made of the one in hand.
 
 import { askName, askWhich } from "../lib/ask.js";
+import { pictured } from "../document/material-set.js";
 import * as materials from "../document/materials.js";
 import { things } from "../document/things.js";
 import { watchMenu } from "../lib/menu.js";
@@ -10,9 +11,9 @@ import { sentence } from "../lib/format-text.js";
 
 const MOST_NAMED = 2; // things that are named; more are counted
 
-// `find(id)` elements, `acts` the editor, `say(text)` reads out, `paint(image, material)` puts in its picture.
+// `find(id)` elements, `acts` the editor, `say(text)` reads out, `paint(image, set)` puts in its picture.
 export class MaterialPanel {
-  #painted = null;
+  #painted = []; // what its picture was made of
 
   constructor(find, { acts, say, paint }) {
     Object.assign(this, { find, acts, say, paint });
@@ -87,9 +88,9 @@ export class MaterialPanel {
     this.find("material-users").textContent = `${sentence(this.#users())}.`;
     this.find("own-material").hidden = !materials.isShared({ scene }, chosen.thing);
     this.find("delete-material").disabled = Object.keys(scene.materials).length < 2;
-    const { material } = this.acts;
-    if (material === this.#painted) return;
-    this.#painted = material;
-    this.paint(this.find("material-picture"), material);
+    const now = pictured(this.acts.material, scene, this.#painted);
+    if (now === this.#painted) return;
+    this.#painted = now;
+    this.paint(this.find("material-picture"), this.acts.materialSet);
   }
 }

@@ -36,7 +36,7 @@ export class SavedMaterials {
   // Asks for a name, and saves the material in hand.
   save() {
     return this.#try(async () => {
-      const { material, state } = this.acts;
+      const { materialSet, state } = this.acts;
       const wanted = await askName({
         title: "Save the material on the server",
         label: "Name",
@@ -47,7 +47,7 @@ export class SavedMaterials {
       if (wanted === null) return;
       const isTaken = this.entries.some(({ title }) => title === wanted);
       if (isTaken && !(await ask({ title: `Replace “${wanted}”?`, detail: WHOSE, yes: "Replace" }))) return;
-      await api.save("materials", wanted, material);
+      await api.save("materials", wanted, materialSet);
       this.say(`Saved ${wanted}.`);
       await this.refresh();
     });

@@ -3,6 +3,7 @@
 
 import { fetchPreset } from "../server/api.js";
 import { OWN } from "../document/editor.js";
+import { carried, pictured } from "../document/material-set.js";
 import { pointer } from "../lib/patch.js";
 import { PictureList } from "../lib/picture-list.js";
 import { element } from "../lib/dom.js";
@@ -160,9 +161,10 @@ export class Shelf {
     this.materials.fill(documents.map(([name]) => ({ value: name, title: name })));
     for (const [name, document] of documents) {
       const image = this.materials.image(name);
-      if (image.painted === document) continue;
-      image.painted = document;
-      this.thumbnails.own(image, document);
+      const now = pictured(document, scene, image.painted);
+      if (now === image.painted) continue;
+      image.painted = now;
+      this.thumbnails.own(image, carried(name, document, scene));
     }
     this.materials.mark(chosen.material);
     if (this.used && this.#materials.get(this.used) !== scene.materials[chosen.material]) this.used = null;
