@@ -1,5 +1,5 @@
 # make run [PORT=8000]   set everything up and serve the editor
-# make test              set everything up and pass the tests
+# make test              set everything up and pass the tests; where CI=true is set, those of the benchmarks as well
 # make extremes          every row of the tables of numerical stability, with a million samples
 # make hostile           10 000 broken documents, 1 000 broken files and more: the long form of tests/service/test_hostile.py
 # make image-test        build the container's image and run it; needs root, buildah and debootstrap, and minutes
@@ -20,12 +20,13 @@ unexport PYTHONDONTWRITEBYTECODE
 run: setup
 	@exec .venv/bin/sunbox serve --port $(PORT)
 
+test: WITHOUT = $(if $(CI),, and not bench)
 test:
 	@.ci/setup test
 	.venv/bin/sunbox info
 	.venv/bin/ruff check .
 	.venv/bin/mypy
-	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm' --durations 20
+	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m 'not browser and not calm$(WITHOUT)' --durations 20
 	.venv/bin/pytest -n 2 --dist loadfile --no-loadscope-reorder -m browser || .venv/bin/pytest -m browser --last-failed  # once more, alone
 	.venv/bin/pytest -m calm || .venv/bin/pytest -m calm --last-failed  # once more: the machine may not have been calm
 

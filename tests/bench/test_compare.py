@@ -11,6 +11,7 @@ from tests.bench import compare
 from tests.bench.__main__ import main
 
 
+@pytest.mark.bench
 def test_a_revision_is_the_same_as_itself(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
     """And not as one without what the scene needs. Where this is no checkout, that is said."""
     monkeypatch.setattr(compare, "cases", lambda: scenes.cases()[2:3])

@@ -31,6 +31,7 @@ def test_sliders_are_of_the_first_material_of_each_kind() -> None:
     assert "lights/1/intensity" in {slider.name for slider in sliders(presets.get("scenes", "point-lights"))}
 
 
+@pytest.mark.bench
 def test_first_frames_are_measured_at_a_real_server(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
     found = [Slider(("camera", "vfov"), 20, 60, "number"), Slider(("materials", "subject", "albedo"), 0, 1, "color")]
     monkeypatch.setattr(first_frames, "sliders", lambda document: found)

@@ -6,9 +6,12 @@ import json
 from importlib.util import find_spec
 from pathlib import Path
 
+import pytest
+
 from tests.bench.__main__ import main
 
 
+@pytest.mark.bench
 def test_uniform_directions_fall_with_the_root_of_samples(tmp_path: Path) -> None:
     """The founding experiment, short: theory's slope, and Sunbox below it at equal samples and at equal time."""
     out, drawn = tmp_path / "hemisphere.json", tmp_path / "hemisphere.svg"

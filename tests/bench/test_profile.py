@@ -150,6 +150,7 @@ def test_a_folder_without_a_mesa_is_an_error(
     assert main(["profile", "--quick", "--publish"]) == 2
 
 
+@pytest.mark.bench
 def test_the_command_measures_a_file_and_publishes_it(
     gpu: Renderer,
     monkeypatch: pytest.MonkeyPatch,

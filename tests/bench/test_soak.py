@@ -58,9 +58,11 @@ def test_who_gets_further_is_not_stuck() -> None:
     assert tally.still_s(threading.get_ident(), began) < 100.0 <= tally.still_s(None, began)
 
 
+@pytest.mark.bench
 def test_a_short_soak_with_restarts(gpu: Renderer, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """The long form has 20 restarts and 1 000 renders."""
-    monkeypatch.setattr(soak_restarts, "LONG_SAMPLES", 100)
+    monkeypatch.setattr(soak_restarts, "LONG_SIDE", 256)
+    monkeypatch.setattr(soak_restarts, "LONG_SAMPLES", 200)
     monkeypatch.setattr(soak_restarts, "LOOK_S", 0.2)
     outcome = soak_restarts.restart(tmp_path, restarts=2, renders=12, seconds=4.0, chance=random.Random(3))
     assert outcome.good, outcome

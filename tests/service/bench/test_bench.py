@@ -59,13 +59,15 @@ def test_growth_is_that_of_one_form(gpu: Any, monkeypatch: pytest.MonkeyPatch) -
     assert len(growth.table(rows).splitlines()) == 3
 
 
-def test_latencies_are_measured_at_a_real_server(gpu: Any, monkeypatch: pytest.MonkeyPatch) -> None:
+@pytest.mark.bench
+def test_latencies_are_measured_at_a_real_server(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(latency, "MOVES", 5)
     figures = latency.measure()
     assert figures["server_start_warm_ms"] > figures["slider_p50_ms"] > 0
     assert figures["slider_p50_ms"] <= figures["slider_p95_ms"] <= figures["slider_worst_ms"]
 
 
+@pytest.mark.bench
 def test_latencies_in_rooms_are_measured(gpu: Any, filled: None, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(latency, "MOVES", 2)
     monkeypatch.setattr(latency.presets, "names", lambda kind: [{"name": "cornell-empty"}])

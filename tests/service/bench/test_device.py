@@ -27,6 +27,7 @@ def _in_little(measure: Callable[..., dict[str, Any]]) -> Callable[..., dict[str
     return lambda options, told: measure(replace(options, sizes=TINY.sizes, scenes=TINY.scenes), told)
 
 
+@pytest.mark.bench
 def test_every_part_gives_figures(
     gpu: Renderer,
     filled: None,

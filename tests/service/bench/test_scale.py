@@ -79,6 +79,7 @@ def test_the_home_s_first_block_holds_up_many_renderers(renderers: int, samples:
     assert renderers == 8 or expected < 0.8 * renderers
 
 
+@pytest.mark.bench
 @pytest.mark.skipif(len(os.sched_getaffinity(0)) < 2, reason="two cores are compared with one")
 def test_a_real_server_is_measured_with_one_core_and_two(tmp_path: Path) -> None:
     output = tmp_path / "scale.json"

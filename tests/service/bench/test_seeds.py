@@ -74,6 +74,7 @@ def test_sheets_keep_their_pictures_apart() -> None:
     assert (page[2 : 2 + GAP] == 255).all() and (page[2 + GAP :, 3:] == 255).all()
 
 
+@pytest.mark.bench
 def test_the_experiments_run_and_are_published(
     gpu: Any, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

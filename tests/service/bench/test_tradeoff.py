@@ -47,6 +47,7 @@ def test_a_bilinear_enlargement_keeps_a_ramp() -> None:
     assert large[0, 1:-1, 0] == pytest.approx((np.arange(1, 15) + 0.5) / 2 - 0.5)
 
 
+@pytest.mark.bench
 def test_one_command_measures_it_all(tmp_path: Path, gpu: Any, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["bench", "tradeoff", "--quick", "-o", str(tmp_path / "t.json")]) == 0
     document = json.loads((tmp_path / "t.json").read_text())
