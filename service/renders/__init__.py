@@ -14,7 +14,7 @@ memory      what a render takes in memory
 documents   what the documents of renders that wait take on the disk, by owner
 retention   which ended renders make room
 recorder    writes what becomes of a render to the store
-waiting     waits for events
+waiting     waits for an event, for a time
 followers   who follows renders, and learns of their changes
 reads       requests for a picture that the renderer has not answered yet
 status      the status of a render, as callers see it
